@@ -74,11 +74,9 @@ class Draw:
     def reached(self) -> Array | None:
         """The nearest goal configuration (nq,) [rad] to which the path planner finds a path in AMPLE seconds; None if
         there is none."""
-        checkers = ValidityCheckers(self.arm, self.model)
+        checkers, one = ValidityCheckers(self.arm, self.model), Effort(paths=1)
         for q_goal in self.q_goals:
-            if plan_paths(
-                self.arm, self.q_start, q_goal, Deadline.after(AMPLE), Effort(paths=1), checkers=checkers
-            ).paths:
+            if plan_paths(self.arm, self.q_start, q_goal, Deadline.after(AMPLE), one, checkers=checkers).paths:
                 return q_goal
         return None
 

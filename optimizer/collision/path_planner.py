@@ -49,18 +49,14 @@ PATIENCE = 0.02
 _OMPL = threading.Lock()
 
 
-# paths that are sought, and checked states for further ones, once one is found
-PATHS, MORE_STATES = 2, 3_000
-
-
 @dataclass(frozen=True)
 class Effort:
-    """Of a planning: states that all searches check at most, paths that are sought, and states for further ones, once
-    one is found. If that takes fewer than `easy` states, PATHS are sought, in MORE_STATES."""
+    """Of a planning: states that all searches check at most, paths that are sought, and states that may be checked for
+    further ones, once one is found. If that takes fewer than `easy` states, both are those of USUAL."""
 
     most_states: int = MOST_STATES
-    paths: int = PATHS
-    more_states: int = MORE_STATES
+    paths: int = 2
+    more_states: int = 3_000
     easy: int = 0
 
 
@@ -193,10 +189,10 @@ class _Planning:
 
     def run(self, effort: Effort) -> list[Array]:
         """Different paths, as many as the effort seeks at most."""
-        paths, most, most_states = list[Array](), effort.paths, effort.most_states
+        paths, most_states = list[Array](), effort.most_states
         while True:
             for region in REGIONS:
-                if len(paths) == most or self._deadline.passed or self.checked_states >= most_states:
+                if len(paths) == effort.paths or self._deadline.passed or self.checked_states >= most_states:
                     return paths
                 if not region.after <= self.checked_states < region.before:
                     continue
@@ -208,10 +204,8 @@ class _Planning:
                     # the straight line
                     return paths
                 if len(paths) == 1:
-                    easy = self.checked_states < effort.easy
-                    most = min(effort.paths, PATHS) if easy else effort.paths
-                    more = MORE_STATES if easy else effort.more_states
-                    most_states = min(most_states, self.checked_states + more)
+                    effort = USUAL if self.checked_states < effort.easy else effort
+                    most_states = min(most_states, self.checked_states + effort.more_states)
 
     def _slice(self, region: Region, left: int) -> Array | None:
         """The path that a region's search finds in its turn, if any; then the region begins a new search.

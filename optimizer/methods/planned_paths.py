@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from models.robot import Array
-from optimizer.collision.path_planner import MOST_STATES, Effort, PlannedPaths, PlanningEnd, length, lengths
+from optimizer.collision.path_planner import MOST_STATES, USUAL, Effort, PlannedPaths, PlanningEnd, length, lengths
 from optimizer.methods.method import Method, SolveResult, SolveStatus
 from optimizer.prepared_problem import RATIO_ROUNDING, PreparedProblem
 from optimizer.trajectories import bspline
@@ -16,10 +16,9 @@ from optimizer.trajectories.spline import Spline
 # a planning may take this fraction of the time left: the rest is for the solves. The first one to a goal, and all of
 # them once a motion is known, may check so many states
 PLANNING, FEW_STATES = 0.75, 20_000
-# of the only candidate, for which there is more time: paths that are sought, and states that may be checked for those
-# beyond the first, unless that was found in fewer than the last number of states
-OF_SOLE = (4, 12_000, 1_000)
-# fraction of the time left that a method which follows paths gives to the second one
+# for the only candidate there is more time: in narrow spaces, motions from four paths differ by some percent
+OF_SOLE = Effort(paths=4, more_states=12_000, easy=1_000)
+# fraction of the time left that a method which follows paths gives to those after the first
 PATIENCE = 0.3
 # planned paths longer than this multiple of the shortest one are skipped
 DETOUR = 1.3
@@ -45,7 +44,7 @@ def plan(method: Method) -> PlannedPaths:
         method.q_goal,
         method.deadline.within(PLANNING * left) if np.isfinite(left) else method.deadline,
         others if thorough else (),
-        Effort(MOST_STATES if thorough else FEW_STATES, *(OF_SOLE if method.is_sole else ())),
+        replace(OF_SOLE if method.is_sole else USUAL, most_states=MOST_STATES if thorough else FEW_STATES),
     )
 
 

@@ -39,9 +39,9 @@ def raise_bounds(prepared: PreparedProblem, candidates: Sequence[Candidate], dea
         cap = min(lowest.lower_bound + step, most)
         gain = prepared.potential(lowest.q_goal) - prepared.potential(lowest.q_start)
         value = cells.pair(lowest.q_start, lowest.q_goal, gain, cap)
-        lowest.lower_bound = max(lowest.lower_bound, value)
-        if value < cap or cap == most:
+        if value < cap or value <= lowest.lower_bound:
             done.add(id(lowest))
+        lowest.lower_bound = max(lowest.lower_bound, value)
         lowest = min(pairs, key=_bound_of)
 
 

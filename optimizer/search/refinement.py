@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 
 from models.robot import Array
@@ -28,7 +26,7 @@ from optimizer.trajectories.time_scalings import quintic_spline
 # assumed values of a joule of surplus if the storage cannot take all of it: shares of the way from what the supply
 # pays for it to what the storage gives back
 SURPLUS_VALUES = (0.75, 0.5, 0.25)
-# how much slower a baseline may become: where jumps of jerk are close, rounding takes jerk beyond its limit
+# factors tried for the duration of a baseline: where jumps of jerk are close, rounding takes jerk beyond its limit
 SLOWER = (1.0, 1 + 1e-5)
 
 
@@ -152,11 +150,12 @@ def _accept_certified(incumbent: Incumbent, candidate: Candidate, better: list[B
         "ruckig_slowed": retimed(fastest, duration / fastest.duration),
         "quintic": quintic_spline(candidate.q_start, candidate.q_goal, duration),
     }
-    for name, slower in product(better, SLOWER):
-        needed = least_time_scale(motions[name], limits.rates)
-        spline = retimed(motions[name], slower * max(needed, 1.0))
-        energy = incumbent.prepared.energy(spline)
-        if incumbent.allows(spline.duration) and incumbent.certified(candidate, spline, energy).valid:
-            incumbent.accept_if_better(
-                candidate, SolveResult(SolveStatus.SOLVED, f"the {name} motion itself", spline=spline), energy
-            )
+    for name in better:
+        scale = max(least_time_scale(motions[name], limits.rates), 1.0)
+        for spline in (retimed(motions[name], slower * scale) for slower in SLOWER):
+            energy = incumbent.prepared.energy(spline)
+            if incumbent.allows(spline.duration) and incumbent.certified(candidate, spline, energy).valid:
+                incumbent.accept_if_better(
+                    candidate, SolveResult(SolveStatus.SOLVED, f"the {name} motion itself", spline=spline), energy
+                )
+                break

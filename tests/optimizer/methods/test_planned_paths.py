@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from optimizer.collision.path_planner import Effort, PlanningEnd, along, plan_paths
+from optimizer.collision.path_planner import USUAL, Effort, PlannedPaths, PlanningEnd, along, plan_paths
 from optimizer.deadline import NEVER, Deadline
 from optimizer.methods import free_spline, planned_paths
 from optimizer.methods.free_spline import FreeSpline
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.methods.planned_paths import FROM_PLANNED_PATH
 from optimizer.methods.sqp_method import NOT_MUCH_BETTER, above
+from optimizer.optimize import optimize
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.bus import Bus, BusMode
+from optimizer.problem.targets import AnyOf
+from optimizer.surroundings import Surroundings
 from tests.optimizer.collision.test_path_planner import AMPLE, between, least, problem, task, walled_in
 
 
@@ -30,6 +34,32 @@ def test_a_known_path_leads_to_goals_that_differ_by_full_turns() -> None:
     np.testing.assert_array_equal(found[[0, -1]], [q_start, turned])
     assert least(arm, between(found)) > 0
     assert beside.checked_states < alone.checked_states
+
+
+def test_more_paths_are_planned_only_where_the_first_is_hard_to_find() -> None:
+    """Around the post there are more than two; a first path that counts as easy leads to the usual ones."""
+    ends, more = task("post"), Effort(paths=4, more_states=12_000)
+    usual, many, easy = (
+        plan_paths(*ends, Deadline.after(AMPLE), effort).paths for effort in (USUAL, more, replace(more, easy=10**9))
+    )
+    assert 2 == len(usual) < len(many) <= 4
+    for path, same in zip(usual, easy, strict=True):
+        np.testing.assert_array_equal(path, same)
+
+
+@pytest.mark.parametrize("goals", [1, 2])
+def test_more_paths_are_planned_for_the_only_candidate(goals: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    arm, q_start, q_goal = task("post")
+    asked, efforts, plan = problem(arm, q_start, q_goal), list[Effort](), Surroundings.planned_paths
+
+    def noted(*given: Any) -> PlannedPaths:
+        efforts.append(given[-1])
+        return plan(*given)
+
+    monkeypatch.setattr(Surroundings, "planned_paths", noted)
+    beside = [q_goal + 0.01 * k for k in range(goals)]
+    optimize(replace(asked, goal=AnyOf(beside) if goals > 1 else q_goal))
+    assert efforts and {each.paths for each in efforts} == {4 if goals == 1 else 2}
 
 
 def test_a_solve_among_obstacles_ends_once_it_cannot_come_near_the_best_motion() -> None:
