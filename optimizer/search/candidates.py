@@ -193,8 +193,8 @@ def joint_options(starts: list[float], goals: list[float], fixed: bool, windings
 def bound(prepared: PreparedProblem, candidates: Sequence[Candidate], checked: Sequence[Side] = SIDES) -> None:
     """Mark the candidates with an infeasible start or goal, and give each its lower bound and least duration.
 
-    An end at which only the reserve of the clearance is missing is infeasible, but other motions may go there: its
-    candidates keep their bounds.
+    An end that keeps its margins, but not the reserve beyond them, is infeasible, although there may be motions to it:
+    its candidates keep their bounds.
 
     Ends that are not to be `checked` are known to be feasible.
 

@@ -26,7 +26,7 @@ EDGE = 1e-9
 class InvalidReason:
     """Why a configuration is infeasible: a message and its cause (an angle [rad] beyond the cone, a pair, a joint).
 
-    `possible`: the arm can be there, only RESERVE is missing. No motion is sought, but there may be one.
+    `possible`: the margins are kept, but not RESERVE beyond them. No motion is sought, although there may be one.
     """
 
     reason: str
