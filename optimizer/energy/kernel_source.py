@@ -71,7 +71,7 @@ def source(functions: list[ca.Function], count: int) -> str:
         f"{{ lanes y; for (int i = 0; i < LANES; ++i) y[i] = {name}(x[i]); return y; }}\n"
         for name in _CALLS.values()
     ]
-    helpers = [f"#define LANES {count}\n", _HEAD, *calls, vector_asinh.SOURCE]
+    helpers = [f"#define LANES {count}\n", _HEAD, *calls, vector_asinh.source()]
     return "".join([*helpers, *(_of(function) for function in functions)])
 
 

@@ -16,12 +16,17 @@ from __future__ import annotations
 TERMS = 10
 ERROR = 4 * 2.0**-53
 
-_SERIES = "every(0.0)"
-for _n in reversed(range(TERMS)):
-    _SERIES = f"z * (every(2.0 / {2 * _n + 3}) + {_SERIES})"
 
-# `lanes` and `bits` are vectors of doubles and of their bits, `every` fills one with a number
-SOURCE = f"""static inline lanes choose(bits mask, lanes a, lanes b) {{
+def source() -> str:
+    """The C function `lanes_asinh`, and `choose`, which takes a number where the bits of a mask are set, else another.
+
+    `lanes` and `bits` are vectors of doubles and of their bits, `every` fills one with a number, `lanes_sqrt` takes
+    roots.
+    """
+    series = "every(0.0)"
+    for n in reversed(range(TERMS)):
+        series = f"z * (every(2.0 / {2 * n + 3}) + {series})"
+    return f"""static inline lanes choose(bits mask, lanes a, lanes b) {{
   return (lanes)((mask & (bits)a) | (~mask & (bits)b));
 }}
 static inline lanes lanes_asinh(lanes x) {{
@@ -37,7 +42,7 @@ static inline lanes lanes_asinh(lanes x) {{
   lanes k = (lanes)((scaled >> 52) - 0x3ff + shift) - every(0x1.8p52);
   lanes t = (lanes)((scaled & 0x000fffffffffffff) + least) - every(1.0);
   lanes s = t / (every(2.0) + t), z = s * s, half = every(0.5) * t * t;
-  lanes R = {_SERIES};
+  lanes R = {series};
   /* log 2 in two parts, of which the first times k is exact */
   lanes low = s * (half + R) + (k * every(0x1.a39ef35793c76p-33) + rounded);
   lanes y = k * every(0x1.62e42fee00000p-1) - ((half - low) - t);
