@@ -99,7 +99,8 @@ def test_what_fails_in_its_search_is_an_event(one: Server) -> None:
     name, content = told(one, "/optimize", move(duration=0.01))[-1]
     assert name == "problem"
     problem = DurationTooShort.model_validate(content)
-    assert one.request_logged("/optimize")["request_id"] == problem.instance
+    # written once the stream has ended
+    until(lambda: one.request_logged("/optimize")["request_id"] == problem.instance)
 
 
 def test_an_answer_without_room_is_a_problem(one: Server) -> None:
@@ -108,7 +109,7 @@ def test_an_answer_without_room_is_a_problem(one: Server) -> None:
     name, content = told(one, "/optimize", large)[-1]
     assert name == "problem"
     TooManyRequests.model_validate(content)
-    assert one.request_logged("/optimize")["problem"] == "too-many-requests"
+    until(lambda: one.request_logged("/optimize")["problem"] == "too-many-requests")
 
 
 def open_stream(server: Server) -> Any:
