@@ -90,19 +90,18 @@ def explore_least_work(incumbent: Incumbent, explore: Callable[[], object]) -> b
 
 @dataclass(frozen=True)
 class _Effort:
-    """`restarts`: random guesses of each of the two best candidates; `followed`: how many of all their motions are
-    solved on more control points; `sharpened`: how many get sharp corners, if they need at most `near` times the
-    least before."""
+    """`restarts`: random guesses of the best candidate; `sharpened`: how many of all motions get sharp
+    corners, if they need at most `near` times the least before."""
 
     restarts: int
-    followed: int
     sharpened: int
     near: float
 
 
-# Of one candidate, the best of 8 restarts is often another one than that of 24. Which of several motions needs the
-# least with sharp corners, the rough ones hardly say. Many candidates take their time before
-SOLE, SEVERAL = _Effort(24, 16, 3, 1.03), _Effort(8, 6, 1, 1.0)
+# Of one candidate, the best of 12 restarts is often another one than that of 32: a swing that one in tens of guesses
+# leads to, and that few control points do not favour. Which of several motions needs the least with sharp corners, the
+# rough ones hardly say. Many candidates take their time before
+SOLE, SEVERAL = _Effort(32, 4, 1.03), _Effort(12, 1, 1.0)
 
 
 @dataclass(eq=False)
@@ -126,8 +125,8 @@ class _LeastWork:
         contenders = [each for each in self._known() if each.work <= CONTENDING * least][:CONTENDERS]
         contenders = self._note(self.work.solved(contenders, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND))
         effort = SOLE if len(contenders) == 1 else SEVERAL
-        again = [rough for each in contenders[:2] for rough in self.work.random(each.candidate, effort.restarts)]
-        again = self.work.solved(again, COARSE, WIDTH, RESTART_PROGRESS, BEHIND)[: effort.followed]
+        again = self.work.random(contenders[0].candidate, effort.restarts)
+        again = self.work.solved(again, COARSE, WIDTH, RESTART_PROGRESS, BEHIND)
         again = self._note(self.work.solved(again, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND))
         self._follow(self._clear(sorted([*contenders, *again], key=lambda each: each.work)), effort)
         self._solve_promising()
@@ -168,30 +167,36 @@ class _LeastWork:
         for each in found:
             if clear and (each.work > NEAR_BEST * clear[0].work or len(clear) == RIVALS):
                 break
-            roomy = self.work.duration >= LEAST_FREEDOM * each.candidate.shortest
-            if roomy and not any(each.is_like(other) for other in clear) and self._is_clear(each):
+            if not any(each.is_like(other) for other in clear) and self._is_clear(each):
                 clear.append(each)
         return clear
 
     def _is_clear(self, rough: Rough) -> bool:
-        return self.incumbent.prepared.surroundings.worst_violation(rough.spline(self.work.duration)) is None
+        """Whether corners may be sharpened from a motion: it does not collide, and its time is not too short."""
+        roomy = self.work.duration >= LEAST_FREEDOM * rough.candidate.shortest
+        return roomy and self.incumbent.prepared.surroundings.worst_violation(rough.spline(self.work.duration)) is None
 
     def _follow(self, clear: list[Rough], effort: _Effort) -> None:
-        """Follow motions to sharp corners, the best first; those that are left behind on the way are given up."""
+        """Follow motions to sharp corners, the best first."""
         made, least = 0, np.inf
         for each in clear:
             if made == effort.sharpened or each.work > effort.near * least:
                 self.behind.add(id(each.candidate))
                 continue
-            result = self._sharpened(each)
             made += 1
-            if result.spline is not None:
+            if self._sharpen(each):
                 # if there is none, there may be one with rounder corners
                 least = min(least, each.work)
-                self.tried.add(id(each.candidate))
-            elif result.status is SolveStatus.PRUNED:
-                self.behind.add(id(each.candidate))
         self.behind -= self.tried
+
+    def _sharpen(self, rough: Rough) -> bool:
+        """Follow a motion to sharp corners, unless it is left behind on the way; whether one was found."""
+        result = self._sharpened(rough)
+        if result.spline is not None:
+            self.tried.add(id(rough.candidate))
+        elif result.status is SolveStatus.PRUNED:
+            self.behind.add(id(rough.candidate))
+        return result.spline is not None
 
     def _sharpened(self, rough: Rough) -> SolveResult:
         """A candidate's solve with sharp corners, from a rough motion; by the SQP, if it collides or fails."""
@@ -219,6 +224,10 @@ class _LeastWork:
             candidate, best = rough.candidate, self.incumbent.best()
             known = np.inf if best is None or best.energy is None else best.energy
             if id(candidate) in self.tried | self.behind or PROMISE * rough.work >= known:
+                continue
+            if best is not None and self._is_clear(rough):
+                self._sharpen(rough)
+            if id(candidate) in self.tried | self.behind:
                 continue
             self.tried.add(id(candidate))
             result = self._solved(rough, rough.on(MIDDLE), WIDTH, PROGRESS, above(known, WORTH))

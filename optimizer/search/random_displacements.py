@@ -8,11 +8,11 @@ import numpy as np
 
 from models.robot import Array, Limits
 
-# half waves, least and largest standard deviation of their amplitudes [rad]
-WAVES, AMPLITUDES = 3, (0.1, 1.5)
+# half waves, least and largest standard deviation of their amplitudes [rad]: the motions of least work swing far
+WAVES, AMPLITUDES = 3, (1.0, 5.0)
 # share of each limit on speed, acceleration and jerk that a displacement may use: far beyond the limits, solves would
 # spend their time on getting back
-SHARE = 0.5
+SHARE = 1.0
 SEED = 0
 
 
