@@ -98,10 +98,10 @@ class _Effort:
     near: float
 
 
-# Of one candidate, the best of 12 restarts is often another one than that of 32: a swing that one in tens of guesses
+# Of one candidate, the best of 8 restarts is often another one than that of 32: a swing that one in tens of guesses
 # leads to, and that few control points do not favour. Which of several motions needs the least with sharp corners, the
 # rough ones hardly say. Many candidates take their time before
-SOLE, SEVERAL = _Effort(32, 4, 1.03), _Effort(12, 1, 1.0)
+SOLE, SEVERAL = _Effort(32, 4, 1.03), _Effort(8, 1, 1.0)
 
 
 @dataclass(eq=False)
