@@ -19,9 +19,8 @@ from optimizer.methods import polynomial_ga
 from tests.optimizer.concurrent_work import Work, all_work, behind_a_post, fingerprint
 
 THREADS = 8
-# work for every thread, a second in all, and work for one thread each
+# work for every thread, half a second in all, and work for one thread each
 QUICK = (
-    "move 2 by time_scaling",
     "out of reach",
     "replay with storage",
     "replayed log",

@@ -20,6 +20,7 @@ from optimizer.search import candidates as search
 from optimizer.search.ends import ends
 from optimizer.search.holding_pairs import raise_bounds
 from tests.optimizer.moves import GOAL, START, problem, tcp_pose
+from tests.selection import long_but
 
 # the arm stretched out sideways at both ends: it holds its weight all the way
 OUT = np.array([0.0, -0.3, 0.4, -1.5, -1.57, 0.0])
@@ -69,7 +70,7 @@ def test_the_lowest_are_raised_until_the_least_is() -> None:
     assert min(each.lower_bound for each in found) == pytest.approx(least, rel=AGAIN)
 
 
-@pytest.mark.parametrize("bound", ["normal", "tight"])
+@pytest.mark.parametrize("bound", long_but(["normal"], ["normal", "tight"]))
 def test_turns_that_are_no_candidates_are_bounded_too(bound: str) -> None:
     """Without full turns, a joint that has half a turn to go has about as far the other way around."""
     arm = problem(robot=load_robot("ur20")).arm

@@ -173,6 +173,7 @@ def test_orientations_at_stops_are_chosen_for_the_whole_round(windings: bool) ->
         assert found.energy.electrical.total <= given.energy.electrical.total * (1 + CHOSEN)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few_angles")
 def test_a_free_stop_has_lines_and_is_passed() -> None:
     """Along the free axis, so that the outer end is a pose of the same kind; and a stop that the arm passes."""
