@@ -40,7 +40,9 @@ CLOSE, MIDDLES = 1e-3, 4
 
 # rounds in which pairs get the copper loss of holding, and the most that do in one; half side [rad] of the groups of
 # cells for which it is found, and how near to the least pair's bound those of the others are that get it
-HOLDING_ROUNDS, HELD, GROUP_HALF, NEAR = 8, 1024, 0.02, 0.1
+HOLDING_ROUNDS, HELD, GROUP_HALF, NEAR = 8, 1024, 0.0025, 0.1
+# pairs that get it again with the multipliers of the lowest, and by how much that must raise its bound, relative
+LED, SAME = 256, 1e-9
 
 # finds boxes from rows in a group of curves (n,), parameters and half sides (n,) [rad]
 _Boxes = Callable[[NDArray[np.intp], Array, Array], tuple[Array, Array]]
@@ -234,7 +236,13 @@ class _CellSearch:
             order = order[value[order] <= least + NEAR * abs(least)]
             held, parts = order[~done[order]], order[done[order] & (goals.half[order] >= LAST_HALF)][:SPLIT]
             if done[order[0]] and order[0] not in parts:
-                break
+                # it had the multipliers of another pair, which was the lowest then
+                lowest = order[:LED]
+                raised = self._with_holding(starts[lowest], goals[lowest], value[lowest])
+                if raised[0] <= least + SAME * abs(least):
+                    break
+                value[lowest] = raised
+                continue
             (s0, s1), (g0, g1) = (
                 starts[parts].halved(np.zeros(len(parts), dtype=bool)),
                 goals[parts].halved(np.ones(len(parts), dtype=bool)),
@@ -261,6 +269,8 @@ class _CellSearch:
         groups = np.stack([starts.curve, goals.curve, np.floor(goals.parameter / (2 * GROUP_HALF))], axis=1)
         first, row = np.unique(groups, axis=0, return_index=True, return_inverse=True)[1:]
         row = row.ravel()
+        # a full turn of a joint changes nothing: those of a group are the same
+        q_goal = q_goal - 2 * np.pi * np.round((q_goal - q_goal[first[row]]) / (2 * np.pi))
         shape = (len(first), q_goal.shape[1])
         low, high, least, plain = (
             np.full(shape, np.inf),
