@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
-from optimizer.exceptions import DeadlineExceeded, JoulepathError
+from optimizer.exceptions import DeadlineExceeded, JoulepathError, NoTrajectory
 from optimizer.linear_algebra import one_thread
 from optimizer.problem.work_round import WorkRound
 from optimizer.progress import Improved, Tell, forward, nobody, only_improved
@@ -32,7 +32,7 @@ from optimizer.sequence.round_baselines import (
 from optimizer.sequence.round_search import LEAST_TIME, RoundSearch
 from optimizer.sequence.round_solution import Move, Needed, RoundBaseline, RoundSolution, needed_by
 from optimizer.sequence.stored_round import with_storage
-from optimizer.sequence.timed_round import TimedSearch
+from optimizer.sequence.timed_round import Timed, TimedSearch
 from optimizer.solution import Branch, Solution
 
 
@@ -187,13 +187,29 @@ def _best_of(search: RoundSearch) -> _Found:
 def _in_time(search: RoundSearch, duration: float, nodes: list[int] | None) -> _Found:
     """The best round found in a duration [s], from a chain on whose motions are known, or from the fastest one."""
     timing = TimedSearch(search, duration)
-    timed = timing.run(nodes)
-    shares = zip(search.pairs(timed.nodes), timed.shared.lengths, strict=True)
-    moving = [search.solve_in(*each, length) for each, length in shares]
+    timed, moving = _moving(search, timing, timing.run(nodes), nodes)
     bound = proven_bound(search.asked, search.legs, search.end)
     waits = {timed.at: (timed.shared.waited, timed.wait_energy)}
     moves, exact = _moves(search, timed.nodes, moving, waits, timing.sought), timing.exact and timed.shared.exact
     return _Found(timed.nodes, moves, timed.shared.price, bound, timing, exact)
+
+
+def _moving(
+    search: RoundSearch, timing: TimedSearch, timed: Timed, nodes: list[int] | None
+) -> tuple[Timed, list[Solution]]:
+    """The certified motions of a round in its time; if some are not found, those of the chain `nodes` as they are."""
+
+    def motion(pair: tuple[int, int, int], length: float) -> Solution:
+        own = search.solutions.get(pair)
+        return own if own is not None and own.duration == length else search.solve_in(*pair, length)
+
+    try:
+        return timed, list(map(motion, search.pairs(timed.nodes), timed.shared.lengths))
+    except (NoTrajectory, DeadlineExceeded):
+        known = None if nodes is None else timing.as_it_is(nodes)
+        if known is None:
+            raise
+        return known, [search.solutions[each] for each in search.pairs(known.nodes)]
 
 
 def _as_stopping(search: RoundSearch, rested: Rested, better: bool = True) -> _Found:

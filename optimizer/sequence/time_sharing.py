@@ -83,9 +83,11 @@ class TimeSharing:
         `fastest` are the moves as fast as they can be, in no more than this time. Raises NoTrajectory, or
         DeadlineExceeded.
         """
-        slow = self.at(-waiting * (1 - WORTH_SLOWING))
+        own, slow = self.guesses, self.at(-waiting * (1 - WORTH_SLOWING))
         if slow.moving <= time:
             return Shared(-waiting, slow.lengths, slow.energy, time - slow.moving)
+        # these may be as slow as they are let
+        self.guesses = own
         for price in PRICES:
             fast = self.at(price)
             if fast.moving <= time:

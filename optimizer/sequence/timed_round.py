@@ -8,12 +8,13 @@ the price that shares the time exactly, the least chain is the best round of all
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
 from models.robot import Array
-from optimizer.exceptions import DeadlineExceeded, NoTrajectory, RoundTooShort
+from optimizer.exceptions import DeadlineExceeded, NoSequence, NoTrajectory, RoundTooShort
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 from optimizer.sequence.chains import LeastChain
 from optimizer.sequence.priced_search import PricedMotion, PricedSearch, fastest_motion
@@ -65,26 +66,46 @@ class TimedSearch:
 
         Raises RoundTooShort, NoTrajectory or DeadlineExceeded.
         """
-        best = None
-        if nodes is not None:
-            own = [self.search.solutions[each].trajectory.spline for each in self.search.pairs(nodes)]
-            best = self._of(nodes, own)
+        best = self._of_the_own(nodes) if nodes is not None else None
         if best is None:
             best = self._of_the_fastest()
-        for _ in range(MOST_CHAINS):
-            priced = self._priced(best.shared.price, self.longest)
-            chain = self._explored(priced)
-            self.exact &= not (priced.cut_short or priced.failed or (not self._rests_count and priced.leaves_chains))
-            if chain == best.nodes:
-                return best
-            other = self._of(chain, [priced.motion(*each) for each in self.search.pairs(chain)])
-            if other is None or other.energy > best.energy * (1 - BETTER):
-                # another chain is as good at this price, and worse in this time
-                self.exact = False
-                return best
-            best = other
+        with suppress(DeadlineExceeded, NoSequence):
+            for _ in range(MOST_CHAINS):
+                priced = self._priced(best.shared.price, self.longest)
+                chain = self._explored(priced)
+                unsure = priced.cut_short or priced.failed or (not self._rests_count and priced.leaves_chains)
+                self.exact &= not unsure
+                if chain == best.nodes:
+                    return best
+                other = self._of(chain, [priced.motion(*each) for each in self.search.pairs(chain)])
+                if other is None or other.energy > best.energy * (1 - BETTER):
+                    # another chain is as good at this price, and worse in this time
+                    break
+                best = other
         self.exact = False
         return best
+
+    def _of_the_own(self, nodes: list[int]) -> Timed | None:
+        """A chain whose motions are known, with its time shared; as they are, if that is not done in time."""
+        own = [self.search.solutions[each].trajectory.spline for each in self.search.pairs(nodes)]
+        try:
+            found = self._of(nodes, own)
+        except DeadlineExceeded:
+            found = None
+        return self.as_it_is(nodes) if found is None else found
+
+    def as_it_is(self, nodes: list[int]) -> Timed | None:
+        """The motions of a chain as they are known, the time left over waited out; None if they take too long."""
+        found = [self.search.solutions[each] for each in self.search.pairs(nodes)]
+        lengths, needed = [each.duration for each in found], sum(each.energy.of(self.asked.objective) for each in found)
+        waited = self.time - sum(lengths)
+        if waited < 0 or not self._rests_count:
+            return None
+        self.exact = False
+        at, wait = self.cheapest_wait(nodes, waited)
+        price = -float(self._powers(at)[nodes[at + 1]])
+        energy = needed + wait + self.search.dwells(nodes)
+        return Timed(nodes, Shared(price, lengths, needed, waited, exact=False), at, wait, energy)
 
     def _priced(self, price: float, longest: float) -> PricedSearch:
         return PricedSearch(self.legs, self.asked.closed, price, longest, self.search.search_end)
@@ -101,7 +122,7 @@ class TimedSearch:
         chain = self._explored(priced)
         fast = self.fastest(chain)
         if fast is None:
-            raise NoTrajectory([])
+            raise DeadlineExceeded([]) if priced.cut_short or self.search.search_end.passed else NoTrajectory([])
         if duration_of(fast) > self.time:
             if priced.cut_short:
                 raise DeadlineExceeded([])

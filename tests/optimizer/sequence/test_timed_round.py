@@ -11,14 +11,16 @@ import numpy as np
 import pytest
 
 from optimizer.energy.dwell import holding_power
-from optimizer.exceptions import DeadlineExceeded, InvalidProblem, JoulepathError, RoundTooShort
+from optimizer.exceptions import DeadlineExceeded, InvalidProblem, JoulepathError, NoTrajectory, RoundTooShort
 from optimizer.optimize import optimize
 from optimizer.optimize_round import optimize_round
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.problem import Problem
 from optimizer.problem.stops import Stop
 from optimizer.problem.work_round import WorkRound
+from optimizer.sequence.round_search import RoundSearch
 from optimizer.sequence.round_solution import RoundSolution
+from optimizer.sequence.time_sharing import TimeSharing
 from optimizer.sequence.ways import layers_of
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import AMPLE, fixed, torques
@@ -31,6 +33,8 @@ ROUNDING = 1e-9
 TURN = np.array([0.9, -0.3, 0.2, 0.0, 0.1, 0.4])
 # relative: an optimum found from another guess
 CONVERGED = 2e-3
+# of the round's own duration; and between the shortest one and this
+LONGER, SHORTER = 1.2, 0.5
 ASKED = pick_and_place(1, 2, windings=False)
 
 
@@ -247,3 +251,34 @@ def test_a_place_to_wait_must_be_one() -> None:
     with pytest.raises(InvalidProblem) as refusal:
         replace(ASKED, wait="nowhere")
     assert refusal.value.field == "wait"
+
+
+REFUSALS = {"no time": DeadlineExceeded([]), "no motion": NoTrajectory([])}
+
+
+@pytest.mark.parametrize(
+    ("where", "problem"),
+    long_but([("sharing", "no time"), ("motions", "no motion")], product(["sharing", "motions"], REFUSALS)),
+)
+def test_time_that_cannot_be_shared_is_waited_out(where: str, problem: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Among obstacles, what shares the time may end by the deadline, or miss a motion: the round in its own time is
+    known by then."""
+
+    def fails(*_: Any) -> Any:
+        raise REFUSALS[problem]
+
+    if where == "sharing":
+        monkeypatch.setattr(TimeSharing, "fill", fails)
+    else:
+        monkeypatch.setattr(RoundSearch, "solve_in", fails)
+    asked = in_time(ASKED, duration_of(LONGER))
+    found = optimize_round(asked)
+    # moves slowed alike may need less than a wait
+    assert all(move.solution.certificate.valid for move in found.moves) and found.joins < ROUNDING
+    assert 0 < found.lower_bound <= found.energy.electrical.total
+    assert found.status == "feasible"
+    assert found.duration == pytest.approx(asked.duration_max, rel=ROUNDING)
+    assert sum(move.wait for move in found.moves) == pytest.approx((LONGER - 1) * free().duration, rel=ROUNDING)
+    # what is shorter than the round's own time has no such answer
+    with pytest.raises(type(REFUSALS[problem])):
+        optimize_round(in_time(ASKED, duration_of(SHORTER)))
