@@ -1,0 +1,76 @@
+"""Draws the energy of a round over its time: one request for each of some times, and its baselines.
+
+    python -m examples.plot_round_times examples/cycle/pick_and_place.json --output round_times.png
+
+asks the service once without a time, then for 0.97 to 2 times the duration of that answer, and draws what it answers.
+Needs matplotlib.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from examples.plot_answer import COLOURS, call
+
+RATIOS = (0.97, 1.0, 1.05, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0)
+BASELINES = {"same_factor": "every move slowed alike", "fastest_then_wait": "as fast as possible, then waiting"}
+
+
+def draw(answers: Sequence[dict[str, Any]]) -> Figure:
+    """Energy over duration: the answers', their lower bounds and their baselines; the first one chose its time."""
+    figure = Figure(figsize=(8, 4.2), layout="constrained")
+    axes = figure.subplots()
+    free, timed = answers[0], sorted(answers, key=lambda each: each["duration"])
+    times = [each["duration"] for each in timed]
+    energies = [each["energy"]["electrical"]["total"] for each in timed]
+    for (name, title), colour in zip(BASELINES.items(), COLOURS[1:], strict=False):
+        known = [
+            (answer["duration"], each["electrical"])
+            for answer in timed
+            for each in answer["baselines"]
+            if each["name"] == name and each["within_limits"]
+        ]
+        axes.plot(*zip(*known, strict=True), color=colour, marker="s", markersize=3, linewidth=1, label=title)
+    axes.plot(times, energies, color=COLOURS[0], marker="o", markersize=4, label="answer")
+    axes.plot(
+        times, [each["energy"]["lower_bound"] for each in timed], color=COLOURS[0], linestyle=":", label="lower bound"
+    )
+    best = free["duration"], free["energy"]["electrical"]["total"]
+    axes.annotate("no time given", best, (46, -60), textcoords="offset points", ha="center", fontsize=9,
+                  arrowprops={"arrowstyle": "-", "color": "0.5"})  # fmt: skip
+    axes.set(xlabel="time of the round [s]", ylabel="energy of the round [J]")
+    axes.set_ylim(bottom=0)
+    axes.spines[["right", "top"]].set_visible(False)
+    axes.legend(frameon=False, fontsize=9, loc="lower right")
+    return figure
+
+
+def main() -> None:
+    """Ask, draw, save."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("file", type=Path, help="a request for POST /cycle")
+    parser.add_argument("--service", default="http://127.0.0.1:8000", help="where the service is (%(default)s)")
+    parser.add_argument("--output", type=Path, help="the picture (default: the file's name with .png, here)")
+    arguments = parser.parse_args()
+    asked: dict[str, Any] = json.loads(arguments.file.read_bytes())
+
+    def answer(time: float | None) -> dict[str, Any]:
+        return call(f"{arguments.service}/cycle", json.dumps(asked | {"time": time}).encode())
+
+    free = answer(None)
+    answers = [free, *(answer(ratio * free["duration"]) for ratio in RATIOS if ratio != 1.0)]
+    output = arguments.output or Path(arguments.file.with_suffix(".png").name)
+    draw(answers).savefig(output, dpi=130)
+    for each in answers:
+        print(f"{each['duration']:.2f} s: {each['energy']['electrical']['total']:.1f} J")
+    print(output)
+
+
+if __name__ == "__main__":
+    main()
