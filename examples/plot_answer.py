@@ -37,6 +37,22 @@ def call(url: str, body: bytes | None = None) -> dict[str, Any]:
     return content
 
 
+def command(document: str | None, file: str) -> argparse.ArgumentParser:
+    """The command line of a program that draws what the service answers to a `file`."""
+    parser = argparse.ArgumentParser(description=document, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("file", type=Path, help=file)
+    parser.add_argument("--service", default="http://127.0.0.1:8000", help="where the service is (%(default)s)")
+    parser.add_argument("--output", type=Path, help="the picture (default: the file's name with .png, here)")
+    return parser
+
+
+def save(figure: Figure, given: argparse.Namespace, dpi: int) -> None:
+    """Write the picture where the command line wants it, and print where that is."""
+    output = given.output or Path(given.file.with_suffix(".png").name)
+    figure.savefig(output, dpi=dpi)
+    print(output)
+
+
 def limits_of(service: str, robot: str, request: dict[str, Any]) -> dict[str, list[float]]:
     """Limit per joint on speed and torque: the robot's, or the request's where it tightens them."""
     figures = call(f"{service}/robots/{robot}")["limits"]
@@ -109,18 +125,12 @@ def draw(answer: dict[str, Any], limits: dict[str, list[float]]) -> Figure:
 
 def main() -> None:
     """Ask if need be, draw, save."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("file", type=Path, help="a request, which is sent to the service, or a saved answer")
-    parser.add_argument("--service", default="http://127.0.0.1:8000", help="where the service is (%(default)s)")
-    parser.add_argument("--output", type=Path, help="the picture (default: the file's name with .png, here)")
-    arguments = parser.parse_args()
+    arguments = command(__doc__, "a request, which is sent to the service, or a saved answer").parse_args()
     content = json.loads(arguments.file.read_text())
     saved = "trajectory" in content
     answer = content if saved else call(f"{arguments.service}/optimize", json.dumps(content).encode())
     limits = limits_of(arguments.service, answer["robot"], {} if saved else content)
-    output = arguments.output or Path(arguments.file.with_suffix(".png").name)
-    draw(answer, limits).savefig(output, dpi=150)
-    print(output)
+    save(draw(answer, limits), arguments, dpi=150)
 
 
 if __name__ == "__main__":

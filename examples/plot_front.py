@@ -7,14 +7,12 @@ asks the service and draws its answer. Needs matplotlib.
 
 from __future__ import annotations
 
-import argparse
 from itertools import cycle
-from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 
-from examples.plot_answer import COLOURS, call
+from examples.plot_answer import COLOURS, call, command, save
 
 
 def draw(front: dict[str, Any]) -> Figure:
@@ -44,14 +42,8 @@ def draw(front: dict[str, Any]) -> Figure:
 
 def main() -> None:
     """Ask, draw, save."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("file", type=Path, help="a request for POST /pareto")
-    parser.add_argument("--service", default="http://127.0.0.1:8000", help="where the service is (%(default)s)")
-    parser.add_argument("--output", type=Path, help="the picture (default: the file's name with .png, here)")
-    arguments = parser.parse_args()
-    output = arguments.output or Path(arguments.file.with_suffix(".png").name)
-    draw(call(f"{arguments.service}/pareto", arguments.file.read_bytes())).savefig(output, dpi=130)
-    print(output)
+    arguments = command(__doc__, "a request for POST /pareto").parse_args()
+    save(draw(call(f"{arguments.service}/pareto", arguments.file.read_bytes())), arguments, dpi=130)
 
 
 if __name__ == "__main__":

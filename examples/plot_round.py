@@ -7,13 +7,11 @@ asks the service and draws its answer. Needs matplotlib.
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 
-from examples.plot_answer import COLOURS, call
+from examples.plot_answer import COLOURS, call, command, save
 
 
 def draw(answer: dict[str, Any], powers: list[tuple[list[float], list[float]]]) -> Figure:
@@ -45,11 +43,7 @@ def draw(answer: dict[str, Any], powers: list[tuple[list[float], list[float]]]) 
 
 def main() -> None:
     """Ask, draw, save."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("file", type=Path, help="a request for POST /cycle")
-    parser.add_argument("--service", default="http://127.0.0.1:8000", help="where the service is (%(default)s)")
-    parser.add_argument("--output", type=Path, help="the picture (default: the file's name with .png, here)")
-    arguments = parser.parse_args()
+    arguments = command(__doc__, "a request for POST /cycle").parse_args()
     answer = call(f"{arguments.service}/cycle", arguments.file.read_bytes())
     powers = []
     for leg in answer["legs"]:
@@ -59,9 +53,7 @@ def main() -> None:
         else:
             motion = call(f"{arguments.service}{leg['answer']}")["answer"]["trajectory"]
             powers.append(([leg["t0"] + t for t in motion["t"]], motion["power"]))
-    output = arguments.output or Path(arguments.file.with_suffix(".png").name)
-    draw(answer, powers).savefig(output, dpi=130)
-    print(output)
+    save(draw(answer, powers), arguments, dpi=130)
 
 
 if __name__ == "__main__":

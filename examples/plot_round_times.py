@@ -2,23 +2,21 @@
 
     python -m examples.plot_round_times examples/cycle/pick_and_place.json --output round_times.png
 
-asks the service once without a time, then for 0.97 to 2 times the duration of that answer, and draws what it answers.
+asks the service once without a time, then for each of `--ratios` of the duration of that answer, and draws the answers.
 Needs matplotlib.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 
-from examples.plot_answer import COLOURS, call
+from examples.plot_answer import COLOURS, call, command, save
 
-RATIOS = (0.97, 1.0, 1.05, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0)
+RATIOS = (0.97, 1.05, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0)
 BASELINES = {"same_factor": "every move slowed alike", "fastest_then_wait": "as fast as possible, then waiting"}
 
 
@@ -53,10 +51,8 @@ def draw(answers: Sequence[dict[str, Any]]) -> Figure:
 
 def main() -> None:
     """Ask, draw, save."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("file", type=Path, help="a request for POST /cycle")
-    parser.add_argument("--service", default="http://127.0.0.1:8000", help="where the service is (%(default)s)")
-    parser.add_argument("--output", type=Path, help="the picture (default: the file's name with .png, here)")
+    parser = command(__doc__, "a request for POST /cycle")
+    parser.add_argument("--ratios", type=float, nargs="+", default=RATIOS, help="of the duration (%(default)s)")
     arguments = parser.parse_args()
     asked: dict[str, Any] = json.loads(arguments.file.read_bytes())
 
@@ -64,12 +60,10 @@ def main() -> None:
         return call(f"{arguments.service}/cycle", json.dumps(asked | {"time": time}).encode())
 
     free = answer(None)
-    answers = [free, *(answer(ratio * free["duration"]) for ratio in RATIOS if ratio != 1.0)]
-    output = arguments.output or Path(arguments.file.with_suffix(".png").name)
-    draw(answers).savefig(output, dpi=130)
+    answers = [free, *(answer(ratio * free["duration"]) for ratio in arguments.ratios)]
     for each in answers:
         print(f"{each['duration']:.2f} s: {each['energy']['electrical']['total']:.1f} J")
-    print(output)
+    save(draw(answers), arguments, dpi=130)
 
 
 if __name__ == "__main__":
