@@ -22,7 +22,7 @@ import numpy as np
 
 import models.robot
 from models.robot import Robot
-from optimizer.energy import inverse_dynamics, kernel_expressions, kernel_source, losses, vector_asinh
+from optimizer.energy import inverse_dynamics, kernel_expressions, kernel_source, losses
 from optimizer.energy.kernel_expressions import SYMBOLICS, build
 from optimizer.energy.kernel_source import PORTABLE, Vectors, source, vectors
 
@@ -34,7 +34,7 @@ COMPILER_FLAGS = ("-Og", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=o
 # users may bring any number of arms, each with a library of about a megabyte
 MOST_LIBRARIES = 200
 # modules whose code decides what is compiled
-SOURCES = (models.robot, inverse_dynamics, losses, kernel_expressions, kernel_source, vector_asinh)
+SOURCES = (models.robot, inverse_dynamics, losses, kernel_expressions, kernel_source)
 
 
 def cache_directory() -> Path:

@@ -1,8 +1,7 @@
 """The per-node functions as C that evaluates several nodes at once, one in each lane of the processor's vectors.
 
-CasADi's own C does one node after the other, in four to eight times as long. The operations are the same and in the
-same order: so are the results, to the last bit where no friction needs asinh. The C library's has no vectors of these
-processors, and took half of all the time. Here it is made of vector operations, within `vector_asinh.ERROR`.
+CasADi's own C does one node after the other, and takes two to three times as long for the derivatives. The operations
+are the same and in the same order: so are the results, to the last bit.
 """
 
 from __future__ import annotations
@@ -11,15 +10,15 @@ from pathlib import Path
 
 import casadi as ca
 
-from optimizer.energy import vector_asinh
-
 # numbers per vector, and what the compiler must be told: for every processor of this kind, and for one with AVX2
 Vectors = tuple[int, tuple[str, ...]]
 PORTABLE: Vectors = (2, ())
 AVX2: Vectors = (4, ("-mavx2",))
 _CPU = Path("/proc/cpuinfo")
 
-_CALLS = {ca.OP_SQRT: "sqrt", ca.OP_SIN: "sin", ca.OP_COS: "cos", ca.OP_FABS: "fabs"}
+# what processors have an instruction for, and what the C library computes, one number at a time
+_INSTRUCTIONS = {ca.OP_SQRT: "sqrt", ca.OP_FABS: "fabs"}
+_CALLS = {ca.OP_SIN: "sin", ca.OP_COS: "cos", ca.OP_ASINH: "asinh"}
 _OPERATIONS = {
     ca.OP_ADD: "{} + {}",
     ca.OP_SUB: "{} - {}",
@@ -30,12 +29,18 @@ _OPERATIONS = {
     ca.OP_TWICE: "{0} + {0}",
     ca.OP_INV: "every(1.0) / {}",
     ca.OP_ASSIGN: "{}",
-    **{operation: f"lanes_{name}({{}})" for operation, name in _CALLS.items()},
-    ca.OP_ASINH: "lanes_asinh({})",
+    **{operation: f"lanes_{name}({{}})" for operation, name in (_INSTRUCTIONS | _CALLS).items()},
 }
+# Some functions of the C library are code for processors without AVX, which waits for the upper halves of vector
+# registers unless they are cleared: an asinh takes ten times as long. No vector may be in a register then, so the call
+# goes by memory and is never inlined
 _HEAD = """#include <math.h>
+#ifdef __AVX__
+#define CLEAR_UPPER_HALVES __builtin_ia32_vzeroupper()
+#else
+#define CLEAR_UPPER_HALVES
+#endif
 typedef double lanes __attribute__((vector_size(8 * LANES)));
-typedef long long bits __attribute__((vector_size(8 * LANES)));
 static inline lanes every(double x) { lanes y; for (int i = 0; i < LANES; ++i) y[i] = x; return y; }
 static inline void take(const double *rows, long size, long first, long count, lanes *x) {
   for (int i = 0; i < LANES; ++i) {
@@ -66,13 +71,28 @@ def source(functions: list[ca.Function], count: int) -> str:
 
     Raises NotImplementedError for an operation that is not known here.
     """
-    calls = [
+    instructions = [
         f"static inline lanes lanes_{name}(lanes x) "
         f"{{ lanes y; for (int i = 0; i < LANES; ++i) y[i] = {name}(x[i]); return y; }}\n"
-        for name in _CALLS.values()
+        for name in _INSTRUCTIONS.values()
     ]
-    helpers = [f"#define LANES {count}\n", _HEAD, *calls, vector_asinh.source()]
-    return "".join([*helpers, *(_of(function) for function in functions)])
+    calls = map(_call, _CALLS.values())
+    return "".join([f"#define LANES {count}\n", _HEAD, *instructions, *calls, *map(_of, functions)])
+
+
+def _call(name: str) -> str:
+    """C for a function of the C library."""
+    return f"""
+static __attribute__((noinline)) void all_{name}(double *x) {{
+  CLEAR_UPPER_HALVES;
+  for (int i = 0; i < LANES; ++i) x[i] = {name}(x[i]);
+}}
+static inline lanes lanes_{name}(lanes x) {{
+  union {{ lanes vector; double number[LANES]; }} y = {{ x }};
+  all_{name}(y.number);
+  return y.vector;
+}}
+"""
 
 
 def _of(function: ca.Function) -> str:
