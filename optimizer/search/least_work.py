@@ -90,17 +90,17 @@ def explore_least_work(incumbent: Incumbent, explore: Callable[[], object]) -> b
 
 @dataclass(frozen=True)
 class _Effort:
-    """`restarts`: random guesses of the best candidate; `sharpened`: how many of all motions get sharp
-    corners, if they need at most `near` times the least before."""
+    """`restarts`: random guesses of the best candidate; `sharpened`: how many of all motions get sharp corners, if they
+    need at most `near` times the least before."""
 
     restarts: int
     sharpened: int
     near: float
 
 
-# Of one candidate, the best of 8 restarts is often another one than that of 32: a swing that one in tens of guesses
-# leads to, and that few control points do not favour. Which of several motions needs the least with sharp corners, the
-# rough ones hardly say. Many candidates take their time before
+# The motion of least work often is a wide swing. Some percent of the guesses lead to it, and on few control points it
+# does not stand out. Rough motions within some percent do not tell which needs the least once its corners are sharp.
+# Where there are several candidates, finding the best of them has taken time already
 SOLE, SEVERAL = _Effort(32, 4, 1.03), _Effort(8, 1, 1.0)
 
 
@@ -203,10 +203,8 @@ class _LeastWork:
         incumbent, found = self.incumbent, list[Array]()
 
         def sharpen() -> SolveResult:
-            best = incumbent.best()
-            known = np.inf if best is None or best.energy is None else best.energy
             points, first = rough.on(DENSE), FIRST_WIDTH
-            result, points = sharp_motion(incumbent.prepared, points, self.work.duration, first, known)
+            result, points = sharp_motion(incumbent.prepared, points, self.work.duration, first, self._least_known)
             found.append(points)
             return result
 
@@ -221,18 +219,26 @@ class _LeastWork:
     def _solve_promising(self) -> None:
         """Solve the candidates whose rough motions promise less than what is known, the most promising first."""
         for rough in self._known():
-            candidate, best = rough.candidate, self.incumbent.best()
-            known = np.inf if best is None or best.energy is None else best.energy
-            if id(candidate) in self.tried | self.behind or PROMISE * rough.work >= known:
+            candidate, known = rough.candidate, self._least_known
+            if self._is_settled(candidate) or PROMISE * rough.work >= known:
                 continue
-            if best is not None and self._is_clear(rough):
+            if np.isfinite(known) and self._is_clear(rough):
                 self._sharpen(rough)
-            if id(candidate) in self.tried | self.behind:
-                continue
-            self.tried.add(id(candidate))
-            result = self._solved(rough, rough.on(MIDDLE), WIDTH, PROGRESS, above(known, WORTH))
-            if result.spline is not None and (candidate.energy or np.inf) < above(known, WORTH_SHARPENING):
-                follow_in_time(self.incumbent, candidate, known)
+            if not self._is_settled(candidate):
+                self.tried.add(id(candidate))
+                result = self._solved(rough, rough.on(MIDDLE), WIDTH, PROGRESS, above(known, WORTH))
+                if result.spline is not None and (candidate.energy or np.inf) < above(known, WORTH_SHARPENING):
+                    follow_in_time(self.incumbent, candidate, known)
+
+    def _is_settled(self, candidate: Candidate) -> bool:
+        """Whether a candidate was solved, or given up as it seems to need more than another one."""
+        return id(candidate) in self.tried | self.behind
+
+    @property
+    def _least_known(self) -> float:
+        """Energy [J] of the best motion, inf without one."""
+        best = self.incumbent.best()
+        return np.inf if best is None or best.energy is None else best.energy
 
     def _solved(self, rough: Rough, points: Array, width: float, progress: float, below: float = np.inf) -> SolveResult:
         """A candidate's solve from control points (n, nq) [rad], which it keeps; from nothing if that fails while no
@@ -259,8 +265,7 @@ class _LeastWork:
 
     def not_promising(self) -> list[Candidate]:
         """The candidates that are left whose rough motions do not promise less than what is known."""
-        best = self.incumbent.best()
-        known = np.inf if best is None or best.energy is None else best.energy
+        known = self._least_known
         return [
             each.candidate
             for each in self._known()

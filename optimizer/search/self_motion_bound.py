@@ -236,7 +236,7 @@ class _CellSearch:
             order = order[value[order] <= least + NEAR * abs(least)]
             held, parts = order[~done[order]], order[done[order] & (goals.half[order] >= LAST_HALF)][:SPLIT]
             if done[order[0]] and order[0] not in parts:
-                # it had the multipliers of another pair, which was the lowest then
+                # its multipliers were chosen for another pair, the lowest one then
                 lowest = order[:LED]
                 raised = self._with_holding(starts[lowest], goals[lowest], value[lowest])
                 if raised[0] <= least + SAME * abs(least):
@@ -269,7 +269,7 @@ class _CellSearch:
         groups = np.stack([starts.curve, goals.curve, np.floor(goals.parameter / (2 * GROUP_HALF))], axis=1)
         first, row = np.unique(groups, axis=0, return_index=True, return_inverse=True)[1:]
         row = row.ravel()
-        # a full turn of a joint changes nothing: those of a group are the same
+        # full turns change neither pose nor energy: without those between its cells, the box of a group is small
         q_goal = q_goal - 2 * np.pi * np.round((q_goal - q_goal[first[row]]) / (2 * np.pi))
         shape = (len(first), q_goal.shape[1])
         low, high, least, plain = (

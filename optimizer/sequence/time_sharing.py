@@ -86,7 +86,7 @@ class TimeSharing:
         own, slow = self.guesses, self.at(-waiting * (1 - WORTH_SLOWING))
         if slow.moving <= time:
             return Shared(-waiting, slow.lengths, slow.energy, time - slow.moving)
-        # these may be as slow as they are let
+        # the moves at that price may last as long as they are allowed to: no good guesses
         self.guesses = own
         for price in PRICES:
             fast = self.at(price)
