@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from optimizer.deadline import Deadline, DeadlinePassed, watch
+from optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from optimizer.methods import solver_for
 from optimizer.methods.duration_intervals import DurationInterval, fastest
 from optimizer.methods.method import SolveResult
@@ -42,6 +43,41 @@ def priced_motion(
     p = leg.prepared.parameters(**weights, time=price)
     interval = DurationInterval(p, LEAST_DURATION, longest, price=price)
     return _solved(leg, s, g, interval, deadline, guess)
+
+
+@dataclass(frozen=True)
+class MoveOfALeg:
+    """The move of a pair, nodes `s` and `g` of a leg, by a `motion` that is known (None: none is), as one whose time is
+    shared. It lasts `longest` [s] at most.
+    """
+
+    leg: Leg
+    s: int
+    g: int
+    longest: float
+    deadline: Deadline
+    motion: PricedMotion | None
+
+    @property
+    def duration(self) -> float:
+        """Duration [s] of its motion; nan without one."""
+        return np.nan if self.motion is None else self.motion.duration
+
+    @property
+    def energy(self) -> float:
+        """Objective [J] of its motion; nan without one."""
+        return np.nan if self.motion is None else self.motion.energy
+
+    def at(self, price: float) -> MoveOfALeg:
+        """The move by its motion of least objective + price · duration. Raises NoTrajectory, or DeadlineExceeded."""
+        guess = None if self.motion is None else self.motion.spline
+        pair = (self.leg, self.s, self.g, price, self.longest, self.deadline)
+        found = priced_motion(*pair, guess)
+        if found is None and guess is not None:
+            found = priced_motion(*pair)
+        if found is None:
+            raise DeadlineExceeded([]) if self.deadline.passed else NoTrajectory([])
+        return replace(self, motion=found)
 
 
 def fastest_motion(leg: Leg, s: int, g: int, deadline: Deadline) -> PricedMotion | None:

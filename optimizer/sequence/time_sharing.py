@@ -8,24 +8,42 @@ where every move saves less by a further second than waiting costs, or hardly mo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Protocol, Self
 
 import numpy as np
-
-from optimizer.deadline import Deadline
-from optimizer.exceptions import DeadlineExceeded, NoTrajectory
-from optimizer.sequence.legs import Leg
-from optimizer.sequence.priced_search import PricedMotion, priced_motion
-from optimizer.trajectories.spline import Spline
 
 # W: prices of time that are tried where it is short; at the last, motions are nearly as fast as they can be
 PRICES = (20.0, 100.0, 500.0, 2500.0)
 # relative: a slower move must save more than a wait draws by this share, or else the time is waited out
 WORTH_SLOWING = 2e-3
-# relative: durations that add up to the time within this are stretched by the rest; and most prices tried
-SHARED, MOST_PRICES = 1e-3, 14
+# relative: durations that add up to the time within this, where sharing it better saves no more energy than this, are
+# mixed with those of another price; and most prices tried
+NEAR, SHARED, MOST_PRICES = 1e-3, 1e-4, 14
 # W: a second that saves less mechanical work than this is waited out; and factor from one price to the next
 LEAST_PRICE, STEP = 1e-3, 6.0
+
+
+class Motion(Protocol):
+    """A motion, of which only duration and objective count."""
+
+    @property
+    def duration(self) -> float:
+        """Its duration [s]."""
+        ...
+
+    @property
+    def energy(self) -> float:
+        """Its objective [J]."""
+        ...
+
+
+class PricedMove(Motion, Protocol):
+    """A move between two rests, by one of its motions."""
+
+    def at(self, price: float) -> Self:
+        """The same move by the motion of least energy + price · duration. Raises NoTrajectory, or DeadlineExceeded."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -42,7 +60,7 @@ class Shared:
     exact: bool = True
 
     @classmethod
-    def of(cls, price: float, motions: Sequence[PricedMotion]) -> Shared:
+    def of(cls, price: float, motions: Sequence[Motion]) -> Shared:
         """The durations and energies of motions."""
         return cls(price, [each.duration for each in motions], energy_of(motions))
 
@@ -51,43 +69,33 @@ class Shared:
         """Duration [s] of all moves."""
         return sum(self.lengths)
 
+    def tangent(self, time: float) -> float:
+        """What moves of this chain need at least [J] in another time [s], by the price."""
+        return self.energy - self.price * (time - self.moving)
+
 
 class TimeSharing:
-    """The motions of one chain at several prices of time; `pairs` are leg, start node and goal node of each move."""
+    """The moves of one chain at several prices of time; each begins from the motion that it has now."""
 
-    def __init__(
-        self,
-        legs: Sequence[Leg],
-        pairs: Sequence[tuple[int, int, int]],
-        guesses: Sequence[Spline | None],
-        longest: float,
-        deadline: Deadline,
-    ) -> None:
-        self.legs, self.pairs, self.longest, self.deadline = legs, pairs, longest, deadline
-        self.guesses = list(guesses)
+    def __init__(self, moves: Sequence[PricedMove]) -> None:
+        self.moves = moves
 
     def at(self, price: float) -> Shared:
         """The moves at a price [W]. Raises NoTrajectory, or DeadlineExceeded."""
-        motions = []
-        for (k, s, g), guess in zip(self.pairs, self.guesses, strict=True):
-            found = priced_motion(self.legs[k], s, g, price, self.longest, self.deadline, guess)
-            if found is None and guess is not None:
-                found = priced_motion(self.legs[k], s, g, price, self.longest, self.deadline)
-            motions.append(self._checked(found))
-        self.guesses = [motion.spline for motion in motions]
-        return Shared.of(price, motions)
+        self.moves = [move.at(price) for move in self.moves]
+        return Shared.of(price, self.moves)
 
-    def fill(self, time: float, waiting: float, fastest: Sequence[PricedMotion]) -> Shared:
+    def fill(self, time: float, waiting: float, fastest: Sequence[Motion]) -> Shared:
         """The moves that need the least energy with a wait that draws `waiting` [W], in exactly `time` [s].
 
         `fastest` are the moves as fast as they can be, in no more than this time. Raises NoTrajectory, or
         DeadlineExceeded.
         """
-        own, slow = self.guesses, self.at(-waiting * (1 - WORTH_SLOWING))
+        own, slow = self.moves, self.at(-waiting * (1 - WORTH_SLOWING))
         if slow.moving <= time:
             return Shared(-waiting, slow.lengths, slow.energy, time - slow.moving)
-        # the moves at that price may last as long as they are allowed to: no good guesses
-        self.guesses = own
+        # the moves at that price may last as long as they are allowed to: no good motions to begin from
+        self.moves = own
         for price in PRICES:
             fast = self.at(price)
             if fast.moving <= time:
@@ -95,7 +103,7 @@ class TimeSharing:
             slow = fast
         return _mixed(slow, Shared.of(PRICES[-1], fastest), time)
 
-    def fill_for_work(self, time: float, fastest: Sequence[PricedMotion]) -> Shared:
+    def fill_for_work(self, time: float, fastest: Sequence[Motion]) -> Shared:
         """The moves that do the least mechanical work within `time` [s], as in `fill`: rests do none, and every second
         more saves work, but less and less.
 
@@ -120,9 +128,11 @@ class TimeSharing:
         """The moves at a price between two, one of which is too slow: by the Illinois method."""
         above, below = slow.moving - time, fast.moving - time
         for _ in range(MOST_PRICES):
-            if -(fast.moving - time) <= SHARED * time:
-                stretch = time / fast.moving if fast.moving else 1.0
-                return Shared(fast.price, [length * stretch for length in fast.lengths], fast.energy)
+            mixed, nearer = _mixed(slow, fast, time), min(slow, fast, key=lambda each: abs(each.moving - time))
+            # near, or else the durations may jump between the two
+            near = abs(nearer.moving - time) <= NEAR * time
+            if near and mixed.energy - max(slow.tangent(time), fast.tangent(time)) <= SHARED * fast.energy:
+                return replace(mixed, price=nearer.price, exact=True)
             middle = self.at(fast.price - below * (slow.price - fast.price) / (above - below))
             if middle.moving > time:
                 slow, above, below = middle, middle.moving - time, below / 2
@@ -131,18 +141,13 @@ class TimeSharing:
         # the durations jump at some price
         return _mixed(slow, fast, time)
 
-    def _checked(self, found: PricedMotion | None) -> PricedMotion:
-        if found is None:
-            raise DeadlineExceeded([]) if self.deadline.passed else NoTrajectory([])
-        return found
 
-
-def duration_of(motions: Sequence[PricedMotion]) -> float:
+def duration_of(motions: Sequence[Motion]) -> float:
     """Duration [s] of motions one after the other."""
     return sum(each.duration for each in motions)
 
 
-def energy_of(motions: Sequence[PricedMotion]) -> float:
+def energy_of(motions: Sequence[Motion]) -> float:
     """Energy [J] of motions."""
     return sum(each.energy for each in motions)
 

@@ -17,11 +17,10 @@ from models.robot import Array
 from optimizer.exceptions import DeadlineExceeded, NoSequence, NoTrajectory, RoundTooShort
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 from optimizer.sequence.chains import LeastChain
-from optimizer.sequence.priced_search import PricedMotion, PricedSearch, fastest_motion
+from optimizer.sequence.priced_search import MoveOfALeg, PricedMotion, PricedSearch, fastest_motion
 from optimizer.sequence.rests import holding_powers, long_wait_powers, rest_energy
 from optimizer.sequence.round_search import RoundSearch
 from optimizer.sequence.time_sharing import PRICES, Shared, TimeSharing, duration_of
-from optimizer.trajectories.spline import Spline
 
 # chains that are tried, each better than the one before at the price of time that shares this one's
 MOST_CHAINS = 5
@@ -77,7 +76,7 @@ class TimedSearch:
                 self.exact &= not unsure
                 if chain == best.nodes:
                     return best
-                other = self._of(chain, [priced.motion(*each) for each in self.search.pairs(chain)])
+                other = self._of(chain, [priced.motions.get(each) for each in self.search.pairs(chain)])
                 if other is None or other.energy > best.energy * (1 - BETTER):
                     # another chain is as good at this price, and worse in this time
                     break
@@ -87,7 +86,8 @@ class TimedSearch:
 
     def _of_the_own(self, nodes: list[int]) -> Timed | None:
         """A chain whose motions are known, with its time shared; as they are, if that is not done in time."""
-        own = [self.search.solutions[each].trajectory.spline for each in self.search.pairs(nodes)]
+        known = [self.search.solutions[each] for each in self.search.pairs(nodes)]
+        own = [PricedMotion(each.trajectory.spline, each.energy.of(self.asked.objective)) for each in known]
         try:
             found = self._of(nodes, own)
         except DeadlineExceeded:
@@ -127,7 +127,7 @@ class TimedSearch:
             if priced.cut_short:
                 raise DeadlineExceeded([])
             raise RoundTooShort(duration_of(fast) + self.asked.dwelling, self.asked.dwelling)
-        found = self._of(chain, [priced.motion(*each) for each in self.search.pairs(chain)])
+        found = self._of(chain, [priced.motions.get(each) for each in self.search.pairs(chain)])
         if found is None:
             raise NoTrajectory([])
         return found
@@ -144,13 +144,14 @@ class TimedSearch:
             found.append(motion)
         return found
 
-    def _of(self, nodes: list[int], guesses: Sequence[Spline | None]) -> Timed | None:
-        """A chain with its time shared; None if no motions that fast are found."""
+    def _of(self, nodes: list[int], motions: Sequence[PricedMotion | None]) -> Timed | None:
+        """A chain with its time shared, from motions of its moves; None if no motions that fast are found."""
         fast = self.fastest(nodes)
         if fast is None or duration_of(fast) > self.time:
             return None
-        pairs, end = list(self.search.pairs(nodes)), self.search.search_end
-        sharing = TimeSharing(self.legs, pairs, guesses, self.longest, end)
+        beside = (self.longest, self.search.search_end)
+        pairs = zip(self.search.pairs(nodes), motions, strict=True)
+        sharing = TimeSharing([MoveOfALeg(self.legs[k], s, g, *beside, motion) for (k, s, g), motion in pairs])
         try:
             if self._rests_count:
                 waiting = min(float(self._powers(k)[nodes[k + 1]]) for k in self.places)
