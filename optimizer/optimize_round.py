@@ -35,6 +35,9 @@ from optimizer.sequence.stored_round import with_storage
 from optimizer.sequence.timed_round import Timed, TimedSearch
 from optimizer.solution import Branch, Solution
 
+# relative: a chain needs no more than its time shared best, as far as the price of time tells
+SHARED = 1e-3
+
 
 def optimize_round(asked: WorkRound, clock: Clock = time.perf_counter, tell: Tell = nobody) -> RoundSolution:
     """Find the round of least energy, every move of it certified against every limit.
@@ -190,8 +193,9 @@ def _in_time(search: RoundSearch, duration: float, nodes: list[int] | None) -> _
     timed, moving = _moving(search, timing, timing.run(nodes), nodes)
     bound = proven_bound(search.asked, search.legs, search.end)
     waits = {timed.at: (timed.shared.waited, timed.wait_energy)}
-    moves, exact = _moves(search, timed.nodes, moving, waits, timing.sought), timing.exact and timed.shared.exact
-    return _Found(timed.nodes, moves, timed.shared.price, bound, timing, exact)
+    moves = _moves(search, timed.nodes, moving, waits, timing.sought)
+    shared = needed_by(moves).of(search.asked.objective) <= timed.least * (1 + SHARED)
+    return _Found(timed.nodes, moves, timed.shared.price, bound, timing, timing.exact and shared)
 
 
 def _moving(
@@ -229,7 +233,7 @@ def _baselines(search: RoundSearch, found: _Found, ours: Needed) -> list[RoundBa
         controller_default(search, nodes[0], ours),
     ]
     if timing is not None:
-        compared += [same_factor(timing, nodes, ours), fastest_then_wait(timing, nodes, ours)]
+        compared += [same_factor(timing, nodes, ours), fastest_then_wait(timing, ours)]
     return [each for each in compared if each is not None]
 
 

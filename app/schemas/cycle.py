@@ -255,9 +255,10 @@ class CycleBaseline(Response):
         "`move_by_move`: at each stop the move that needs the least energy by itself, as successive calls of "
         "`POST /optimize` choose it. `controller_default`: to the nearest configuration each time, by the robot's own "
         "controller with its default speed and acceleration. Where `time` changes the round: `same_factor`, every move "
-        "slowed or sped up alike; `fastest_then_wait`, the fastest moves and a wait. With a free order, where it is "
-        "allowed: `given_order`, the best round in the order of `stops`. With an energy storage on the bus: "
-        "`without_storage`, the best round on the same bus without it, beside `move_by_move` alone.",
+        "slowed or sped up alike; `fastest_then_wait`, the fastest round, in configurations of its own, and a wait. "
+        "With a free order, where it is allowed: `given_order`, the best round in the order of `stops`. With an energy "
+        "storage on the bus: `without_storage`, the best round on the same bus without it, beside `move_by_move` "
+        "alone.",
         None,
         "move_by_move",
     )

@@ -31,6 +31,10 @@ class PricedMotion:
         """Its duration [s]."""
         return self.spline.duration
 
+    def value(self, price: float) -> float:
+        """Objective + price · duration [J], at a price [W]."""
+        return self.energy + price * self.duration
+
 
 def priced_motion(
     leg: Leg, s: int, g: int, price: float, longest: float, deadline: Deadline, guess: Spline | None = None
@@ -47,8 +51,9 @@ def priced_motion(
 
 @dataclass(frozen=True)
 class MoveOfALeg:
-    """The move of a pair, nodes `s` and `g` of a leg, by a `motion` that is known (None: none is), as one whose time is
-    shared. It lasts `longest` [s] at most.
+    """The move of a pair, nodes `s` and `g` of a leg, by the last of its `known` motions, as one whose time is shared.
+
+    It lasts `longest` [s] at most.
     """
 
     leg: Leg
@@ -56,28 +61,33 @@ class MoveOfALeg:
     g: int
     longest: float
     deadline: Deadline
-    motion: PricedMotion | None
+    known: tuple[PricedMotion, ...]
 
     @property
     def duration(self) -> float:
         """Duration [s] of its motion; nan without one."""
-        return np.nan if self.motion is None else self.motion.duration
+        return self.known[-1].duration if self.known else np.nan
 
     @property
     def energy(self) -> float:
         """Objective [J] of its motion; nan without one."""
-        return np.nan if self.motion is None else self.motion.energy
+        return self.known[-1].energy if self.known else np.nan
 
     def at(self, price: float) -> MoveOfALeg:
-        """The move by its motion of least objective + price · duration. Raises NoTrajectory, or DeadlineExceeded."""
-        guess = None if self.motion is None else self.motion.spline
+        """The move by its motion of least objective + price · duration. Raises NoTrajectory, or DeadlineExceeded.
+
+        What is solved begins from the best motion that is known, and may end in a worse one: long motions are flat.
+        """
         pair = (self.leg, self.s, self.g, price, self.longest, self.deadline)
-        found = priced_motion(*pair, guess)
-        if found is None and guess is not None:
+        best = min(self.known, key=lambda motion: motion.value(price), default=None)
+        found = priced_motion(*pair, None if best is None else best.spline)
+        if found is None and best is not None:
             found = priced_motion(*pair)
         if found is None:
             raise DeadlineExceeded([]) if self.deadline.passed else NoTrajectory([])
-        return replace(self, motion=found)
+        if best is not None and best.duration <= self.longest and best.value(price) < found.value(price):
+            found = best
+        return replace(self, known=(*self.known, found))
 
 
 def fastest_motion(leg: Leg, s: int, g: int, deadline: Deadline) -> PricedMotion | None:
@@ -130,7 +140,7 @@ class PricedSearch(LazySearch):
             self.failed = True
             return np.inf
         self.motions[k, s, g] = found
-        return found.energy + self.price * found.duration
+        return found.value(self.price)
 
     def chain_tried(self, nodes: list[int]) -> None:
         """Takes no note: at a price of time, what was found is no round of the time that is asked for."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from optimizer.deadline import Clock, DeadlinePassed, watch
 from optimizer.energy.interval import Known, saving_interval
-from optimizer.exceptions import DeadlineExceeded, JoulepathError
+from optimizer.exceptions import DeadlineExceeded, JoulepathError, NoSequence
 from optimizer.problem.free_order import is_given_order_allowed
 from optimizer.problem.work_round import WorkRound
 from optimizer.search.baselines import baselines, nearest, saving
@@ -75,8 +75,14 @@ def same_factor(timing: TimedSearch, nodes: list[int], ours: Needed) -> RoundBas
     return _in_time(timing, "same_factor", nodes, [lasting(spline, spline.duration * factor) for spline in own], ours)
 
 
-def fastest_then_wait(timing: TimedSearch, nodes: list[int], ours: Needed) -> RoundBaseline | None:
-    """The chain's moves as fast as they can be, all the time that is left waited out; None if some are not found."""
+def fastest_then_wait(timing: TimedSearch, ours: Needed) -> RoundBaseline | None:
+    """The round that is nearly the fastest of all, as whoever knows time alone chooses it, in the configurations at the
+    stops as well; all the time that is left is waited out. None if it is not found.
+    """
+    try:
+        nodes = timing.fastest_chain()[1]
+    except (DeadlineExceeded, NoSequence):
+        return None
     fast = timing.fastest(nodes)
     if fast is None or duration_of(fast) > timing.time:
         return None

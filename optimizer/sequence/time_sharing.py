@@ -17,9 +17,9 @@ import numpy as np
 PRICES = (20.0, 100.0, 500.0, 2500.0)
 # relative: a slower move must save more than a wait draws by this share, or else the time is waited out
 WORTH_SLOWING = 2e-3
-# relative: durations that add up to the time within this, where sharing it better saves no more energy than this, are
-# mixed with those of another price; and most prices tried
-NEAR, SHARED, MOST_PRICES = 1e-3, 1e-4, 14
+# relative: the durations of two prices are mixed where sharing the time better saves no more energy than this, and one
+# of them adds up to the time nearly, or the prices are nearly the same; and most prices tried
+SHARED, NEAR, SETTLED, MOST_PRICES = 1e-4, 1e-3, 1e-2, 14
 # W: a second that saves less mechanical work than this is waited out; and factor from one price to the next
 LEAST_PRICE, STEP = 1e-3, 6.0
 
@@ -50,14 +50,15 @@ class PricedMove(Motion, Protocol):
 class Shared:
     """Durations `lengths` [s] of the moves, which need `energy` [J], nearly; the rest of the time is `waited` [s].
 
-    One more second would save `price` [W]. `exact`: at this price they are the best of this chain.
+    One more second would save `price` [W]. As far as the price tells, the moves of this chain need `least` [J] or more
+    in this time, the wait included.
     """
 
     price: float
     lengths: list[float]
     energy: float
     waited: float = 0.0
-    exact: bool = True
+    least: float = -np.inf
 
     @classmethod
     def of(cls, price: float, motions: Sequence[Motion]) -> Shared:
@@ -75,7 +76,7 @@ class Shared:
 
 
 class TimeSharing:
-    """The moves of one chain at several prices of time; each begins from the motion that it has now."""
+    """The moves of one chain at several prices of time; each knows the motions that it had."""
 
     def __init__(self, moves: Sequence[PricedMove]) -> None:
         self.moves = moves
@@ -91,17 +92,16 @@ class TimeSharing:
         `fastest` are the moves as fast as they can be, in no more than this time. Raises NoTrajectory, or
         DeadlineExceeded.
         """
-        own, slow = self.moves, self.at(-waiting * (1 - WORTH_SLOWING))
+        slow = self.at(-waiting * (1 - WORTH_SLOWING))
         if slow.moving <= time:
-            return Shared(-waiting, slow.lengths, slow.energy, time - slow.moving)
-        # the moves at that price may last as long as they are allowed to: no good motions to begin from
-        self.moves = own
+            return Shared(-waiting, slow.lengths, slow.energy, time - slow.moving, slow.tangent(time))
         for price in PRICES:
             fast = self.at(price)
             if fast.moving <= time:
                 return self._between(slow, fast, time)
             slow = fast
-        return _mixed(slow, Shared.of(PRICES[-1], fastest), time)
+        # of no price are the fastest moves the best
+        return replace(_mixed(slow, Shared.of(PRICES[-1], fastest), time), least=slow.tangent(time))
 
     def fill_for_work(self, time: float, fastest: Sequence[Motion]) -> Shared:
         """The moves that do the least mechanical work within `time` [s], as in `fill`: rests do none, and every second
@@ -115,7 +115,7 @@ class TimeSharing:
         if found.moving <= time:
             while found.moving <= time:
                 if found.price <= LEAST_PRICE:
-                    return Shared(0.0, found.lengths, found.energy, time - found.moving)
+                    return Shared(0.0, found.lengths, found.energy, time - found.moving, found.energy)
                 fast, found = found, self.at(max(found.price / STEP, LEAST_PRICE))
             return self._between(found, fast, time)
         while found.price < PRICES[-1]:
@@ -128,17 +128,15 @@ class TimeSharing:
         """The moves at a price between two, one of which is too slow: by the Illinois method."""
         above, below = slow.moving - time, fast.moving - time
         for _ in range(MOST_PRICES):
-            mixed, nearer = _mixed(slow, fast, time), min(slow, fast, key=lambda each: abs(each.moving - time))
-            # near, or else the durations may jump between the two
-            near = abs(nearer.moving - time) <= NEAR * time
-            if near and mixed.energy - max(slow.tangent(time), fast.tangent(time)) <= SHARED * fast.energy:
-                return replace(mixed, price=nearer.price, exact=True)
+            mixed = _mixed(slow, fast, time)
+            settled = min(above, -below) <= NEAR * time or slow.price >= fast.price - SETTLED * abs(fast.price)
+            if settled and mixed.energy - mixed.least <= SHARED * mixed.energy:
+                return replace(mixed, price=(slow if above < -below else fast).price)
             middle = self.at(fast.price - below * (slow.price - fast.price) / (above - below))
             if middle.moving > time:
                 slow, above, below = middle, middle.moving - time, below / 2
             else:
                 fast, below, above = middle, middle.moving - time, above / 2
-        # the durations jump at some price
         return _mixed(slow, fast, time)
 
 
@@ -157,4 +155,5 @@ def _mixed(slow: Shared, fast: Shared, time: float) -> Shared:
     share = (time - fast.moving) / (slow.moving - fast.moving)
     lengths = [a + share * (b - a) for a, b in zip(fast.lengths, slow.lengths, strict=True)]
     price = (fast.energy - slow.energy) / (slow.moving - fast.moving)
-    return Shared(price, lengths, fast.energy + share * (slow.energy - fast.energy), exact=False)
+    least = max(slow.tangent(time), fast.tangent(time))
+    return Shared(price, lengths, fast.energy + share * (slow.energy - fast.energy), least=least)

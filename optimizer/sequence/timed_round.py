@@ -32,7 +32,8 @@ BETTER = 1e-4
 class Timed:
     """A chain whose time is shared. It waits after move `at`, which draws `wait_energy` [J] beside the dwell there.
 
-    The objective of the round is `energy` [J], nearly.
+    The objective of the round is `energy` [J], nearly. With the time shared otherwise, this chain needs `least` [J] or
+    more, as far as the price of time tells.
     """
 
     nodes: list[int]
@@ -40,6 +41,7 @@ class Timed:
     at: int
     wait_energy: float
     energy: float
+    least: float = -np.inf
 
 
 class TimedSearch:
@@ -59,6 +61,7 @@ class TimedSearch:
         self.places = [k for k, move in enumerate(self.asked.moves) if self.asked.may_wait_after(move)]
         self.sought = [set[int]() for _ in self.legs]
         self._fastest: dict[tuple[int, int, int], PricedMotion | None] = {}
+        self._fastest_chain: tuple[PricedSearch, list[int]] | None = None
 
     def run(self, nodes: list[int] | None) -> Timed:
         """The best round found from that of a chain on, whose motions are known, or from the fastest one.
@@ -105,7 +108,7 @@ class TimedSearch:
         at, wait = self.cheapest_wait(nodes, waited)
         price = -float(self._powers(at)[nodes[at + 1]])
         energy = needed + wait + self.search.dwells(nodes)
-        return Timed(nodes, Shared(price, lengths, needed, waited, exact=False), at, wait, energy)
+        return Timed(nodes, Shared(price, lengths, needed, waited), at, wait, energy)
 
     def _priced(self, price: float, longest: float) -> PricedSearch:
         return PricedSearch(self.legs, self.asked.closed, price, longest, self.search.search_end)
@@ -118,8 +121,7 @@ class TimedSearch:
 
     def _of_the_fastest(self) -> Timed:
         """The chain that is nearly the fastest, with its time shared. Raises RoundTooShort or NoTrajectory."""
-        priced = self._priced(PRICES[-1], LONGEST_DURATION)
-        chain = self._explored(priced)
+        priced, chain = self.fastest_chain()
         fast = self.fastest(chain)
         if fast is None:
             raise DeadlineExceeded([]) if priced.cut_short or self.search.search_end.passed else NoTrajectory([])
@@ -131,6 +133,13 @@ class TimedSearch:
         if found is None:
             raise NoTrajectory([])
         return found
+
+    def fastest_chain(self) -> tuple[PricedSearch, list[int]]:
+        """The chain that is nearly the fastest, and its search. Raises NoSequence or DeadlineExceeded."""
+        if self._fastest_chain is None:
+            priced = self._priced(PRICES[-1], LONGEST_DURATION)
+            self._fastest_chain = priced, self._explored(priced)
+        return self._fastest_chain
 
     def fastest(self, nodes: list[int]) -> list[PricedMotion] | None:
         """The moves of a chain as fast as they can be; None if some are not found."""
@@ -150,8 +159,9 @@ class TimedSearch:
         if fast is None or duration_of(fast) > self.time:
             return None
         beside = (self.longest, self.search.search_end)
-        pairs = zip(self.search.pairs(nodes), motions, strict=True)
-        sharing = TimeSharing([MoveOfALeg(self.legs[k], s, g, *beside, motion) for (k, s, g), motion in pairs])
+        known = [() if motion is None else (motion,) for motion in motions]
+        pairs = zip(self.search.pairs(nodes), known, strict=True)
+        sharing = TimeSharing([MoveOfALeg(self.legs[k], s, g, *beside, own) for (k, s, g), own in pairs])
         try:
             if self._rests_count:
                 waiting = min(float(self._powers(k)[nodes[k + 1]]) for k in self.places)
@@ -161,8 +171,8 @@ class TimedSearch:
         except NoTrajectory:
             return None
         at, wait = self.cheapest_wait(nodes, shared.waited)
-        resting = self.search.dwells(nodes) + (wait if self._rests_count else 0.0)
-        return Timed(nodes, shared, at, wait, shared.energy + resting)
+        dwelling, waiting = self.search.dwells(nodes), wait if self._rests_count else 0.0
+        return Timed(nodes, shared, at, wait, shared.energy + dwelling + waiting, shared.least + dwelling)
 
     @property
     def _rests_count(self) -> bool:

@@ -81,6 +81,9 @@ class TestFilling:
         shared = [replace(move, duration=length) for move, length in zip(moves, found.lengths, strict=True)]
         assert all(each.shortest <= each.duration <= each.longest for each in shared)
         needed = sum(each.energy for each in shared) + WAITING * found.waited
+        if factor > 1.01:
+            # a little below, by the price of a wait; of moves as fast as they can be, less is known
+            assert found.least == pytest.approx(needed - WORTH_SLOWING * WAITING * found.waited, rel=ENERGY)
         # the tangents are below the energies by less than 1e-5 of them
         assert needed == pytest.approx(least(moves, time, WAITING), rel=ENERGY + 1e-5)
 
@@ -95,7 +98,7 @@ class TestFilling:
         assert found.price == pytest.approx(saved, rel=0.03, abs=0.2)
 
 
-def test_a_jump_of_the_durations_is_told_as_not_exact() -> None:
+def test_where_the_durations_jump_the_best_is_not_known() -> None:
     @dataclass(frozen=True)
     class Jumping(Move):
         """A move that is either fast or slow: its energy is not convex in between."""
@@ -105,7 +108,7 @@ def test_a_jump_of_the_durations_is_told_as_not_exact() -> None:
             ends = [replace(self, duration=self.shortest), replace(self, duration=self.longest)]
             return min(ends, key=lambda each: each.energy + price * each.duration)
 
-    move = Jumping(swing=100.0, drawn=1.0, shortest=1.0, longest=5.0)
+    move = Jumping(swing=-100.0, drawn=1.0, shortest=1.0, longest=5.0)
     found = TimeSharing([move]).fill(3.0, 50.0, fastest([move]))
-    assert not found.exact
     assert found.moving == pytest.approx(3.0)
+    assert replace(move, duration=3.0).energy > found.least + 10
