@@ -73,6 +73,8 @@ class _Found:
 class DecomposedArm:
     """`ClosedForm` of an arm that EAIK knows a decomposition of."""
 
+    confirmed = True
+
     def __init__(self, chain: Chain, axes: JointAxes, names: NamedBranches | None, decomposition: eaik.Robot) -> None:
         self._chain, self._names, self._decomposition = chain, names, decomposition
         self._R_zero = axes.T_zero[:3, :3]

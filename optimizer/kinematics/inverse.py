@@ -124,6 +124,11 @@ class ClosedForm(Protocol):
         """Whether every branch is found."""
         ...
 
+    @property
+    def confirmed(self) -> bool:
+        """Whether what `solve` returns has been confirmed by forward kinematics."""
+        ...
+
     def label(self, q: Array) -> BranchLabel:
         """The branch of a configuration q (nq,) [rad]."""
         ...
@@ -198,6 +203,8 @@ class ClosedFormInverseKinematics:
                 labels += [motion.label] * len(of_motion)
                 curves += [None if is_point(motion) else motion] * len(of_motion)
             q = np.vstack([q, *configurations])
+        elif self._form.confirmed:
+            return _Reached(q, labels, curves)
         reached = self._confirmed(_Reached(q, labels, curves), T, len(motions) > 1)
         others = _unseen(motions, reached, limits) if motions and limits is not None else []
         if not others:

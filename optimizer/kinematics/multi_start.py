@@ -42,7 +42,7 @@ KEPT = 256
 class MultiStart:
     """`ClosedForm` of an arm without one."""
 
-    complete = False
+    complete, confirmed = False, False
 
     def __init__(self, chain: Chain) -> None:
         self._chain = chain

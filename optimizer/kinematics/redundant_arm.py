@@ -30,7 +30,7 @@ class RedundantArm:
     """`ClosedForm` of a redundant arm. Its configurations are never isolated, but where a curve is a point."""
 
     form: SphericalShoulder
-    complete = True
+    complete, confirmed = True, False
 
     @classmethod
     def of(cls, model: pin.Model) -> RedundantArm | None:

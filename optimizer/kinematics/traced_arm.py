@@ -45,7 +45,7 @@ KEPT = 32
 class TracedArm:
     """`ClosedForm` of an arm with one joint too many and without a closed form. It has no isolated configurations."""
 
-    complete = False
+    complete, confirmed = False, False
 
     def __init__(self, chain: Chain, seeds: SeedTable, nearby: NearbyArm | None) -> None:
         self._chain, self._seeds, self._nearby = chain, seeds, nearby

@@ -56,7 +56,7 @@ class URClosedForm:
     d5: float
     d6: float
 
-    complete = True
+    complete, confirmed = True, False
 
     @classmethod
     def of(cls, model: pin.Model, tolerance: float = EQUAL) -> URClosedForm | None:

@@ -115,6 +115,8 @@ def test_an_arm_folded_onto_its_own_axis_is_no_isolated_solution() -> None:
 class NothingKnown:
     """A closed form that finds nothing of a pose within reach, like one that does not know its self-motion."""
 
+    confirmed = False
+
     def label(self, q: Array) -> Label:
         return IK.label(q)
 
