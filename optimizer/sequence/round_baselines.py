@@ -3,6 +3,7 @@ default speed."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from functools import reduce
 from operator import add
@@ -79,11 +80,13 @@ def fastest_then_wait(timing: TimedSearch, ours: Needed) -> RoundBaseline | None
     """The round that is nearly the fastest of all, as whoever knows time alone chooses it, in the configurations at the
     stops as well; all the time that is left is waited out. None if it is not found.
     """
-    try:
-        nodes = timing.fastest_chain()[1]
-    except (DeadlineExceeded, NoSequence):
-        return None
-    fast = timing.fastest(nodes)
+    nodes = timing.fastest_by_bounds()
+    fast = timing.fastest(nodes) if nodes else None
+    if fast is None:
+        # among obstacles, bounds tell little
+        with suppress(DeadlineExceeded, NoSequence):
+            nodes = timing.fastest_chain()[1]
+            fast = timing.fastest(nodes)
     if fast is None or duration_of(fast) > timing.time:
         return None
     return _in_time(timing, "fastest_then_wait", nodes, [each.spline for each in fast], ours)

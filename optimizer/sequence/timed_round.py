@@ -141,6 +141,12 @@ class TimedSearch:
             self._fastest_chain = priced, self._explored(priced)
         return self._fastest_chain
 
+    def fastest_by_bounds(self) -> list[int]:
+        """The chain that is nearly the fastest, as far as bounds tell; no nodes if there is none."""
+        return LeastChain(
+            [leg.priced(PRICES[-1], LONGEST_DURATION).cost for leg in self.legs], self.asked.closed
+        ).find()[1]
+
     def fastest(self, nodes: list[int]) -> list[PricedMotion] | None:
         """The moves of a chain as fast as they can be; None if some are not found."""
         found = list[PricedMotion]()
