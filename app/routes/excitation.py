@@ -25,7 +25,9 @@ _CSV = "t,q1,…,q6,v1,…,v6,a1,…,a6\n0.0,0.0,-1.57,…\n0.008,0.0001,-1.5699
     response_model=ExcitationResponse,
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}, "example": _CSV}}},
-        **problem_responses(*WORKER_PROBLEMS, problems.OutsideLimits, problems.ExcitationInfeasible),
+        **problem_responses(
+            *WORKER_PROBLEMS, problems.UnknownFigures, problems.OutsideLimits, problems.ExcitationInfeasible
+        ),
     },
 )
 async def excitation(

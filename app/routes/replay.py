@@ -24,7 +24,11 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     summary="A motion in an independent simulator",
     response_model=ReplayResponse,
     responses=problem_responses(
-        *WORKER_PROBLEMS, problems.UnknownAnswer, problems.NotCertified, problems.SimulatorMissing
+        *WORKER_PROBLEMS,
+        problems.UnknownAnswer,
+        problems.UnknownFigures,
+        problems.NotCertified,
+        problems.SimulatorMissing,
     ),
 )
 async def replay(

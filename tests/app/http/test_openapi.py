@@ -33,6 +33,20 @@ def properties(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]
             yield f"{name}.{field}", content
 
 
+def named(node: Any, document: dict[str, Any]) -> set[str]:
+    """Names of all schemas that a part of the document is made of."""
+    found, open_ = set[str](), [node]
+    while open_:
+        part = open_.pop()
+        if isinstance(part, dict):
+            name = str(part.get("$ref", "")).rpartition("/")[2]
+            if name and name not in found:
+                found.add(name)
+                open_.append(document["components"]["schemas"][name])
+        open_ += part.values() if isinstance(part, dict) else part if isinstance(part, list) else []
+    return found
+
+
 def is_number(schema: dict[str, Any]) -> bool:
     return '"number"' in repr(schema).replace("'", '"')
 
@@ -83,6 +97,18 @@ def test_every_problem_is_documented(document: dict[str, Any]) -> None:
                 assert expected in (None, *response.get("content", ()))
                 if status == "503":
                     assert "Retry-After" in response["headers"]
+
+
+def test_what_takes_figures_tells_that_they_may_be_unknown(document: dict[str, Any]) -> None:
+    schemas, silent = document["components"]["schemas"], set[str]()
+    for path, methods in document["paths"].items():
+        post = methods.get("post", {})
+        taken = named(post.get("requestBody"), document)
+        figures = any("figures" in schemas[name].get("properties", {}) for name in taken)
+        if figures and "UnknownFigures" not in named(post["responses"], document):
+            silent.add(path)
+    # a request of a job meets its problem when its turn comes
+    assert silent == {"/jobs"}
 
 
 def test_no_error_model_of_the_framework_is_left(document: dict[str, Any]) -> None:
