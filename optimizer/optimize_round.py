@@ -35,8 +35,8 @@ from optimizer.sequence.stored_round import with_storage
 from optimizer.sequence.timed_round import Timed, TimedSearch
 from optimizer.solution import Branch, Solution
 
-# relative: a chain needs no more than its time shared best, as far as the price of time tells
-SHARED = 1e-3
+# relative: what a round in a given time may need above the least of its chain, and still be optimal
+WELL_SHARED = 1e-3
 
 
 def optimize_round(asked: WorkRound, clock: Clock = time.perf_counter, tell: Tell = nobody) -> RoundSolution:
@@ -194,7 +194,8 @@ def _in_time(search: RoundSearch, duration: float, nodes: list[int] | None) -> _
     bound = proven_bound(search.asked, search.legs, search.end)
     waits = {timed.at: (timed.shared.waited, timed.wait_energy)}
     moves = _moves(search, timed.nodes, moving, waits, timing.sought)
-    shared = needed_by(moves).of(search.asked.objective) <= timed.least * (1 + SHARED)
+    needed = needed_by(moves).of(search.asked.objective)
+    shared = needed - timed.least <= WELL_SHARED * abs(needed)
     return _Found(timed.nodes, moves, timed.shared.price, bound, timing, timing.exact and shared)
 
 

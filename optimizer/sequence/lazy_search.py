@@ -82,6 +82,10 @@ class LazySearch(ABC):
         """Energy [J] of the dwells of a chain."""
         return sum(float(self.legs[k].dwell[g]) for k, _, g in self.pairs(nodes))
 
+    def least(self) -> list[int]:
+        """The nodes of the least chain, as far as motions and bounds tell by now; none if there is no chain."""
+        return self._chain.find()[1]
+
     def explore(self) -> list[int]:
         """The nodes of the least chain, all of its legs solved; once the time is up, of the least solved one.
 
@@ -89,7 +93,7 @@ class LazySearch(ABC):
         might close the gap was given too little time.
         """
         while True:
-            _, nodes = self._chain.find()
+            nodes = self.least()
             if not nodes:
                 raise self._no_chain()
             open_ = [(k, s, g) for k, s, g in self.pairs(nodes) if not self.legs[k].known(s, g)]

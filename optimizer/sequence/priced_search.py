@@ -49,45 +49,34 @@ def priced_motion(
     return _solved(leg, s, g, interval, deadline, guess)
 
 
-@dataclass(frozen=True)
 class MoveOfALeg:
-    """The move of a pair, nodes `s` and `g` of a leg, by the last of its `known` motions, as one whose time is shared.
+    """The move of a pair, nodes `s` and `g` of a leg, at several prices of time; it lasts `longest` [s] at most.
 
-    It lasts `longest` [s] at most.
+    It begins with the motions `known`, and keeps those that it finds.
     """
 
-    leg: Leg
-    s: int
-    g: int
-    longest: float
-    deadline: Deadline
-    known: tuple[PricedMotion, ...]
+    def __init__(
+        self, leg: Leg, s: int, g: int, longest: float, deadline: Deadline, known: Sequence[PricedMotion]
+    ) -> None:
+        self.leg, self.s, self.g, self.longest, self.deadline = leg, s, g, longest, deadline
+        self.known = list(known)
 
-    @property
-    def duration(self) -> float:
-        """Duration [s] of its motion; nan without one."""
-        return self.known[-1].duration if self.known else np.nan
+    def at(self, price: float) -> PricedMotion:
+        """The motion of least objective + price · duration. Raises NoTrajectory, or DeadlineExceeded.
 
-    @property
-    def energy(self) -> float:
-        """Objective [J] of its motion; nan without one."""
-        return self.known[-1].energy if self.known else np.nan
-
-    def at(self, price: float) -> MoveOfALeg:
-        """The move by its motion of least objective + price · duration. Raises NoTrajectory, or DeadlineExceeded.
-
-        What is solved begins from the best motion that is known, and may end in a worse one: long motions are flat.
+        A solve begins from the best motion that is known, and may end in a worse one: where motions are long, a change
+        of duration hardly changes the objective + price · duration.
         """
         pair = (self.leg, self.s, self.g, price, self.longest, self.deadline)
-        best = min(self.known, key=lambda motion: motion.value(price), default=None)
-        found = priced_motion(*pair, None if best is None else best.spline)
-        if found is None and best is not None:
+        guess = min(self.known, key=lambda motion: motion.value(price), default=None)
+        found = priced_motion(*pair, None if guess is None else guess.spline)
+        if found is None and guess is not None:
             found = priced_motion(*pair)
         if found is None:
             raise DeadlineExceeded([]) if self.deadline.passed else NoTrajectory([])
-        if best is not None and best.duration <= self.longest and best.value(price) < found.value(price):
-            found = best
-        return replace(self, known=(*self.known, found))
+        self.known.append(found)
+        allowed = [motion for motion in self.known if motion.duration <= self.longest]
+        return min(allowed, key=lambda motion: motion.value(price), default=found)
 
 
 def fastest_motion(leg: Leg, s: int, g: int, deadline: Deadline) -> PricedMotion | None:

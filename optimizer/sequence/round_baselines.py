@@ -3,7 +3,6 @@ default speed."""
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import replace
 from functools import reduce
 from operator import add
@@ -12,7 +11,7 @@ import numpy as np
 
 from optimizer.deadline import Clock, DeadlinePassed, watch
 from optimizer.energy.interval import Known, saving_interval
-from optimizer.exceptions import DeadlineExceeded, JoulepathError, NoSequence
+from optimizer.exceptions import DeadlineExceeded, JoulepathError
 from optimizer.problem.free_order import is_given_order_allowed
 from optimizer.problem.work_round import WorkRound
 from optimizer.search.baselines import baselines, nearest, saving
@@ -77,18 +76,13 @@ def same_factor(timing: TimedSearch, nodes: list[int], ours: Needed) -> RoundBas
 
 
 def fastest_then_wait(timing: TimedSearch, ours: Needed) -> RoundBaseline | None:
-    """The round that is nearly the fastest of all, as whoever knows time alone chooses it, in the configurations at the
-    stops as well; all the time that is left is waited out. None if it is not found.
+    """The round that is nearly the fastest of all, in configurations of its own, as a planner of least time chooses
+    them; all the time that is left is waited out. None if it is not found.
     """
-    nodes = timing.fastest_by_bounds()
-    fast = timing.fastest(nodes) if nodes else None
-    if fast is None:
-        # among obstacles, bounds tell little
-        with suppress(DeadlineExceeded, NoSequence):
-            nodes = timing.fastest_chain()[1]
-            fast = timing.fastest(nodes)
-    if fast is None or duration_of(fast) > timing.time:
+    found = timing.fastest_round()
+    if found is None or duration_of(found[1]) > timing.time:
         return None
+    nodes, fast = found
     return _in_time(timing, "fastest_then_wait", nodes, [each.spline for each in fast], ours)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, Self
+from typing import Protocol
 
 import numpy as np
 
@@ -17,9 +17,11 @@ import numpy as np
 PRICES = (20.0, 100.0, 500.0, 2500.0)
 # relative: a slower move must save more than a wait draws by this share, or else the time is waited out
 WORTH_SLOWING = 2e-3
-# relative: the durations of two prices are mixed where sharing the time better saves no more energy than this, and one
-# of them adds up to the time nearly, or the prices are nearly the same; and most prices tried
-SHARED, NEAR, SETTLED, MOST_PRICES = 1e-4, 1e-3, 1e-2, 14
+# relative: no further price is tried where sharing the time better saves no more energy than SHARED, and the durations
+# at one price add up to the time but for NEAR, or two prices differ by SETTLED at most
+SHARED, NEAR, SETTLED = 1e-4, 1e-3, 1e-2
+# prices that are tried at most
+MOST_PRICES = 14
 # W: a second that saves less mechanical work than this is waited out; and factor from one price to the next
 LEAST_PRICE, STEP = 1e-3, 6.0
 
@@ -38,11 +40,11 @@ class Motion(Protocol):
         ...
 
 
-class PricedMove(Motion, Protocol):
-    """A move between two rests, by one of its motions."""
+class PricedMove(Protocol):
+    """A move between two rests."""
 
-    def at(self, price: float) -> Self:
-        """The same move by the motion of least energy + price · duration. Raises NoTrajectory, or DeadlineExceeded."""
+    def at(self, price: float) -> Motion:
+        """Its motion of least energy + price · duration. Raises NoTrajectory, or DeadlineExceeded."""
         ...
 
 
@@ -50,8 +52,8 @@ class PricedMove(Motion, Protocol):
 class Shared:
     """Durations `lengths` [s] of the moves, which need `energy` [J], nearly; the rest of the time is `waited` [s].
 
-    One more second would save `price` [W]. As far as the price tells, the moves of this chain need `least` [J] or more
-    in this time, the wait included.
+    One more second would save `price` [W]. By duality at prices of time, this chain needs `least` [J] or more in this
+    time, the wait included; the motions at these prices are local optima.
     """
 
     price: float
@@ -71,20 +73,19 @@ class Shared:
         return sum(self.lengths)
 
     def tangent(self, time: float) -> float:
-        """What moves of this chain need at least [J] in another time [s], by the price."""
+        """What the moves of this chain need at least [J] in another time [s], if these are the best at the price."""
         return self.energy - self.price * (time - self.moving)
 
 
 class TimeSharing:
-    """The moves of one chain at several prices of time; each knows the motions that it had."""
+    """The moves of one chain at several prices of time."""
 
     def __init__(self, moves: Sequence[PricedMove]) -> None:
         self.moves = moves
 
     def at(self, price: float) -> Shared:
         """The moves at a price [W]. Raises NoTrajectory, or DeadlineExceeded."""
-        self.moves = [move.at(price) for move in self.moves]
-        return Shared.of(price, self.moves)
+        return Shared.of(price, [move.at(price) for move in self.moves])
 
     def fill(self, time: float, waiting: float, fastest: Sequence[Motion]) -> Shared:
         """The moves that need the least energy with a wait that draws `waiting` [W], in exactly `time` [s].
@@ -100,7 +101,7 @@ class TimeSharing:
             if fast.moving <= time:
                 return self._between(slow, fast, time)
             slow = fast
-        # of no price are the fastest moves the best
+        # the fastest moves are the best at no price: only the slow ones have a tangent
         return replace(_mixed(slow, Shared.of(PRICES[-1], fastest), time), least=slow.tangent(time))
 
     def fill_for_work(self, time: float, fastest: Sequence[Motion]) -> Shared:
@@ -130,7 +131,7 @@ class TimeSharing:
         for _ in range(MOST_PRICES):
             mixed = _mixed(slow, fast, time)
             settled = min(above, -below) <= NEAR * time or slow.price >= fast.price - SETTLED * abs(fast.price)
-            if settled and mixed.energy - mixed.least <= SHARED * mixed.energy:
+            if settled and mixed.energy - mixed.least <= SHARED * abs(mixed.energy):
                 return replace(mixed, price=(slow if above < -below else fast).price)
             middle = self.at(fast.price - below * (slow.price - fast.price) / (above - below))
             if middle.moving > time:

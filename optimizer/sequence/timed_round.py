@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -32,8 +33,8 @@ BETTER = 1e-4
 class Timed:
     """A chain whose time is shared. It waits after move `at`, which draws `wait_energy` [J] beside the dwell there.
 
-    The objective of the round is `energy` [J], nearly. With the time shared otherwise, this chain needs `least` [J] or
-    more, as far as the price of time tells.
+    The objective of the round is `energy` [J], nearly. However the time is shared, this chain needs `least` [J] or
+    more: see `Shared`.
     """
 
     nodes: list[int]
@@ -61,7 +62,6 @@ class TimedSearch:
         self.places = [k for k, move in enumerate(self.asked.moves) if self.asked.may_wait_after(move)]
         self.sought = [set[int]() for _ in self.legs]
         self._fastest: dict[tuple[int, int, int], PricedMotion | None] = {}
-        self._fastest_chain: tuple[PricedSearch, list[int]] | None = None
 
     def run(self, nodes: list[int] | None) -> Timed:
         """The best round found from that of a chain on, whose motions are known, or from the fastest one.
@@ -110,6 +110,11 @@ class TimedSearch:
         energy = needed + wait + self.search.dwells(nodes)
         return Timed(nodes, Shared(price, lengths, needed, waited), at, wait, energy)
 
+    @cached_property
+    def _fast_search(self) -> PricedSearch:
+        """The search at a price at which motions are nearly as fast as they can be."""
+        return self._priced(PRICES[-1], LONGEST_DURATION)
+
     def _priced(self, price: float, longest: float) -> PricedSearch:
         return PricedSearch(self.legs, self.asked.closed, price, longest, self.search.search_end)
 
@@ -121,7 +126,8 @@ class TimedSearch:
 
     def _of_the_fastest(self) -> Timed:
         """The chain that is nearly the fastest, with its time shared. Raises RoundTooShort or NoTrajectory."""
-        priced, chain = self.fastest_chain()
+        priced = self._fast_search
+        chain = self._explored(priced)
         fast = self.fastest(chain)
         if fast is None:
             raise DeadlineExceeded([]) if priced.cut_short or self.search.search_end.passed else NoTrajectory([])
@@ -134,18 +140,18 @@ class TimedSearch:
             raise NoTrajectory([])
         return found
 
-    def fastest_chain(self) -> tuple[PricedSearch, list[int]]:
-        """The chain that is nearly the fastest, and its search. Raises NoSequence or DeadlineExceeded."""
-        if self._fastest_chain is None:
-            priced = self._priced(PRICES[-1], LONGEST_DURATION)
-            self._fastest_chain = priced, self._explored(priced)
-        return self._fastest_chain
+    def fastest_round(self) -> tuple[list[int], list[PricedMotion]] | None:
+        """The chain that is nearly the fastest of all, and its moves as fast as they can be; None if it is not found.
 
-    def fastest_by_bounds(self) -> list[int]:
-        """The chain that is nearly the fastest, as far as bounds tell; no nodes if there is none."""
-        return LeastChain(
-            [leg.priced(PRICES[-1], LONGEST_DURATION).cost for leg in self.legs], self.asked.closed
-        ).find()[1]
+        It is that by bounds; where one of its moves has no motion, as among obstacles, that of a search.
+        """
+        with suppress(DeadlineExceeded, NoSequence):
+            for find in (self._fast_search.least, partial(self._explored, self._fast_search)):
+                nodes = find()
+                fast = self.fastest(nodes) if nodes else None
+                if fast is not None:
+                    return nodes, fast
+        return None
 
     def fastest(self, nodes: list[int]) -> list[PricedMotion] | None:
         """The moves of a chain as fast as they can be; None if some are not found."""
@@ -165,9 +171,12 @@ class TimedSearch:
         if fast is None or duration_of(fast) > self.time:
             return None
         beside = (self.longest, self.search.search_end)
-        known = [() if motion is None else (motion,) for motion in motions]
-        pairs = zip(self.search.pairs(nodes), known, strict=True)
-        sharing = TimeSharing([MoveOfALeg(self.legs[k], s, g, *beside, own) for (k, s, g), own in pairs])
+        sharing = TimeSharing(
+            [
+                MoveOfALeg(self.legs[k], s, g, *beside, [] if motion is None else [motion])
+                for (k, s, g), motion in zip(self.search.pairs(nodes), motions, strict=True)
+            ]
+        )
         try:
             if self._rests_count:
                 waiting = min(float(self._powers(k)[nodes[k + 1]]) for k in self.places)

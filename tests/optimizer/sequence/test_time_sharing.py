@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from optimizer.sequence.time_sharing import SHARED, WORTH_SLOWING, TimeSharing
+from optimizer.optimize_round import WELL_SHARED
+from optimizer.sequence.time_sharing import SETTLED, SHARED, WORTH_SLOWING, TimeSharing
 
 # W: what a wait draws
 WAITING = 5.0
@@ -18,18 +19,19 @@ ENERGY = SHARED + WORTH_SLOWING**2
 
 @dataclass(frozen=True)
 class Move:
-    """A move of energy swing / T² + drawn T [J], for durations from `shortest` to `longest` [s]."""
+    """A move of energy swing / T² + drawn T - gained [J], for durations T from `shortest` to `longest` [s]."""
 
     swing: float
     drawn: float
     shortest: float
     longest: float
+    gained: float = 0.0
     duration: float = 0.0
 
     @property
     def energy(self) -> float:
         """Its energy [J]."""
-        return self.swing / self.duration**2 + self.drawn * self.duration
+        return self.swing / self.duration**2 + self.drawn * self.duration - self.gained
 
     def at(self, price: float) -> Move:
         """The move in the duration of least energy + price · duration."""
@@ -96,6 +98,33 @@ class TestFilling:
         found = TimeSharing(moves).fill(time, WAITING, fastest(moves))
         # the price changes over the step, and the tangents are not smooth
         assert found.price == pytest.approx(saved, rel=0.03, abs=0.2)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_moves_that_gain_more_than_they_need(seed: int) -> None:
+    moves = [replace(move, gained=100.0) for move in moves_of(seed)]
+    time = 1.5 * sum(move.shortest for move in moves)
+    found = TimeSharing(moves).fill(time, WAITING, fastest(moves))
+    assert found.energy < 0
+    assert found.energy == pytest.approx(least(moves, time, WAITING), rel=10 * ENERGY)
+    assert found.energy - found.least <= SHARED * abs(found.energy)
+
+
+def test_where_every_share_of_the_time_needs_the_same_any_is_the_best() -> None:
+    """Energies in proportion to durations: at the one price that counts, the durations jump from end to end."""
+    moves = [Move(0.0, drawn, 1.0, 5.0) for drawn in (3.0, 3.0)]
+    found = TimeSharing(moves).fill(7.0, WAITING, fastest(moves))
+    assert found.moving == pytest.approx(7.0)
+    assert found.price == pytest.approx(-3.0, rel=SETTLED)
+    assert found.energy == pytest.approx(21.0, rel=1e-12)
+    assert found.energy - found.least <= WELL_SHARED * found.energy
+
+
+def test_one_move_and_moves_of_one_duration() -> None:
+    alone, rigid = Move(10.0, 4.0, 0.5, 9.0), Move(10.0, 4.0, 0.5, 0.5)
+    assert TimeSharing([alone]).fill(2.0, WAITING, fastest([alone])).lengths == pytest.approx([2.0], rel=SHARED)
+    found = TimeSharing([rigid, rigid]).fill(2.0, WAITING, fastest([rigid, rigid]))
+    assert (found.lengths, found.waited) == ([0.5, 0.5], pytest.approx(1.0))
 
 
 def test_where_the_durations_jump_the_best_is_not_known() -> None:

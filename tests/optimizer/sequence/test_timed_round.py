@@ -21,8 +21,10 @@ from optimizer.problem.work_round import WorkRound
 from optimizer.sequence.round_search import RoundSearch
 from optimizer.sequence.round_solution import RoundSolution
 from optimizer.sequence.time_sharing import TimeSharing
+from optimizer.sequence.time_sharing import duration_of as duration_of_all
+from optimizer.sequence.timed_round import TimedSearch
 from optimizer.sequence.ways import layers_of
-from tests.optimizer.clocks import CountingClock
+from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.moves import AMPLE, fixed, torques
 from tests.optimizer.sequence.rounds import HOME, pick_and_place
 from tests.optimizer.sequence.test_optimize_round import assert_true
@@ -251,6 +253,16 @@ def test_a_place_to_wait_must_be_one() -> None:
     with pytest.raises(InvalidProblem) as refusal:
         replace(ASKED, wait="nowhere")
     assert refusal.value.field == "wait"
+
+
+def test_the_fastest_round_is_no_slower_than_ours_at_full_speed() -> None:
+    search = RoundSearch(ASKED, still)
+    own = search.run()
+    timing = TimedSearch(search, duration_of(LONGER))
+    found, ours = timing.fastest_round(), timing.fastest(own)
+    assert found is not None and ours is not None
+    assert duration_of_all(found[1]) <= duration_of_all(ours) * (1 + CONVERGED)
+    assert shortest() == pytest.approx(duration_of_all(found[1]) + ASKED.dwelling, rel=CONVERGED)
 
 
 REFUSALS = {"no time": DeadlineExceeded([]), "no motion": NoTrajectory([])}
