@@ -16,7 +16,7 @@ from optimizer.collision.model import collision_model
 from optimizer.deadline import checkpoint
 from optimizer.energy.dwell import dwell_energy, holding_power
 from optimizer.energy.limited_torque import limited_torque
-from optimizer.energy.losses import breakdown, relative_error
+from optimizer.energy.losses import breakdown, friction_torque, relative_error
 from optimizer.kinematics.orientation_tolerance import excess_angle
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.kinematics.tcp import T_last_tcp
@@ -94,6 +94,7 @@ class _Replay:
             np.ascontiguousarray(curve(self.t, order, extrapolate=False)) for order in range(4)
         )
         self.tau = self.torques(self.q, self.v, self.a)
+        self._lost = friction_torque(arm.friction_law, arm.drives, self.tau, self.v, self.a)
 
     def torques(self, q: Array, v: Array, a: Array) -> Array:
         """Rigid body and rotor torques (k, nq) [N·m]: Pinocchio's recursion adds armature · a."""
@@ -117,7 +118,7 @@ class _Replay:
         ]
         gain_potential, gain_kinetic = (after - before for before, after in zip(*ends, strict=True))
         weights = simpson_weights(self.t)
-        return breakdown(weights, self.v, self.a, self.tau, gain_potential, self.arm, kinetic=gain_kinetic)
+        return breakdown(weights, self.v, self.a, self.tau, gain_potential, self.arm, gain_kinetic, self._lost)
 
     @property
     def final_holding_power(self) -> float:
@@ -128,7 +129,7 @@ class _Replay:
     @property
     def limit_ratios(self) -> dict[str, float]:
         """The worst value / limit of position, velocity, acceleration, jerk and torque."""
-        tau_limited = limited_torque(self.arm, self.tau, self.v, self.a)
+        tau_limited = limited_torque(self.arm, self.tau, self.v, self.a, self._lost)
         return limit_ratios(self.arm.active_limits, self.q, self.v, self.a, self.jerk, tau_limited)
 
     @property

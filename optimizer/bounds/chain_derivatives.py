@@ -31,8 +31,18 @@ from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.kinematics.vectors import cross
 from optimizer.problem.arm import Arm
 
-# chains whose inertia's terms are kept
-_MOST_KEPT = 8
+# chains of which the inertia's terms, and bounds of several orders, are kept
+_MOST_KEPT, _BOUNDS_KEPT = 8, 32
+
+
+def _digest(chain: ChainDerivatives) -> bytes:
+    """What the inertia depends on."""
+    return b"".join(each.tobytes() for each in (chain.placements, chain.mass, chain.lever, chain.inertia))
+
+
+def _by_order(chain: ChainDerivatives, order: int) -> tuple[int, bytes]:
+    """What a bound on derivatives depends on."""
+    return order, _digest(chain) + chain.gravity.tobytes()
 
 
 @dataclass(frozen=True)
@@ -79,6 +89,7 @@ class ChainDerivatives:
                 reach[i, j] = np.linalg.norm(self.lever[i]) + lengths[j:i].sum()
         return reach
 
+    @cached(LRUCache(_BOUNDS_KEPT), key=_by_order, lock=threading.Lock())
     def potential_bound(self, order: int) -> Array:
         """Bounds (nq,) * order [J] on the derivatives of the potential energy by that many joints."""
         moments = np.array([self.mass[j:] @ self._reach[j:, j] for j in range(self.nq)])
@@ -87,6 +98,7 @@ class ChainDerivatives:
         joints = np.indices((self.nq,) * order)
         return np.asarray(leading[joints.min(axis=0)] * moments[joints.max(axis=0)])
 
+    @cached(LRUCache(_BOUNDS_KEPT), key=_by_order, lock=threading.Lock())
     def inertia_bound(self, order: int) -> Array:
         """Bounds (nq,) * order + (nq, nq) [kg·m²] on the derivatives of M_jk by `order` ≥ 1 joints."""
         joints = np.indices((self.nq,) * (order + 2))
@@ -141,11 +153,6 @@ class ChainDerivatives:
         rotations = frames[..., :3, :3]
         centres = frames[..., :3, 3] + (rotations @ self.lever[:, :, None])[..., 0]
         return np.ascontiguousarray(rotations[..., 2]), np.ascontiguousarray(frames[..., :3, 3]), rotations, centres
-
-
-def _digest(chain: ChainDerivatives) -> bytes:
-    """What the inertia depends on."""
-    return b"".join(each.tobytes() for each in (chain.placements, chain.mass, chain.lever, chain.inertia))
 
 
 @cached(LRUCache(_MOST_KEPT), key=_digest, lock=threading.Lock())

@@ -126,8 +126,7 @@ class HoldingBound:
 
     def _tried(self, line: Line, half: Array, edges: Array, eta: Array, deficit: float) -> Planes:
         """The bounds of one line, (1, …), with each of the shares of the multipliers."""
-        many = np.zeros(len(SCALES), dtype=np.intp)
-        cells, half = Cells(self, line[many], edges[many], eta[many]), half[many]
+        cells = Cells(self, line, edges, eta)
         return cells.planes(cells.omega(_Choice(SCALES[:, None], ALONE[:, None]), half), half, deficit)
 
 

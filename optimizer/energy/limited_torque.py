@@ -13,19 +13,20 @@ from optimizer.energy.losses import friction_torque
 from optimizer.problem.arm import Arm
 
 
-def limited_parts(arm: Arm, tau: Array, v: Array, a: Array) -> tuple[Array, Array]:
+def limited_parts(arm: Arm, tau: Array, v: Array, a: Array, lost: Array | None = None) -> tuple[Array, Array]:
     """The parts (k, nq) [N·m] of the limited torque that are smooth, and the friction in it.
 
-    `tau` is rigid body and rotor torque at speeds v [rad/s] and accelerations a [rad/s²], all (k, nq).
+    `tau` is rigid body and rotor torque at speeds v [rad/s] and accelerations a [rad/s²], `lost` friction's torque if
+    it is known, all (k, nq).
     """
     if arm.robot.torque_side == "link":
         return tau - arm.drives.rotor_inertia * a, np.zeros_like(tau)
-    return tau, friction_torque(arm.friction_law, arm.drives, tau, v, a)
+    return tau, friction_torque(arm.friction_law, arm.drives, tau, v, a) if lost is None else lost
 
 
-def limited_torque(arm: Arm, tau: Array, v: Array, a: Array) -> Array:
+def limited_torque(arm: Arm, tau: Array, v: Array, a: Array, lost: Array | None = None) -> Array:
     """The torque (k, nq) [N·m] that the limit is for: see `limited_parts`."""
-    smooth, friction = limited_parts(arm, tau, v, a)
+    smooth, friction = limited_parts(arm, tau, v, a, lost)
     return smooth + friction
 
 

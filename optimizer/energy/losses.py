@@ -87,17 +87,26 @@ def drawn_power(net: Any, regeneration: Any, width: Any = 0.0, xp: Any = np) -> 
 
 
 def breakdown(
-    weights: Array, v: Array, a: Array, tau: Array, potential: float, arm: Arm, kinetic: float = 0.0
+    weights: Array,
+    v: Array,
+    a: Array,
+    tau: Array,
+    potential: float,
+    arm: Arm,
+    kinetic: float = 0.0,
+    lost: Array | None = None,
 ) -> Energy:
     """Energy of a motion of an arm from its samples, in order of time.
 
     `weights` (k,) [s] are those of the quadrature; they add up to the duration. v [rad/s], a [rad/s²] and tau [N·m]
     (k, nq) are the samples; tau are torques of rigid body and rotor, without friction. `potential` and `kinetic` [J]
-    are the gains of energy from the first to the last state, known without quadrature. A part that is zero is 0.0,
-    never -0.0.
+    are the gains of energy from the first to the last state, known without quadrature. `lost` (k, nq) [N·m] are the
+    friction torques if they are known. A part that is zero is 0.0, never -0.0.
     """
     duration = float(weights.sum())
-    flow = power_flow(tau, v, a, arm.drives, arm.friction_law)
+    if lost is None:
+        lost = friction_torque(arm.friction_law, arm.drives, tau, v, a)
+    flow = flow_with(lost, tau, v, arm.drives)
     bus, joints = arm.bus, flow.joints
     flows = exchange(bus, arm.regeneration, arm.base_power, joints, weights)
     surplus, charged = float(flows.surplus.sum()), float(flows.charged.sum())

@@ -16,7 +16,7 @@ from optimizer.energy.interval import arm_spread
 from optimizer.energy.kernel import Kernel, kernel_for
 from optimizer.energy.kernel_expressions import Parameters
 from optimizer.energy.limited_torque import limited_torque
-from optimizer.energy.losses import breakdown, power_flow
+from optimizer.energy.losses import breakdown, friction_torque, power_flow
 from optimizer.energy.sensitivity import energy_sensitivity
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.problem.arm import Arm
@@ -24,8 +24,8 @@ from optimizer.solution import Energy, Sensitivity, Trajectory
 from optimizer.trajectories.spline import Spline, fine_samples, sample
 
 Found = TypeVar("Found")
-# quadrature weights (k,) [s], and q, v, a, torques (k, nq) of a motion
-ReportSamples = tuple[Array, Array, Array, Array, Array]
+# quadrature weights (k,) [s], and q, v, a, torques and friction's torques (k, nq) of a motion
+ReportSamples = tuple[Array, Array, Array, Array, Array, Array]
 
 # smoothing in the optimiser's cost: the reversal of friction [rad/s], the corner of the load that friction grows with
 # as a share of the robot's torque limit, and the corners of |power| [W]
@@ -168,14 +168,15 @@ class Plant:
         return self._last_energy.of(spline, self._computed_energy)
 
     def _computed_energy(self, spline: Spline) -> Energy:
-        weights, _, v, a, tau = self._report_samples(spline)
+        weights, _, v, a, tau, lost = self._report_samples(spline)
         ends = spline.control_points
         change = self.potential(ends[-1]) - self.potential(ends[0])
-        return breakdown(weights, v, a, tau, change, self.arm)
+        return breakdown(weights, v, a, tau, change, self.arm, lost=lost)
 
     def sensitivity(self, spline: Spline) -> Sensitivity:
         """How the electrical energy of a spline motion hangs on the arm's figures."""
-        return energy_sensitivity(*self._report_samples(spline), self.arm, arm_spread(self.arm))
+        weights, q, v, a, tau, lost = self._report_samples(spline)
+        return energy_sensitivity(weights, q, v, a, tau, self.arm, arm_spread(self.arm), lost)
 
     def _report_samples(self, spline: Spline) -> ReportSamples:
         """Samples of a motion for reported figures."""
@@ -183,7 +184,8 @@ class Plant:
 
     def _computed_samples(self, spline: Spline) -> ReportSamples:
         weights, q, v, a = fine_samples(spline, REPORT_NODES)
-        return weights, q, v, a, self.torques(q, v, a)
+        tau = self.torques(q, v, a)
+        return weights, q, v, a, tau, friction_torque(self.friction, self.arm.drives, tau, v, a)
 
     @cached_property
     def _last_energy(self) -> _OfTheLast[Energy]:

@@ -37,10 +37,10 @@ _CERTAIN = 1e-9
 
 
 def energy_sensitivity(
-    weights: Array, q: Array, v: Array, a: Array, tau: Array, arm: Arm, spread: Spread
+    weights: Array, q: Array, v: Array, a: Array, tau: Array, arm: Arm, spread: Spread, lost: Array | None = None
 ) -> Sensitivity:
     """That of a motion to the errors of `spread`; q (k, nq) [rad], the other arguments as in `losses.breakdown`."""
-    rates, by_link, joints = _power_rates(q, v, a, tau, arm, spread)
+    rates, by_link, joints = _power_rates(q, v, a, tau, arm, spread, lost)
     size, figures, nq = rates.shape
     base, behind = np.full(size, arm.base_power), count(nq)
     if arm.bus.mode == "isolated":
@@ -96,11 +96,13 @@ def _taken(arm: Arm, joints: Array, weights: Array) -> Array:
     return np.where((flows.charged > 0) & (flows.surplus <= _STORED * flows.charged), arm.bus.efficiency, taken)
 
 
-def _power_rates(q: Array, v: Array, a: Array, tau: Array, arm: Arm, spread: Spread) -> tuple[Array, Array, Array]:
+def _power_rates(
+    q: Array, v: Array, a: Array, tau: Array, arm: Arm, spread: Spread, lost: Array | None = None
+) -> tuple[Array, Array, Array]:
     """Derivatives (k, c, nq) of each joint's power by its figures in PER_JOINT, those (k, nq, p) by the parameters of
     all links, of which p = 0 have errors where the links are known, and the power (k, nq) itself [W]."""
     drives, law = arm.drives, arm.friction_law
-    u = tau + friction_torque(law, drives, tau, v, a)
+    u = tau + (friction_torque(law, drives, tau, v, a) if lost is None else lost)
     i = u / drives.torque_constant
     size, square = np.abs(i), i * i
     linear, quadratic = drives.inverter_linear, drives.copper + drives.inverter_quadratic
@@ -123,7 +125,10 @@ def _power_rates(q: Array, v: Array, a: Array, tau: Array, arm: Arm, spread: Spr
         "inverter_quadratic": square,
     }
     by_link = by_rigid[:, :, None] * _of_links(q, v, a, arm, spread)
-    return np.stack([rates[name] for name in PER_JOINT], axis=1), by_link, joints
+    each = np.empty((len(v), len(PER_JOINT), v.shape[1]))
+    for k, name in enumerate(PER_JOINT):
+        each[:, k] = rates[name]
+    return each, by_link, joints
 
 
 def _of_links(q: Array, v: Array, a: Array, arm: Arm, spread: Spread) -> Array:

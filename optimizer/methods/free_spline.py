@@ -44,8 +44,9 @@ POLISHED = 1.05
 WAY_OUT = 1.12
 # relative decrease of the cost that a further step must promise in a solve whose motion is followed to sharper corners
 CORNERED_PROGRESS = 5e-2
-# the same where clearances hold a motion: further steps would take some 5 % of the time, and save 0.01 % of the energy
-NEAR_PROGRESS = 2e-4
+# the same in a solve from a known motion: further steps would take some 5 % of the time, and save 0.002 % of the
+# energy, 0.01 % where clearances hold the motion
+FINE_PROGRESS = 2e-4
 
 
 class FreeSpline(SqpMethod):
@@ -189,7 +190,7 @@ class FreeSpline(SqpMethod):
         """From a guess near samples q (k, nq) of a motion."""
         # without clearance constraints, a motion from a planned path would return to the obstacle
         near = self.prepared.surroundings.is_near_contact(q)
-        progress = max(guess.progress, NEAR_PROGRESS) if near else guess.progress
+        progress = max(guess.progress, FINE_PROGRESS)
         result = self.improve(replace(guess, collision_free=near, progress=progress))
         planned = result.spline is not None and self.is_from_planned_path
         return replace(result, reason=f"{result.reason}{FROM_PLANNED_PATH}") if planned else result

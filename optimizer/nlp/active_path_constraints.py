@@ -42,6 +42,9 @@ class NearPathConstraints:
         return NearPathConstraints(self.points[chosen], self.columns[chosen], self.ratio[chosen], self.slack[chosen])
 
 
+_NONE_NEAR = NearPathConstraints(*(np.zeros(0, dtype=kind) for kind in (np.intp, np.intp, float, float)))
+
+
 @dataclass(frozen=True)
 class PathConstraintRows:
     """Path constraints of one NLP as functions of its decision variables: free control points s (m, r), duration T.
@@ -77,6 +80,8 @@ class PathConstraintRows:
 
     def near(self, values: PathConstraintValues, near: float) -> NearPathConstraints:
         """The constraints whose ratio exceeds `near` times its bound."""
+        if self.constraints is None:
+            return _NONE_NEAR
         ratio = values.ratios.value
         k, c = np.unravel_index(np.flatnonzero(ratio > near * self.bounds), ratio.shape)
         found = ratio[k, c]
@@ -84,8 +89,6 @@ class PathConstraintRows:
 
     def gradients(self, values: PathConstraintValues, T: float, of: NearPathConstraints) -> Array:
         """Gradients (rows, n) by (s, T) of some constraints."""
-        if self.constraints is None:
-            return np.zeros((0, self.n))
         k, c = of.points, of.columns
         by_q, by_v = values.ratios.by_q[k, c], values.ratios.by_v[k, c]
         at, rising = self.at_path_free[:, k, :, None]

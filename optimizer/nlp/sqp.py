@@ -174,7 +174,8 @@ class _Solver:
                 status = SqpStatus.OUT_OF_TIME
                 break
             qp = self._qp_inputs()
-            step = self.qp.solve(qp, self.rounds)
+            feasible = float(self.at.violation.max()) < FEASIBILITY
+            step = self.qp.solve(qp, self.rounds, enough=self.progress if feasible else -np.inf)
             if step is None:
                 status = SqpStatus.INFEASIBLE
                 break
@@ -187,7 +188,6 @@ class _Solver:
             Hdx, slope = qp.hessian(step.x), float(qp.gradient @ step.x)
             stationarity = float(np.abs(Hdx).max())
             promised = -slope - 0.5 * float(step.x @ Hdx)
-            feasible = float(self.at.violation.max()) < FEASIBILITY
             if feasible and promised < self.progress:
                 status = SqpStatus.SOLVED
                 break
@@ -245,8 +245,9 @@ class _Solver:
         """The QP at the iterate: the Lagrangian's Hessian made positive definite, and the cost's gradient, scaled."""
         at, n = self.at, self.qp.n
         g = self.line.gradient[:n] * self.scale * self.cost_scale
-        bent = self.p.path_rows.hessian(at.path_values, at.T, self.multipliers.path)
-        H = (self.line.hessian + bent) * self.cost_scale
+        H = self.line.hessian * self.cost_scale
+        if self.p.path is not None:
+            H += self.p.path_rows.hessian(at.path_values, at.T, self.multipliers.path) * self.cost_scale
         H[-1, -1] += self.multipliers.curvature
         H = H[:n, :n] * np.outer(self.scale, self.scale)
         if at.held is None:

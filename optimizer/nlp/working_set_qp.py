@@ -107,8 +107,12 @@ class WorkingSetQP:
         """Limits on the first to third derivative of s by τ, (3, r), for the duration T [s]."""
         return np.asarray(self.p.limits.rates * (T**self._orders)[:, None])
 
-    def solve(self, at: QPInputs, rounds: int) -> QPStep | None:
-        """The step; None if even the relaxed QP has no solution."""
+    def solve(self, at: QPInputs, rounds: int, enough: float = -np.inf) -> QPStep | None:
+        """The step; None if even the relaxed QP has no solution.
+
+        A solution that promises a relative decrease of the cost below `enough` is the step as it is: further
+        constraints let it promise only less.
+        """
         torque = self._torque_rows(at)
         rows, bounds = QPRows(at.whitening, at.ratio.shape), np.array(self._bounds(at.free, at.T))
         self._add_goal(rows, at.free)
@@ -133,7 +137,8 @@ class WorkingSetQP:
                 path = self._add_path(rows, at, path, np.ones(len(path.slack), dtype=bool))
                 continue
             x = at.whitening @ y
-            if attempt >= last:
+            # the Hessian is the identity in y
+            if attempt >= last or -float(gradient @ y) - 0.5 * float(y @ y) < enough:
                 break
             if self._adds_bounds(rows, bounds, x):
                 continue
@@ -161,6 +166,8 @@ class WorkingSetQP:
     def _first_path_rows(self, rows: QPRows, at: QPInputs) -> NearPathConstraints:
         """Adds the path constraints that the QP is first solved with, and returns the others that are near."""
         near = self.p.path_rows.near(at.path_values, NEAR_PATH)
+        if not len(near.slack):
+            return near
         at_once = np.ones(len(near.slack), dtype=bool)
         if self.p.has_clearance:
             at_once = (near.ratio > NEAR_CLEARANCE * (near.ratio + near.slack)) | self._passed[

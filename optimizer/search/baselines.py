@@ -22,7 +22,7 @@ from models.robot import Array
 from optimizer.energy.dwell import dwell_energy, holding_power, waits
 from optimizer.energy.interval import Known, arm_spread, saving_intervals
 from optimizer.energy.limited_torque import limited_torque
-from optimizer.energy.losses import breakdown
+from optimizer.energy.losses import breakdown, friction_torque
 from optimizer.energy.sensitivity import energy_sensitivity, waiting_sensitivity
 from optimizer.problem.problem import Problem
 from optimizer.solution import Baseline, BaselineName, Energy
@@ -79,21 +79,23 @@ def compared(
 
     `broken` are the limits along the path that it breaks, and what collides, in words.
     """
-    energy = motion_energy(problem, motion, tau, potential)
-    spread = arm_spread(problem.arm)
-    sensitivity = energy_sensitivity(motion.weights, motion.q, motion.v, motion.a, tau, problem.arm, spread)
+    arm = problem.arm
+    lost = friction_torque(arm.friction_law, arm.drives, tau, motion.v, motion.a)
+    energy = motion_energy(problem, motion, tau, potential, lost)
+    spread = arm_spread(arm)
+    sensitivity = energy_sensitivity(motion.weights, motion.q, motion.v, motion.a, tau, arm, spread, lost)
     if problem.cycle is not None:
-        hold = float(holding_power(problem.arm, held))
-        energy = energy.with_dwell(dwell_energy(problem.cycle, problem.arm, hold, motion.duration))
+        hold = float(holding_power(arm, held))
+        energy = energy.with_dwell(dwell_energy(problem.cycle, arm, hold, motion.duration))
         times = waits(problem.cycle, motion.duration)
-        sensitivity += waiting_sensitivity(problem.arm, motion.q[-1], held, *times, problem.cycle, spread)
+        sensitivity += waiting_sensitivity(arm, motion.q[-1], held, *times, problem.cycle, spread)
     return Baseline(
         name=name,
         duration=motion.duration,
         electrical=energy.electrical.total,
         mechanical=energy.mechanical.total,
         saving=saving(ours, energy.of(problem.objective)),
-        reason="; ".join([*broken_limits(problem, motion, tau), *broken]) or None,
+        reason="; ".join([*broken_limits(problem, motion, tau, lost), *broken]) or None,
         sensitivity=sensitivity,
     )
 
@@ -139,21 +141,27 @@ def saving(ours: float, theirs: float) -> float:
     return (theirs - ours) / abs(theirs) if theirs else 0.0
 
 
-def motion_energy(problem: Problem, motion: SampledMotion, tau: Array, potential: Callable[[Array], float]) -> Energy:
-    """Breakdown of a motion that begins and ends at rest, waiting left out, from its torques (k, nq)."""
-    return breakdown(
-        motion.weights, motion.v, motion.a, tau, potential(motion.q[-1]) - potential(motion.q[0]), problem.arm
-    )
+def motion_energy(
+    problem: Problem,
+    motion: SampledMotion,
+    tau: Array,
+    potential: Callable[[Array], float],
+    lost: Array | None = None,
+) -> Energy:
+    """Breakdown of a motion that begins and ends at rest, waiting left out, from its torques (k, nq); `lost` (k, nq)
+    are those of friction if they are known."""
+    gain = potential(motion.q[-1]) - potential(motion.q[0])
+    return breakdown(motion.weights, motion.v, motion.a, tau, gain, problem.arm, lost=lost)
 
 
-def broken_limits(problem: Problem, motion: SampledMotion, tau: Array) -> list[str]:
+def broken_limits(problem: Problem, motion: SampledMotion, tau: Array, lost: Array | None = None) -> list[str]:
     """The limits that a motion breaks, in words: its exact peaks of the rates, positions and torques at its samples.
 
-    A motion that takes longer than the cycle breaks it, too.
+    `lost` as of `motion_energy`. A motion that takes longer than the cycle breaks it, too.
     """
     late = problem.cycle is not None and motion.duration > problem.cycle.time * (1 + RATIO_TOLERANCE)
     limits = problem.arm.active_limits
-    tau_limited = limited_torque(problem.arm, tau, motion.v, motion.a)
+    tau_limited = limited_torque(problem.arm, tau, motion.v, motion.a, lost)
     jerk = np.where(np.isfinite(limits.j_max), motion.peak_jerk, 0.0)  # where none is in force, unbounded jerk is fine
     ratios = limit_ratios(limits, motion.q, motion.peak_v, motion.peak_a, jerk, tau_limited)
     return [

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,9 @@ from optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
 from optimizer.nlp.working_set_qp import MOST_ROUNDS, NEAR, QPInputs, WorkingSetQP
 from tests.optimizer.moves import GOAL, START
 from tests.optimizer.nlp.test_sqp import program, quintic, shortest
+
+# of promises of about 0.1, by DAQP
+ROUNDING = 1e-8
 
 
 def inputs_at(p: NonlinearProgram, qp: WorkingSetQP, free: Array, rng: np.random.Generator) -> QPInputs:
@@ -57,3 +62,28 @@ def test_no_limit_has_two_rows(share: float) -> None:
         assert step is not None and (share > 1 or step.relaxed)
         # the lower and the upper one of a point
         assert np.unique(np.array(step.places), axis=1, return_counts=True)[1].max() <= 2
+
+
+def test_further_constraints_let_a_step_promise_less() -> None:
+    """So that a QP may end with its first solution if even this promises too little, and only then."""
+    duration = 1.2 * shortest(START, GOAL)
+    p = program(START, GOAL, duration_max=duration, duration_min=duration)
+    rng = np.random.default_rng(9)
+    ended = 0
+    for _ in range(20):
+        free = quintic(p) + 0.02 * rng.normal(size=(p.free_count, p.r))
+        inputs = inputs_at(p, WorkingSetQP(p, duration), free, rng)
+        # no step so long that a bound shortens it
+        inputs = replace(inputs, gradient=0.1 * inputs.gradient)
+
+        def promised(rounds: int, enough: float = -np.inf, inputs: QPInputs = inputs) -> float:
+            step = WorkingSetQP(p, duration).solve(inputs, rounds, enough)
+            assert step is not None and not step.relaxed
+            return -float(inputs.gradient @ step.x) - 0.5 * float(step.x @ inputs.hessian(step.x))
+
+        first, last = promised(1), promised(MOST_ROUNDS)
+        assert last <= first + ROUNDING
+        assert promised(MOST_ROUNDS, enough=last - ROUNDING) == pytest.approx(last, abs=ROUNDING)
+        assert promised(MOST_ROUNDS, enough=first + ROUNDING) == pytest.approx(first, abs=ROUNDING)
+        ended += last < 0.9 * first
+    assert ended
