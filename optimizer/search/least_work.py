@@ -43,6 +43,11 @@ COARSE_PROGRESS, RESTART_PROGRESS, MIDDLE_PROGRESS = 2e-2, 2e-3, 2e-3
 BEHIND = 1.4
 # those that need at most this ratio of the least work on few control points are solved on more of them, and so many
 CONTENDING, CONTENDERS = 1.35, 8
+# half of the random guesses end far above the others: those that need more than this ratio of the least work on few
+# control points hardly ever become the best on more, which takes longest from there
+HOPELESS = 1.6
+# guesses have helped if a motion from one needs less than this ratio of the least work before
+HELPFUL = 0.99
 # motions without collisions that need at most this ratio of the least are followed, and so many
 NEAR_BEST, RIVALS = 1.05, 6
 # width of their corners [W] at first
@@ -90,10 +95,11 @@ def explore_least_work(incumbent: Incumbent, explore: Callable[[], object]) -> b
 
 @dataclass(frozen=True)
 class _Effort:
-    """`restarts`: random guesses of the best candidate; `sharpened`: how many of all motions get sharp corners, if they
-    need at most `near` times the least before."""
+    """`restarts`: most random guesses of the best candidate, `at_once` of them before it is asked whether they help;
+    `sharpened`: how many of all motions get sharp corners, if they need at most `near` times the least before."""
 
     restarts: int
+    at_once: int
     sharpened: int
     near: float
 
@@ -101,7 +107,7 @@ class _Effort:
 # The motion of least work often is a wide swing. Some percent of the guesses lead to it, and on few control points it
 # does not stand out. Rough motions within some percent do not tell which needs the least once its corners are sharp.
 # Where there are several candidates, finding the best of them has taken time already
-SOLE, SEVERAL = _Effort(32, 4, 1.03), _Effort(8, 1, 1.0)
+SOLE, SEVERAL = _Effort(32, 32, 4, 1.03), _Effort(32, 8, 1, 1.0)
 
 
 @dataclass(eq=False)
@@ -125,11 +131,22 @@ class _LeastWork:
         contenders = [each for each in self._known() if each.work <= CONTENDING * least][:CONTENDERS]
         contenders = self._note(self.work.solved(contenders, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND))
         effort = SOLE if len(contenders) == 1 else SEVERAL
-        again = self.work.random(contenders[0].candidate, effort.restarts)
-        again = self.work.solved(again, COARSE, WIDTH, RESTART_PROGRESS, BEHIND)
-        again = self._note(self.work.solved(again, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND))
+        again = self._restarted(contenders[0], effort)
         self._follow(self._clear(sorted([*contenders, *again], key=lambda each: each.work)), effort)
         self._solve_promising()
+
+    def _restarted(self, best: Rough, effort: _Effort) -> list[Rough]:
+        """Motions from random guesses of the best candidate; the first guesses, then others as long as they help."""
+        guesses, found, least = self.work.random(best.candidate, effort.restarts), list[Rough](), best.work
+        for k in range(0, len(guesses), effort.at_once):
+            coarse = self.work.solved(guesses[k : k + effort.at_once], COARSE, WIDTH, RESTART_PROGRESS, BEHIND)
+            worth = [each for each in coarse if each.work <= HOPELESS * least]
+            middle = self._note(self.work.solved(worth, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND))
+            found += middle
+            before, least = least, min([least, *(each.work for each in middle)])
+            if least > HELPFUL * before:
+                break
+        return found
 
     def _screen(self) -> None:
         """Rough motions of one member of each family, then of the best families' others."""
