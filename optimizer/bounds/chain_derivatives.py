@@ -96,7 +96,7 @@ class ChainDerivatives:
         leading = np.full(self.nq, np.linalg.norm(self.gravity))
         leading[0] = np.linalg.norm(np.cross(self.gravity, self.placements[0, :3, 2]))
         joints = np.indices((self.nq,) * order)
-        return np.asarray(leading[joints.min(axis=0)] * moments[joints.max(axis=0)])
+        return _shared(leading[joints.min(axis=0)] * moments[joints.max(axis=0)])
 
     @cached(LRUCache(_BOUNDS_KEPT), key=_by_order, lock=threading.Lock())
     def inertia_bound(self, order: int) -> Array:
@@ -119,7 +119,7 @@ class ChainDerivatives:
                 products += self._reach[i][first] * self._reach[i][second]
             own = self.mass[i] * products + 2.0**order * principal[i]
             bound += np.where(changes & (last <= i), own, 0.0)
-        return bound if self._spectrum is None else np.minimum(bound, self._spectrum.bound(order))
+        return _shared(bound if self._spectrum is None else np.minimum(bound, self._spectrum.bound(order)))
 
     @cached_property
     def _spectrum(self) -> InertiaSpectrum | None:
@@ -159,6 +159,12 @@ class ChainDerivatives:
 def _spectrum_of(chain: ChainDerivatives) -> InertiaSpectrum | None:
     """The terms of the inertia, kept for the chains last seen: they take as long as a request."""
     return InertiaSpectrum.of(chain.joint_inertia, chain.nq)
+
+
+def _shared(bound: Array) -> Array:
+    """The array, which nobody can change."""
+    bound.flags.writeable = False
+    return bound
 
 
 def _from_outside(each: Array) -> Array:
