@@ -5,24 +5,22 @@ from __future__ import annotations
 import threading
 
 import pinocchio as pin
-from cachetools import LRUCache
+from cachetools import LRUCache, cached
 
 from optimizer.problem.arm import Arm
 
-# models of the arms last asked for: an answer asks for its arm's several times, and a copy takes a third of a
-# millisecond. An arm has arrays, and no hash
-_kept: LRUCache[int, tuple[Arm, pin.Model]] = LRUCache(4)
-_lock = threading.Lock()
+# arms whose models are kept: an answer asks for its arm's several times, and a copy takes a third of a millisecond
+_MOST_KEPT = 4
 
 
 def rigid_body_model(arm: Arm) -> pin.Model:
-    """Pinocchio model of the arm with payload, gravity and scaled link masses. It may be shared: it is not changed."""
-    with _lock:
-        known = _kept.get(id(arm))
-    if known is not None and known[0] is arm:
-        return known[1]
+    """Pinocchio model of the arm with payload, gravity and scaled link masses. Others may have it too: do not change
+    it."""
+    return _with_model(arm)[1]
+
+
+@cached(LRUCache(_MOST_KEPT), key=id, lock=threading.Lock())
+def _with_model(arm: Arm) -> tuple[Arm, pin.Model]:
+    """The arm, so that no other one gets its id as long as it is kept, and its model."""
     payload = arm.payload
-    model = arm.robot.loaded_model(payload.mass, payload.com, payload.inertia, arm.gravity, arm.link_mass_scale)
-    with _lock:
-        _kept[id(arm)] = arm, model
-    return model
+    return arm, arm.robot.loaded_model(payload.mass, payload.com, payload.inertia, arm.gravity, arm.link_mass_scale)

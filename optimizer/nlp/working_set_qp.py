@@ -110,8 +110,8 @@ class WorkingSetQP:
     def solve(self, at: QPInputs, rounds: int, enough: float = -np.inf) -> QPStep | None:
         """The step; None if even the relaxed QP has no solution.
 
-        A solution that promises a relative decrease of the cost below `enough` is the step as it is: further
-        constraints let it promise only less.
+        It ends early with a solution that promises a relative decrease of the cost below `enough`: with further
+        constraints, the next one would promise less still.
         """
         torque = self._torque_rows(at)
         rows, bounds = QPRows(at.whitening, at.ratio.shape), np.array(self._bounds(at.free, at.T))

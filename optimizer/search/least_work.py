@@ -43,10 +43,10 @@ COARSE_PROGRESS, RESTART_PROGRESS, MIDDLE_PROGRESS = 2e-2, 2e-3, 2e-3
 BEHIND = 1.4
 # those that need at most this ratio of the least work on few control points are solved on more of them, and so many
 CONTENDING, CONTENDERS = 1.35, 8
-# half of the random guesses end far above the others: those that need more than this ratio of the least work on few
-# control points hardly ever become the best on more, which takes longest from there
+# motions from random guesses that need more than this ratio of the least work on few control points are dropped. Half
+# of them do: more control points take longest from there, and hardly ever make the best motion of one
 HOPELESS = 1.6
-# guesses have helped if a motion from one needs less than this ratio of the least work before
+# a batch of guesses has helped if a motion from one needs at most this ratio of the least work before
 HELPFUL = 0.99
 # motions without collisions that need at most this ratio of the least are followed, and so many
 NEAR_BEST, RIVALS = 1.05, 6
@@ -95,8 +95,8 @@ def explore_least_work(incumbent: Incumbent, explore: Callable[[], object]) -> b
 
 @dataclass(frozen=True)
 class _Effort:
-    """`restarts`: most random guesses of the best candidate, `at_once` of them before it is asked whether they help;
-    `sharpened`: how many of all motions get sharp corners, if they need at most `near` times the least before."""
+    """`restarts`: random guesses of the best candidate at most, in batches of `at_once`; one that does not help is the
+    last. `sharpened`: how many of all motions get sharp corners, if they need at most `near` times the least before."""
 
     restarts: int
     at_once: int
@@ -136,7 +136,7 @@ class _LeastWork:
         self._solve_promising()
 
     def _restarted(self, best: Rough, effort: _Effort) -> list[Rough]:
-        """Motions from random guesses of the best candidate; the first guesses, then others as long as they help."""
+        """Motions from random guesses of the best candidate, batch by batch as long as they help."""
         guesses, found, least = self.work.random(best.candidate, effort.restarts), list[Rough](), best.work
         for k in range(0, len(guesses), effort.at_once):
             coarse = self.work.solved(guesses[k : k + effort.at_once], COARSE, WIDTH, RESTART_PROGRESS, BEHIND)

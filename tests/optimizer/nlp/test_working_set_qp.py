@@ -17,6 +17,12 @@ from tests.optimizer.nlp.test_sqp import program, quintic, shortest
 ROUNDING = 1e-8
 
 
+def of_duration(share: float) -> NonlinearProgram:
+    """The program of a move whose duration is fixed, at this share of the shortest one."""
+    duration = share * shortest(START, GOAL)
+    return program(START, GOAL, duration_max=duration, duration_min=duration)
+
+
 def inputs_at(p: NonlinearProgram, qp: WorkingSetQP, free: Array, rng: np.random.Generator) -> QPInputs:
     """A QP with the identity as its Hessian and a random gradient, at free control points (m, r)."""
     one, duration = np.eye(qp.n), qp.time_scale
@@ -28,14 +34,13 @@ def inputs_at(p: NonlinearProgram, qp: WorkingSetQP, free: Array, rng: np.random
 
 def test_a_step_breaks_no_limit_on_the_other_side() -> None:
     """Of motions near their limits on one side, steps far to the other: linear predictions keep every limit."""
-    duration = 2.5 * shortest(START, GOAL)
-    p = program(START, GOAL, duration_max=duration, duration_min=duration)
+    p = of_duration(2.5)
     rng = np.random.default_rng(7)
     turned = 0
     for _ in range(20):
         free, noise = quintic(p), rng.normal(size=(p.free_count, p.r))
-        qp = WorkingSetQP(p, duration)
-        rates = qp.rates(duration)[:, :, None]
+        qp = WorkingSetQP(p, p.t_max)
+        rates = qp.rates(p.t_max)[:, :, None]
         scale = 0.5
         while np.abs(p.kinematics(free + scale * noise) / rates).max() > 0.95:
             scale *= 0.9
@@ -53,11 +58,10 @@ def test_a_step_breaks_no_limit_on_the_other_side() -> None:
 @pytest.mark.parametrize("share", [0.5, 0.9, 2.5])
 def test_no_limit_has_two_rows(share: float) -> None:
     """Also where the limits cannot be kept: a relaxed step breaks limits whose rows are there."""
-    duration = share * shortest(START, GOAL)
-    p = program(START, GOAL, duration_max=duration, duration_min=duration)
+    p = of_duration(share)
     rng = np.random.default_rng(8)
     for _ in range(10):
-        qp = WorkingSetQP(p, duration)
+        qp = WorkingSetQP(p, p.t_max)
         step = qp.solve(inputs_at(p, qp, quintic(p) + 0.05 * rng.normal(size=(p.free_count, p.r)), rng), MOST_ROUNDS)
         assert step is not None and (share > 1 or step.relaxed)
         # the lower and the upper one of a point
@@ -66,18 +70,17 @@ def test_no_limit_has_two_rows(share: float) -> None:
 
 def test_further_constraints_let_a_step_promise_less() -> None:
     """So that a QP may end with its first solution if even this promises too little, and only then."""
-    duration = 1.2 * shortest(START, GOAL)
-    p = program(START, GOAL, duration_max=duration, duration_min=duration)
+    p = of_duration(1.2)
     rng = np.random.default_rng(9)
     ended = 0
     for _ in range(20):
         free = quintic(p) + 0.02 * rng.normal(size=(p.free_count, p.r))
-        inputs = inputs_at(p, WorkingSetQP(p, duration), free, rng)
+        inputs = inputs_at(p, WorkingSetQP(p, p.t_max), free, rng)
         # no step so long that a bound shortens it
         inputs = replace(inputs, gradient=0.1 * inputs.gradient)
 
         def promised(rounds: int, enough: float = -np.inf, inputs: QPInputs = inputs) -> float:
-            step = WorkingSetQP(p, duration).solve(inputs, rounds, enough)
+            step = WorkingSetQP(p, p.t_max).solve(inputs, rounds, enough)
             assert step is not None and not step.relaxed
             return -float(inputs.gradient @ step.x) - 0.5 * float(step.x @ inputs.hessian(step.x))
 
