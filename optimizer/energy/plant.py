@@ -16,7 +16,7 @@ from optimizer.energy.interval import arm_spread
 from optimizer.energy.kernel import Kernel, kernel_for
 from optimizer.energy.kernel_expressions import Parameters
 from optimizer.energy.limited_torque import limited_torque
-from optimizer.energy.losses import breakdown, friction_torque, power_flow
+from optimizer.energy.losses import breakdown, flow_with, friction_torque, power_flow
 from optimizer.energy.sensitivity import energy_sensitivity
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.problem.arm import Arm
@@ -168,17 +168,17 @@ class Plant:
         return self._last_energy.of(spline, self._computed_energy)
 
     def _computed_energy(self, spline: Spline) -> Energy:
-        weights, _, v, a, tau, lost = self._report_samples(spline)
+        weights, _, v, a, tau, lost = self.report_samples(spline)
         ends = spline.control_points
         change = self.potential(ends[-1]) - self.potential(ends[0])
         return breakdown(weights, v, a, tau, change, self.arm, lost=lost)
 
     def sensitivity(self, spline: Spline) -> Sensitivity:
         """How the electrical energy of a spline motion hangs on the arm's figures."""
-        weights, q, v, a, tau, lost = self._report_samples(spline)
+        weights, q, v, a, tau, lost = self.report_samples(spline)
         return energy_sensitivity(weights, q, v, a, tau, self.arm, arm_spread(self.arm), lost)
 
-    def _report_samples(self, spline: Spline) -> ReportSamples:
+    def report_samples(self, spline: Spline) -> ReportSamples:
         """Samples of a motion for reported figures."""
         return self._last_samples.of(spline, self._computed_samples)
 
@@ -215,7 +215,7 @@ class Plant:
         """
         if self.arm.bus.mode != "storage":
             return np.zeros_like(t)
-        weights, q, v, a = fine_samples(spline, REPORT_NODES)
-        joints = power_flow(self.torques(q, v, a), v, a, self.arm.drives, self.friction).joints
+        weights, _, v, _, tau, lost = self.report_samples(spline)
+        joints = flow_with(lost, tau, v, self.arm.drives).joints
         charge = charges(self.arm.bus, weights * (self.arm.base_power + joints.sum(axis=1)), weights)
         return np.interp(t, np.append(0.0, weights.cumsum()), charge)

@@ -41,26 +41,26 @@ def energy_sensitivity(
 ) -> Sensitivity:
     """That of a motion to the errors of `spread`; q (k, nq) [rad], the other arguments as in `losses.breakdown`."""
     rates, by_link, joints = _power_rates(q, v, a, tau, arm, spread, lost)
-    size, figures, nq = rates.shape
+    figures, nq, size = rates.shape
     base, behind = np.full(size, arm.base_power), count(nq)
     if arm.bus.mode == "isolated":
         # by figure and joint, as PER_JOINT orders them
         root, mean = spread.root[1:behind].reshape(figures, nq, -1), spread.mean[1:behind].reshape(figures, nq)
-        means = joints + np.einsum("kcj,cj->kj", rates, mean) + by_link @ spread.mean[behind:]
-        factors = (rates.transpose(2, 0, 1) @ root.transpose(1, 0, 2)).transpose(1, 0, 2)
+        means = joints + np.einsum("cjk,cj->kj", rates, mean) + by_link @ spread.mean[behind:]
+        factors = (rates.transpose(1, 2, 0) @ root.transpose(1, 0, 2)).transpose(1, 0, 2)
         worth, expected = _expected(means, factors + by_link @ spread.root[behind:], np.zeros(nq))
         drawn, plain = base + spread.mean[0] + expected.sum(axis=1), base + np.maximum(joints, 0.0).sum(axis=1)
         electronics, watts = np.ones(size), weights[:, None] * worth
-        gradient = np.append(np.einsum("kj,kcj->cj", watts, rates).ravel(), np.einsum("kj,kjp->p", watts, by_link))
+        gradient = np.append(np.einsum("kj,cjk->cj", watts, rates).ravel(), np.einsum("kj,kjp->p", watts, by_link))
     else:
         net, taken = base + joints.sum(axis=1), _taken(arm, joints, weights)
-        flat = rates.reshape(size, -1)
+        flat = rates.reshape(-1, size)
         if by_link.shape[2]:
-            flat = np.hstack([flat, by_link.sum(axis=1)])
-        means = net + spread.mean[0] + flat @ spread.mean[1:]
-        electronics, drawn = _expected(means, flat @ spread.root[1:] + spread.root[0], taken)
+            flat = np.vstack([flat, by_link.sum(axis=1).T])
+        means = net + spread.mean[0] + spread.mean[1:] @ flat
+        electronics, drawn = _expected(means, flat.T @ spread.root[1:] + spread.root[0], taken)
         plain = np.maximum(net, 0.0) - taken * np.maximum(-net, 0.0)
-        gradient = (weights * electronics) @ flat
+        gradient = flat @ (weights * electronics)
     shift = float(weights @ (drawn - plain))
     return Sensitivity(np.append(float(weights @ electronics), gradient), shift)
 
@@ -73,7 +73,7 @@ def waiting_sensitivity(
     still = np.zeros((1, len(tau)))
     rates, by_link, _ = _power_rates(q[None], still, still, tau[None], arm, spread)
     electronics = motors + (brakes if cycle.brake_power is None else 0.0)
-    gradient = np.concatenate([[electronics], motors * rates[0].ravel(), motors * by_link[0].sum(axis=0)])
+    gradient = np.concatenate([[electronics], motors * rates.ravel(), motors * by_link[0].sum(axis=0)])
     return Sensitivity(gradient, float(gradient @ spread.mean))
 
 
@@ -99,24 +99,26 @@ def _taken(arm: Arm, joints: Array, weights: Array) -> Array:
 def _power_rates(
     q: Array, v: Array, a: Array, tau: Array, arm: Arm, spread: Spread, lost: Array | None = None
 ) -> tuple[Array, Array, Array]:
-    """Derivatives (k, c, nq) of each joint's power by its figures in PER_JOINT, those (k, nq, p) by the parameters of
+    """Derivatives (c, nq, k) of each joint's power by its figures in PER_JOINT, those (k, nq, p) by the parameters of
     all links, of which p = 0 have errors where the links are known, and the power (k, nq) itself [W]."""
     drives, law = arm.drives, arm.friction_law
-    u = tau + (friction_torque(law, drives, tau, v, a) if lost is None else lost)
+    if lost is None:
+        lost = friction_torque(law, drives, tau, v, a)
+    u = tau + lost
     i = u / drives.torque_constant
     size, square = np.abs(i), i * i
     linear, quadratic = drives.inverter_linear, drives.copper + drives.inverter_quadratic
     joints = u * v + quadratic * square + linear * size + drives.inverter_constant
     by_torque = v + (2 * quadratic * i + linear * np.sign(i)) / drives.torque_constant
-    step = by_torque * v / np.sqrt(v * v + law.knee * law.knee)
-    tau_rigid = tau - drives.rotor_inertia * a
-    by_rigid = by_torque if law.load is None else by_torque + law.load * step * np.sign(tau_rigid)
+    relative, tau_rigid = v / law.speed, tau - drives.rotor_inertia * a
+    viscous, step = by_torque * v, v / np.sqrt(v * v + law.knee * law.knee)
+    by_rigid = by_torque if law.load is None else by_torque * (1 + law.load * step * np.sign(tau_rigid))
     rates = {
-        "coulomb": step,
-        "curved": by_torque * np.arcsinh(v / law.speed),
-        "speed": -by_torque * law.curved * v / (law.speed * np.hypot(v, law.speed)),
-        "viscous": by_torque * v,
-        "load": step * np.abs(tau_rigid),
+        "coulomb": by_torque * step,
+        "curved": by_torque * np.arcsinh(relative),
+        "speed": -law.curved / law.speed**2 * viscous / np.sqrt(1 + relative * relative),
+        "viscous": viscous,
+        "load": by_torque * step * np.abs(tau_rigid),
         "torque_constant": -(2 * quadratic * square + linear * size) / drives.torque_constant,
         "rotor_inertia": by_torque * a,
         "copper": square,
@@ -125,10 +127,8 @@ def _power_rates(
         "inverter_quadratic": square,
     }
     by_link = by_rigid[:, :, None] * _of_links(q, v, a, arm, spread)
-    each = np.empty((len(v), len(PER_JOINT), v.shape[1]))
-    for k, name in enumerate(PER_JOINT):
-        each[:, k] = rates[name]
-    return each, by_link, joints
+    # samples last: what follows sums over them, or over the figures, of one joint
+    return np.array([rates[name].T for name in PER_JOINT]), by_link, joints
 
 
 def _of_links(q: Array, v: Array, a: Array, arm: Arm, spread: Spread) -> Array:

@@ -19,7 +19,7 @@ from optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.solution import Clearance
 from optimizer.trajectories.quadrature import grid
-from optimizer.trajectories.spline import Spline, fine_samples, peak_rates, retimed, sample, time_scale
+from optimizer.trajectories.spline import Spline, peak_rates, retimed, sample, time_scale
 
 # the NLP's limits are tighter than the problem's by this ratio, so that its tolerance stays within the problem's
 MARGIN = 2 * FEASIBILITY
@@ -33,8 +33,6 @@ TORQUE_REPAIR = 1.5
 POSITION_POINTS, POSITION_REPAIR, ROUNDING = 512, 1.5, 1e-9
 # the greatest time scale that replaces another solve
 MOST_TIME_SCALE = 1 + 5e-4
-# points per panel of a knot span at which torque is checked between the nodes
-TORQUE_POINTS = 4
 # a motion is checked at the quadrature points alone if its torques there, of rigid bodies and of friction with any
 # sign, stay below this ratio of the limits
 FAR_BELOW = 0.8
@@ -71,8 +69,9 @@ def torque_peaks(prepared: PreparedProblem, spline: Spline) -> Array:
 
     Those instants are left out of a motion that stays far from the torque limits.
     """
-    q, v, a = fine_samples(spline, TORQUE_POINTS)[1:]
-    smooth, friction = limited_parts(prepared.arm, prepared.torques(q, v, a), v, a)
+    # the samples of its energy, which is wanted next
+    _, _, v, a, tau, lost = prepared.report_samples(spline)
+    smooth, friction = limited_parts(prepared.arm, tau, v, a, lost)
     peaks = np.abs(smooth + friction).max(axis=0)
     most = np.abs(smooth).max(axis=0) + np.abs(friction).max(axis=0)
     if (most <= FAR_BELOW * prepared.problem.arm.active_limits.tau_max).all():

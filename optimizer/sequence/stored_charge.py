@@ -15,13 +15,13 @@ import numpy as np
 from models.robot import Array
 from optimizer.energy.bus_flow import BusFlow, charge_steps, charges, pooled
 from optimizer.energy.dwell import brake_power, holding_power, waits
-from optimizer.energy.losses import power_flow
-from optimizer.energy.plant import REPORT_NODES, Plant
+from optimizer.energy.losses import flow_with
+from optimizer.energy.plant import Plant
 from optimizer.problem.arm import Arm
 from optimizer.problem.bus import Bus
 from optimizer.problem.stops import PlannedMove
 from optimizer.problem.work_round import WorkRound
-from optimizer.trajectories.spline import Spline, fine_samples
+from optimizer.trajectories.spline import Spline
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,8 @@ class Demand:
     @classmethod
     def of_motion(cls, plant: Plant, spline: Spline) -> Demand:
         """That of a motion, in the intervals of its reported energy."""
-        weights, q, v, a = fine_samples(spline, REPORT_NODES)
-        joints = power_flow(plant.torques(q, v, a), v, a, plant.arm.drives, plant.friction).joints
+        weights, _, v, _, tau, lost = plant.report_samples(spline)
+        joints = flow_with(lost, tau, v, plant.arm.drives).joints
         return cls(weights * (plant.arm.base_power + joints.sum(axis=1)), weights)
 
     @classmethod

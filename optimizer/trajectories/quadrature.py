@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +19,12 @@ def _gauss_legendre(n: int) -> tuple[Array, Array]:
     return np.polynomial.legendre.leggauss(n)
 
 
+def _parts(counts: Indices) -> tuple[Indices, Indices]:
+    """For every part (k,) of intervals that are divided into `counts` (m,) parts: its interval, and its place there."""
+    interval = np.repeat(np.arange(len(counts)), counts)
+    return interval, np.arange(len(interval)) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
 def quadrature(knots: Array, per_panel: int, longest: float = np.inf) -> tuple[Array, Array]:
     """Gauss-Legendre points and weights (panels · per_panel,) over the knots' range.
 
@@ -27,11 +32,12 @@ def quadrature(knots: Array, per_panel: int, longest: float = np.inf) -> tuple[A
     """
     x, w = _gauss_legendre(per_panel)
     spans = np.unique(knots)
-    if np.diff(spans).max() > longest:
-        parts = [np.linspace(a, b, math.ceil((b - a) / longest), endpoint=False) for a, b in pairwise(spans)]
-        spans = np.concatenate([*parts, spans[-1:]])
-    half = np.diff(spans)[:, None] / 2
-    return (spans[:-1, None] + half * (1 + x)).ravel(), (half * w).ravel()
+    lengths = np.diff(spans)
+    panels = np.maximum(np.ceil(lengths / longest), 1).astype(np.int64)
+    span, panel = _parts(panels)
+    length = (lengths / panels)[span]
+    starts, half = spans[span] + panel * length, length[:, None] / 2
+    return (starts[:, None] + half * (1 + x)).ravel(), (half * w).ravel()
 
 
 # least number of Gauss-Lobatto panels over a motion: relative error of the energy below 1e-5
@@ -48,8 +54,7 @@ def lobatto_panels(breaks: Array, panels: Indices) -> tuple[Indices, Array, Arra
 
     For every node (k,): the index of its interval, its offset from the start of the interval, and its weight.
     """
-    interval = np.repeat(np.arange(len(panels)), panels)
-    panel = np.arange(len(interval)) - np.repeat(np.cumsum(panels) - panels, panels)
+    interval, panel = _parts(panels)
     # fractions of the interval first: the last node of an interval is then exactly its end
     starts, ends = (np.diff(breaks)[interval] * ((panel + k) / panels[interval]) for k in (0, 1))
     lengths = (ends - starts)[:, None]

@@ -9,11 +9,11 @@ import pytest
 
 from models.robot import Array
 from optimizer.energy.limited_torque import limited_parts
-from optimizer.methods.limit_repair import FAR_BELOW, TORQUE_POINTS, torque_peaks
+from optimizer.methods.limit_repair import FAR_BELOW, torque_peaks
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.trajectories import bspline, seven_segment
 from optimizer.trajectories.bspline import Basis
-from optimizer.trajectories.spline import Spline, fine_samples, peak_rates, retimed, sample, time_scale
+from optimizer.trajectories.spline import Spline, peak_rates, retimed, sample, time_scale
 from tests.optimizer.moves import PAYLOAD, START, TILTED, limits, problem
 
 # finer than the certificate's grid of 1 ms
@@ -39,8 +39,8 @@ def random_motion(prepared: PreparedProblem, space: Basis, spread: float, rng: n
 
 def estimate(prepared: PreparedProblem, spline: Spline) -> Array:
     """What decides whether a motion is far below the torque limits (nq,): it must stay below FAR_BELOW of them."""
-    q, v, a = fine_samples(spline, TORQUE_POINTS)[1:]
-    parts = limited_parts(prepared.arm, prepared.torques(q, v, a), v, a)
+    _, _, v, a, tau, _ = prepared.report_samples(spline)
+    parts = limited_parts(prepared.arm, tau, v, a)
     return np.asarray(sum(np.abs(part).max(axis=0) for part in parts))
 
 
