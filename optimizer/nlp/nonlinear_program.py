@@ -75,7 +75,7 @@ class NonlinearProgram:
     path_bounds: Array = field(default_factory=lambda: np.zeros(0))
     passes: Array | None = None
 
-    @property
+    @cached_property
     def r(self) -> int:
         """Number of the spline's coordinates."""
         return self.coordinates.r
@@ -85,7 +85,7 @@ class NonlinearProgram:
         """Limits of the spline's coordinates."""
         return self.coordinates.limits
 
-    @property
+    @cached_property
     def free_count(self) -> int:
         """Number of free control points, with the ends that are decision variables."""
         return self.basis.n - 2 * self.basis.resting + self.free_start + self.free_goal
@@ -116,13 +116,19 @@ class NonlinearProgram:
 
     def points(self, free: Array) -> Array:
         """All control points (n, r) for the free ones (m, r)."""
-        ends = np.ones((self.basis.resting, 1))
-        start, goal = self.coordinates.start, self.coordinates.goal
+        start, goal = self._ends
+        resting = self.basis.resting
         if self.free_start:
-            start, free = free[0], free[1:]
+            start, free = np.tile(free[0], (resting, 1)), free[1:]
         if self.free_goal:
-            goal, free = free[-1], free[:-1]
-        return np.concatenate([ends * start, free, ends * goal])
+            goal, free = np.tile(free[-1], (resting, 1)), free[:-1]
+        return np.concatenate([start, free, goal])
+
+    @cached_property
+    def _ends(self) -> tuple[Array, Array]:
+        """The control points at rest at the start and at the goal of the coordinates."""
+        ends = np.ones((self.basis.resting, 1))
+        return ends * self.coordinates.start, ends * self.coordinates.goal
 
     def free_columns(self, matrix: Array) -> Array:
         """The columns (…, m) of a basis matrix (…, n) that multiply the free control points."""

@@ -6,7 +6,7 @@ QP again, and transform all rows with it, at a tenth of the speed of BLAS.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
 import daqp
@@ -21,6 +21,8 @@ LEAST_TIME = 0.05
 # iterations of DAQP after which a QP counts as infeasible. Most take some tens; a relaxed one that collides everywhere
 # has thousands of active rows, and each of its last iterations takes milliseconds
 MOST_QP_ITERATIONS = 1200
+# rows that there is room for at first: more than most QPs have
+ROOM = 320
 
 Places = tuple[Index, Index, Index]  # derivative, coordinate, grid point
 
@@ -29,90 +31,105 @@ _ACTIVE, _EQUAL, _SOFT = 1, 5, 8
 _INFINITE = 1e30
 
 
-@dataclass(frozen=True)
-class _Fresh:
-    """Rows added since the last solve, as in `QPRows`, but with gradients (rows, n) by the scaled variables."""
-
-    gradients: Array
-    least: Array
-    most: Array
-    hard: Mask
-    active: Mask
-
-
 class QPRows:
     """Constraints least ≤ A y ≤ most in whitened variables; rows are added at the end.
 
     `hard` rows are never relaxed. `chosen` (2, 3, r, M) marks the lower and upper limits on rates with a row, by grid
     point, `places` lists the points, and `kinematic` is the row of each. In the same way `bounded` (2, n) marks the
-    lower and upper bounds with a row. `passed` (point, column) lists the path constraints with a row,
-    and `path` is the row of each.
+    lower and upper bounds with a row, `sides` lists them, and `bounds` is the row of each. `passed` (point, column)
+    lists the path constraints with a row, and `path` is the row of each.
     """
 
     def __init__(self, whitening: Array, grid: tuple[int, ...]) -> None:
-        self.whitening, n = whitening, len(whitening)
-        self.count = 0
-        self.gradients, self._fresh = list[Array](), list[_Fresh]()
-        self.A = np.zeros((0, whitening.shape[1]))
-        self.least, self.most = np.zeros(0), np.zeros(0)
-        self.hard, self.active = np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
+        self.whitening, (n, size) = whitening, whitening.shape
+        self.count = self._transformed = 0
+        self.gradients, self._fresh = list[Array](), list[Array]()
+        # of these, the first `count` rows are in use
+        self._A = np.empty((ROOM, size))
+        self._least, self._most = np.empty(ROOM), np.empty(ROOM)
+        self._hard, self._active = np.empty(ROOM, dtype=bool), np.empty(ROOM, dtype=bool)
         self.chosen, self.bounded = np.zeros((2, *grid), dtype=bool), np.zeros((2, n), dtype=bool)
-        none = np.zeros(0, dtype=int)
-        self.places: Places = (none, none, none)
-        self.sides: tuple[Index, Index] = (none, none)
-        self.passed: tuple[Index, Index] = (none, none)
-        self.kinematic, self.bounds, self.path = none, none, none
-        self._identity = np.eye(whitening.shape[1])
+        self._places, self._sides, self._passed = (list[tuple[Index, ...]]() for _ in range(3))
+        self._kinematic, self._bounds, self._path = (list[Index]() for _ in range(3))
+        self._identity = np.eye(size)
+
+    @property
+    def places(self) -> Places:
+        """Derivative, coordinate and grid point of the limits on rates."""
+        return _joined(self._places, 3)  # type: ignore[no-any-return]
+
+    @property
+    def sides(self) -> tuple[Index, Index]:
+        """Side and variable of the bounds."""
+        return _joined(self._sides, 2)  # type: ignore[no-any-return]
+
+    @property
+    def passed(self) -> tuple[Index, Index]:
+        """Point and column of the path constraints."""
+        return _joined(self._passed, 2)  # type: ignore[no-any-return]
+
+    @property
+    def kinematic(self) -> Index:
+        """The rows of `places`."""
+        return np.concatenate(self._kinematic) if self._kinematic else _NONE
+
+    @property
+    def bounds(self) -> Index:
+        """The rows of `sides`."""
+        return np.concatenate(self._bounds) if self._bounds else _NONE
+
+    @property
+    def path(self) -> Index:
+        """The rows of `passed`."""
+        return np.concatenate(self._path) if self._path else _NONE
 
     def add(
         self,
         gradients: Array,
         most: Array,
-        least: Array | None = None,
+        least: Array | float = -_INFINITE,
         hard: bool = False,
-        active: Mask | None = None,
+        active: Mask | bool = False,
     ) -> Index:
         """Add rows with gradients (rows, n) by the scaled variables, and return their numbers.
 
         `active` (rows,) is a guess of those that hold with equality.
         """
-        count = len(most)
         self.gradients.append(gradients)
-        if not count:
-            return np.zeros(0, dtype=int)
-        self._fresh.append(
-            _Fresh(
-                gradients,
-                np.full(count, -_INFINITE) if least is None else least,
-                most,
-                np.full(count, hard),
-                np.zeros(count, dtype=bool) if active is None else active,
-            )
-        )
-        self.count += count
-        return self.count - count + np.arange(count)
+        self._fresh.append(gradients)
+        first, self.count = self.count, self.count + len(most)
+        while self.count > len(self._A):
+            self._make_room()
+        rows = slice(first, self.count)
+        self._least[rows], self._most[rows] = least, most
+        self._hard[rows], self._active[rows] = hard, active
+        return np.arange(first, self.count)
 
-    def _join(self) -> None:
-        """Join the rows added since the last solve: one product for all of them."""
-        fresh, self._fresh = self._fresh, []
-        if not fresh:
-            return
-        self.A = np.concatenate([self.A, np.concatenate([each.gradients for each in fresh]) @ self.whitening])
-        for name in ("least", "most", "hard", "active"):
-            setattr(self, name, np.concatenate([getattr(self, name), *(getattr(each, name) for each in fresh)]))
+    def _make_room(self) -> None:
+        """Room for twice as many rows."""
+        for name in ("_A", "_least", "_most", "_hard", "_active"):
+            old = getattr(self, name)
+            setattr(self, name, np.concatenate([old, np.empty_like(old)]))
+
+    def _transform(self) -> None:
+        """Transform the rows added since the last solve: one product for all of them."""
+        if self.count > self._transformed:
+            rows = slice(self._transformed, self.count)
+            np.matmul(np.concatenate(self._fresh), self.whitening, out=self._A[rows])
+        self._fresh, self._transformed = [], self.count
 
     def add_kinematic(
-        self, gradients: Array, most: Array, places: Places, upper: Mask, active: Mask | None = None
+        self, gradients: Array, most: Array, places: Places, upper: Mask, active: Mask | bool = False
     ) -> None:
         """Add the rows of places that have none yet for their `upper` or lower limit; see `add`."""
-        self.kinematic = np.concatenate([self.kinematic, self.add(gradients, most, active=active)])
-        self.places = _joined(self.places, places)
+        self._kinematic.append(self.add(gradients, most, active=active))
+        self._places.append(places)
         self.chosen[upper.astype(int), *places] = True
 
     def add_path(self, gradients: Array, slack: Array, passed: tuple[Index, Index], active: Mask) -> None:
         """Add the rows of path constraints that have none yet; see `add`."""
-        self.path = np.concatenate([self.path, self.add(gradients, slack, active=active)])
-        self.passed = _joined(self.passed, passed)
+        self._path.append(self.add(gradients, slack, active=active))
+        self._passed.append(passed)
 
     def add_bounds(self, bounds: Array, wanted: Mask) -> None:
         """Add the `wanted` (2, n) lower and upper bounds of variables, if they have no row yet."""
@@ -121,31 +138,37 @@ class QPRows:
         gradients = np.zeros((len(side), len(self.whitening)))
         sign = np.where(side, 1.0, -1.0)
         gradients[np.arange(len(side)), variable] = sign
-        self.bounds = np.concatenate([self.bounds, self.add(gradients, sign * bounds[sides], hard=True)])
-        self.sides = _joined(self.sides, sides)
+        self._bounds.append(self.add(gradients, sign * bounds[sides], hard=True))
+        self._sides.append(sides)
         self.bounded[sides] = True
 
     def solve(self, gradient: Array, relax: bool) -> tuple[Array, Array, bool]:
-        """DAQP's y, the multipliers of the rows, and whether it found them. `active` is its guess, then its result."""
-        self._join()
-        sense = np.zeros(len(self.most), dtype=np.int32)
+        """DAQP's y, the multipliers of the rows, and whether it found them."""
+        self._transform()
+        used = slice(self.count)
+        least, most, active = self._least[used], self._most[used], self._active[used]
+        sense = np.zeros(self.count, dtype=np.int32)
         if relax:
-            sense[~self.hard] = _SOFT
+            sense[~self._hard[used]] = _SOFT
         else:
-            sense[self.active] = _ACTIVE
-        sense[self.least == self.most] = _EQUAL
+            sense[active] = _ACTIVE
+        sense[least == most] = _EQUAL
         left = watched_time_left()
         y, _, flag, info = daqp.solve(
-            self._identity, gradient, self.A, self.most, self.least, sense,
+            self._identity, gradient, self._A[used], most, least, sense,
             primal_tol=1e-9, eps_prox=0.0, rho_soft=1e-6, iter_limit=MOST_QP_ITERATIONS,
             time_limit=max(left, LEAST_TIME) if np.isfinite(left) else 0.0,  # 0: no limit
         )  # fmt: skip
         found = bool(flag >= _DAQP_OPTIMAL)
         if found:
-            self.active = info["lam"] > 0
+            # what the next solve starts from
+            active[:] = info["lam"] > 0
         return y, info["lam"], found
 
 
-def _joined(first: tuple[Index, ...], second: tuple[Index, ...]) -> Any:
-    """Indices of the first places, then of the second."""
-    return tuple(np.concatenate(both) for both in zip(first, second, strict=True))
+_NONE: Index = np.zeros(0, dtype=int)
+
+
+def _joined(parts: Sequence[tuple[Index, ...]], kinds: int) -> Any:
+    """The places of all parts, as one array (places,) for each of their `kinds` of indices."""
+    return tuple(np.concatenate([part[k] for part in parts]) if parts else _NONE for k in range(kinds))

@@ -6,12 +6,10 @@ L1 merit function and backtracking make it converge from any initial guess.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from scipy.linalg.lapack import dpotrf, dsyevr, dtrtri
 
 from models.robot import Array
 from optimizer.deadline import NEVER, Deadline
@@ -19,6 +17,7 @@ from optimizer.nlp.active_path_constraints import PathConstraintValues
 from optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
 from optimizer.nlp.passing import Passes, Passing
 from optimizer.nlp.sliding_ends import Slide, SlidingEnds
+from optimizer.nlp.whitening import whitened
 from optimizer.nlp.working_set_qp import MOST_ROUNDS, QP_ROUNDS, QPInputs, QPStep, WorkingSetQP
 
 # relative decrease of the cost that a further step must promise
@@ -34,12 +33,9 @@ ARMIJO, ROUNDING = 1e-4, 1e-12
 MOST_DECREASE = 3.0
 # a solve ends after a step that promised at most LAST_STEP and kept its promise but for ERROR of it, or of the progress
 # that a further step must promise: the next QP promises about as much as this one was wrong by. With greater errors,
-# one of 50 random requests ended 0.1 % too high
-LAST_STEP, ERROR = 5e-3, (0.02, 0.1)
-# smallest eigenvalue that the QP's Hessian may have, relative to a bound on the largest or to 1, the scale of the cost
-EIGENVALUE_FLOOR = 1e-7
-# variables of a QP beyond which all eigenvalues are found faster than those that change
-MOST_IN_PART = 150
+# one of 50 random requests ended 0.1 % too high. Steps that each promise about as much as the one before are no such
+# last step: mechanical work has valleys that they follow
+LAST_STEP, ERROR, CONVERGING = 5e-3, (0.02, 0.1), 0.5
 # the penalty of a violation before any multiplier is known, and its least multiple of the multipliers
 FIRST_PENALTY, PENALTY_FACTOR = 0.1, 2.0
 # the first penalty of path constraints among which are clearances
@@ -113,17 +109,17 @@ class _Multipliers:
         """Take the multipliers of a QP."""
         # torque is nonlinear in the dynamics, kinematic limits in T^d: their multipliers weigh that curvature
         self.torque = np.zeros_like(self.torque)
-        np.add.at(self.torque, step.nodes, step.signs * step.torque / p.limits.tau_max[step.nodes[1]] / cost_scale)
+        self.torque[step.nodes] = step.signs * step.torque / p.limits.tau_max[step.nodes[1]] / cost_scale
         self.path = np.zeros_like(self.path)
         self.path[step.passed] = step.path / cost_scale
         self.limits = step.pull
         d = step.places[0]
         self.curvature = -float((step.kinematic * (d + 1) * d).sum()) / (T * T)
         if not step.relaxed:
-            need = np.zeros_like(self.penalty)
-            np.add.at(need, d * p.r + step.places[1], step.kinematic)
-            np.add.at(need, 3 * p.r + step.nodes[1], step.torque)
-            np.add.at(need, 3 * p.r + p.kernel.nq + step.passed[1], step.path)
+            torques, paths = 3 * p.r, 3 * p.r + p.kernel.nq
+            which = np.concatenate([d * p.r + step.places[1], torques + step.nodes[1], paths + step.passed[1]])
+            multipliers = np.concatenate([step.kinematic, step.torque, step.path])
+            need = np.bincount(which, multipliers, len(self.penalty))
             self.penalty = np.maximum(self.penalty, PENALTY_FACTOR * need)
 
 
@@ -142,8 +138,6 @@ class _Solver:
     ) -> None:
         self.p, self.deadline, self.progress, self.below = program, deadline, progress, below
         self.qp = WorkingSetQP(program, time_scale=T)
-        # among obstacles, steps of fewer rounds stall
-        self.rounds = MOST_ROUNDS if program.has_clearance else QP_ROUNDS
         self.scale = np.ones(self.qp.n)
         if self.qp.free_time:
             self.scale[-1] = T
@@ -168,14 +162,15 @@ class _Solver:
 
     def solve(self) -> Result:
         """Iterate until no step promises a further, or enough, decrease; or none is found; or the deadline passes."""
-        status, stationarity, iterations, relaxed = SqpStatus.STALLED, np.inf, 0, 0
-        for iterations in range(1, MAX_ITERATIONS + 1):  # noqa: B007
+        status, stationarity, iterations, relaxed, last = SqpStatus.STALLED, np.inf, 0, 0, np.inf
+        for iterations in range(1, MAX_ITERATIONS + 1):
             if self.deadline.passed:
                 status = SqpStatus.OUT_OF_TIME
                 break
             qp = self._qp_inputs()
             feasible = float(self.at.violation.max()) < FEASIBILITY
-            step = self.qp.solve(qp, self.rounds, enough=self.progress if feasible else -np.inf)
+            rounds = self._rounds(iterations)
+            step = self.qp.solve(qp, rounds, enough=self.progress if feasible else -np.inf)
             if step is None:
                 status = SqpStatus.INFEASIBLE
                 break
@@ -195,18 +190,23 @@ class _Solver:
                 status = SqpStatus.COSTLIER
                 break
             found = self._line_search(step.x, slope)
-            if found is None and self.rounds < MOST_ROUNDS:
+            if found is None and rounds < MOST_ROUNDS:
                 found = self._exact_step(qp)
             if found is None:
                 status = SqpStatus.SOLVED if feasible and promised < 100 * self.progress else SqpStatus.STALLED
                 break
             before, self.at = self.at, found
-            if not step.relaxed and self._kept(promised, before):
+            if not step.relaxed and promised <= CONVERGING * last and self._kept(promised, before):
                 status = SqpStatus.SOLVED
                 break
+            last = promised
             self.line = self.p.derivatives(found.free, found.T, self.multipliers.torque)
         at, violation = self.at, float(self.at.violation.max())
         return Result(status, at.free, at.T, at.cost, iterations, violation, stationarity, self.multipliers.torque)
+
+    def _rounds(self, step: int) -> int:
+        """How often the QP of a step, from 1 on, is solved at most. Among obstacles, steps of fewer rounds stall."""
+        return MOST_ROUNDS if self.p.has_clearance else QP_ROUNDS[min(step, len(QP_ROUNDS)) - 1]
 
     def _kept(self, promised: float, before: _Point) -> bool:
         """Whether the last step decreased the cost as promised, so that no further step promises enough.
@@ -249,21 +249,24 @@ class _Solver:
         if self.p.path is not None:
             H += self.p.path_rows.hessian(at.path_values, at.T, self.multipliers.path) * self.cost_scale
         H[-1, -1] += self.multipliers.curvature
-        H = H[:n, :n] * np.outer(self.scale, self.scale)
+        H = H[:n, :n]
+        H[-1] *= self.scale[-1]
+        H[:, -1] *= self.scale[-1]
         if at.held is None:
-            hessian, whitening = _convex(H)
+            hessian, whitening = whitened(H)
         else:
             pull = (g + self.multipliers.limits)[: self.qp.count].reshape(at.free.shape)
             kept = at.held.null_space(n)
             back = kept.T
-            bends, within = _convex(back @ (back @ (H + at.held.curvature(pull, n))).T)
+            bends, within = whitened(back @ (back @ (H + at.held.curvature(pull, n))).T)
             whitening = kept @ within
 
             def hessian(x: Array) -> Array:
                 return np.asarray(kept @ bends(back @ x))
 
-        ratio = at.kinematics / self.qp.rates(at.T)[:, :, None]
-        return QPInputs(hessian, whitening, g, at.free, at.T, self.line, at.path_values, ratio)
+        rates = self.qp.rates(at.T)
+        ratio = at.kinematics / rates[:, :, None]
+        return QPInputs(hessian, whitening, g, at.free, at.T, self.line, at.path_values, rates, ratio)
 
     def _line_search(self, dx: Array, slope: float) -> _Point | None:
         """The first point along dx (n,), halving the step, that lowers the merit function enough; None if none does.
@@ -306,26 +309,6 @@ def _holding(program: NonlinearProgram) -> Passes | SlidingEnds | None:
     if not program.held:
         return None
     return SlidingEnds(program) if program.passes is None else Passes(program, program.passes)
-
-
-def _convex(H: Array) -> tuple[Callable[[Array], Array], Array]:
-    """What multiplies by H (n, n) if it is positive definite, else by H with the absolute values of its eigenvalues,
-    clamped from below; and W with Wᵀ H W = 1."""
-    H = 0.5 * (H + H.T)
-    L, failed = dpotrf(H, lower=1)
-    if failed and len(H) > MOST_IN_PART:
-        values, vectors = np.linalg.eigh(H)
-        kept = np.maximum(np.abs(values), EIGENVALUE_FLOOR * max(1.0, float(np.abs(values).max())))
-        return lambda x: vectors @ (kept * (vectors.T @ x)), vectors / np.sqrt(kept)
-    if failed:
-        # a bound on all eigenvalues. Those that change are few: finding them takes half the time of finding all
-        most = float(np.abs(H).sum(axis=0).max())
-        floor = EIGENVALUE_FLOOR * max(1.0, most)
-        values, vectors, count, _, _ = dsyevr(H, range="V", vl=-2 * most, vu=floor, lower=1)
-        low, vectors = values[:count], vectors[:, :count]
-        H = H + (vectors * (np.maximum(np.abs(low), floor) - low)) @ vectors.T
-        L, _ = dpotrf(H, lower=1)
-    return H.dot, np.ascontiguousarray(dtrtri(L, lower=1)[0].T)
 
 
 def solve(

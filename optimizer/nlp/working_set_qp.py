@@ -18,17 +18,20 @@ from optimizer.nlp.active_path_constraints import Index, NearPathConstraints, Pa
 from optimizer.nlp.nonlinear_program import FEASIBILITY, Linearisation, NonlinearProgram
 from optimizer.nlp.qp_rows import Places, QPRows
 
-# constraints enter the QP when they use more than this ratio of their limit
-NEAR = 0.6
+# limits on rates enter the QP when they use more than this ratio of the limit: in the first QP, and once the QP before
+# tells which ones hold the motion. With a fifth fewer rows, steps are as few and as good
+NEAR, NEAR_LATER = 0.6, 0.85
+# other constraints likewise
 NEAR_TORQUE = 0.5
 NEAR_PATH = 0.5
 # clearances enter above this ratio, or if they were active in the QP before; above NEAR_PATH once a step breaks them
 NEAR_CLEARANCE = 0.9
 # no coordinate of a control point moves further in one step [rad]
 STEP = 1.5
-# solves of a QP, each with the constraints that the step before would break. What the last one breaks enters the QP of
-# the next iterate: more rounds take more time than they save, unless the line search fails
-QP_ROUNDS, MOST_ROUNDS = 3, 10
+# solves of a QP, each with the constraints that the step before would break: of the first QPs, and of all that follow.
+# What the last solve breaks enters the QP of the next iterate: more rounds take more time than they save, unless the
+# line search fails
+QP_ROUNDS, MOST_ROUNDS = (3, 3, 3, 2), 10
 # the same for a relaxed QP with clearance constraints: it has many rows, and none of them was active before
 RELAXED_ROUNDS = 2
 # excess over the bound of a variable [rad, or share of the duration] at which it enters the QP
@@ -40,7 +43,7 @@ class QPInputs:
     """What the QP is made of at one iterate.
 
     `hessian` H times a step (n,) and `gradient` (n,) are in the scaled variables. `whitening` W (n, k): Wᵀ H W = 1, for
-    steps that keep what is held. `ratio` (3, r, M): rates over their limits on the grid.
+    steps that keep what is held. `ratio` (3, r, M): rates over their limits `rates` (3, r) on the grid.
     """
 
     hessian: Callable[[Array], Array]
@@ -50,6 +53,7 @@ class QPInputs:
     T: float
     line: Linearisation
     path_values: PathConstraintValues
+    rates: Array
     ratio: Array
 
 
@@ -146,22 +150,20 @@ class WorkingSetQP:
             if not (adds_rates or adds_path):
                 break
         mu = np.maximum(multipliers, 0.0)
-        self._keep(rows, mu)
         pull = multipliers @ np.concatenate(rows.gradients) if self.p.held else np.zeros(self.n)
-        return QPStep(
+        step = QPStep(
             _shortened(x, bounds), relaxed, rows.places, mu[rows.kinematic],
             torque.nodes, torque.signs, mu[limited], rows.passed, mu[rows.path], pull,
         )  # fmt: skip
-
-    def _keep(self, rows: QPRows, mu: Array) -> None:
-        """Keep what was active for the next QP."""
-        for marks, places, numbers in (
-            (self._active, rows.places, rows.kinematic),
-            (self._bounded, rows.sides, rows.bounds),
-            (self._passed, rows.passed, rows.path),
+        # what was active is kept for the next QP
+        for marks, places, multiplier in (
+            (self._active, step.places, step.kinematic),
+            (self._bounded, rows.sides, mu[rows.bounds]),
+            (self._passed, step.passed, step.path),
         ):
             marks[...] = False
-            marks[places] = mu[numbers] > 0
+            marks[places] = multiplier > 0
+        return step
 
     def _first_path_rows(self, rows: QPRows, at: QPInputs) -> NearPathConstraints:
         """Adds the path constraints that the QP is first solved with, and returns the others that are near."""
@@ -197,8 +199,10 @@ class WorkingSetQP:
     def _add_kinematic(self, rows: QPRows, at: QPInputs) -> None:
         """Adds the limits on rates that the QP is first solved with."""
         chosen = self._active.copy()
-        chosen[self._worst(at.ratio, np.full(3, NEAR))] = True
-        places = _places(chosen)
+        near = NEAR_LATER if chosen.any() else NEAR
+        chosen[self._worst(at.ratio, np.full(3, near))] = True
+        d, j, grid = _places(chosen)
+        places = d, j, grid
         self._add_rates(rows, at, places, at.ratio[places] >= 0, self._active[places])
 
     def _worst(self, ratio: Array, above: Array) -> Places:
@@ -209,7 +213,7 @@ class WorkingSetQP:
         largest = np.maximum(ratio.max(axis=2), -ratio.min(axis=2))
         d, j = np.nonzero(largest > above[:, None])
         size = np.abs(ratio[d, j])
-        k, grid = np.nonzero((size > above[d, None]) & (self._anchors[d] | _peaks(size)))
+        k, grid = _places((size > above[d, None]) & (self._anchors[d] | _peaks(size)))
         return d[k], j[k], grid
 
     def _adds_bounds(self, rows: QPRows, bounds: Array, x: Array) -> bool:
@@ -224,7 +228,7 @@ class WorkingSetQP:
 
     def _adds_rates(self, rows: QPRows, at: QPInputs, x: Array) -> bool:
         """Whether the step x breaks limits on rates without a row: then their peaks get theirs."""
-        change = x[: self.count].reshape(at.free.shape).T / self.rates(at.T)[:, :, None]
+        change = x[: self.count].reshape(at.free.shape).T / at.rates[:, :, None]
         predicted = change @ self._grid_free.swapaxes(1, 2)
         predicted += at.ratio
         # the limits of the rates by τ after the step, as ratios of those before it
@@ -241,21 +245,19 @@ class WorkingSetQP:
         self._add_rates(rows, at, fresh, upper[unknown])
         return True
 
-    def _add_rates(self, rows: QPRows, at: QPInputs, places: Places, upper: Mask, active: Mask | None = None) -> None:
+    def _add_rates(self, rows: QPRows, at: QPInputs, places: Places, upper: Mask, active: Mask | bool = False) -> None:
         """Adds the `upper` or lower limits on rates at the places; `active` as in `QPRows.add`."""
         signs = np.where(upper, 1.0, -1.0)
-        rows.add_kinematic(
-            self._kinematic_rows(places, signs, at.T), 1 - signs * at.ratio[places], places, upper, active
-        )
+        rows.add_kinematic(self._kinematic_rows(at, places, signs), 1 - signs * at.ratio[places], places, upper, active)
 
-    def _kinematic_rows(self, places: Places, signs: Array, T: float) -> Array:
+    def _kinematic_rows(self, at: QPInputs, places: Places, signs: Array) -> Array:
         """Gradients (rows, n) of sign · value / limit at the places."""
         d, j, g = places
         A = np.zeros((len(d), self.n))
-        block = (signs / self.rates(T)[d, j])[:, None] * self._grid_free[d, g]
-        A[np.arange(len(d))[:, None], np.arange(self.p.free_count) * self.p.r + j[:, None]] = block
+        block = (signs / at.rates[d, j])[:, None] * self._grid_free[d, g]
+        A[:, : self.count].reshape(len(d), self.p.free_count, self.p.r)[np.arange(len(d)), :, j] = block
         if self.free_time:
-            A[:, -1] = -(d + 1) / T * self.time_scale
+            A[:, -1] = -(d + 1) / at.T * self.time_scale
         return A
 
     def _torque_rows(self, at: QPInputs) -> _TorqueRows:
@@ -316,6 +318,6 @@ def _peaks(size: Array) -> Mask:
     return high
 
 
-def _places(marks: Mask) -> Places:
-    """The places of marks (3, r, M); a search in one dimension is several times as fast as `np.nonzero` in three."""
-    return np.unravel_index(np.flatnonzero(marks), marks.shape)  # type: ignore[return-value]
+def _places(marks: Mask) -> tuple[Index, ...]:
+    """The places of marks; a search in one dimension is several times as fast as `np.nonzero` in two or three."""
+    return np.unravel_index(np.flatnonzero(marks), marks.shape)

@@ -260,6 +260,16 @@ def test_an_optimum_is_left_alone() -> None:
         assert again.cost == pytest.approx(first.cost, rel=SAME)
 
 
+def test_a_valley_is_followed_to_its_end() -> None:
+    """Mechanical work falls along a valley by steps that each keep their promise: the first of them is not the last."""
+    start, goal = list(random_moves(12, 29))[28]
+    mine = program(start, goal, objective="mechanical", duration_max=1.5 * shortest(start, goal), **conditions(0))
+    found = solve(mine, quintic(mine), mine.t_max)
+    again = solve(mine, found.free, found.duration, found.multiplier)
+    assert found.status is again.status is SqpStatus.SOLVED
+    assert again.cost > found.cost * (1 - REST)
+
+
 @pytest.mark.parametrize("ratio", [0.5, 0.9, 1.02, 1.5])
 def test_a_solve_ends_early_only_if_its_optimum_is_not_below_what_is_asked_for(ratio: float) -> None:
     ended = 0

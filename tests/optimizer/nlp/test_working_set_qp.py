@@ -28,8 +28,9 @@ def inputs_at(p: NonlinearProgram, qp: WorkingSetQP, free: Array, rng: np.random
     one, duration = np.eye(qp.n), qp.time_scale
     line = p.derivatives(free, duration, np.zeros((len(p.basis.nodes), p.kernel.nq)))
     values = p.path_rows.values(p.points(free), duration)
-    ratio = p.kinematics(free) / qp.rates(duration)[:, :, None]
-    return QPInputs(one.dot, one, rng.normal(size=qp.n), free, duration, line, values, ratio)
+    rates = qp.rates(duration)
+    ratio = p.kinematics(free) / rates[:, :, None]
+    return QPInputs(one.dot, one, rng.normal(size=qp.n), free, duration, line, values, rates, ratio)
 
 
 def test_a_step_breaks_no_limit_on_the_other_side() -> None:
