@@ -44,7 +44,7 @@ def with_interval(energy: Energy, sensitivity: Sensitivity, duration: float, arm
 def interval_of(known: Known, arm: Arm) -> EnergyInterval:
     """P5, P95, standard deviation [J], and each source's share of the variance."""
     spread, gradient = arm_spread(arm), known.sensitivity.gradient
-    low, high = _ends(_drawn(spread, known, 0)).tolist()
+    low, high = _ends(_drawn(spread, [known], 0))[:, 0].tolist()
     parts = {name: float(gradient @ covariance @ gradient) for name, covariance in spread.covariances.items()}
     if spread.move_sd:
         parts[MOVE] = (known.duration * spread.move_sd) ** 2
@@ -63,19 +63,21 @@ def saving_intervals(ours: Known, theirs: Sequence[Known], arm: Arm) -> list[Sav
     if not theirs:
         return []
     spread = arm_spread(arm)
-    first, second = _drawn(spread, ours, 0)[:, None], np.stack([_drawn(spread, each, 1) for each in theirs], axis=1)
+    first, second = _drawn(spread, [ours], 0), _drawn(spread, theirs, 1)
     size = np.abs(second)
     savings = np.divide(second - first, size, out=np.zeros_like(size), where=size > 0)
     found = np.append(_ends(savings), savings.std(axis=0)[None], axis=0)
     return [SavingInterval(*each) for each in found.T.tolist()]
 
 
-def _drawn(spread: Spread, known: Known, move: int) -> Array:
-    """Draws (n,) of the energy [J]."""
-    mean, gradient = known.energy + known.sensitivity.shift, known.sensitivity.gradient
-    return np.asarray(mean + spread.draws @ gradient + known.duration * spread.move_draws[move])
+def _drawn(spread: Spread, known: Sequence[Known], move: int) -> Array:
+    """Draws (n, m) of the energies [J] of m motions."""
+    means = np.array([each.energy + each.sensitivity.shift for each in known])
+    gradients = np.stack([each.sensitivity.gradient for each in known], axis=1)
+    durations = np.array([each.duration for each in known])
+    return np.asarray(means + spread.draws @ gradients + np.outer(spread.move_draws[move], durations))
 
 
 def _ends(draws: Array) -> Array:
-    """P5 and P95 (2, ...) of draws (n, ...)."""
+    """P5 and P95 (2, m) of draws (n, m)."""
     return np.asarray(np.quantile(draws, [0.05, 0.95], axis=0))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -81,17 +82,21 @@ def span_peak_rates(spline: Spline) -> Array:
     middle, half = (edges[:-1] + edges[1:]) / 2, np.diff(edges) / 2
     # the spans as polynomials in x ∈ [-1, 1] around their middles
     series = np.stack([curve(middle, k) * half[:, None] ** k for k in range(terms)])
-    x = np.linspace(-1.0, 1.0, (RATE_POINTS - 1) * (1 + 3 * max(spline.degree - bspline.DEGREE, 0)) + 1)
-    powers = np.stack([x**k / math.factorial(k) for k in range(terms)], axis=1)
-    peaks = []
-    for d in range(1, 4):
-        values = np.tensordot(powers[:, : terms - d], series[d:], axes=1) / half[:, None] ** d
-        low, top, high = np.abs(values[:-2]), np.abs(values[1:-1]), np.abs(values[2:])
-        bend = 2 * top - low - high
-        # the vertex counts only between the two outer samples
-        vertex = np.where(np.abs(high - low) <= 2 * bend, (high - low) ** 2 / (8 * bend + 1e-300), 0.0)
-        peaks.append(np.maximum(np.abs(values[[0, -1]]).max(axis=0), (top + vertex).max(axis=0)))
-    return np.array(peaks)
+    powers, flat = _powers(spline.degree), series.reshape(terms, -1)
+    size = np.abs([powers[:, : terms - d] @ flat[d:] for d in range(1, 4)])
+    low, top, high = size[:, :-2], size[:, 1:-1], size[:, 2:]
+    bend = 2 * top - low - high
+    # the vertex counts only between the two outer samples
+    vertex = np.where(np.abs(high - low) <= 2 * bend, (high - low) ** 2 / (8 * bend + 1e-300), 0.0)
+    peaks = np.maximum(size[:, [0, -1]].max(axis=1), (top + vertex).max(axis=1))
+    return np.asarray(peaks.reshape(3, len(half), -1) / half[:, None] ** np.arange(1, 4)[:, None, None])
+
+
+@cache
+def _powers(degree: int) -> Array:
+    """The terms (points, degree + 1) x^k / k! of a Taylor series at points x of [-1, 1]."""
+    x = np.linspace(-1.0, 1.0, (RATE_POINTS - 1) * (1 + 3 * max(degree - bspline.DEGREE, 0)) + 1)
+    return np.stack([x**k / math.factorial(k) for k in range(degree + 1)], axis=1)
 
 
 def time_scales(ratios: Array) -> Array:
