@@ -21,6 +21,7 @@ from optimizer.problem.arm import Inverter, Payload
 from optimizer.problem.bus import Bus
 from optimizer.search.lower_bound import lower_bounds
 from optimizer.solution import Solution
+from optimizer.trajectories.spline import sample
 from tests.optimizer.energy.kernel_states import left_out
 from tests.optimizer.moves import ROBOT, limits, problem
 from tests.selection import long_but
@@ -275,10 +276,10 @@ def test_inverter_figures_replace_the_robots() -> None:
     spline = solved("down", Bus()).trajectory.spline
     assert plain.energy(spline).electrical.inverter == 0
     loss = lossy.energy(spline).per_joint.inverter
-    found = solved("down", Bus()).trajectory
-    i = np.abs(found.tau_motor / ROBOT.drives.torque_constant)
-    expected = np.trapezoid(2.0 + 0.3 * i + 0.02 * i * i, found.t, axis=0)
-    assert loss == pytest.approx(expected, rel=1e-3)  # samples of 8 ms
+    t = np.linspace(0.0, spline.duration, 4001)
+    i = np.abs(plain.motor_torques(*sample(spline, t)) / ROBOT.drives.torque_constant)
+    expected = np.trapezoid(2.0 + 0.3 * i + 0.02 * i * i, t, axis=0)
+    assert loss == pytest.approx(expected, rel=1e-4)  # corners of |i| between quadrature points
     assert lossy.arm.drives.copper is ROBOT.drives.copper
     only_one = PreparedProblem.of(problem(inverter=Inverter(linear=np.arange(6.0))))
     assert (only_one.arm.drives.inverter_linear == np.arange(6)).all()
