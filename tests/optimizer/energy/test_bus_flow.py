@@ -279,7 +279,7 @@ def test_inverter_figures_replace_the_robots() -> None:
     t = np.linspace(0.0, spline.duration, 4001)
     i = np.abs(plain.motor_torques(*sample(spline, t)) / ROBOT.drives.torque_constant)
     expected = np.trapezoid(2.0 + 0.3 * i + 0.02 * i * i, t, axis=0)
-    assert loss == pytest.approx(expected, rel=1e-4)  # corners of |i| between quadrature points
+    assert loss == pytest.approx(expected, rel=5e-4)  # corners of |i| between quadrature points
     assert lossy.arm.drives.copper is ROBOT.drives.copper
     only_one = PreparedProblem.of(problem(inverter=Inverter(linear=np.arange(6.0))))
     assert (only_one.arm.drives.inverter_linear == np.arange(6)).all()
