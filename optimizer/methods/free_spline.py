@@ -42,6 +42,8 @@ POLISHED = 1.05
 # energy of the motion through them: it may have left them on the wrong side. Of 240 random tasks among obstacles seven
 # are beyond, of which one needs 9 % less from a planned path; of those within, none needs 2 % less
 WAY_OUT = 1.12
+# time [s] from which on a solve need not have a checked motion early
+AMPLE = 1.0
 # relative decrease of the cost that a further step must promise in a solve whose motion is followed to sharper corners
 CORNERED_PROGRESS = 5e-2
 # the same in a solve from a known motion: further steps would take some 5 % of the time, and save 0.002 % of the
@@ -72,7 +74,11 @@ class FreeSpline(SqpMethod):
         tried: list[SolveResult] = []
         if not self.interval.minimum_time and self.t_max >= TIGHT * shortest:
             space = bspline.uniform(COARSE)
-            tried.append(self.improve(Guess(space, self._smoothed(space), 0.0, rough=True, progress=self._progress)))
+            guess = Guess(space, self._smoothed(space), 0.0, rough=True, progress=self._progress)
+            if self._is_refined_at_once:
+                tried += self._coarse_and_refined(guess, TIGHT * shortest)
+            if not tried or tried[-1].spline is None:
+                tried.append(self.improve(guess))
         if not tried or (tried[-1].status is SolveStatus.FAILED and tried[-1].collision is None):
             tried.append(self.improve(self.time_optimal_guess()))
         if tried[-1].status is SolveStatus.FAILED and tried[-1].collision is not None:
@@ -80,6 +86,25 @@ class FreeSpline(SqpMethod):
         elif self._may_be_on_the_wrong_side(tried[-1]):
             return self._compared_with_planned_paths(with_effort(tried[-1], tried))
         return with_effort(tried[-1], tried)
+
+    @property
+    def _is_refined_at_once(self) -> bool:
+        """Whether the coarse motion is only the guess of the refined one: no other candidate is compared with it,
+        nothing slides or is in the way, and time is ample."""
+        problem = self.prepared.problem
+        settled = self.start_curve is None and self.goal_curve is None and not len(self.passes)
+        plain = not has_corners(problem.objective, problem.arm) and problem.arm.bus.mode != "storage"
+        return self.is_sole and settled and plain and not problem.arm.scene.names and self.deadline.left > AMPLE
+
+    def _coarse_and_refined(self, guess: Guess, tight: float) -> list[SolveResult]:
+        """The coarse motion of a guess, checked for collisions alone, and the refined one. If the coarse one lasts less
+        than `tight` [s], knots are EXACT. The last result has a motion if that will do."""
+        coarse = self.improve(replace(guess, passing=True))
+        if coarse.spline is None:
+            return [coarse]
+        if self.prepared.surroundings.worst_violation(coarse.spline) is not None:
+            return [replace(coarse, spline=None)]
+        return [coarse, self.solve_from(*sampled(coarse.spline), fine=coarse.spline.duration < tight)]
 
     def _may_be_on_the_wrong_side(self, found: SolveResult) -> bool:
         """Whether a motion may have left obstacles on the wrong side."""

@@ -66,7 +66,8 @@ class Guess:
     `collision_free`: the NLP has clearance constraints from the start. Other guesses get them after a collision.
     `rough`: with clearance constraints, the solve ends at ROUGH_PROGRESS, since another one refines its motion.
     `progress` is the relative decrease of the cost that a further step of the SQP must promise. `nearly_feasible`: the
-    solve begins with this duration, although jerk may exceed its limit next to knots that have moved.
+    solve begins with this duration, although jerk may exceed its limit next to knots that have moved. `passing`: the
+    motion is only the guess of another one, and is not checked between the nodes.
     """
 
     space: Basis
@@ -76,6 +77,7 @@ class Guess:
     rough: bool = False
     progress: float = PROGRESS
     nearly_feasible: bool = False
+    passing: bool = False
 
 
 @dataclass(frozen=True)
@@ -147,6 +149,8 @@ class SqpMethod(Method):
                 return _failed(reason, collision, iterations, solves)
             if result.status is SqpStatus.COSTLIER:
                 return SolveResult(SolveStatus.PRUNED, COSTLIER, iterations, solves)
+            if guess.passing:
+                return SolveResult(SolveStatus.SOLVED, CONVERGED, iterations, solves, _spline(stage.program, result))
             check = self._checked(stage.program, result)
             collision = check.collision
             if check.passed:
@@ -276,7 +280,7 @@ class SqpMethod(Method):
     def _checked(self, program: NonlinearProgram, result: Result) -> LimitCheck:
         """The motion that an NLP gave, slightly retimed if that repairs it, with its excess over the limits."""
         prepared = self.prepared
-        spline = spline_of(program.basis, program.joint_points(result.free), result.duration)
+        spline = _spline(program, result)
         factors = repair_factors(prepared, spline, self.overshoot(spline))
         slower = spline if factors is None else slightly_retimed(spline, factors, self.t_max)
         if slower is not spline:
@@ -300,6 +304,11 @@ class SqpMethod(Method):
         # the SQP takes no step for positions alone: it bounds them
         free = np.clip(result.free, program.limits.q_min, program.limits.q_max)
         return _Stage(program, limits, nearby, free, result.duration, result.multiplier)
+
+
+def _spline(program: NonlinearProgram, result: Result) -> Spline:
+    """The motion that an NLP gave."""
+    return spline_of(program.basis, program.joint_points(result.free), result.duration)
 
 
 def above(energy: float, multiple: float) -> float:

@@ -14,7 +14,7 @@ from optimizer.deadline import Deadline
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.methods import METHODS, solver_for
 from optimizer.methods import duration_intervals as duration_intervals
-from optimizer.methods.free_spline import FreeSpline
+from optimizer.methods.free_spline import TIGHT, FreeSpline
 from optimizer.methods.method import Method, SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import Problem
@@ -165,3 +165,40 @@ def test_a_motion_is_solved_again_from_itself_with_its_knots_where_jerk_switches
         assert cost(spline(again)) <= cost(spline(fitted)) * (1 + 1e-3)
         assert_held(problem(start, goal), spline(again))
     assert steps[0] < steps[1]
+
+
+def test_a_sole_candidate_is_refined_at_once() -> None:
+    """Its coarse motion is only a guess: the result is that of two solves, one after the other, and within limits."""
+    at_once, twice = solver(START, GOAL), solver(START, GOAL)
+    at_once.is_sole = True
+    found = spline(at_once.solve())
+    coarse = spline(twice.solve())
+    assert FreeSpline.may_refine(coarse) and not FreeSpline.may_refine(found)
+    assert_held(at_once.prepared.problem, found)
+    tight = coarse.duration < TIGHT * shortest_duration(GOAL - START, ROBOT.limits)
+    cost = at_once.prepared.cost_of
+    assert cost(found) == pytest.approx(cost(spline(twice.solve_from(*sampled(coarse), fine=bool(tight)))), rel=1e-3)
+
+
+@pytest.mark.parametrize("why", ["refining fails", "another candidate", "little time"])
+def test_else_the_coarse_motion_is_checked(why: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    own = solver(START, GOAL, wait=0.8 if why == "little time" else 60.0)
+    own.is_sole = why != "another candidate"
+    if why == "refining fails":
+        failed = SolveResult(SolveStatus.FAILED, "for a test", 5, 1)
+        monkeypatch.setattr(FreeSpline, "solve_from", lambda *_, **__: failed)
+    result = own.solve()
+    assert FreeSpline.may_refine(spline(result))
+    assert result.solves == (3 if why == "refining fails" else 1)
+    assert_held(own.prepared.problem, spline(result))
+
+
+def test_a_coarse_motion_that_collides_is_no_guess() -> None:
+    """Of this move it hits the arm itself: clearance constraints are added to it, as without a refined motion."""
+    start, goal = list(random_moves(5, 7))[6]
+    own, usual = (solver(start, goal, collisions=True) for _ in range(2))
+    own.is_sole = True
+    found, expected = own.solve(), usual.solve()
+    assert expected.unhindered is not None
+    assert found.unhindered == pytest.approx(expected.unhindered)
+    assert FreeSpline.may_refine(spline(found))
