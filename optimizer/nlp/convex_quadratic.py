@@ -70,6 +70,7 @@ class Convexity:
 def _upper(band: Array) -> Array:
     """The upper triangle (n, n) of a symmetric matrix by its lower band (n, width), whose columns are the rows here."""
     n, width = band.shape
-    H = np.zeros(n * (n + width))
-    np.lib.stride_tricks.as_strided(H, (n, width), (H.itemsize * (n + 1), H.itemsize))[:] = band
-    return H[: n * n].reshape(n, n)
+    H = np.zeros((n, n + 1))
+    # the diagonal of the matrix is the first column here
+    H[:, :width] = band
+    return H.ravel()[: n * n].reshape(n, n)

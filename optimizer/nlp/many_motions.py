@@ -227,4 +227,5 @@ class ManyMotions(TimedMotions):
 
 
 def _beyond_one(ratio: Array) -> Array:
-    return np.asarray(ratio - np.clip(ratio, -1.0, 1.0))
+    # `np.clip` takes twice as long
+    return np.asarray(ratio - np.minimum(np.maximum(ratio, -1.0), 1.0))

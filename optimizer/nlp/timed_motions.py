@@ -41,11 +41,11 @@ class TimedMotions(ABC):
         """q, v, a at the nodes, (..., N, 3 r), for all control points (..., n, r)."""
         return (self._at_nodes @ points).reshape(*points.shape[:-2], len(self.basis.nodes), -1)
 
-    @property
+    @cached_property
     def _r(self) -> int:
         return self.kernel.nq
 
-    @property
+    @cached_property
     def _m(self) -> int:
         return self.basis.n - 2 * self.basis.resting
 
