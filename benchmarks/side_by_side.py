@@ -1,0 +1,116 @@
+"""Planners on the same seeded tasks, task by task in turns: ratios that hold where the machine's speed changes.
+
+    python -m benchmarks.side_by_side answer drake --count 20
+
+Every planner has a process of its own, on one core. The first takes its tasks before and after each of the others', and
+all as often as `--repeat` says; a task's time is the median of these.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+import numpy as np
+
+from benchmarks.command import THREADS, parser, write_json
+from benchmarks.planners.__main__ import PLANNERS, attempt
+from benchmarks.planners.planner import Planner
+from benchmarks.service import ROOT
+from benchmarks.statistics import Spread
+from benchmarks.tasks import moves
+from models.registry import load_robot
+from models.robot import Array
+
+# what begins the lines that tell a time: planners may print others
+WALL = "wall "
+
+
+class Worker:
+    """A planner in another process, which plans the seeded tasks by their numbers."""
+
+    def __init__(self, name: str, seed: int, count: int) -> None:
+        call = f"from benchmarks.side_by_side import serve; serve({name!r}, {seed}, {count})"
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", call],
+            cwd=ROOT,
+            env=os.environ | dict.fromkeys(THREADS, "1"),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        self._told()
+
+    def end(self) -> None:
+        """End the process."""
+        self._process.kill()
+        self._process.communicate()
+
+    def wall(self, index: int) -> float:
+        """Wall time [s] of a task. Raises RuntimeError if the process ends."""
+        assert self._process.stdin is not None
+        print(index, file=self._process.stdin, flush=True)
+        return self._told()
+
+    def _told(self) -> float:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            if line.startswith(WALL):
+                return float(line.removeprefix(WALL))
+        raise RuntimeError("a planner's process ended; `make bench` installs the packages that the planners need")
+
+
+def serve(name: str, seed: int, count: int) -> None:
+    """Plans the tasks whose numbers come in, and tells their wall times [s]; at first that of building all."""
+    module, kind = PLANNERS[name].split(":")
+    planner: Planner = getattr(import_module(f"benchmarks.planners.{module}"), kind)(load_robot("ur5e"))
+    tasks = list(moves(seed, count))
+    print(f"{WALL}{attempt(planner, tasks[0])[0]}", flush=True)
+    for line in sys.stdin:
+        print(f"{WALL}{attempt(planner, tasks[int(line)])[0]}", flush=True)
+
+
+def measured(first: Worker, others: Sequence[Worker], count: int, repeat: int) -> Array:
+    """Wall times (1 + others, count) [s] of all planners."""
+    walls = np.empty((1 + len(others), count))
+    for task in range(count):
+        own, each = list[float](), [list[float]() for _ in others]
+        for _ in range(repeat):
+            for other, times in zip(others, each, strict=True):
+                own.append(first.wall(task))
+                times.append(other.wall(task))
+                own.append(first.wall(task))
+        walls[:, task] = [np.median(times) for times in (own, *each)]
+    return walls
+
+
+def main() -> None:
+    """Runs all planners, and prints times and ratios."""
+    arguments = parser(__doc__)
+    arguments.add_argument("first", choices=PLANNERS)
+    arguments.add_argument("others", choices=PLANNERS, nargs="+")
+    arguments.add_argument("--count", type=int, default=20, help="tasks (%(default)s)")
+    arguments.add_argument("--repeat", type=int, default=1, help="plans of a task by each of the others (%(default)s)")
+    given = arguments.parse_args()
+    names = [given.first, *given.others]
+    workers = [Worker(name, given.seed, given.count) for name in names]
+    try:
+        walls = measured(workers[0], workers[1:], given.count, given.repeat)
+    finally:
+        for worker in workers:
+            worker.end()
+    for name, own in zip(names, walls, strict=True):
+        print(f"{name:10s} {Spread.of(own.tolist()).times(1e3).formatted(' ms')}")
+    ratios = {}
+    for name, own in zip(given.others, walls[1:], strict=True):
+        ratio, spread = float(np.median(own) / np.median(walls[0])), Spread.of((own / walls[0]).tolist())
+        ratios[name] = ratio
+        print(f"{name} / {given.first}: {ratio:.1f} of the medians; task by task {spread.formatted()}")
+    write_json(given.json, {"seed": given.seed, "names": names, "walls": walls.tolist(), "ratios": ratios})
+
+
+if __name__ == "__main__":
+    main()
