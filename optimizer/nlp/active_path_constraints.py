@@ -122,6 +122,8 @@ class PathConstraintRows:
         slopes = np.concatenate([np.einsum("kc,skcj->skj", w[:, c], each) for each in by_state], axis=2)
         bent = np.zeros((len(k), 2 * nq, 2 * nq))
         bent[:, : len(steps)] = (slopes[1:] - slopes[0]).transpose(1, 0, 2) / DIFFERENCE
+        # differences are symmetric but for their error; what factorises a Hessian reads half of it
+        bent = (bent + bent.transpose(0, 2, 1)) / 2
         Y = np.concatenate(self._state_gradients(v, T, k), axis=1)
         hessian: Array = Y.reshape(-1, self.n).T @ (bent @ Y).reshape(-1, self.n)
         # second derivatives of v = s' / T by (s, T)

@@ -18,6 +18,8 @@ STEP = 1e-6  # of control points [rad, or of the line's fraction] and of the dur
 FIRST = 1e-7
 # the Hessian is itself a forward difference, of step 1e-6
 SECOND = 1e-4
+# of its halves
+ROUNDING = 1e-13
 SPACE = bspline.uniform(9)
 # a path point of the middle and one near the end
 POINTS = (48, 90)
@@ -86,6 +88,7 @@ def test_the_hessian_is_the_slope_of_the_gradients(case: Case) -> None:
     )
     assert np.abs(hessian - slopes).max() < SECOND * np.abs(slopes).max()
     assert np.abs(hessian[-1] - slopes[-1]).max() < SECOND * np.abs(slopes[-1]).max()
+    assert np.abs(hessian - hessian.T).max() < ROUNDING * np.abs(hessian).max()
 
 
 def test_only_ratios_near_their_bounds_are_active(case: Case) -> None:
