@@ -42,8 +42,9 @@ POLISHED = 1.05
 # energy of the motion through them: it may have left them on the wrong side. Of 240 random tasks among obstacles seven
 # are beyond, of which one needs 9 % less from a planned path; of those within, none needs 2 % less
 WAY_OUT = 1.12
-# time [s] from which on a solve need not have a checked motion early
-AMPLE = 1.0
+# a sole candidate is refined at once if so much time [s] is left, and after its coarse motion this multiple of the time
+# that it took: with less, a checked motion comes first. Refining takes twice as long, and up to 8 solves
+AMPLE, MULTIPLE = 1.0, 30.0
 # relative decrease of the cost that a further step must promise in a solve whose motion is followed to sharper corners
 CORNERED_PROGRESS = 5e-2
 # the same in a solve from a known motion: further steps would take some 5 % of the time, and save 0.002 % of the
@@ -76,7 +77,7 @@ class FreeSpline(SqpMethod):
             space = bspline.uniform(COARSE)
             guess = Guess(space, self._smoothed(space), 0.0, rough=True, progress=self._progress)
             if self._is_refined_at_once:
-                tried += self._coarse_and_refined(guess, TIGHT * shortest)
+                tried, guess = self._coarse_and_refined(guess, TIGHT * shortest)
             if not tried or tried[-1].spline is None:
                 tried.append(self.improve(guess))
         if not tried or (tried[-1].status is SolveStatus.FAILED and tried[-1].collision is None):
@@ -89,22 +90,29 @@ class FreeSpline(SqpMethod):
 
     @property
     def _is_refined_at_once(self) -> bool:
-        """Whether the coarse motion is only the guess of the refined one: no other candidate is compared with it,
-        nothing slides or is in the way, and time is ample."""
+        """Whether the coarse motion is only the guess of the refined one: there is no other candidate, no obstacle, no
+        end that slides, and ample time."""
         problem = self.prepared.problem
         settled = self.start_curve is None and self.goal_curve is None and not len(self.passes)
         plain = not has_corners(problem.objective, problem.arm) and problem.arm.bus.mode != "storage"
         return self.is_sole and settled and plain and not problem.arm.scene.names and self.deadline.left > AMPLE
 
-    def _coarse_and_refined(self, guess: Guess, tight: float) -> list[SolveResult]:
+    def _coarse_and_refined(self, guess: Guess, tight: float) -> tuple[list[SolveResult], Guess]:
         """The coarse motion of a guess, checked for collisions alone, and the refined one. If the coarse one lasts less
-        than `tight` [s], knots are EXACT. The last result has a motion if that will do."""
-        coarse = self.improve(replace(guess, passing=True))
+        than `tight` [s], knots are EXACT.
+
+        Where the last result has no motion, the coarse motion has to be checked: the guess for that is returned, too.
+        """
+        left = self.deadline.left
+        coarse = self.improve(replace(guess, unchecked=True))
         if coarse.spline is None:
-            return [coarse]
-        if self.prepared.surroundings.worst_violation(coarse.spline) is not None:
-            return [replace(coarse, spline=None)]
-        return [coarse, self.solve_from(*sampled(coarse.spline), fine=coarse.spline.duration < tight)]
+            return [coarse], guess
+        points, duration = self.coordinates.from_joints(coarse.spline.control_points), coarse.spline.duration
+        found = replace(guess, points=points, duration=duration, nearly_feasible=True)
+        late = self.deadline.left < MULTIPLE * (left - self.deadline.left)
+        if late or self.prepared.surroundings.worst_violation(coarse.spline) is not None:
+            return [replace(coarse, spline=None)], found
+        return [coarse, self.solve_from(*sampled(coarse.spline), fine=duration < tight)], found
 
     def _may_be_on_the_wrong_side(self, found: SolveResult) -> bool:
         """Whether a motion may have left obstacles on the wrong side."""

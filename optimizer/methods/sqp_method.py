@@ -66,8 +66,8 @@ class Guess:
     `collision_free`: the NLP has clearance constraints from the start. Other guesses get them after a collision.
     `rough`: with clearance constraints, the solve ends at ROUGH_PROGRESS, since another one refines its motion.
     `progress` is the relative decrease of the cost that a further step of the SQP must promise. `nearly_feasible`: the
-    solve begins with this duration, although jerk may exceed its limit next to knots that have moved. `passing`: the
-    motion is only the guess of another one, and is not checked between the nodes.
+    solve begins with this duration, although jerk may exceed its limit next to knots that have moved. `unchecked`:
+    the motion is only a guess of another solve. It may break limits between the nodes, and collide.
     """
 
     space: Basis
@@ -77,7 +77,7 @@ class Guess:
     rough: bool = False
     progress: float = PROGRESS
     nearly_feasible: bool = False
-    passing: bool = False
+    unchecked: bool = False
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ class SqpMethod(Method):
                 return _failed(reason, collision, iterations, solves)
             if result.status is SqpStatus.COSTLIER:
                 return SolveResult(SolveStatus.PRUNED, COSTLIER, iterations, solves)
-            if guess.passing:
+            if guess.unchecked:
                 return SolveResult(SolveStatus.SOLVED, CONVERGED, iterations, solves, _spline(stage.program, result))
             check = self._checked(stage.program, result)
             collision = check.collision

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import product
+from itertools import count, product
 from typing import Any
 
 import numpy as np
@@ -191,6 +191,16 @@ def test_else_the_coarse_motion_is_checked(why: str, monkeypatch: pytest.MonkeyP
     assert FreeSpline.may_refine(spline(result))
     assert result.solves == (3 if why == "refining fails" else 1)
     assert_held(own.prepared.problem, spline(result))
+
+
+@pytest.mark.parametrize(("readings", "refined"), [(25, False), (30, False), (34, False), (200, False), (1000, True)])
+def test_on_a_slow_machine_a_checked_motion_comes_first(readings: int, refined: bool) -> None:
+    """Of the time that is left, a reading of the clock takes a share; coarse and refined motion take 34 of them."""
+    own, ticks = solver(START, GOAL), count()
+    own.is_sole, own.deadline = True, Deadline(2.0, clock=lambda: 2.0 * next(ticks) / readings)
+    found = spline(own.solve())
+    assert FreeSpline.may_refine(found) is not refined
+    assert_held(own.prepared.problem, found)
 
 
 def test_a_coarse_motion_that_collides_is_no_guess() -> None:
