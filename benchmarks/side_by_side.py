@@ -1,9 +1,9 @@
-"""Planners on the same seeded tasks, task by task in turns: ratios that hold where the machine's speed changes.
+"""Planners on the same seeded tasks, task by task in turns: their ratio hardly hangs on a machine whose speed changes.
 
     python -m benchmarks.side_by_side answer drake --count 20
 
-Every planner has a process of its own, on one core. The first takes its tasks before and after each of the others', and
-all as often as `--repeat` says; a task's time is the median of these.
+Every planner has a process of its own, on one core. The first one plans a task before and after each of the others, and
+all do so `--repeat` times. The median of a planner's times for a task counts.
 """
 
 from __future__ import annotations
@@ -12,17 +12,14 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
-from importlib import import_module
 
 import numpy as np
 
 from benchmarks.command import THREADS, parser, write_json
-from benchmarks.planners.__main__ import PLANNERS, attempt
-from benchmarks.planners.planner import Planner
+from benchmarks.planners.__main__ import PLANNERS, attempt, planner_of
 from benchmarks.service import ROOT
 from benchmarks.statistics import Spread
 from benchmarks.tasks import moves
-from models.registry import load_robot
 from models.robot import Array
 
 # what begins the lines that tell a time: planners may print others
@@ -65,9 +62,7 @@ class Worker:
 
 def serve(name: str, seed: int, count: int) -> None:
     """Plans the tasks whose numbers come in, and tells their wall times [s]; at first that of building all."""
-    module, kind = PLANNERS[name].split(":")
-    planner: Planner = getattr(import_module(f"benchmarks.planners.{module}"), kind)(load_robot("ur5e"))
-    tasks = list(moves(seed, count))
+    planner, tasks = planner_of(name), list(moves(seed, count))
     print(f"{WALL}{attempt(planner, tasks[0])[0]}", flush=True)
     for line in sys.stdin:
         print(f"{WALL}{attempt(planner, tasks[int(line)])[0]}", flush=True)
@@ -95,9 +90,10 @@ def main() -> None:
     arguments.add_argument("--count", type=int, default=20, help="tasks (%(default)s)")
     arguments.add_argument("--repeat", type=int, default=1, help="plans of a task by each of the others (%(default)s)")
     given = arguments.parse_args()
-    names = [given.first, *given.others]
-    workers = [Worker(name, given.seed, given.count) for name in names]
+    names, workers = [given.first, *given.others], list[Worker]()
     try:
+        for name in names:
+            workers.append(Worker(name, given.seed, given.count))
         walls = measured(workers[0], workers[1:], given.count, given.repeat)
     finally:
         for worker in workers:
@@ -108,7 +104,7 @@ def main() -> None:
     for name, own in zip(given.others, walls[1:], strict=True):
         ratio, spread = float(np.median(own) / np.median(walls[0])), Spread.of((own / walls[0]).tolist())
         ratios[name] = ratio
-        print(f"{name} / {given.first}: {ratio:.1f} of the medians; task by task {spread.formatted()}")
+        print(f"{name} / {given.first}: ratio of the medians {ratio:.1f}; ratio per task: {spread.formatted()}")
     write_json(given.json, {"seed": given.seed, "names": names, "walls": walls.tolist(), "ratios": ratios})
 
 

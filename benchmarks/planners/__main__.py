@@ -32,6 +32,13 @@ PLANNERS = {
 REACHED = 1e-6  # largest joint error at start and goal [rad]
 
 
+def planner_of(name: str) -> Planner:
+    """The planner of this name, for a UR5e. Raises ImportError if its packages are missing."""
+    module, kind = PLANNERS[name].split(":")
+    planner: Planner = getattr(import_module(f"benchmarks.planners.{module}"), kind)(load_robot("ur5e"))
+    return planner
+
+
 def attempt(planner: Planner, task: Move) -> tuple[float, Replay | None]:
     """Wall time [s] and the replayed motion of a task; None without a motion or after an exception of the planner."""
     began = time.perf_counter()
@@ -59,10 +66,8 @@ def main() -> None:
     arguments.add_argument("--count", type=int, default=20, help="tasks (%(default)s)")
     given = arguments.parse_args()
     on_one_core()
-    robot = load_robot("ur5e")
-    module, name = PLANNERS[given.planner].split(":")
     began = time.perf_counter()
-    planner: Planner = getattr(import_module(f"benchmarks.planners.{module}"), name)(robot)
+    planner = planner_of(given.planner)
     tasks = list(moves(given.seed, given.count))
     attempt(planner, tasks[0])  # the first call builds what later calls reuse
     built = time.perf_counter() - began

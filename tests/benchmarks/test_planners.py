@@ -8,9 +8,9 @@ from scipy.interpolate import BSpline
 
 from benchmarks.comparison import Comparison
 from benchmarks.motion import Replay, replay
-from benchmarks.planners.__main__ import PLANNERS
+from benchmarks.planners.__main__ import PLANNERS, planner_of
 from benchmarks.planners.casadi_opti import derivative_points
-from benchmarks.planners.planner import Planner, versions
+from benchmarks.planners.planner import versions
 from benchmarks.tasks import move
 from models.registry import load_robot
 from optimizer.trajectories.bspline import DEGREE, uniform
@@ -28,9 +28,7 @@ HOLDING = [name for name in PLANNERS if name not in ("toppra", "opti-grid")]
 def planned(name: str) -> Replay:
     if name in OPTIONAL:
         pytest.importorskip(OPTIONAL[name])
-    robot, task = load_robot("ur5e"), move(0, 0)
-    module, kind = PLANNERS[name].split(":")
-    planner: Planner = getattr(import_module(f"benchmarks.planners.{module}"), kind)(robot)
+    planner, task = planner_of(name), move(0, 0)
     assert versions(planner)
     motion = planner.plan(task.q_start, task.q_goal)
     assert motion is not None
