@@ -179,13 +179,19 @@ class Plant:
         return energy_sensitivity(weights, q, v, a, tau, self.arm, arm_spread(self.arm), lost)
 
     def report_samples(self, spline: Spline) -> ReportSamples:
-        """Samples of a motion for reported figures."""
+        """Samples of a motion at the Gauss-Legendre points of its reported energy."""
         return self._last_samples.of(spline, self._computed_samples)
 
     def _computed_samples(self, spline: Spline) -> ReportSamples:
         weights, q, v, a = fine_samples(spline, REPORT_NODES)
         tau = self.torques(q, v, a)
         return weights, q, v, a, tau, friction_torque(self.friction, self.arm.drives, tau, v, a)
+
+    def net_demand(self, spline: Spline) -> tuple[Array, Array]:
+        """Net demand (k,) [J] on the bus in the intervals of a motion's reported energy, and their lengths (k,) [s]."""
+        weights, _, v, _, tau, lost = self.report_samples(spline)
+        joints = flow_with(lost, tau, v, self.arm.drives).joints
+        return weights * (self.arm.base_power + joints.sum(axis=1)), weights
 
     @cached_property
     def _last_energy(self) -> _OfTheLast[Energy]:
@@ -215,7 +221,6 @@ class Plant:
         """
         if self.arm.bus.mode != "storage":
             return np.zeros_like(t)
-        weights, _, v, _, tau, lost = self.report_samples(spline)
-        joints = flow_with(lost, tau, v, self.arm.drives).joints
-        charge = charges(self.arm.bus, weights * (self.arm.base_power + joints.sum(axis=1)), weights)
-        return np.interp(t, np.append(0.0, weights.cumsum()), charge)
+        net, lengths = self.net_demand(spline)
+        charge = charges(self.arm.bus, net, lengths)
+        return np.interp(t, np.append(0.0, lengths.cumsum()), charge)

@@ -111,14 +111,15 @@ def _power_rates(
     joints = u * v + quadratic * square + linear * size + drives.inverter_constant
     by_torque = v + (2 * quadratic * i + linear * np.sign(i)) / drives.torque_constant
     relative, tau_rigid = v / law.speed, tau - drives.rotor_inertia * a
-    viscous, step = by_torque * v, v / np.sqrt(v * v + law.knee * law.knee)
-    by_rigid = by_torque if law.load is None else by_torque * (1 + law.load * step * np.sign(tau_rigid))
+    viscous = by_torque * v
+    step = viscous / np.sqrt(v * v + law.knee * law.knee)
+    by_rigid = by_torque if law.load is None else by_torque + law.load * step * np.sign(tau_rigid)
     rates = {
-        "coulomb": by_torque * step,
+        "coulomb": step,
         "curved": by_torque * np.arcsinh(relative),
         "speed": -law.curved / law.speed**2 * viscous / np.sqrt(1 + relative * relative),
         "viscous": viscous,
-        "load": by_torque * step * np.abs(tau_rigid),
+        "load": step * np.abs(tau_rigid),
         "torque_constant": -(2 * quadratic * square + linear * size) / drives.torque_constant,
         "rotor_inertia": by_torque * a,
         "copper": square,

@@ -6,7 +6,6 @@ QP again, and transform all rows with it, at a tenth of the speed of BLAS.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import daqp
@@ -31,13 +30,29 @@ _ACTIVE, _EQUAL, _SOFT = 1, 5, 8
 _INFINITE = 1e30
 
 
+class Listed:
+    """Rows of one kind, and the place of each: so many indices."""
+
+    def __init__(self, indices: int) -> None:
+        none = np.zeros(0, dtype=int)
+        self._parts = [(none,) * (1 + indices)]
+
+    def add(self, rows: Index, places: tuple[Index, ...]) -> None:
+        """Add rows at places."""
+        self._parts.append((rows, *places))
+
+    def joined(self) -> tuple[Index, Any]:
+        """All rows, and their places, an array for each index."""
+        rows, *places = (np.concatenate(each) for each in zip(*self._parts, strict=True))
+        return rows, tuple(places)
+
+
 class QPRows:
     """Constraints least ≤ A y ≤ most in whitened variables; rows are added at the end.
 
-    `hard` rows are never relaxed. `chosen` (2, 3, r, M) marks the lower and upper limits on rates with a row, by grid
-    point, `places` lists the points, and `kinematic` is the row of each. In the same way `bounded` (2, n) marks the
-    lower and upper bounds with a row, `sides` lists them, and `bounds` is the row of each. `passed` (point, column)
-    lists the path constraints with a row, and `path` is the row of each.
+    `hard` rows are never relaxed. `rates` are the rows of limits on rates, by derivative, coordinate and grid point;
+    `bounds` those of bounds, by side and variable; `path` those of path constraints, by point and column. `chosen`
+    (2, 3, r, M) marks the lower and upper limits on rates with a row, `bounded` (2, n) the lower and upper bounds.
     """
 
     def __init__(self, whitening: Array, grid: tuple[int, ...]) -> None:
@@ -49,39 +64,8 @@ class QPRows:
         self._least, self._most = np.empty(ROOM), np.empty(ROOM)
         self._hard, self._active = np.empty(ROOM, dtype=bool), np.empty(ROOM, dtype=bool)
         self.chosen, self.bounded = np.zeros((2, *grid), dtype=bool), np.zeros((2, n), dtype=bool)
-        self._places, self._sides, self._passed = (list[tuple[Index, ...]]() for _ in range(3))
-        self._kinematic, self._bounds, self._path = (list[Index]() for _ in range(3))
+        self.rates, self.bounds, self.path = Listed(3), Listed(2), Listed(2)
         self._identity = np.eye(size)
-
-    @property
-    def places(self) -> Places:
-        """Derivative, coordinate and grid point of the limits on rates."""
-        return _joined(self._places, 3)  # type: ignore[no-any-return]
-
-    @property
-    def sides(self) -> tuple[Index, Index]:
-        """Side and variable of the bounds."""
-        return _joined(self._sides, 2)  # type: ignore[no-any-return]
-
-    @property
-    def passed(self) -> tuple[Index, Index]:
-        """Point and column of the path constraints."""
-        return _joined(self._passed, 2)  # type: ignore[no-any-return]
-
-    @property
-    def kinematic(self) -> Index:
-        """The rows of `places`."""
-        return np.concatenate(self._kinematic) if self._kinematic else _NONE
-
-    @property
-    def bounds(self) -> Index:
-        """The rows of `sides`."""
-        return np.concatenate(self._bounds) if self._bounds else _NONE
-
-    @property
-    def path(self) -> Index:
-        """The rows of `passed`."""
-        return np.concatenate(self._path) if self._path else _NONE
 
     def add(
         self,
@@ -122,14 +106,12 @@ class QPRows:
         self, gradients: Array, most: Array, places: Places, upper: Mask, active: Mask | bool = False
     ) -> None:
         """Add the rows of places that have none yet for their `upper` or lower limit; see `add`."""
-        self._kinematic.append(self.add(gradients, most, active=active))
-        self._places.append(places)
+        self.rates.add(self.add(gradients, most, active=active), places)
         self.chosen[upper.astype(int), *places] = True
 
     def add_path(self, gradients: Array, slack: Array, passed: tuple[Index, Index], active: Mask) -> None:
         """Add the rows of path constraints that have none yet; see `add`."""
-        self._path.append(self.add(gradients, slack, active=active))
-        self._passed.append(passed)
+        self.path.add(self.add(gradients, slack, active=active), passed)
 
     def add_bounds(self, bounds: Array, wanted: Mask) -> None:
         """Add the `wanted` (2, n) lower and upper bounds of variables, if they have no row yet."""
@@ -138,8 +120,7 @@ class QPRows:
         gradients = np.zeros((len(side), len(self.whitening)))
         sign = np.where(side, 1.0, -1.0)
         gradients[np.arange(len(side)), variable] = sign
-        self._bounds.append(self.add(gradients, sign * bounds[sides], hard=True))
-        self._sides.append(sides)
+        self.bounds.add(self.add(gradients, sign * bounds[sides], hard=True), sides)
         self.bounded[sides] = True
 
     def solve(self, gradient: Array, relax: bool) -> tuple[Array, Array, bool]:
@@ -164,11 +145,3 @@ class QPRows:
             # what the next solve starts from
             active[:] = info["lam"] > 0
         return y, info["lam"], found
-
-
-_NONE: Index = np.zeros(0, dtype=int)
-
-
-def _joined(parts: Sequence[tuple[Index, ...]], kinds: int) -> Any:
-    """The places of all parts, as one array (places,) for each of their `kinds` of indices."""
-    return tuple(np.concatenate([part[k] for part in parts]) if parts else _NONE for k in range(kinds))

@@ -18,10 +18,10 @@ from optimizer.nlp.active_path_constraints import Index, NearPathConstraints, Pa
 from optimizer.nlp.nonlinear_program import FEASIBILITY, Linearisation, NonlinearProgram
 from optimizer.nlp.qp_rows import Places, QPRows
 
-# limits on rates enter the QP when they use more than this ratio of the limit: in the first QP, and once the QP before
-# tells which ones hold the motion. With a fifth fewer rows, steps are as few and as good
+# a rate enters the first QP above this ratio of its limit, and a later one above the second: there, limits that were
+# active in the QP before enter, too. With a fifth fewer rows, steps are as few and as good
 NEAR, NEAR_LATER = 0.6, 0.85
-# other constraints likewise
+# torques and path constraints enter any QP above these
 NEAR_TORQUE = 0.5
 NEAR_PATH = 0.5
 # clearances enter above this ratio, or if they were active in the QP before; above NEAR_PATH once a step breaks them
@@ -151,19 +151,19 @@ class WorkingSetQP:
                 break
         mu = np.maximum(multipliers, 0.0)
         pull = multipliers @ np.concatenate(rows.gradients) if self.p.held else np.zeros(self.n)
-        step = QPStep(
-            _shortened(x, bounds), relaxed, rows.places, mu[rows.kinematic],
-            torque.nodes, torque.signs, mu[limited], rows.passed, mu[rows.path], pull,
-        )  # fmt: skip
+        (kinematic, places), (bounded, sides), (near, passed) = (
+            each.joined() for each in (rows.rates, rows.bounds, rows.path)
+        )
         # what was active is kept for the next QP
-        for marks, places, multiplier in (
-            (self._active, step.places, step.kinematic),
-            (self._bounded, rows.sides, mu[rows.bounds]),
-            (self._passed, step.passed, step.path),
-        ):
+        for marks, at_places, numbers in (
+            (self._active, places, kinematic), (self._bounded, sides, bounded), (self._passed, passed, near)
+        ):  # fmt: skip
             marks[...] = False
-            marks[places] = multiplier > 0
-        return step
+            marks[at_places] = mu[numbers] > 0
+        return QPStep(
+            _shortened(x, bounds), relaxed, places, mu[kinematic],
+            torque.nodes, torque.signs, mu[limited], passed, mu[near], pull,
+        )  # fmt: skip
 
     def _first_path_rows(self, rows: QPRows, at: QPInputs) -> NearPathConstraints:
         """Adds the path constraints that the QP is first solved with, and returns the others that are near."""

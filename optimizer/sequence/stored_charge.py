@@ -15,7 +15,6 @@ import numpy as np
 from models.robot import Array
 from optimizer.energy.bus_flow import BusFlow, charge_steps, charges, pooled
 from optimizer.energy.dwell import brake_power, holding_power, waits
-from optimizer.energy.losses import flow_with
 from optimizer.energy.plant import Plant
 from optimizer.problem.arm import Arm
 from optimizer.problem.bus import Bus
@@ -34,9 +33,7 @@ class Demand:
     @classmethod
     def of_motion(cls, plant: Plant, spline: Spline) -> Demand:
         """That of a motion, in the intervals of its reported energy."""
-        weights, _, v, _, tau, lost = plant.report_samples(spline)
-        joints = flow_with(lost, tau, v, plant.arm.drives).joints
-        return cls(weights * (plant.arm.base_power + joints.sum(axis=1)), weights)
+        return cls(*plant.net_demand(spline))
 
     @classmethod
     def of_rest(cls, asked: WorkRound, move: PlannedMove, before: float, length: float, q: Array) -> Demand:
