@@ -31,7 +31,7 @@ _INFINITE = 1e30
 
 
 class Listed:
-    """Rows of one kind, and the place of each: so many indices."""
+    """Rows of one kind, and the place of each, which is so many indices: of a bound, its side and its variable."""
 
     def __init__(self, indices: int) -> None:
         none = np.zeros(0, dtype=int)
@@ -42,7 +42,7 @@ class Listed:
         self._parts.append((rows, *places))
 
     def joined(self) -> tuple[Index, Any]:
-        """All rows, and their places, an array for each index."""
+        """All rows (k,), and their places: an array (k,) for each index."""
         rows, *places = (np.concatenate(each) for each in zip(*self._parts, strict=True))
         return rows, tuple(places)
 

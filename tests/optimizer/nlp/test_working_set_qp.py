@@ -9,6 +9,7 @@ import pytest
 
 from models.robot import Array
 from optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
+from optimizer.nlp.qp_rows import ROOM, QPRows
 from optimizer.nlp.working_set_qp import MOST_ROUNDS, NEAR, QPInputs, WorkingSetQP
 from tests.optimizer.moves import GOAL, START
 from tests.optimizer.nlp.test_sqp import program, quintic, shortest
@@ -91,3 +92,20 @@ def test_further_constraints_let_a_step_promise_less() -> None:
         assert promised(MOST_ROUNDS, enough=first + ROUNDING) == pytest.approx(first, abs=ROUNDING)
         ended += last < 0.9 * first
     assert ended
+
+
+def test_rows_added_one_by_one_are_those_added_at_once() -> None:
+    """Several times as many as there is room for at first; half of them before a first solve."""
+    rng, n, count = np.random.default_rng(6), 12, 3 * ROOM
+    A, most, gradient = rng.normal(size=(count, n)), rng.uniform(0.05, 1.0, count), rng.normal(size=n)
+    at_once, one_by_one = (QPRows(np.eye(n), (3, 1, 1)) for _ in range(2))
+    at_once.add(A, most)
+    for k in range(count):
+        if k == count // 2:
+            one_by_one.solve(gradient, relax=False)
+        assert one_by_one.add(A[k : k + 1], most[k : k + 1]) == [k]
+    (y, price, found), (others, _, other_found) = (rows.solve(gradient, relax=False) for rows in (at_once, one_by_one))
+    assert found and other_found
+    assert others == pytest.approx(y, abs=ROUNDING)
+    assert (A @ y <= most + ROUNDING).all() and (price >= 0).all()
+    assert y == pytest.approx(-gradient - price @ A, abs=ROUNDING)
