@@ -14,7 +14,7 @@ import models.meshes
 import models.pictures
 from app.engine.result import TaskResult
 from models.pictures import picture, picture_sources
-from optimizer.energy.kernel_cache import cache_directory, workplace
+from optimizer.native.library_cache import cache_directory, workplace
 
 logger = logging.getLogger(__name__)
 

@@ -191,7 +191,7 @@ class _Proof:
         travel = (v * h[:, None]) @ self.levers.T
         is_open = self.may_be_closest(distances, travel)
         instant, pair = np.nonzero(_at_ends(is_open))
-        beads = self.geometry.bead_distances(instants.frames, instant, pair)
+        beads = self.geometry.bead_bounds(instants.frames, instant, pair)
         distances[instant, pair] = np.maximum(distances[instant, pair], beads)
         is_open &= self.may_be_closest(distances, travel)
         instant, pair = np.nonzero(_at_ends(is_open))
@@ -268,17 +268,8 @@ class _Proof:
 
     def convex_bounds(self, instants: _Instants, checks: _Checks) -> Array:
         """The same for convex bodies and parts."""
-        begin, end, pair = checks.begin, checks.end, checks.pair
-        link = self.geometry.links[self.model.pairs[pair, 0]]
-        R_begin, R_end = instants.frames[begin, link][:, :3, :3], instants.frames[end, link][:, :3, :3]
-        best = np.full(len(pair), -np.inf)
-        for normal, R_from in ((checks.at_begin.normal, R_begin), (checks.at_end.normal, R_end)):
-            in_link = np.einsum("kij,ki->kj", R_from, normal)
-            separations = [
-                self.geometry.separation(instants.frames, at, pair, np.einsum("kij,kj->ki", R_to, in_link), checks.part)
-                for at, R_to in ((begin, R_begin), (end, R_end))
-            ]
-            best = np.maximum(best, np.minimum(*separations))
+        normals = checks.at_begin.normal, checks.at_end.normal
+        best = self.geometry.separations(instants.frames, checks.begin, checks.end, checks.pair, normals, checks.part)
         return best - self.chord_errors(instants, checks)
 
     def travels(self, instants: _Instants, checks: _Checks) -> Array:

@@ -14,9 +14,9 @@ import numpy as np
 
 from models.robot import MOST_ROBOTS, Array, Mask, Robot
 from optimizer.collision.bodies import Body, Indices, bodies_of
-from optimizer.collision.many_points import cross
 from optimizer.collision.pair_distance import PairGeometry, WitnessPoints
 from optimizer.kinematics.forward import joint_placements, link_frames
+from optimizer.native.shared_library import shared_library
 from optimizer.problem.arm import Arm
 
 # along a motion, the distances at every so many samples are computed first
@@ -56,7 +56,7 @@ class CollisionModel:
     def __init__(self, arm: Arm) -> None:
         self.bodies = bodies_of(arm)
         self.pairs = _checked_pairs(arm, self.bodies)
-        self.geometry = PairGeometry(self.bodies, self.pairs)
+        self.geometry = PairGeometry(self.bodies, self.pairs, arm.robot.nq, shared_library())
         self.nq = arm.robot.nq
         self._placements = joint_placements(arm.robot.model)
         joints = np.arange(1, self.nq + 1)
@@ -92,11 +92,11 @@ class CollisionModel:
         """Signed distances of `pairs` (p,), by default of every pair, at n configurations.
 
         They are exact for half-spaces, and for pairs whose lower bounds are at most `within` [m], of patches of a cloud
-        only those that are at most `within` apart themselves. `known` (n, p) are lower bounds that take the place of
-        the distances of the balls.
+        only those that are at most `within` apart themselves. `known` (n, p) are lower bounds: balls bound only what
+        they leave open.
         """
         pairs = np.arange(len(self.pairs)) if pairs is None else pairs
-        distance, configuration, column = self._bounds(frames, pairs, within, known)
+        distance, configuration, column = self.geometry.bounds(frames, pairs, within, known)
         nearest = self.geometry.witness_points(frames, configuration, pairs[column], within)
         if self.geometry.is_cloud.any() and np.isfinite(within):
             # no part of these patches is within the limit, which is then the better lower bound
@@ -106,22 +106,6 @@ class CollisionModel:
             configuration, column, nearest = configuration[~beyond], column[~beyond], nearest[~beyond]
         distance[configuration, column] = nearest.distance
         return PairDistances(distance, configuration, column, nearest)
-
-    def _bounds(
-        self, frames: Array, pairs: Indices, within: float, known: Array | None = None
-    ) -> tuple[Array, Indices, Indices]:
-        """Lower bounds (n, p) [m] on the distances of `pairs` (p,), and where (k,) they are at most `within`: rows and
-        columns."""
-        distance = self.geometry.ball_distances(frames, pairs) if known is None else known
-        configuration, column = np.nonzero(distance <= within)
-        if np.isfinite(within):
-            # the ball around a shelf encloses half of the cell: a second bound leaves out most of these pairs
-            near = configuration, column
-            bound = self.geometry.bead_distances(frames, configuration, pairs[column])
-            distance[near] = np.maximum(distance[near], bound)
-            chosen = bound <= within
-            configuration, column = configuration[chosen], column[chosen]
-        return distance, configuration, column
 
     def along(self, q: Array, within: float, pairs: Indices | None = None) -> Array:
         """Signed distances (n, p) [m] at consecutive samples q (n, nq) [rad] of a motion, exact up to `within` [m].
@@ -155,7 +139,7 @@ class CollisionModel:
         Most are so where their lower bounds are least: few distances are needed.
         """
         every = np.arange(len(self.pairs))
-        bound = self._bounds(frames, every, within)[0]
+        bound = self.geometry.bounds(frames, every, within)[0]
         least = bound.argmin(axis=0)
         found = np.zeros(len(every), dtype=bool)
         (near,) = np.nonzero((bound[least, every] < within) & ~self.geometry.is_cloud)
@@ -209,11 +193,7 @@ class CollisionModel:
 
         By the envelope theorem, the motion of the witness points over the bodies does not contribute.
         """
-        axes, origins = frames[:, 1:, :3, 2], frames[:, 1:, :3, 3]
-        moment = cross(found.point, found.normal)
-        gradient = np.einsum("kji,ki->kj", axes[configuration], moment)
-        gradient -= np.einsum("kji,ki->kj", cross(axes, origins)[configuration], found.normal)
-        return np.asarray(gradient * self.joints_between[pair])
+        return self.geometry.gradients(frames, configuration, pair, found)
 
     @cached_property
     def levers_between(self) -> Array:

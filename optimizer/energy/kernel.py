@@ -10,6 +10,7 @@ compiler, CasADi's virtual machine evaluates the same expressions.
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Sequence
 from functools import lru_cache
@@ -18,9 +19,12 @@ import numpy as np
 
 from models.robot import MOST_ROBOTS, Array, Robot
 from optimizer.deadline import checkpoint
-from optimizer.energy.kernel_cache import compile_kernel, compiler, is_intact, library_paths, log, mark_used, seal_path
+from optimizer.energy.kernel_cache import compile_kernel, library_paths
 from optimizer.energy.kernel_expressions import build
 from optimizer.energy.kernel_functions import Compiled, Evaluation, Functions, Interpreted
+from optimizer.native.library_cache import compiler, is_intact, mark_used, seal_path
+
+log = logging.getLogger(__name__)
 
 # nodes per call of a function whose number of nodes varies from caller to caller
 CHUNK = 64

@@ -1,5 +1,5 @@
-"""`python -m optimizer.energy.precompile [--portable] [ROBOT …]` compiles the kernels of robots, so that no request is
-interpreted.
+"""`python -m optimizer.energy.precompile [--portable] [ROBOT …]` compiles the kernels of robots, and the library that
+all arms share, so that no request is interpreted.
 
 Without a name it compiles those of all robots. With `--portable` they serve on every processor of this kind, as in an
 image for many machines; without, they are for this one, and twice as fast.
@@ -11,11 +11,13 @@ import sys
 
 from models.registry import load_robot, robot_names
 from optimizer.energy.kernel_cache import compile_kernel
+from optimizer.native.shared_library import compile_shared
 
 if __name__ == "__main__":
     portable = "--portable" in sys.argv
     wanted = [name for name in sys.argv[1:] if name != "--portable"] or robot_names()
     if unknown := set(wanted) - set(robot_names()):
         sys.exit(f"There is no robot named {', '.join(sorted(unknown))}: use some of {', '.join(robot_names())}.")
+    print(compile_shared())
     for name in wanted:
         print(compile_kernel(load_robot(name), portable))

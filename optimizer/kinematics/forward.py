@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from models.robot import Array
+from optimizer.native.shared_library import address, shared_library
 
 
 def joint_placements(model: pin.Model) -> Array:
@@ -18,6 +19,17 @@ def link_frames(placements: Array, q: Array) -> Array:
 
     Frame 0 is that of the base, the identity. Frame k, of link k, lies on joint k with z along the joint's axis.
     """
+    library, nq = shared_library(), q.shape[1]
+    if library is None:
+        return link_frames_by_numpy(placements, q)
+    q, placements = np.ascontiguousarray(q, dtype=float), np.ascontiguousarray(placements)
+    frames = np.empty((len(q), nq + 1, 4, 4))
+    library.link_frames(len(q), nq, address(placements), address(q), address(frames))
+    return frames
+
+
+def link_frames_by_numpy(placements: Array, q: Array) -> Array:
+    """The same where the shared library cannot be compiled."""
     c, s = np.cos(q)[..., None], np.sin(q)[..., None]
     x, y = placements[..., 0], placements[..., 1]
     frames = np.empty((len(q), q.shape[1] + 1, 4, 4))

@@ -90,20 +90,25 @@ class PathConstraintRows:
     def gradients(self, values: PathConstraintValues, T: float, of: NearPathConstraints) -> Array:
         """Gradients (rows, n) by (s, T) of some constraints."""
         k, c = of.points, of.columns
-        by_q, by_v = values.ratios.by_q[k, c], values.ratios.by_v[k, c]
         at, rising = self.at_path_free[:, k, :, None]
-        P = self.coordinates.directions
-        by_points = at * (by_q @ P)[:, None] + rising * (by_v @ P / T)[:, None]
-        by_time = -np.einsum("rj,rj->r", by_v, values.v[k]) / T
-        return np.hstack([by_points.reshape(len(k), self.n - 1), by_time[:, None]])
+        P, result = self.coordinates.directions, np.zeros((len(k), self.n))
+        by_points = at * (values.ratios.by_q[k, c] @ P)[:, None]
+        if self.constraints is not None and self.constraints.limit_speeds:
+            by_v = values.ratios.by_v[k, c]
+            by_points += rising * (by_v @ P / T)[:, None]
+            result[:, -1] = -np.einsum("rj,rj->r", by_v, values.v[k]) / T
+        result[:, :-1] = by_points.reshape(len(k), self.n - 1)
+        return result
 
     def changes(self, values: PathConstraintValues, T: float, of: NearPathConstraints, ds: Array, dT: float) -> Array:
         """Changes (rows,) of some ratios to first order: their gradients times a step ds (m, r), dT [s]."""
         k, c = of.points, of.columns
         dq, rising = self.at_path_free @ ds @ self.coordinates.directions.T
-        dv = (rising - values.v * dT) / T
-        ratios = values.ratios
-        return np.asarray((ratios.by_q[k, c] * dq[k]).sum(axis=1) + (ratios.by_v[k, c] * dv[k]).sum(axis=1))
+        change = np.einsum("rj,rj->r", values.ratios.by_q[k, c], dq[k])
+        if self.constraints is not None and self.constraints.limit_speeds:
+            dv = (rising - values.v * dT) / T
+            change += np.einsum("rj,rj->r", values.ratios.by_v[k, c], dv[k])
+        return change
 
     def hessian(self, values: PathConstraintValues, T: float, weights: Array) -> Array:
         """Hessian (n, n) of Σ weights · ratios, weights (M, c), by finite differences of the ratios' gradients."""

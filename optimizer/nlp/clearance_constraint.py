@@ -20,8 +20,6 @@ RESERVE = 2e-4
 SCALE, COUNTED = 0.1, 0.06
 # the ratio above which that of a motion that is checked is exact
 CHECKED = 0.98
-# where earlier distances leave open more than this share of the distances, those of the balls are computed too
-FEW = 0.1
 
 
 @dataclass
@@ -61,15 +59,13 @@ class ClearanceConstraint:
         by_q = np.zeros((*found.distance.shape, q.shape[1]))
         gradients = self.model.gradients(frames, found.configuration, self.pairs[found.column], found.nearest)
         by_q[found.configuration, found.column] = gradients / -SCALE
-        return ConstraintRatios(_ratio(found.distance), by_q, np.zeros_like(by_q))
+        return ConstraintRatios(_ratio(found.distance), by_q, np.broadcast_to(0.0, by_q.shape))
 
     def _pair_distances(self, frames: Array, q: Array) -> PairDistances:
         """Distances at q (n, nq), of which those bounded away from COUNTED by earlier ones are not computed."""
         last, known = self._last, None
         if last.q.shape == q.shape:
             known = last.distance - self.model.changes(q - last.q, self.pairs)
-            if np.count_nonzero(known <= COUNTED) > FEW * known.size:
-                known = np.maximum(known, self.model.geometry.ball_distances(frames, self.pairs))
         found = self.model.pair_distances(frames, self.pairs, COUNTED, known)
         last.q, last.distance = q, found.distance
         return found

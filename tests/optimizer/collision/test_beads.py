@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from optimizer.collision.model import CollisionModel
+from optimizer.collision.numpy_distances import NumpyDistances
+from optimizer.collision.pair_arrays import PairArrays
 from optimizer.nlp.clearance_constraint import COUNTED, ClearanceConstraint
 from tests.optimizer.cells import LOADS, arm_in_cell, cell
 
@@ -22,9 +24,9 @@ def test_beads_bound_the_distances_from_below(seed: int) -> None:
     frames, pairs = model.frames(q), np.arange(len(model.pairs))
     configuration, pair = (index.ravel() for index in np.indices((len(q), len(pairs))))
     exact = model.pair_distances(frames).distance.ravel()
-    bound = model.geometry.bead_distances(frames, configuration, pair)
+    bound = model.geometry.bead_bounds(frames, configuration, pair)
     assert (bound <= exact + ITERATED).all()
-    balls = model.geometry.ball_distances(frames, pairs).ravel()
+    balls = NumpyDistances(PairArrays.of(model.bodies, model.pairs)).ball_distances(frames, pairs).ravel()
     has_bound = np.isfinite(bound) & np.isfinite(balls)
     assert has_bound.any()
     assert np.median(bound[has_bound] - balls[has_bound]) > 0

@@ -13,6 +13,8 @@ from models.registry import load_robot
 from models.robot import Array
 from optimizer.collision.coal_distance import _lower_bound, coal_shape
 from optimizer.collision.model import CollisionModel
+from optimizer.collision.numpy_distances import NumpyDistances
+from optimizer.collision.pair_arrays import PairArrays
 from optimizer.exceptions import InvalidProblem
 from optimizer.problem.arm import Arm, Payload
 from optimizer.problem.scene import Attachment, Cylinder, Mesh, Obstacle, Scene, Shape, Sphere, capsule_between
@@ -102,13 +104,14 @@ def test_separation_never_exceeds_the_distance_and_attains_it() -> None:
     frames, n, p = model.frames(q), len(q), len(model.pairs)
     configuration, pair = np.divmod(np.arange(n * p), p)
     found = model.geometry.witness_points(frames, configuration, pair)
-    at_normal = model.geometry.separation(frames, configuration, pair, found.normal)
+    separation = NumpyDistances(PairArrays.of(model.bodies, model.pairs)).separation
+    at_normal = separation(frames, configuration, pair, found.normal)
     shallow = (found.distance > -0.1) | model.geometry.is_closed_form[pair]
     assert np.abs(at_normal - found.distance)[shallow].max() < ITERATED
     normal = np.random.default_rng(2).normal(size=(n * p, 3))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     free = ~np.array([model.bodies[i].core.is_half_space for i in model.pairs[pair, 0]])
-    elsewhere = model.geometry.separation(frames, configuration, pair, normal)
+    elsewhere = separation(frames, configuration, pair, normal)
     assert (elsewhere <= found.distance + ITERATED)[free & shallow].all()
 
 

@@ -1,11 +1,10 @@
-"""The compiled library's life: its name, its seal, who compiles it, and who waits for it.
+"""The compiled kernel's life: its name, its seal, who compiles it, and who waits for it.
 
 Tests that compile do it without optimisation, by a compiler that adds a flag and leaves a line for each of its calls.
 """
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 import sys
@@ -22,11 +21,12 @@ import pytest
 
 from models.registry import robot_names
 from models.robot import Robot
-from optimizer.energy import kernel, kernel_cache
+from optimizer.energy import kernel
 from optimizer.energy.kernel import Kernel, kernel_for
-from optimizer.energy.kernel_cache import SOURCES, cache_directory, compile_kernel, compiler, digest, library_path
+from optimizer.energy.kernel_cache import SOURCES, compile_kernel, digest, library_path
 from optimizer.energy.kernel_expressions import build
 from optimizer.energy.kernel_source import AVX2, PORTABLE, source
+from optimizer.native.library_cache import compiler, workplace
 from optimizer.optimize import optimize
 from tests.optimizer.energy.kernel_states import LOSSY, TASK, TORQUE, states
 from tests.optimizer.moves import GOAL, ROBOT, START, problem, torques
@@ -208,13 +208,16 @@ def test_a_damaged_library_is_noticed_and_rebuilt(workshop: Workshop, whole: Pat
 
 @pytest.mark.parametrize("names", long_but([["ur5e"]], [["ur5e"], []]), ids=lambda names: ", ".join(names) or "all")
 def test_several_processes_make_one_library_of_each_robot(workshop: Workshop, names: list[str]) -> None:
-    """Three at once into an empty folder: one compiles, the others wait for it, nothing is left lying about."""
+    """Three at once into an empty folder: one compiles, the others wait for it, nothing is left lying about.
+
+    They make the library that all arms share, too.
+    """
     command = [sys.executable, "-W", "error::RuntimeWarning", "-m", "optimizer.energy.precompile", *names]
     processes = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(3)]
     printed = [process.communicate(timeout=ALL_COMPILED)[0].splitlines() for process in processes]
     assert [process.returncode for process in processes] == [0, 0, 0]
     assert [sorted(each) for each in printed] == [workshop.libraries] * 3
-    assert workshop.compilations == len(workshop.libraries) == len(names or robot_names())
+    assert workshop.compilations == len(workshop.libraries) == len(names or robot_names()) + 1
     assert workshop.leftovers() == []
     assert kernel_for(workshop.robot).compiled
 
@@ -223,7 +226,7 @@ def test_several_processes_make_one_library_of_each_robot(workshop: Workshop, na
 def test_what_a_killed_process_left_is_deleted(workshop: Workshop) -> None:
     target = library_path(workshop.robot, PORTABLE)
     target.parent.mkdir()
-    with kernel_cache.workplace(target) as folder:
+    with workplace(target) as folder:
         (folder / "kernel.c").write_text("half")
         left = shutil.copytree(folder, f"{folder}-killed.part")
     assert workshop.leftovers() == [left.removeprefix(f"{target.parent}/")]
@@ -280,28 +283,3 @@ def test_trouble_while_compiling_is_logged_and_survived(
     found = kernel_for(workshop.robot)
     assert not found.compiled
     assert_right(found)
-
-
-def test_the_cache_is_where_the_user_says_or_at_home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("JOULEPATH_CACHE_DIR", str(tmp_path))
-    assert cache_directory() == tmp_path
-    monkeypatch.delenv("JOULEPATH_CACHE_DIR")
-    monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    assert cache_directory() == tmp_path / "home" / ".cache" / "joulepath"
-
-
-def test_libraries_that_rested_longest_leave(whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of many arms that users bring; a library in use is marked, and stays."""
-    monkeypatch.setattr(kernel_cache, "MOST_LIBRARIES", 3)
-    for k in range(5):
-        for ending in (".so", ".sha256", ".lock"):
-            (tmp_path / f"arm{k}{ending}").write_bytes(b"?")
-        os.utime(tmp_path / f"arm{k}.so", (k, k))
-    kernel_cache.mark_used(tmp_path / "arm0.so")
-    kernel_cache._prune(tmp_path)
-    assert sorted(path.name for path in tmp_path.glob("*.so")) == ["arm0.so", "arm3.so", "arm4.so"]
-    assert len(list(tmp_path.iterdir())) == 9
-    # a folder that is gone is no error
-    kernel_cache.mark_used(tmp_path / "none" / "arm.so")
-    kernel_cache._prune(tmp_path / "none")
-    assert whole.exists()

@@ -1,0 +1,95 @@
+"""Distances of many pairs by the shared library: what `numpy_distances` computes, several times as fast."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.collision.bodies import Indices
+from optimizer.collision.pair_arrays import PairArrays
+from optimizer.native.shared_library import address
+
+# in the order of the C
+_SIZES = ("frames", "bodies", "most_points")
+_ARRAYS = (
+    "first", "second", "kinds", "growth", "links", "counts", "points", "ball_centres", "ball_radii", "axes",
+    "disc_radii", "half_sizes", "T_link_core", "formed", "beaded", "bead_centres", "bead_radii", "form_sizes",
+    "is_round",
+)  # fmt: skip
+
+
+class _Shapes(ctypes.Structure):
+    """The `Shapes` of the C: sizes, and the addresses of the arrays of `PairArrays`."""
+
+    _fields_ = [(name, ctypes.c_long) for name in _SIZES] + [(name, ctypes.c_void_p) for name in _ARRAYS]
+
+
+class CompiledDistances:
+    """Distances of the pairs of some bodies on the links of an arm of nq joints."""
+
+    def __init__(self, arrays: PairArrays, nq: int, library: ctypes.CDLL) -> None:
+        self._library, self._nq, self._bodies = library, nq, len(arrays.links)
+        given = vars(arrays) | {"first": arrays.pairs[:, 0], "second": arrays.pairs[:, 1]}
+        # an address does not keep its array alive
+        self._kept = [_plain(given[name]) for name in _ARRAYS]
+        self._shapes = _Shapes(nq + 1, self._bodies, arrays.points.shape[1], *map(address, self._kept))
+        self._of = ctypes.addressof(self._shapes)
+
+    def bounds(
+        self, frames: Array, pairs: Indices, within: float, known: Array | None
+    ) -> tuple[Array, Indices, Indices]:
+        """See `NumpyDistances.bounds`."""
+        n, p = len(frames), len(pairs)
+        distance = np.empty((n, p)) if known is None else known.copy()
+        row, column = np.empty(n * p, dtype=np.intp), np.empty(n * p, dtype=np.intp)
+        room = np.empty((self._bodies, 3))
+        given = _plain(frames), _plain(pairs)
+        found = self._library.bounds(
+            self._of, n, address(given[0]), p, address(given[1]), within, known is not None,
+            *map(address, (distance, row, column, room)),
+        )  # fmt: skip
+        return distance, row[:found], column[:found]
+
+    def bead_bounds(self, frames: Array, configuration: Indices, pair: Indices) -> Array:
+        """See `NumpyDistances.bead_bounds`."""
+        result = np.empty(len(pair))
+        self._call(self._library.bead_bounds, frames, configuration, pair, result)
+        return result
+
+    def witness_points(self, frames: Array, configuration: Indices, pair: Indices) -> tuple[Array, Array, Array]:
+        """Signed distance of the cores (k,) [m], normal and point (k, 3), as of `PairGeometry.witness_points`.
+
+        The distance is NaN where cores touch, and where Coal or a cloud has to compute it.
+        """
+        k = len(pair)
+        distance, normal, point = np.empty(k), np.empty((k, 3)), np.empty((k, 3))
+        self._call(self._library.witness_points, frames, configuration, pair, distance, normal, point)
+        return distance, normal, point
+
+    def separations(
+        self, frames: Array, begin: Indices, end: Indices, pair: Indices, normals: tuple[Array, Array]
+    ) -> Array:
+        """See `NumpyDistances.separations`."""
+        result = np.empty(len(pair))
+        self._call(self._library.separations, frames, begin, end, pair, *normals, result)
+        return result
+
+    def gradients(self, frames: Array, configuration: Indices, pair: Indices, normal: Array, point: Array) -> Array:
+        """See `NumpyDistances.gradients`."""
+        result = np.empty((len(pair), self._nq))
+        self._call(self._library.gradients, frames, configuration, pair, normal, point, result)
+        return result
+
+    def _call(self, function: Any, frames: Array, *arrays: Array | Indices) -> None:
+        """Call a function about as many cases as the arrays are long; the last ones are its results."""
+        given = [_plain(each) for each in (frames, *arrays)]
+        function(self._of, address(given[0]), len(given[1]), *map(address, given[1:]))
+
+
+def _plain(array: Array | Indices) -> Array | Indices:
+    """The array as C knows it: numbers one after the other, 64 bits each."""
+    kind = float if array.dtype == float else np.intp
+    return np.ascontiguousarray(array, dtype=kind)

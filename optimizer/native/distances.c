@@ -1,0 +1,318 @@
+/* Distances between bodies at many configurations, one pair after the other.
+
+   What the functions compute, and the shapes of their arguments, are those of optimizer/collision/pair_distance.py,
+   which computes by numpy what is left out here. */
+
+#include <math.h>
+
+#define BEADS 4
+
+/* the order of PairKind */
+enum { SEGMENT_SEGMENT, BOX_SEGMENT, SEGMENT_BOX, HALF_SPACE };
+
+/* cores nearer than this [m] touch, segments whose squared sine is below PARALLEL are parallel, and a vector of a squared
+   length below NONE has no direction: as in closed_form_distance.py */
+static const double TOUCHING = 1e-10, PARALLEL = 1e-15, NONE = 1e-24;
+
+/* Bodies b and their pairs p: see PairArrays in pair_arrays.py, and compiled_distances.py, which has the same order. */
+typedef struct {
+  long links, bodies, points; /* frames of a configuration, bodies, most points of a body */
+  const long *first, *second, *kind;
+  const double *growth;
+  const long *link, *count;
+  const double *body_points, *ball_centre, *ball_radius, *axis, *disc_radius, *half_size, *placement;
+  const long *formed, *beaded;
+  const double *bead_centre, *bead_radius, *form_size;
+  const long *is_round;
+} Shapes;
+
+static double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+static double lesser(double a, double b) { return a < b ? a : b; }
+
+static double greater(double a, double b) { return a > b ? a : b; }
+
+static double clipped(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
+
+/* a point by the pose T (4, 4) */
+static void place(const double *T, const double *x, double *y) {
+  for (int i = 0; i < 3; ++i) y[i] = dot(T + 4 * i, x) + T[4 * i + 3];
+}
+
+/* a point in the frame of the pose T */
+static void into(const double *T, const double *x, double *y) {
+  double d[3];
+  for (int i = 0; i < 3; ++i) d[i] = x[i] - T[4 * i + 3];
+  for (int i = 0; i < 3; ++i) y[i] = T[i] * d[0] + T[4 + i] * d[1] + T[8 + i] * d[2];
+}
+
+static void turn(const double *T, const double *x, double *y) {
+  for (int i = 0; i < 3; ++i) y[i] = dot(T + 4 * i, x);
+}
+
+static void turn_back(const double *T, const double *x, double *y) {
+  for (int i = 0; i < 3; ++i) y[i] = T[i] * x[0] + T[4 + i] * x[1] + T[8 + i] * x[2];
+}
+
+static const double *frame_of(const Shapes *shapes, const double *frames, long configuration, long body) {
+  return frames + 16 * (shapes->links * configuration + shapes->link[body]);
+}
+
+/* Lower bound [m] on the distance of the cores of a pair by beads, but for radii; -INFINITY if there is none. */
+static double bead_bound(const Shapes *shapes, const double *frames, long configuration, long pair) {
+  const long formed = shapes->formed[pair], beaded = shapes->beaded[pair];
+  if (formed < 0) return -INFINITY;
+  const double *of_beads = frame_of(shapes, frames, configuration, beaded);
+  const double *of_form = frame_of(shapes, frames, configuration, formed), *half = shapes->form_size + 3 * formed;
+  double least = INFINITY;
+  for (int k = 0; k < BEADS; ++k) {
+    double at[3], in_link[3], x[3], outside[3];
+    place(of_beads, shapes->bead_centre + 3 * (BEADS * beaded + k), at);
+    into(of_form, at, in_link);
+    into(shapes->placement + 16 * formed, in_link, x);
+    if (shapes->is_round[formed]) {
+      x[0] = sqrt(x[0] * x[0] + x[1] * x[1]);
+      x[1] = 0.0;
+    }
+    for (int i = 0; i < 3; ++i) outside[i] = greater(fabs(x[i]) - half[i], 0.0);
+    least = lesser(least, dot(outside, outside));
+  }
+  const double bound = sqrt(least) - shapes->bead_radius[beaded];
+  return bound > 0 ? bound : -INFINITY;
+}
+
+/* Lower bounds (n, p) on the distances of pairs (p), at first those in `distance` if `known`. Where they are at most
+   `within`, balls improve them, and beads if `within` is finite. Returns how many are left at most as great: their
+   `row` and `column`. `centre` has room for (bodies, 3). */
+long bounds(const Shapes *shapes, long n, const double *frames, long p, const long *pairs, double within, long known,
+            double *distance, long *row, long *column, double *centre) {
+  long found = 0;
+  for (long c = 0; c < n; ++c) {
+    for (long b = 0; b < shapes->bodies; ++b)
+      place(frame_of(shapes, frames, c, b), shapes->ball_centre + 3 * b, centre + 3 * b);
+    for (long k = 0; k < p; ++k) {
+      const long pair = pairs[k];
+      double *at = distance + c * p + k;
+      if (known && *at > within) continue;
+      double bound = -INFINITY;
+      if (shapes->kind[pair] != HALF_SPACE) {
+        const long first = shapes->first[pair], second = shapes->second[pair];
+        double across[3];
+        for (int i = 0; i < 3; ++i) across[i] = centre[3 * second + i] - centre[3 * first + i];
+        bound = sqrt(dot(across, across)) - (shapes->ball_radius[first] + shapes->ball_radius[second] + shapes->growth[pair]);
+      }
+      *at = known ? greater(*at, bound) : bound;
+      if (*at > within) continue;
+      if (isfinite(within)) {
+        *at = greater(*at, bead_bound(shapes, frames, c, pair) - shapes->growth[pair]);
+        if (*at > within) continue;
+      }
+      row[found] = c;
+      column[found++] = k;
+    }
+  }
+  return found;
+}
+
+/* Lower bounds (k) [m] on the distances of pairs (k) at configurations (k) by beads; -INFINITY where there is none. */
+void bead_bounds(const Shapes *shapes, const double *frames, long k, const long *configuration, const long *pair,
+                 double *bound) {
+  for (long j = 0; j < k; ++j)
+    bound[j] = bead_bound(shapes, frames, configuration[j], pair[j]) - shapes->growth[pair[j]];
+}
+
+/* Distance [m] of segments (2, 3), unit normal from a to b and the nearest point of b; NAN if they touch. */
+static double segment_segment(const double *a, const double *b, double *normal, double *point) {
+  double u[3], v[3], w[3], across[3];
+  for (int i = 0; i < 3; ++i) {
+    u[i] = a[3 + i] - a[i];
+    v[i] = b[3 + i] - b[i];
+    w[i] = a[i] - b[i];
+  }
+  const double uu = dot(u, u), vv = dot(v, v), uv = dot(u, v), uw = dot(u, w), vw = dot(v, w);
+  const double denominator = uu * vv - uv * uv;
+  double s = denominator > PARALLEL * uu * vv ? clipped((uv * vw - vv * uw) / denominator, 0, 1) : 0.0;
+  const double t = clipped((uv * s + vw) / greater(vv, NONE), 0, 1);
+  s = clipped((uv * t - uw) / greater(uu, NONE), 0, 1);
+  for (int i = 0; i < 3; ++i) {
+    point[i] = b[i] + t * v[i];
+    across[i] = point[i] - (a[i] + s * u[i]);
+  }
+  const double distance = sqrt(dot(across, across));
+  if (!(distance >= TOUCHING)) return NAN;
+  for (int i = 0; i < 3; ++i) normal[i] = across[i] / distance;
+  return distance;
+}
+
+/* Derivative of half the squared distance of p + s u from a box of half size h, by s. */
+static double slope(const double *p, const double *u, const double *h, double s) {
+  double sum = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    const double x = p[i] + s * u[i];
+    sum += (x - clipped(x, -h[i], h[i])) * u[i];
+  }
+  return sum;
+}
+
+/* Distance [m] of a segment b (2, 3) from a box of half size h about the origin, unit normal from the box and the
+   nearest point of the segment; NAN if they touch. */
+static double box_segment(const double *h, const double *b, double *normal, double *point) {
+  double u[3], bends[8] = {0.0, 1.0}, low = 0.0, high = 1.0;
+  int many = 2;
+  for (int i = 0; i < 3; ++i) {
+    u[i] = b[3 + i] - b[i];
+    if (fabs(u[i]) <= 1e-15) continue;
+    bends[many++] = clipped((h[i] - b[i]) / u[i], 0, 1);
+    bends[many++] = clipped((-h[i] - b[i]) / u[i], 0, 1);
+  }
+  for (int k = 0; k < many; ++k) {
+    if (slope(b, u, h, bends[k]) < 0)
+      low = greater(low, bends[k]);
+    else
+      high = lesser(high, bends[k]);
+  }
+  const double g0 = slope(b, u, h, low), g1 = slope(b, u, h, high);
+  const double s = low + (g0 < 0 && g1 > 0 ? -g0 / (g1 - g0) : 1.0) * (high - low);
+  double across[3];
+  for (int i = 0; i < 3; ++i) {
+    point[i] = b[i] + s * u[i];
+    across[i] = point[i] - clipped(point[i], -h[i], h[i]);
+  }
+  const double distance = sqrt(dot(across, across));
+  if (!(distance >= TOUCHING)) return NAN;
+  for (int i = 0; i < 3; ++i) normal[i] = across[i] / distance;
+  return distance;
+}
+
+/* The ends (2, 3) of a segment in the base frame. */
+static void segment_ends(const Shapes *shapes, const double *frames, long configuration, long body, double *ends) {
+  const double *T = frame_of(shapes, frames, configuration, body), *x = shapes->body_points + 3 * shapes->points * body;
+  place(T, x, ends);
+  place(T, x + 3 * (shapes->count[body] - 1), ends + 3);
+}
+
+static double box_and_segment(const Shapes *shapes, const double *frames, long configuration, long box, long segment,
+                              double *normal, double *point) {
+  const double *T = frame_of(shapes, frames, configuration, box), *in_link = shapes->placement + 16 * box;
+  double ends[6], local[6], of_link[3], n[3], x[3];
+  segment_ends(shapes, frames, configuration, segment, ends);
+  for (int k = 0; k < 2; ++k) {
+    into(T, ends + 3 * k, of_link);
+    into(in_link, of_link, local + 3 * k);
+  }
+  const double distance = box_segment(shapes->half_size + 3 * box, local, n, x);
+  if (isnan(distance)) return NAN;
+  turn(in_link, n, of_link);
+  turn(T, of_link, normal);
+  place(in_link, x, of_link);
+  place(T, of_link, point);
+  return distance;
+}
+
+/* Signed height [m] of the lowest point of a body above a half-space, its outward normal, and that point. */
+static double half_space(const Shapes *shapes, const double *frames, long configuration, long ground, long body,
+                         double *normal, double *point) {
+  const double *T = frame_of(shapes, frames, configuration, body), *origin = shapes->body_points + 3 * shapes->points * ground;
+  const double *up = shapes->axis + 3 * ground;
+  double least = INFINITY, axis[3], in_disc[3];
+  for (long k = 0; k < shapes->count[body]; ++k) {
+    double x[3], above[3];
+    place(T, shapes->body_points + 3 * (shapes->points * body + k), x);
+    for (int i = 0; i < 3; ++i) above[i] = x[i] - origin[i];
+    const double height = dot(above, up);
+    if (height >= least) continue;
+    least = height;
+    for (int i = 0; i < 3; ++i) point[i] = x[i];
+  }
+  turn(T, shapes->axis + 3 * body, axis);
+  const double cosine = dot(axis, up), radius = shapes->disc_radius[body];
+  for (int i = 0; i < 3; ++i) in_disc[i] = up[i] - cosine * axis[i];
+  const double sine = sqrt(dot(in_disc, in_disc));
+  for (int i = 0; i < 3; ++i) {
+    point[i] -= radius / greater(sine, 1e-12) * in_disc[i];
+    normal[i] = up[i];
+  }
+  return least - radius * sine;
+}
+
+/* Signed distances (k), normals and points (k, 3) of pairs (k) at configurations (k). NAN where they touch, or where
+   Coal or a cloud computes them. */
+void witness_points(const Shapes *shapes, const double *frames, long k, const long *configuration, const long *pair,
+                    double *distance, double *normal, double *point) {
+  for (long j = 0; j < k; ++j, normal += 3, point += 3) {
+    const long c = configuration[j], first = shapes->first[pair[j]], second = shapes->second[pair[j]];
+    double found = NAN, a[6], b[6];
+    switch (shapes->kind[pair[j]]) {
+      case SEGMENT_SEGMENT:
+        segment_ends(shapes, frames, c, first, a);
+        segment_ends(shapes, frames, c, second, b);
+        found = segment_segment(a, b, normal, point);
+        break;
+      case BOX_SEGMENT:
+        found = box_and_segment(shapes, frames, c, first, second, normal, point);
+        break;
+      case SEGMENT_BOX:
+        found = box_and_segment(shapes, frames, c, second, first, normal, point);
+        for (int i = 0; i < 3; ++i) normal[i] = -normal[i];
+        break;
+      case HALF_SPACE:
+        found = half_space(shapes, frames, c, first, second, normal, point);
+    }
+    distance[j] = found;
+  }
+}
+
+/* min n·x [m] over the core of a body; n is in the base frame. */
+static double support(const Shapes *shapes, const double *frames, long configuration, long body, const double *n) {
+  const double *T = frame_of(shapes, frames, configuration, body), *x = shapes->body_points + 3 * shapes->points * body;
+  const double shift = T[3] * n[0] + T[7] * n[1] + T[11] * n[2];
+  double in_link[3], least = INFINITY;
+  turn_back(T, n, in_link);
+  for (long k = 0; k < shapes->count[body]; ++k) least = lesser(least, dot(x + 3 * k, in_link));
+  if (shapes->disc_radius[body] > 0) {
+    const double cosine = dot(shapes->axis + 3 * body, in_link);
+    least -= shapes->disc_radius[body] * sqrt(greater(1 - cosine * cosine, 0.0));
+  }
+  return least + shift;
+}
+
+/* Separation [m] along n, which is fixed to the first body of a pair and given in the frame of its link. */
+static double separation(const Shapes *shapes, const double *frames, long configuration, long pair, const double *n) {
+  const long first = shapes->first[pair], second = shapes->second[pair];
+  double normal[3], opposite[3];
+  turn(frame_of(shapes, frames, configuration, first), n, normal);
+  for (int i = 0; i < 3; ++i) opposite[i] = -normal[i];
+  return support(shapes, frames, configuration, second, normal) + support(shapes, frames, configuration, first, opposite) -
+         shapes->growth[pair];
+}
+
+/* For pairs (k) between configurations `begin` and `end` (k), and unit normals there (k, 3): the greater, of both
+   normals, of the lesser separation (k) [m] at both, the normal being fixed to the first body. */
+void separations(const Shapes *shapes, const double *frames, long k, const long *begin, const long *end, const long *pair,
+                 const double *normal_begin, const double *normal_end, double *result) {
+  for (long j = 0; j < k; ++j) {
+    const long first = shapes->first[pair[j]];
+    double n[3];
+    turn_back(frame_of(shapes, frames, begin[j], first), normal_begin + 3 * j, n);
+    const double one = lesser(separation(shapes, frames, begin[j], pair[j], n), separation(shapes, frames, end[j], pair[j], n));
+    turn_back(frame_of(shapes, frames, end[j], first), normal_end + 3 * j, n);
+    const double other = lesser(separation(shapes, frames, begin[j], pair[j], n), separation(shapes, frames, end[j], pair[j], n));
+    result[j] = greater(one, other);
+  }
+}
+
+/* Gradients (k, links - 1) [m/rad] of the distances of pairs (k) with these unit normals and witness points (k, 3). */
+void gradients(const Shapes *shapes, const double *frames, long k, const long *configuration, const long *pair,
+               const double *normal, const double *point, double *result) {
+  const long nq = shapes->links - 1;
+  for (long j = 0; j < k; ++j, normal += 3, point += 3, result += nq) {
+    const long below = shapes->link[shapes->first[pair[j]]], last = shapes->link[shapes->second[pair[j]]];
+    for (long i = 0; i < nq; ++i) {
+      const double *T = frames + 16 * (shapes->links * configuration[j] + i + 1);
+      const double x = point[0] - T[3], y = point[1] - T[7], z = point[2] - T[11];
+      result[i] = i < below || i >= last ? 0.0
+                                         : normal[0] * (T[6] * z - T[10] * y) + normal[1] * (T[10] * x - T[2] * z) +
+                                               normal[2] * (T[2] * y - T[6] * x);
+    }
+  }
+}

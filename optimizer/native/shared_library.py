@@ -1,0 +1,78 @@
+"""The library that every arm shares: forward kinematics and distances, of many configurations at once.
+
+It serves on every processor of this kind. Where there is none, since there is no compiler or no place for it, numpy
+computes the same, several times as slowly.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import logging
+import os
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from optimizer.native.library_cache import cache_directory, compile_library, compiler, is_intact, mark_used
+
+log = logging.getLogger(__name__)
+
+SOURCES = ("chain.c", "distances.c")
+# all processors round alike without contraction
+FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off")
+
+_LONG, _DOUBLE, _ARRAY = ctypes.c_long, ctypes.c_double, ctypes.c_void_p
+# arguments and result of every function: those of the C
+_FUNCTIONS = {
+    "link_frames": ([_LONG, _LONG, *3 * [_ARRAY]], None),
+    "bounds": ([_ARRAY, _LONG, _ARRAY, _LONG, _ARRAY, _DOUBLE, _LONG, *4 * [_ARRAY]], _LONG),
+    "bead_bounds": ([_ARRAY, _ARRAY, _LONG, *3 * [_ARRAY]], None),
+    "witness_points": ([_ARRAY, _ARRAY, _LONG, *5 * [_ARRAY]], None),
+    "separations": ([_ARRAY, _ARRAY, _LONG, *6 * [_ARRAY]], None),
+    "gradients": ([_ARRAY, _ARRAY, _LONG, *5 * [_ARRAY]], None),
+}
+
+
+def source() -> str:
+    """The C of the library."""
+    return "".join((Path(__file__).parent / name).read_text() for name in SOURCES)
+
+
+def library_path() -> Path:
+    """Path of the library."""
+    depends_on = f"{source()}{FLAGS}{os.uname().machine}"
+    return cache_directory() / f"shared-{hashlib.sha256(depends_on.encode()).hexdigest()[:24]}.so"
+
+
+def compile_shared() -> Path:
+    """Compile the library if that has not been done, and return its path. Raises as `compile_library`."""
+    path = library_path()
+    if not is_intact(path):
+        compile_library(path, FLAGS, source)
+    return path
+
+
+@cache
+def shared_library() -> ctypes.CDLL | None:
+    """The library, compiled if that has not been done, which takes half a second; None if it cannot be."""
+    if compiler() is None and not is_intact(library_path()):
+        return None
+    try:
+        path = compile_shared()
+        library = ctypes.CDLL(str(path))
+    except (RuntimeError, OSError) as error:
+        log.warning("the shared library is not compiled, numpy serves: %s", error)
+        return None
+    mark_used(path)
+    for name, (arguments, result) in _FUNCTIONS.items():
+        function = getattr(library, name)
+        function.argtypes, function.restype = arguments, result
+    return library
+
+
+def address(array: np.ndarray[Any, Any]) -> int:
+    """Address of the numbers of an array, which must lie one after the other."""
+    return array.ctypes.data
