@@ -108,7 +108,7 @@ class PathConstraintRows:
         if self.constraints is not None and self.constraints.limit_speeds:
             dv = (rising - values.v * dT) / T
             change += np.einsum("rj,rj->r", values.ratios.by_v[k, c], dv[k])
-        return change
+        return np.asarray(change)
 
     def hessian(self, values: PathConstraintValues, T: float, weights: Array) -> Array:
         """Hessian (n, n) of Σ weights · ratios, weights (M, c), by finite differences of the ratios' gradients."""
