@@ -23,6 +23,7 @@ from optimizer.collision.state_validity import ValidityCheckers
 from optimizer.deadline import Deadline
 from optimizer.exceptions import SingularPose, UnreachablePose
 from optimizer.kinematics.inverse import required_inverse_kinematics
+from optimizer.nlp.clearance_constraint import RESERVE
 from optimizer.problem.arm import Arm
 from optimizer.problem.scene import Box, Capsule, Cylinder, Obstacle, Scene, Shape, Sphere, capsule_between
 
@@ -116,13 +117,14 @@ def cell_tasks(seed: int, number: int) -> Iterator[CellTask]:
 
 
 def _clear(arm: Arm, model: CollisionModel, T: Array) -> list[Array]:
-    """Collision-free configurations (nq,) [rad] of a TCP pose."""
+    """Configurations (nq,) [rad] of a TCP pose that keep all margins, and RESERVE beyond them."""
     kinematics = required_inverse_kinematics(arm.robot, "goal")
     try:
         found = kinematics.solve(T, arm.T_flange_tcp, arm.active_limits, windings=False, target="goal")
     except (UnreachablePose, SingularPose):
         return []
-    return [solution.q for solution in found if model.least_distance(solution.q[None], 0.0) > 0]
+    # what a request may start or end at
+    return [each.q for each in found if model.least_distance(each.q[None], RESERVE) >= RESERVE]
 
 
 # obstacles, and where the TCP may start and end (4, 4)

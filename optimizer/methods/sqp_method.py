@@ -51,7 +51,7 @@ NOT_MUCH_BETTER = 1.05
 FAR_COSTLIER = 2.5
 # penetration [m] of the motion without clearance constraints beyond which, once a motion is known, they are added to a
 # planned path alone: what is that deep inside an obstacle seldom gets out of it
-DEEP = 0.09
+DEEP = 0.06
 STOPPED = "the deadline ended its optimisation"
 COSTLIER = "ended early: it comes to no less energy than the best motion found"
 NO_BETTER = (
