@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -57,11 +58,17 @@ class PairGeometry:
         self.is_cloud = arrays.kinds == PairKind.CLOUD
         # pairs (p,) whose distance is exact, not iterated
         self.is_closed_form = (arrays.kinds != PairKind.CONVEX) & ~self.is_cloud
-        self._numpy = NumpyDistances(arrays)
         self._compiled = None if library is None else CompiledDistances(arrays, nq, library)
-        self._fast = self._compiled or self._numpy
         self._clouds = CloudPairs(bodies)
         self._convex = ConvexPairs([body.core for body in bodies])
+
+    @cached_property
+    def _numpy(self) -> NumpyDistances:
+        return NumpyDistances(self._arrays)
+
+    @property
+    def _fast(self) -> CompiledDistances | NumpyDistances:
+        return self._compiled or self._numpy
 
     def bounds(
         self, frames: Array, pairs: Indices, within: float, known: Array | None = None

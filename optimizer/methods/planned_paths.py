@@ -18,6 +18,8 @@ from optimizer.trajectories.spline import Spline
 PLANNING, FEW_STATES = 0.75, 20_000
 # for the only candidate there is more time: in narrow spaces, motions from four paths differ by some percent
 OF_SOLE = Effort(paths=4, more_states=12_000, easy=1_000)
+# once a motion is known, a second path of another candidate seldom leads to a better one
+OF_ANOTHER = Effort(more_states=1_000)
 # fraction of the time left that a method which follows paths gives to those after the first
 PATIENCE = 0.3
 # planned paths longer than this multiple of the shortest one are skipped
@@ -39,12 +41,13 @@ def plan(method: Method) -> PlannedPaths:
     left, surroundings, others = method.deadline.left, method.prepared.surroundings, method.other_goals()
     tried = method.was_postponed or surroundings.seems_enclosed(method.q_start, method.q_goal)
     thorough = np.isinf(method.best_known) and (tried or not others)
+    effort = OF_SOLE if method.is_sole else USUAL if np.isinf(method.best_known) else OF_ANOTHER
     return surroundings.planned_paths(
         method.q_start,
         method.q_goal,
         method.deadline.within(PLANNING * left) if np.isfinite(left) else method.deadline,
         others if thorough else (),
-        replace(OF_SOLE if method.is_sole else USUAL, most_states=MOST_STATES if thorough else FEW_STATES),
+        replace(effort, most_states=MOST_STATES if thorough else FEW_STATES),
     )
 
 
