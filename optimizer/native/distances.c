@@ -16,13 +16,13 @@ static const double TOUCHING = 1e-10, PARALLEL = 1e-15, NONE = 1e-24;
 
 /* Bodies b and their pairs p: see PairArrays in pair_arrays.py, and compiled_distances.py, which has the same order. */
 typedef struct {
-  long links, bodies, points; /* frames of a configuration, bodies, most points of a body */
-  const long *first, *second, *kind;
+  long frames, bodies, most_points; /* frames of a configuration, bodies, most points of a body */
+  const long *first, *second, *kinds;
   const double *growth;
-  const long *link, *count;
-  const double *body_points, *ball_centre, *ball_radius, *axis, *disc_radius, *half_size, *placement;
+  const long *links, *counts;
+  const double *points, *ball_centres, *ball_radii, *axes, *disc_radii, *half_sizes, *T_link_core;
   const long *formed, *beaded;
-  const double *bead_centre, *bead_radius, *form_size;
+  const double *bead_centres, *bead_radii, *form_sizes;
   const long *is_round;
 } Shapes;
 
@@ -34,18 +34,7 @@ static double greater(double a, double b) { return a > b ? a : b; }
 
 static double clipped(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
 
-/* a point by the pose T (4, 4) */
-static void place(const double *T, const double *x, double *y) {
-  for (int i = 0; i < 3; ++i) y[i] = dot(T + 4 * i, x) + T[4 * i + 3];
-}
-
-/* a point in the frame of the pose T */
-static void into(const double *T, const double *x, double *y) {
-  double d[3];
-  for (int i = 0; i < 3; ++i) d[i] = x[i] - T[4 * i + 3];
-  for (int i = 0; i < 3; ++i) y[i] = T[i] * d[0] + T[4 + i] * d[1] + T[8 + i] * d[2];
-}
-
+/* a vector by the rotation of the pose T (4, 4) */
 static void turn(const double *T, const double *x, double *y) {
   for (int i = 0; i < 3; ++i) y[i] = dot(T + 4 * i, x);
 }
@@ -54,8 +43,29 @@ static void turn_back(const double *T, const double *x, double *y) {
   for (int i = 0; i < 3; ++i) y[i] = T[i] * x[0] + T[4 + i] * x[1] + T[8 + i] * x[2];
 }
 
+/* a point by the pose T */
+static void place(const double *T, const double *x, double *y) {
+  turn(T, x, y);
+  for (int i = 0; i < 3; ++i) y[i] += T[4 * i + 3];
+}
+
+/* a point in the frame of the pose T */
+static void into(const double *T, const double *x, double *y) {
+  double d[3];
+  for (int i = 0; i < 3; ++i) d[i] = x[i] - T[4 * i + 3];
+  turn_back(T, d, y);
+}
+
+/* Length [m] of a vector between two nearest points, and its direction; NAN if they touch. */
+static double length_of(const double *across, double *normal) {
+  const double distance = sqrt(dot(across, across));
+  if (!(distance >= TOUCHING)) return NAN;
+  for (int i = 0; i < 3; ++i) normal[i] = across[i] / distance;
+  return distance;
+}
+
 static const double *frame_of(const Shapes *shapes, const double *frames, long configuration, long body) {
-  return frames + 16 * (shapes->links * configuration + shapes->link[body]);
+  return frames + 16 * (shapes->frames * configuration + shapes->links[body]);
 }
 
 /* Lower bound [m] on the distance of the cores of a pair by beads, but for radii; -INFINITY if there is none. */
@@ -63,13 +73,13 @@ static double bead_bound(const Shapes *shapes, const double *frames, long config
   const long formed = shapes->formed[pair], beaded = shapes->beaded[pair];
   if (formed < 0) return -INFINITY;
   const double *of_beads = frame_of(shapes, frames, configuration, beaded);
-  const double *of_form = frame_of(shapes, frames, configuration, formed), *half = shapes->form_size + 3 * formed;
+  const double *of_form = frame_of(shapes, frames, configuration, formed), *half = shapes->form_sizes + 3 * formed;
   double least = INFINITY;
   for (int k = 0; k < BEADS; ++k) {
     double at[3], in_link[3], x[3], outside[3];
-    place(of_beads, shapes->bead_centre + 3 * (BEADS * beaded + k), at);
+    place(of_beads, shapes->bead_centres + 3 * (BEADS * beaded + k), at);
     into(of_form, at, in_link);
-    into(shapes->placement + 16 * formed, in_link, x);
+    into(shapes->T_link_core + 16 * formed, in_link, x);
     if (shapes->is_round[formed]) {
       x[0] = sqrt(x[0] * x[0] + x[1] * x[1]);
       x[1] = 0.0;
@@ -77,7 +87,7 @@ static double bead_bound(const Shapes *shapes, const double *frames, long config
     for (int i = 0; i < 3; ++i) outside[i] = greater(fabs(x[i]) - half[i], 0.0);
     least = lesser(least, dot(outside, outside));
   }
-  const double bound = sqrt(least) - shapes->bead_radius[beaded];
+  const double bound = sqrt(least) - shapes->bead_radii[beaded];
   return bound > 0 ? bound : -INFINITY;
 }
 
@@ -89,17 +99,18 @@ long bounds(const Shapes *shapes, long n, const double *frames, long p, const lo
   long found = 0;
   for (long c = 0; c < n; ++c) {
     for (long b = 0; b < shapes->bodies; ++b)
-      place(frame_of(shapes, frames, c, b), shapes->ball_centre + 3 * b, centre + 3 * b);
+      place(frame_of(shapes, frames, c, b), shapes->ball_centres + 3 * b, centre + 3 * b);
     for (long k = 0; k < p; ++k) {
       const long pair = pairs[k];
       double *at = distance + c * p + k;
       if (known && *at > within) continue;
       double bound = -INFINITY;
-      if (shapes->kind[pair] != HALF_SPACE) {
+      if (shapes->kinds[pair] != HALF_SPACE) {
         const long first = shapes->first[pair], second = shapes->second[pair];
         double across[3];
         for (int i = 0; i < 3; ++i) across[i] = centre[3 * second + i] - centre[3 * first + i];
-        bound = sqrt(dot(across, across)) - (shapes->ball_radius[first] + shapes->ball_radius[second] + shapes->growth[pair]);
+        const double radii = shapes->ball_radii[first] + shapes->ball_radii[second] + shapes->growth[pair];
+        bound = sqrt(dot(across, across)) - radii;
       }
       *at = known ? greater(*at, bound) : bound;
       if (*at > within) continue;
@@ -138,10 +149,7 @@ static double segment_segment(const double *a, const double *b, double *normal, 
     point[i] = b[i] + t * v[i];
     across[i] = point[i] - (a[i] + s * u[i]);
   }
-  const double distance = sqrt(dot(across, across));
-  if (!(distance >= TOUCHING)) return NAN;
-  for (int i = 0; i < 3; ++i) normal[i] = across[i] / distance;
-  return distance;
+  return length_of(across, normal);
 }
 
 /* Derivative of half the squared distance of p + s u from a box of half size h, by s. */
@@ -178,29 +186,26 @@ static double box_segment(const double *h, const double *b, double *normal, doub
     point[i] = b[i] + s * u[i];
     across[i] = point[i] - clipped(point[i], -h[i], h[i]);
   }
-  const double distance = sqrt(dot(across, across));
-  if (!(distance >= TOUCHING)) return NAN;
-  for (int i = 0; i < 3; ++i) normal[i] = across[i] / distance;
-  return distance;
+  return length_of(across, normal);
 }
 
 /* The ends (2, 3) of a segment in the base frame. */
 static void segment_ends(const Shapes *shapes, const double *frames, long configuration, long body, double *ends) {
-  const double *T = frame_of(shapes, frames, configuration, body), *x = shapes->body_points + 3 * shapes->points * body;
+  const double *T = frame_of(shapes, frames, configuration, body), *x = shapes->points + 3 * shapes->most_points * body;
   place(T, x, ends);
-  place(T, x + 3 * (shapes->count[body] - 1), ends + 3);
+  place(T, x + 3 * (shapes->counts[body] - 1), ends + 3);
 }
 
 static double box_and_segment(const Shapes *shapes, const double *frames, long configuration, long box, long segment,
                               double *normal, double *point) {
-  const double *T = frame_of(shapes, frames, configuration, box), *in_link = shapes->placement + 16 * box;
+  const double *T = frame_of(shapes, frames, configuration, box), *in_link = shapes->T_link_core + 16 * box;
   double ends[6], local[6], of_link[3], n[3], x[3];
   segment_ends(shapes, frames, configuration, segment, ends);
   for (int k = 0; k < 2; ++k) {
     into(T, ends + 3 * k, of_link);
     into(in_link, of_link, local + 3 * k);
   }
-  const double distance = box_segment(shapes->half_size + 3 * box, local, n, x);
+  const double distance = box_segment(shapes->half_sizes + 3 * box, local, n, x);
   if (isnan(distance)) return NAN;
   turn(in_link, n, of_link);
   turn(T, of_link, normal);
@@ -212,20 +217,21 @@ static double box_and_segment(const Shapes *shapes, const double *frames, long c
 /* Signed height [m] of the lowest point of a body above a half-space, its outward normal, and that point. */
 static double half_space(const Shapes *shapes, const double *frames, long configuration, long ground, long body,
                          double *normal, double *point) {
-  const double *T = frame_of(shapes, frames, configuration, body), *origin = shapes->body_points + 3 * shapes->points * ground;
-  const double *up = shapes->axis + 3 * ground;
+  const double *T = frame_of(shapes, frames, configuration, body);
+  const double *origin = shapes->points + 3 * shapes->most_points * ground;
+  const double *up = shapes->axes + 3 * ground;
   double least = INFINITY, axis[3], in_disc[3];
-  for (long k = 0; k < shapes->count[body]; ++k) {
+  for (long k = 0; k < shapes->counts[body]; ++k) {
     double x[3], above[3];
-    place(T, shapes->body_points + 3 * (shapes->points * body + k), x);
+    place(T, shapes->points + 3 * (shapes->most_points * body + k), x);
     for (int i = 0; i < 3; ++i) above[i] = x[i] - origin[i];
     const double height = dot(above, up);
     if (height >= least) continue;
     least = height;
     for (int i = 0; i < 3; ++i) point[i] = x[i];
   }
-  turn(T, shapes->axis + 3 * body, axis);
-  const double cosine = dot(axis, up), radius = shapes->disc_radius[body];
+  turn(T, shapes->axes + 3 * body, axis);
+  const double cosine = dot(axis, up), radius = shapes->disc_radii[body];
   for (int i = 0; i < 3; ++i) in_disc[i] = up[i] - cosine * axis[i];
   const double sine = sqrt(dot(in_disc, in_disc));
   for (int i = 0; i < 3; ++i) {
@@ -242,7 +248,7 @@ void witness_points(const Shapes *shapes, const double *frames, long k, const lo
   for (long j = 0; j < k; ++j, normal += 3, point += 3) {
     const long c = configuration[j], first = shapes->first[pair[j]], second = shapes->second[pair[j]];
     double found = NAN, a[6], b[6];
-    switch (shapes->kind[pair[j]]) {
+    switch (shapes->kinds[pair[j]]) {
       case SEGMENT_SEGMENT:
         segment_ends(shapes, frames, c, first, a);
         segment_ends(shapes, frames, c, second, b);
@@ -264,51 +270,53 @@ void witness_points(const Shapes *shapes, const double *frames, long k, const lo
 
 /* min n·x [m] over the core of a body; n is in the base frame. */
 static double support(const Shapes *shapes, const double *frames, long configuration, long body, const double *n) {
-  const double *T = frame_of(shapes, frames, configuration, body), *x = shapes->body_points + 3 * shapes->points * body;
+  const double *T = frame_of(shapes, frames, configuration, body), *x = shapes->points + 3 * shapes->most_points * body;
   const double shift = T[3] * n[0] + T[7] * n[1] + T[11] * n[2];
   double in_link[3], least = INFINITY;
   turn_back(T, n, in_link);
-  for (long k = 0; k < shapes->count[body]; ++k) least = lesser(least, dot(x + 3 * k, in_link));
-  if (shapes->disc_radius[body] > 0) {
-    const double cosine = dot(shapes->axis + 3 * body, in_link);
-    least -= shapes->disc_radius[body] * sqrt(greater(1 - cosine * cosine, 0.0));
+  for (long k = 0; k < shapes->counts[body]; ++k) least = lesser(least, dot(x + 3 * k, in_link));
+  if (shapes->disc_radii[body] > 0) {
+    const double cosine = dot(shapes->axes + 3 * body, in_link);
+    least -= shapes->disc_radii[body] * sqrt(greater(1 - cosine * cosine, 0.0));
   }
   return least + shift;
 }
 
-/* Separation [m] along n, which is fixed to the first body of a pair and given in the frame of its link. */
+/* Separation [m] of a pair along n, which is given in the frame of its first body's link. */
 static double separation(const Shapes *shapes, const double *frames, long configuration, long pair, const double *n) {
   const long first = shapes->first[pair], second = shapes->second[pair];
   double normal[3], opposite[3];
   turn(frame_of(shapes, frames, configuration, first), n, normal);
   for (int i = 0; i < 3; ++i) opposite[i] = -normal[i];
-  return support(shapes, frames, configuration, second, normal) + support(shapes, frames, configuration, first, opposite) -
-         shapes->growth[pair];
+  const double apart = support(shapes, frames, configuration, second, normal);
+  return apart + support(shapes, frames, configuration, first, opposite) - shapes->growth[pair];
 }
 
-/* For pairs (k) between configurations `begin` and `end` (k), and unit normals there (k, 3): the greater, of both
-   normals, of the lesser separation (k) [m] at both, the normal being fixed to the first body. */
-void separations(const Shapes *shapes, const double *frames, long k, const long *begin, const long *end, const long *pair,
-                 const double *normal_begin, const double *normal_end, double *result) {
-  for (long j = 0; j < k; ++j) {
-    const long first = shapes->first[pair[j]];
-    double n[3];
-    turn_back(frame_of(shapes, frames, begin[j], first), normal_begin + 3 * j, n);
-    const double one = lesser(separation(shapes, frames, begin[j], pair[j], n), separation(shapes, frames, end[j], pair[j], n));
-    turn_back(frame_of(shapes, frames, end[j], first), normal_end + 3 * j, n);
-    const double other = lesser(separation(shapes, frames, begin[j], pair[j], n), separation(shapes, frames, end[j], pair[j], n));
-    result[j] = greater(one, other);
-  }
+/* The lesser separation [m] of a pair at two configurations, along a normal at `from` that moves with its first body. */
+static double held(const Shapes *shapes, const double *frames, long begin, long end, long pair, long from,
+                   const double *normal) {
+  double n[3];
+  turn_back(frame_of(shapes, frames, from, shapes->first[pair]), normal, n);
+  return lesser(separation(shapes, frames, begin, pair, n), separation(shapes, frames, end, pair, n));
 }
 
-/* Gradients (k, links - 1) [m/rad] of the distances of pairs (k) with these unit normals and witness points (k, 3). */
+/* For pairs (k) between configurations `begin` and `end` (k), and unit normals there (k, 3): what is held by the better
+   normal, (k) [m]. */
+void separations(const Shapes *shapes, const double *frames, long k, const long *begin, const long *end,
+                 const long *pair, const double *normal_begin, const double *normal_end, double *result) {
+  for (long j = 0; j < k; ++j, normal_begin += 3, normal_end += 3)
+    result[j] = greater(held(shapes, frames, begin[j], end[j], pair[j], begin[j], normal_begin),
+                        held(shapes, frames, begin[j], end[j], pair[j], end[j], normal_end));
+}
+
+/* Gradients (k, nq) [m/rad] of the distances of pairs (k) with these unit normals and witness points (k, 3). */
 void gradients(const Shapes *shapes, const double *frames, long k, const long *configuration, const long *pair,
                const double *normal, const double *point, double *result) {
-  const long nq = shapes->links - 1;
+  const long nq = shapes->frames - 1;
   for (long j = 0; j < k; ++j, normal += 3, point += 3, result += nq) {
-    const long below = shapes->link[shapes->first[pair[j]]], last = shapes->link[shapes->second[pair[j]]];
+    const long below = shapes->links[shapes->first[pair[j]]], last = shapes->links[shapes->second[pair[j]]];
     for (long i = 0; i < nq; ++i) {
-      const double *T = frames + 16 * (shapes->links * configuration[j] + i + 1);
+      const double *T = frames + 16 * (shapes->frames * configuration[j] + i + 1);
       const double x = point[0] - T[3], y = point[1] - T[7], z = point[2] - T[11];
       result[i] = i < below || i >= last ? 0.0
                                          : normal[0] * (T[6] * z - T[10] * y) + normal[1] * (T[10] * x - T[2] * z) +

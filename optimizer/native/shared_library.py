@@ -50,6 +50,7 @@ def library_path() -> Path:
 def compile_shared() -> Path:
     """Compile the library if that has not been done, and return its path. Raises as `compile_library`."""
     path = library_path()
+    # where the cache is read-only, as in an image, there is no lock to take
     if not is_intact(path):
         compile_library(path, FLAGS, source)
     return path

@@ -104,3 +104,20 @@ def test_bounds(seed: int, within: float) -> None:
     configuration, pair = (each.ravel() for each in np.indices((len(frames), len(model.pairs))))
     beads = [each.bead_bounds(frames, configuration, pair) for each in (model.geometry, by_numpy)]
     np.testing.assert_allclose(*beads, rtol=0, atol=SAME)
+
+
+@pytest.mark.parametrize("within", [0.1, np.inf])
+def test_a_configuration_that_is_no_number_is_never_clear(within: float) -> None:
+    """Its distances are no numbers, as by numpy, and the others are what they are without it; nor is there an error
+    without any configuration."""
+    model, by_numpy, frames = in_cell(1)
+    found = model.pair_distances(frames[:3], within=within).distance
+    lost = frames[:3].copy()
+    lost[1, 1:] = np.nan
+    distances = []
+    for model.geometry in (model.geometry, by_numpy):
+        assert model.pair_distances(frames[:0], within=within).distance.shape == (0, len(model.pairs))
+        distances.append(model.pair_distances(lost, within=within).distance)
+        assert np.isnan(distances[-1][1]).any()
+        np.testing.assert_allclose(distances[-1][[0, 2]], found[[0, 2]], rtol=0, atol=SAME)
+    np.testing.assert_array_equal(np.isnan(distances[0]), np.isnan(distances[1]))
