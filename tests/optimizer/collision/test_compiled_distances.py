@@ -115,7 +115,8 @@ def test_a_configuration_that_is_no_number_is_never_clear(within: float) -> None
     lost = frames[:3].copy()
     lost[1, 1:] = np.nan
     distances = []
-    for model.geometry in (model.geometry, by_numpy):
+    for geometry in (model.geometry, by_numpy):
+        model.geometry = geometry
         assert model.pair_distances(frames[:0], within=within).distance.shape == (0, len(model.pairs))
         distances.append(model.pair_distances(lost, within=within).distance)
         assert np.isnan(distances[-1][1]).any()
