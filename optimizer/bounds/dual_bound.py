@@ -46,17 +46,25 @@ with the square of δ only.
 **H in time.** Over a part of a step p and ω are linear in time and b, r are constants: H_j, a maximum of functions
 linear in (p, ω), is convex, and its integral is at most the trapezoid's. Parts are short where r rises.
 
-**Ψ in space.** Over the grid joints by the corners of cells (`path_terms`). With the others' positions δ_l ∈ [-W_l,
-W_l] the first line of Ψ falls by no more than Σ_l (s_l |δ_l| + k_l δ_l² / 2): s_l is the slope of ω · g at the cell,
-less Γ̇_l, and the bound on that of the kinetic terms; k_l those on second derivatives. With |ρ - ρ̄|_j ≤ a_j + Σ_l
-a_lj |δ_l| and τ > 0, (ρ_j - ρ̄_j)² ≤ (1 + τ) a_j² + (1 + 1 / τ) (Σ_l a_lj |δ_l|)², whose second part adds to k_l. The
-least value of (κ_l (π / T)² - k_l) δ² / 2 - s_l |δ| on the interval is known.
+**Ψ in space.** Over two joints by the corners of a grid's cells (`grid_cells`), at both ends of a step. Between the
+ends every term is at least what interpolation gives, less `along` (`path_terms`), and the least of what is interpolated
+is no less than the interpolated least: so Ψ's mean over a step is at least the mean of the two ends'. With the others'
+positions δ_l ∈ [-W_l, W_l] the first line of Ψ falls by no more than Σ_l (s_l |δ_l| + k_l δ_l² / 2): s_l is the slope
+of ω · g at the cell, less Γ̇_l, and the bound on that of the kinetic terms; k_l those on second derivatives. With |ρ -
+ρ̄|_j ≤ a_j + Σ_l a_lj |δ_l| and τ > 0, (ρ_j - ρ̄_j)² ≤ (1 + τ) a_j² + (1 + 1 / τ) (Σ_l a_lj |δ_l|)², whose second part
+adds to k_l. The least value of (κ_l (π / T)² - k_l) δ² / 2 - s_l |δ| on the interval is known; it is concave in s, and
+-a² is in a, so that both may be interpolated between the ends, too.
 
-**Durations.** t = s T, β = 1 / T, and the path, λ, m, Γ and ρ̄ depend on s alone, so that b = β x', ω̇ = β ω', Γ̇ = β
-Γ'. For T in [T_1, T_2], H is convex in b and so in β: its integral over s is at most its chord A + B β. Ψ's corner
-values are quadratic in β: at least the lesser of the two ends', less a quarter of the square of β's range times their
-leading coefficient. |β ρ - ρ̄| and the slopes are greatest at one of the ends; κ (π β)² is least at T_2. So energy ≥
-ΔU - B + T (base + ∫ (Ψ - Σ c λ²) ds - A), linear in T, and least at an end.
+**Durations.** t = s T, β = 1 / T, and the path and λ depend on s alone, so that b = β x', ω̇ = β ω', Γ̇ = β Γ'. For T
+in [T_1, T_2], m and Γ are linear in β, ρ̄ is β times what it is on the path, and so p = p_0 + β p_1. But for -β² p_1 ·
+x', H is a maximum of convex functions of β: at most its chord, A + B β over the whole motion. Of the kinetic terms, k
+β² is what they have on the path. So
+
+    energy ≥ ΔU - B + T (base + ∫ (Ψ - Σ c λ²) ds - A) + ∫ (p_1 · x' - k) ds / T,
+
+without k in Ψ, whose least value over T is known. Γ' is the gradient of ω · g on the path times T at both ends of [T_1,
+T_2], so that Γ̇ is that gradient, or up to (T_2 - T_1)² / (4 T_1 T_2) times itself more in between. Otherwise Ψ's
+corners are linear in β²: least at one of the ends. |ρ - ρ̄| is greatest at T_1; κ (π β)² is least at T_2.
 """
 
 from __future__ import annotations
@@ -68,25 +76,13 @@ import numpy as np
 
 from models.robot import Array, Limits
 from optimizer.bounds.friction_conjugate import FrictionConjugate
-from optimizer.bounds.grid_minimum import least_potential_terms
+from optimizer.bounds.least_potential import LeastPotential
 from optimizer.bounds.path_terms import PathTerms
-from optimizer.bounds.time_parts import TimeParts
+from optimizer.bounds.speed_conjugate import SpeedConjugate
+from optimizer.bounds.weights import Weights
 
-# halvings of the interval that holds the multiplier of a joint's displacement
-_BISECTIONS = 13
-# what a joint's loss is at least where it divides
+# what a denominator is at least
 _TINY = 1e-300
-
-
-@dataclass(frozen=True)
-class Weights:
-    """Choices that the bound's quality depends on, and not its validity: the multipliers' factor `scale` and, per joint
-    (nq,) [N·m·s/rad], κ and μ of `dual_bound`; `work` is η."""
-
-    scale: float
-    confinement: Array
-    mixing: Array
-    work: float = 0.0
 
 
 def multiplier_rates(multipliers: Array, loss: Array, load: Array | None) -> Array:
@@ -116,17 +112,7 @@ class DualBound:
     rotor: Array
 
     @cached_property
-    def _torque_slope(self) -> Array:
-        """Gradient (S, nq) of ω · g on the path, the mean of both ends of each step."""
-        return np.asarray(self.terms.torque_slope[:, :, self.terms.centre].mean(axis=1))
-
-    @cached_property
-    def _momentum(self) -> Array:
-        """M ω' + N x' (S, nq) on the path, the mean of both ends of each step."""
-        return np.asarray(self.terms.momentum[:, :, self.terms.centre].mean(axis=1))
-
-    @cached_property
-    def _rotor_power(self) -> float:
+    def rotor_power(self) -> float:
         """Mean over the duration of Σ |ω| load / (1 - load) · J a_max [W]; |ω| is convex on each step."""
         load = self.friction.load
         if load is None:
@@ -134,93 +120,50 @@ class DualBound:
         size = np.abs(self.terms.omega)
         return float((size[:-1] + size[1:]).mean(axis=0) / 2 @ (load / (1 - load) * self.rotor * self.limits.a_max))
 
-    def __call__(self, shortest: Array, longest: Array, weights: Weights, waiting: float = 0.0) -> Array:
-        """Bounds (B,) [J] on motions of durations from `shortest` to `longest` (B,) [s], at most that of the boxes.
+    @cached_property
+    def potential(self) -> LeastPotential:
+        """Ψ of the terms."""
+        return LeastPotential(self.terms)
 
-        `waiting` [W] is what a motion saves by every second that it takes.
-        """
-        assert longest.max() <= self.longest and (weights.work == 0 or self.friction.load is None)
-        terms, S = self.terms, len(self.rates)
-        middle, fast, slow = np.sqrt(shortest * longest), 1 / shortest, 1 / longest
-        # Γ' by the share of the duration, and Γ at the nodes
-        pull = middle[:, None, None] * weights.scale * self._torque_slope
-        costate = np.concatenate([np.zeros_like(pull[:, :1]), np.cumsum(pull, axis=1) / S], axis=1)
-        momentum = weights.scale * self._momentum / middle[:, None, None]
-        parts = TimeParts.of(S, self.limits, longest)
-        stiffness = weights.confinement + weights.mixing + weights.scale * terms.spread
-        conjugate = _Conjugate(self, parts, weights.scale, weights.work, costate, momentum, stiffness)
-        m = conjugate.multiplier(middle)
-        at_fast, at_slow = conjugate.integral(m, fast), conjugate.integral(m, slow)
-        span = fast - slow
-        B = np.where(span > 0, (at_fast - at_slow) / np.where(span > 0, span, 1.0), 0.0)
-        A = at_slow - B * slow
-        least = least_potential_terms(
-            terms, weights.scale, weights.confinement, weights.mixing, pull, momentum, fast, slow
-        )
-        rate = (
-            self.base
-            - waiting
-            - weights.scale * self._rotor_power
-            + (least - weights.scale**2 * self.rates).mean(axis=1)
-            - A
-        )
-        gain = (1 + 2 * weights.work) * self.potential_gain
-        return np.asarray(gain - B + np.minimum(shortest * rate, longest * rate))
+    def over(self, edges: Array) -> CellBounds:
+        """The bounds on motions of durations between edges (B + 1,) [s], at most that of the boxes."""
+        assert edges[-1] <= self.longest
+        # of no cell but one duration, once is enough
+        at = edges if edges[-1] > edges[0] else edges[:1]
+        return CellBounds(self, edges, SpeedConjugate(self.friction, self.limits, self.terms, self.loss, at))
 
 
 @dataclass(frozen=True)
-class _Conjugate:
-    """Σ_j ∫ H_j ds of a bound for B intervals of durations, at parts of its steps."""
+class CellBounds:
+    """A dual bound in cells of durations between edges (B + 1,) [s]."""
 
-    bound: DualBound
-    parts: TimeParts
-    scale: float
-    work: float
-    costate: Array
-    momentum: Array
-    stiffness: Array
+    dual: DualBound
+    edges: Array
+    conjugate: SpeedConjugate
 
-    @cached_property
-    def _omega(self) -> Array:
-        return self.parts.ends(self.scale * self.bound.terms.omega)
+    def __call__(self, weights: Weights, waiting: float = 0.0) -> Array:
+        """Bounds (B,) [J]; `waiting` [W] is what a motion saves by every second that it takes."""
+        dual, beta, scale = self.dual, 1 / self.edges, weights.scale
+        assert weights.work == 0 or dual.friction.load is None
+        fast, slow = beta[:-1], beta[1:]
+        potential = dual.potential(weights, fast, slow)
+        height, along = np.broadcast_to(self.conjugate(weights), (2, len(beta)))
+        span = fast - slow
+        split = np.where(span > 0, span, 1.0)
+        # what changes with the square of 1 / T: p_1 · x', and the kinetic terms on the path
+        turning = np.where(span > 0, (along[:-1] - along[1:]) / split, 0.0)
+        at_fast, at_slow = height[:-1] + fast**2 * turning, height[1:] + slow**2 * turning
+        B = np.where(span > 0, (at_fast - at_slow) / split, 0.0)
+        power = dual.base - waiting - scale * dual.rotor_power - at_slow + B * slow
+        rate = power + (potential - scale**2 * dual.rates).mean(axis=1)
+        gain = (1 + 2 * weights.work) * dual.potential_gain
+        return gain - B + _least(rate, turning - scale * dual.terms.kinetic_mean.mean(), self.edges)
 
-    @cached_property
-    def _slowness(self) -> Array:
-        """η / c (nq,)."""
-        return np.asarray(self.work / np.maximum(self.bound.loss, _TINY))
 
-    @cached_property
-    def _p(self) -> Array:
-        """p - m (B, parts, 2, nq) at both ends of each part."""
-        return self.parts.ends(self.costate) + self.momentum[:, self.parts.step, None]
-
-    def _greatest(self, m: Array, beta: Array) -> tuple[Array, Array]:
-        """H (B, parts, 2, nq) [W] and the speeds where it is reached, for m (B, nq) and 1 / T = beta (B,)."""
-        b = (beta[:, None, None] * self.bound.terms.x_rate)[:, self.parts.step, None]
-        stiffness = self.stiffness[self.parts.step, None]
-        p, more = self._p + m[:, None, None], 1 + 2 * self.work
-        linear = p - stiffness * b + self._slowness * self._omega
-        square = stiffness / 2 + self.work * self._slowness
-        # (1 + 2 η) v + ω is more · (v + ω / more)
-        value, v = self.bound.friction.greatest(
-            linear / more, self._omega / more, square / more, self.parts.speed[:, :, None]
-        )
-        return more * value - p * b + stiffness * b * b / 2, v
-
-    def integral(self, m: Array, beta: Array) -> Array:
-        """Trapezoids (B,) [W] of Σ_j H_j over the share of the duration."""
-        return np.asarray((self._greatest(m, beta)[0].mean(axis=2) * self.parts.length[:, None]).sum(axis=(1, 2)))
-
-    def multiplier(self, duration: Array) -> Array:
-        """m (B, nq) [N·m] with which the speeds of H cover the displacement: the greatest bound, near enough."""
-        displacement = self.bound.terms.x_rate.mean(axis=0)
-        friction = self.bound.friction
-        torque = (friction.constant + friction.slope * friction.last)[-1]
-        reach = 4 * torque + np.abs(self._p).max(axis=(1, 2)) + self.stiffness.max(axis=0) * friction.last[-1]
-        low, high = -reach, reach
-        for _ in range(_BISECTIONS):
-            m = (low + high) / 2
-            v = self._greatest(m, 1 / duration)[1].mean(axis=2)
-            short = duration[:, None] * (v * self.parts.length[:, None]).sum(axis=1) < displacement
-            low, high = np.where(short, m, low), np.where(short, high, m)
-        return np.asarray((low + high) / 2)
+def _least(rate: Array, inverse: Array, edges: Array) -> Array:
+    """The least (B,) [J] of rate · T + inverse / T for T between edges (B + 1,) [s]."""
+    low, high = edges[:-1], edges[1:]
+    ends = np.minimum(rate * low + inverse / low, rate * high + inverse / high)
+    T = np.clip(np.sqrt(np.maximum(inverse, 0.0) / np.maximum(rate, _TINY)), low, high)
+    # only where both are positive the least may be in between
+    return np.asarray(np.where((rate > 0) & (inverse > 0), np.minimum(ends, rate * T + inverse / T), ends))

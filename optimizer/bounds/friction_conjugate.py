@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -50,12 +51,20 @@ class FrictionConjugate:
         sagitta = np.maximum((rate[:-1] - slope) * at, 0.0)
         return cls(v[:-1], v[1:], torque[:-1] - slope * v[:-1], slope, sagitta, law.load)
 
+    @cached_property
+    def by_joint(self) -> tuple[Array, ...]:
+        """`first`, `last`, `constant`, `slope` and `sagitta`, (nq, k) each."""
+        intervals = self.first, self.last, self.constant, self.slope, self.sagitta
+        return tuple(np.ascontiguousarray(each.T) for each in intervals)
+
     def greatest(self, p: Array, omega: Array, square: Array, most: Array) -> tuple[Array, Array]:
         """Upper bounds (..., nq) on max over |v| ≤ most of p v - (v + omega) tau_f(v) + square v², and where it is.
 
         For v ≥ 0 the torque is between its chord and the chord plus the sagitta. So (v + omega) tau_f(v) ≥ (v + omega)
         chord - max(-(first + omega), 0) sagitta, a quadratic function of v, whose greatest value on an interval is
-        known. For v < 0 the same holds with -v, -p, -omega, as the torque is odd.
+        known. For v < 0 the same holds with -v, -p, -omega, as the torque is odd. Against p a value is at most that of
+        p v + square v² at an end, or zero, and what friction helps omega by at the greatest torque: where that is no
+        more than the value along p, it is left out.
 
         Where friction grows with the load, ω̂ stands in the place of omega: that of all from omega / (1 + load) to
         omega / (1 - load) at which ω̂ tau_f(v) is least.
@@ -66,11 +75,15 @@ class FrictionConjugate:
         low, high = np.minimum(self.first, limit), np.minimum(self.last, limit)
         second = square[..., None, :] - self.slope
         bent = second < 0
-        for sign in (1.0, -1.0):
-            shift = sign * omega[..., None, :]
+        fastest = (self.constant + self.slope * self.last)[-1]
+        for way in (1.0, -1.0):
+            sign = way * np.where(p < 0, -1.0, 1.0)
+            shift = sign * omega
             if self.load is not None:
                 shift = shift / np.where(shift > 0, 1 + self.load, 1 - self.load)
-            rate = sign * p[..., None, :] - self.constant - shift * self.slope
+            reach = np.maximum((sign * p + square * most) * most, 0.0) + np.maximum(-shift, 0.0) * fastest
+            shift = np.broadcast_to(shift, shape)[..., None, :]
+            rate = (sign * p)[..., None, :] - self.constant - shift * self.slope
             v = np.clip(np.where(bent, -rate / np.where(bent, 2 * second, -1.0), high), low, high)
             value = np.maximum((second * v + rate) * v, (second * low + rate) * low)
             value = value - shift * self.constant + np.maximum(-(self.first + shift), 0.0) * self.sagitta
@@ -78,7 +91,8 @@ class FrictionConjugate:
             k = value.argmax(axis=-2)[..., None, :]
             own = np.take_along_axis(value, k, axis=-2)[..., 0, :]
             at = np.take_along_axis(np.broadcast_to(v, value.shape), k, axis=-2)[..., 0, :]
-            best, where = np.where(own > best, own, best), np.where(own > best, sign * at, where)
+            better = (own > best) & ((way > 0) | (reach > best))
+            best, where = np.where(better, own, best), np.where(better, sign * at, where)
         return best, where
 
     def stiffness(self, law: FrictionLaw) -> Array:

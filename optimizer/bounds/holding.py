@@ -118,12 +118,6 @@ class HoldingBound:
             found = cells.planes(omega, half, deficit)
         return found
 
-    def of_pair(self, line: Line, edges: Array, eta: Array, gain: float, deficit: float) -> float:
-        """The bound [J] of all motions between the ends of one line, (1, …), of durations between edges (1, C + 1) [s];
-        η (1, C), the gain of potential energy [J], and `deficit` as above."""
-        found = self._tried(line, np.zeros_like(line.d), edges, eta, deficit)
-        return float((found.value + found.more * gain).max(axis=0).min())
-
     def _tried(self, line: Line, half: Array, edges: Array, eta: Array, deficit: float) -> Planes:
         """The bounds of one line, (1, …), with each of the shares of the multipliers."""
         cells = Cells(self, line, edges, eta)

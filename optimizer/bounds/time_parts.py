@@ -40,6 +40,12 @@ class TimeParts:
         inner = np.where((share[:, 0] < 0.5) & (share[:, 1] > 0.5), 0.5, np.minimum(share[:, 1], 1 - share[:, 0]))
         return cls(step, within, 1 / (steps * count[step]), greatest_speed(limits, duration[:, None] * inner))
 
+    def mean_speed(self, which: Indices) -> Array:
+        """The means (k, S, nq) [rad/s] of the speeds in each step, for some of the greatest durations."""
+        first = np.flatnonzero(np.diff(self.step, prepend=-1))
+        weight = self.length[:, None] * len(first)
+        return np.asarray(np.add.reduceat(self.speed[which] * weight, first, axis=1))
+
     def ends(self, nodes: Array) -> Array:
         """Values (..., P, 2, nq) at both ends of each part, of what is linear between nodes (..., steps + 1, nq)."""
         first, last = nodes[..., self.step, None, :], nodes[..., self.step + 1, None, :]

@@ -33,6 +33,11 @@ class LinearDwell:
     power: Array
     constant: Array
 
+    @staticmethod
+    def none() -> LinearDwell:
+        """No wait after a motion, of whatever duration."""
+        return LinearDwell(0.0, np.inf, np.zeros(1), np.zeros(1))
+
 
 def linear_dwells(cycle: Cycle, arm: Arm, hold: Array) -> list[LinearDwell]:
     """The intervals of [0, cycle.time] on which dwell(T) is linear, in order, for holding powers `hold` (...) [W]."""

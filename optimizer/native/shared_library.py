@@ -1,4 +1,5 @@
-"""The library that every arm shares: forward kinematics and distances, of many configurations at once.
+"""The library that every arm shares: forward kinematics, distances and the terms of dual bounds, of many
+configurations at once.
 
 It serves on every processor of this kind. Where there is none, since there is no compiler or no place for it, numpy
 computes the same, several times as slowly.
@@ -20,9 +21,9 @@ from optimizer.native.library_cache import cache_directory, compile_library, com
 
 log = logging.getLogger(__name__)
 
-SOURCES = ("chain.c", "distances.c")
+SOURCES = ("vectors.c", "chain.c", "distances.c", "grid_points.c", "least_potential.c", "speed_conjugate.c")
 # all processors round alike without contraction
-FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off")
+FLAGS = ("-O3", "-fno-trapping-math", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off")
 
 _LONG, _DOUBLE, _ARRAY = ctypes.c_long, ctypes.c_double, ctypes.c_void_p
 # arguments and result of every function: those of the C
@@ -33,6 +34,10 @@ _FUNCTIONS = {
     "witness_points": ([_ARRAY, _ARRAY, _LONG, *5 * [_ARRAY]], None),
     "separations": ([_ARRAY, _ARRAY, _LONG, *6 * [_ARRAY]], None),
     "gradients": ([_ARRAY, _ARRAY, _LONG, *5 * [_ARRAY]], None),
+    "grid_points": ([_ARRAY, *2 * [_LONG], _DOUBLE, *9 * [_ARRAY]], None),
+    "cell_deviation": ([*5 * [_LONG], *8 * [_ARRAY]], None),
+    "least_potential": ([*5 * [_LONG], *15 * [_ARRAY], _DOUBLE, *7 * [_ARRAY]], None),
+    "speed_conjugate": ([*3 * [_ARRAY], *2 * [_DOUBLE], *2 * [_LONG], *5 * [_ARRAY]], None),
 }
 
 

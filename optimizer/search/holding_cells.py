@@ -61,15 +61,6 @@ class HoldingCells:
         turn = d - ((low + high) / 2 - start)
         return Group(planes, start + np.sign(d) * nearest - turn, np.where(allowed, cap, np.inf))
 
-    def pair(self, start: Array, goal: Array, gain: float, cap: float) -> float:
-        """A bound [J] of motions between two configurations (nq,) [rad] with this gain of potential energy [J], no
-        higher than `cap` [J]."""
-        d = (goal - start)[None]
-        net = NetEnergy.for_motions(self.prepared.arm, np.abs(d), np.array([gain]))
-        edges, eta, _ = self._cells(net, np.abs(d), np.array([cap]))
-        line = Line.of(self.bound.chain, start[None], d)
-        return min(cap, self.bound.of_pair(line, edges, eta, gain, net.deficit))
-
     def _cells(self, net: NetEnergy, away: Array, cap: Array) -> tuple[Array, Array, Mask]:
         """Cells of the durations at which the plain bound is below `cap` (n,) [J], for displacements (n, nq) [rad]:
         edges (n, CELLS + 1) [s] and η (n, CELLS); and which motions may be made in the allowed time (n,)."""

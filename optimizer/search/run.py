@@ -24,7 +24,6 @@ from optimizer.search.candidates import Candidate, Reason, bound, pairs
 from optimizer.search.ends import ends
 from optimizer.search.fastest import find_fastest
 from optimizer.search.free_goal_bound import family_bound_of
-from optimizer.search.holding_pairs import raise_bounds
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.least_work import explore_least_work
 from optimizer.search.missed_branches import all_known, bound_of_others
@@ -32,11 +31,11 @@ from optimizer.search.near_goals import activate_near_goals
 from optimizer.search.other_starts import start_beside
 from optimizer.search.outer_turns import explore_families
 from optimizer.search.path_ends import bound_beside, path_candidates
+from optimizer.search.raised_bounds import raise_bounds
 from optimizer.search.refinement import baselines_of, compare_with_baselines, refine
 from optimizer.search.sampled_ends import activate_deferred, between
 from optimizer.search.seeds import activate_seeds
 from optimizer.search.sliding import slides
-from optimizer.search.tight_bound import tighten
 from optimizer.solution import (
     Baseline,
     Branch,
@@ -328,9 +327,7 @@ class Run:
         """What no motion goes below [J], and whether every candidate that was not solved needs at least `objective`."""
         incumbent = self.incumbent
         prepared, candidates = incumbent.prepared, incumbent.candidates
-        raise_bounds(prepared, candidates, incumbent.deadline)
-        if self.problem.bound == "tight":
-            tighten(prepared, candidates, objective, incumbent.deadline)
+        raise_bounds(prepared, candidates, objective, incumbent.deadline)
         open_ = [each for each in candidates if each.status in (CandidateStatus.UNVISITED, CandidateStatus.FAILED)]
         for candidate in open_:
             if candidate.lower_bound >= objective:

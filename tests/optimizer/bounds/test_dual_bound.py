@@ -3,40 +3,54 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
+from scipy.integrate import simpson
 
 from models.robot import Array
 from optimizer.bounds.chain_derivatives import ChainDerivatives
-from optimizer.bounds.dual_bound import DualBound, Weights, multiplier_rates
+from optimizer.bounds.dual_bound import DualBound, multiplier_rates
 from optimizer.bounds.friction_conjugate import FrictionConjugate
+from optimizer.bounds.grid_cells import Spacing
 from optimizer.bounds.path_terms import path_terms
 from optimizer.bounds.reference import Reference, half_sides
+from optimizer.bounds.weights import Weights
+from optimizer.optimize import optimize
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LEAST_DURATION
 from optimizer.search.baselines import guesses
 from optimizer.search.lower_bound import copper_multiplier
 from optimizer.trajectories.seven_segment import shortest_duration
-from tests.optimizer.moves import ROBOT, problem
+from optimizer.trajectories.spline import sample
+from tests.optimizer.bounds.test_holding import NAMES, NEAR, SAMPLED, SHIFT, asked, many_motions
+from tests.optimizer.moves import GOAL, ROBOT, START, problem
 from tests.optimizer.search.test_lower_bound import CONDITIONS, QUADRATURE, Torques, ends, motions
 from tests.selection import long_but
 
-STEPS = 6
+# times, positions, speeds and accelerations of a motion, and weights of the times [s]
+Moved = tuple[Array, Array, Array, Array, Array]
+STEPS, FINE = 6, 801
+WIDE = Spacing()
 CHOICE = 1e-3  # relative; a cell has one multiplier of the displacement, found by bisection, and a duration its own
 MOVES = 2
+NARROW, LOST = 1.015, 0.01  # a cell of durations, and what such a cell may take from the bound
+CLOSELY = 0.02  # relative: how near the bound comes to what it bounds
 USEFUL = 0.3  # of the energy, where nearly all of it is copper loss; elsewhere more
 CHORDS = 0.05  # of a watt and of the value: chords instead of the curve, 13 intervals up to the greatest speed
 LEEWAY = 1e-9  # rounding: rad, or W
 
 
-def dual_of(task: PreparedProblem, reference: Reference, longest: float, grid: tuple[int, ...]) -> DualBound:
+def dual_of(
+    task: PreparedProblem, reference: Reference, longest: float, grid: tuple[int, int], spacing: Spacing = WIDE
+) -> DualBound:
     arm, x = task.arm, reference.x
     loss = (arm.drives.copper + arm.drives.inverter_quadratic) / arm.drives.torque_constant**2
     friction = FrictionConjugate.of(arm.friction_law, arm.active_limits.v_max)
     assert friction is not None
     half = half_sides(reference, arm.active_limits, longest)
-    terms = path_terms(ChainDerivatives.of(arm), reference, loss, half, grid)
+    terms = path_terms(ChainDerivatives.of(arm), reference, loss, half, grid, spacing)
     rates = multiplier_rates(reference.multipliers, loss, friction.load)
     base = arm.base_power + float(arm.drives.inverter_constant.sum())
     gain = task.potential(x[-1]) - task.potential(x[0])
@@ -73,7 +87,7 @@ def test_no_motion_spends_less(name: str) -> None:
             for scale in (0.3, 1.0):
                 work = 0.0 if dual.friction.load is not None else rng.uniform(-0.5, 1.5) * own
                 weights = Weights(scale, rng.uniform(0, 1.5) * stiffness, rng.uniform(0.05, 1) * stiffness, work)
-                value = dual(np.array([duration / margin]), np.array([duration * margin]), weights)[0]
+                value = dual.over(np.array([duration / margin, duration * margin]))(weights)[0]
                 total = energy.electrical.total
                 slack = QUADRATURE * (abs(total) + energy.electrical.braking)
                 assert value <= total + slack
@@ -82,20 +96,120 @@ def test_no_motion_spends_less(name: str) -> None:
     assert useful > 0
 
 
+def tangent_energy(torques: Torques, dual: DualBound, moved: Moved, multipliers: Array, weights: Weights) -> float:
+    """Energy of a motion with the copper loss as its tangent at the multipliers, times their factor, which is less than
+    it: what the proof bounds."""
+    law, (t, q, v, a, each) = torques.task.arm.friction_law, moved
+    dry, at = law.torque(v), np.linspace(0, 1, len(multipliers))
+    tau = torques(q, v, a) + dry
+    own = weights.scale * np.column_stack([np.interp(t / t[-1], at, joint) for joint in multipliers.T])
+    own += weights.work * v / dual.loss
+    tangent = dual.loss * tau**2 - dual.loss * (tau - own) ** 2
+    return float(dual.potential_gain + each @ (dual.base + (v * dry + tangent).sum(axis=1)))
+
+
+def reference_along(torques: Torques, moved: Moved, steps: int) -> Reference:
+    """A path near a motion's, and multipliers near its torques that are linear in time."""
+    t, q, v, a, _ = moved
+    at, basis = np.linspace(0, 1, steps + 1), np.column_stack([np.ones_like(t), t / t[-1]])
+    x = np.column_stack([np.interp(at, t / t[-1], each) for each in q.T])
+    x[0], x[-1] = q[0], q[-1]
+    tau = torques(q, v, a) + torques.task.arm.friction_law.torque(v)
+    return Reference(x, np.column_stack([np.ones_like(at), at]) @ np.linalg.lstsq(basis, tau, rcond=None)[0])
+
+
+@pytest.mark.parametrize("name", long_but(("as it comes", "much copper"), NAMES))
+def test_any_multipliers_bound_the_linear_energy(name: str) -> None:
+    """Of motions near the path, so that little but the proof's own losses is between them and the bound."""
+    task, rng = asked(name), np.random.default_rng(len(name))
+    torques, seen, near = Torques(task), 0, 0
+    for start, goal in zip(*ends(90 + len(name), 2 * MOVES), strict=True):
+        gain = torques.task.potential(goal) - torques.task.potential(start)
+        for *moved, duration in many_motions(task, start, goal, rng):
+            path = reference_along(torques, tuple(moved), STEPS)
+            path = replace(path, multipliers=path.multipliers * rng.uniform(-1.5, 1.5, 6) * (rng.random(6) < 0.8))
+            edges = duration * np.array([rng.uniform(0.7, 0.95), 1.0, rng.uniform(1, 1.2), rng.uniform(1.2, 1.5)])
+            dual = dual_of(torques.task, path, float(edges[-1]), (1, 2))
+            stiffness = dual.friction.stiffness(task.arm.friction_law)
+            for scale in (0.05, 0.3, 1.0):
+                work = rng.uniform(0, 1) * copper_multiplier(torques.task, goal - start, gain, duration)
+                light = 10 ** rng.uniform(-1.5, 0)
+                weights = Weights(scale, light * stiffness, rng.uniform(0.05, 0.5) * light * stiffness, work)
+                values = dual.over(edges)(weights)
+                linear = tangent_energy(torques, dual, tuple(moved), path.multipliers, weights)
+                # the motion's duration is an edge: it is in both cells
+                assert values[:2].max() <= linear + SAMPLED * (SHIFT + abs(linear))
+                seen, near = seen + 1, near + (values[:2].max() + SHIFT > NEAR * (linear + SHIFT))
+    assert seen > 20 * MOVES
+    assert near > MOVES
+
+
+def test_nor_do_the_best_motions_break_it() -> None:
+    """With multipliers along their torques and against them, where momentum is worth as much as all other losses."""
+    torques, closest = Torques(problem()), np.inf
+    for start, goal in ((START, START + 0.8 * np.eye(6)[0]), (START, GOAL), (GOAL, START)):
+        spline = optimize(problem(start, goal, collisions=False)).trajectory.spline
+        t = np.linspace(0, spline.duration, FINE)
+        moved = t, *sample(spline, t), simpson(np.eye(FINE), dx=spline.duration / (FINE - 1))
+        path = reference_along(torques, moved, 2 * STEPS)
+        for sign, scale, light in product((1, -1), (0.1, 0.3, 0.6), (0.1, 0.4)):
+            path_there = replace(path, multipliers=sign * path.multipliers)
+            dual = dual_of(torques.task, path_there, spline.duration, (1, 2))
+            stiffness = light * dual.friction.stiffness(torques.task.arm.friction_law)
+            weights = Weights(scale, 0.8 * stiffness, 0.2 * stiffness)
+            value = dual.over(np.full(2, spline.duration))(weights)[0]
+            linear = tangent_energy(torques, dual, moved, path_there.multipliers, weights)
+            assert value <= linear * (1 + SAMPLED)
+            closest = min(closest, linear / value - 1)
+    assert closest < CLOSELY
+
+
+@pytest.mark.parametrize("name", long_but(("as it comes",), ("as it comes", "loaded and tilted", "slow limits")))
+def test_many_cells_hold_what_their_durations_spend(name: str) -> None:
+    """Cells that share boxes, path and multipliers, narrow and wide, around motions of durations in any of them."""
+    task = problem(objective="electrical", duration_max=500.0, **CONDITIONS[name])
+    torques, rng = Torques(task), np.random.default_rng(6)
+    seen, useful = 0, 0
+    for k, (start, goal) in enumerate(zip(*ends(80 + len(name), 2 * MOVES), strict=True)):
+        reference = around(torques.task, start, goal, rng, noise=k / 2)
+        spent = [(T, each.electrical) for T, each in motions(task, start, goal, torques, k) if T < 6]
+        ratio = (1.04, 1.15, 1.5, 2.0)[k % 4]
+        shortest, longest = min(T for T, _ in spent), max(T for T, _ in spent)
+        count = int(np.ceil(np.log(longest / shortest) / np.log(ratio))) + 1
+        edges = 0.999 * shortest * ratio ** np.arange(count + 1)
+        dual = dual_of(torques.task, reference, float(edges[-1]), (1, 2))
+        stiffness = dual.friction.stiffness(task.arm.friction_law)
+        own = copper_multiplier(torques.task, goal - start, dual.potential_gain, shortest)
+        for scale in (0.2, 0.7, 1.2):
+            weights = Weights(scale, rng.uniform(0, 1) * stiffness, rng.uniform(0.05, 0.5) * stiffness, own)
+            values = dual.over(edges)(weights)
+            for duration, electrical in spent:
+                value = values[np.searchsorted(edges, duration) - 1]
+                assert value <= electrical.total + QUADRATURE * (abs(electrical.total) + electrical.braking)
+                seen, useful = seen + 1, useful + (value > USEFUL * electrical.total)
+    assert seen > 20 * MOVES
+    assert useful > 0
+
+
 def test_a_cell_of_durations_is_below_each_of_them() -> None:
-    """The bound of an interval of durations is hardly above those of single durations in it: it is for all of them."""
+    """The bound of an interval of durations is hardly above those of single durations in it: it is for all of them.
+    Nor is that of a narrow one far below. Multipliers of either sign grow and fall."""
     task = PreparedProblem.of(problem())
     rng = np.random.default_rng(7)
-    start, goal = (each[0] for each in ends(3, 1))
-    dual = dual_of(task, around(task, start, goal, rng), 3.0, (1, 2))
-    stiffness = dual.friction.stiffness(task.arm.friction_law)
-    for low, high in ((2.0, 2.1), (2.0, 2.6), (2.5, 3.0)):
-        for scale in (0.2, 0.8):
-            weights = Weights(scale, stiffness, stiffness / 4, 0.03)
-            whole = dual(np.array([low]), np.array([high]), weights)[0]
-            at = np.linspace(low, high, 9)
-            each = dual(at, at, weights)
-            assert whole <= each.min() * (1 + CHOICE)
+    for k, (start, goal) in enumerate(zip(*ends(3, 6), strict=True)):
+        reference = around(task, start, goal, rng)
+        slope = np.linspace(-1, 1, STEPS + 1)[:, None] * rng.normal(size=6) * [20, 20, 10, 3, 3, 3]
+        dual = dual_of(task, Reference(reference.x, reference.multipliers + slope), 3.0, (1, 2))
+        stiffness = dual.friction.stiffness(task.arm.friction_law)
+        for low, high in ((2.0, 2.02), (2.0, 2.1), (2.0, 2.6), (2.5, 3.0)):
+            for scale in (0.2, 0.8):
+                weights = Weights(scale, stiffness, stiffness / 4, 0.03 * (k % 2))
+                whole = dual.over(np.array([low, high]))(weights)[0]
+                each = [dual.over(np.full(2, at))(weights)[0] for at in np.linspace(low, high, 9)]
+                size = abs(min(each)) + dual.base * low
+                assert whole <= min(each) + CHOICE * size
+                if high < low * NARROW:
+                    assert whole >= min(each) - LOST * size
 
 
 def test_the_conjugate_is_the_greatest_value() -> None:

@@ -1,0 +1,106 @@
+"""The least value Ψ of a dual bound's terms of position in each step; the proof is in `dual_bound`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.robot import Array
+from optimizer.bounds.path_terms import PathTerms
+from optimizer.bounds.weights import Weights
+from optimizer.native.shared_library import address, shared_library
+
+# τ of the proof: what the others' share of a momentum's change is weighted with
+_TAU = 1.0
+
+
+@dataclass(frozen=True)
+class LeastPotential:
+    """Ψ of a path's terms."""
+
+    terms: PathTerms
+
+    def __call__(self, weights: Weights, fast: Array, slow: Array) -> Array:
+        """Ψ (B, S) [W] for 1 / T from `slow` to `fast` (B,) [1/s]."""
+        library = shared_library()
+        if library is None:
+            return self.by_numpy(weights, fast, slow)
+        terms, (at_terms, _) = self.terms, self._as_c
+        S, nq = terms.half.shape
+        result = np.empty((len(fast), S))
+        own = self._cross(weights), _hold(weights), _weight(weights), fast, slow, _turned(fast, slow), result
+        library.least_potential(
+            len(fast), S, nq, *map(len, terms.cells.axes), *at_terms, weights.scale, *map(address, own)
+        )
+        return result
+
+    @cached_property
+    def _as_c(self) -> tuple[list[int], list[NDArray[Any]]]:
+        """Addresses of the terms as the C has them, in its order, and the arrays themselves."""
+        terms = self.terms
+        given = (
+            *terms.cells.axes, terms.half, terms.gravity, terms.kinetic, terms.slope, terms.deviation, terms.steepness,
+            terms.gravity_curvature.along, terms.gravity_curvature.across,
+            terms.kinetic_curvature.along, terms.kinetic_curvature.across,
+            terms.gravity_others, terms.kinetic_others,
+        )  # fmt: skip
+        arrays = [np.array([*terms.grid, *terms.others]), *(np.ascontiguousarray(each) for each in given)]
+        return [address(each) for each in arrays], arrays
+
+    def _cross(self, weights: Weights) -> Array:
+        """What the square of the momentum's change takes from the stiffness (S, others) of the joints beside the grid,
+        by 1 / T²."""
+        moved = weights.scale * self.terms.momentum_others
+        return np.asarray((1 + 1 / _TAU) * ((moved / weights.mixing) * moved.sum(axis=1, keepdims=True)).sum(axis=-1))
+
+    def by_numpy(self, weights: Weights, fast: Array, slow: Array) -> Array:
+        """The same where the shared library cannot be compiled."""
+        terms, cells, grid, scale = self.terms, self.terms.cells, list(self.terms.grid), weights.scale
+        positions, hold = cells.points(), _hold(weights)
+        square = positions**2 @ hold[grid] / 2 - scale * terms.kinetic  # by 1 / T²
+        along = terms.slope[:, grid] @ positions.T
+        turned = _turned(fast, slow)[:, None, None] * along
+        f2, s2 = (each[:, None, None, None] ** 2 for each in (fast, slow))
+        still = scale * (terms.gravity - (along + np.maximum(turned, 0.0))[:, :, None])
+        corner = still + np.minimum(f2 * square, s2 * square)
+        b2 = fast[:, None, None] ** 2
+        bend = scale * (terms.gravity_curvature.across + b2 * terms.kinetic_curvature.across) + b2 * hold[grid]
+        flat = scale * (terms.gravity_curvature.along + b2[..., 0] * terms.kinetic_curvature.along)
+        value = cells.least(corner)
+        value -= np.stack([cells.between(each[..., None])[..., 0] for each in bend])[:, :, None]
+        value -= flat[:, :, None, None] + f2 * (terms.deviation**2 @ _weight(weights))
+        value += cells.beyond(terms.half[:, grid])[:, None]
+        return np.asarray((value - self._beside(weights, fast, slow)).min(axis=-1).mean(axis=-1))
+
+    def _beside(self, weights: Weights, fast: Array, slow: Array) -> Array:
+        """What the joints beside the grid's can take from Ψ (B, S, 2, cells) [W]."""
+        terms, scale, b2, hold = self.terms, weights.scale, fast[:, None] ** 2, _hold(weights)
+        taken, cross = np.zeros((len(fast), *terms.steepness.shape[:-1])), self._cross(weights)
+        for i, joint in enumerate(terms.others):
+            stiffness = hold[joint] * slow[:, None] ** 2 - scale * terms.gravity_others[:, i] - b2 * cross[:, i]
+            more = _turned(fast, slow)[:, None] * np.abs(terms.slope[:, joint]) + b2 * terms.kinetic_others[:, i]
+            s = scale * (terms.steepness[..., i] + more[:, :, None, None])
+            stable, half = stiffness[:, :, None, None] > 0, terms.half[:, joint, None, None]
+            divisor = np.where(stable, stiffness[:, :, None, None], 1.0)
+            far = np.where(stable, np.minimum(s / divisor, half), half)
+            taken += s * far - stiffness[:, :, None, None] * far * far / 2
+        return taken
+
+
+def _hold(weights: Weights) -> Array:
+    """κ π² (nq,)."""
+    return np.asarray(weights.confinement * np.pi**2)
+
+
+def _weight(weights: Weights) -> Array:
+    """(1 + τ) / (2 μ) (nq,) times the square of the multipliers' factor."""
+    return np.asarray(weights.scale**2 * (1 + _TAU) / (2 * weights.mixing))
+
+
+def _turned(fast: Array, slow: Array) -> Array:
+    """How far (B,) β Γ' exceeds the slope that it has at both ends of a cell, as a share of it; see `dual_bound`."""
+    return np.asarray((fast - slow) ** 2 / (4 * fast * slow))
