@@ -38,23 +38,24 @@ class Stage:
 QUICK = Stage(Effort(16, 1.04, 12, Spacing(0.16, 1.35), heavy=(2,), rounds=0, time=0.1), 0.03)
 FURTHER = Stage(Effort(24, 1.03, 8, Spacing(0.12, 1.25), heavy=(2,), rounds=1, time=0.1), 0.08)
 # for "tight"
-FIRST, FINE = Stage(QUICK.effort, 0.0), Stage(Effort(32, 1.02, 2, Spacing(), heavy=(0, 1, 2), rounds=2, time=0.3), 0.0)
+FIRST = Stage(QUICK.effort, 0.0)
+FINE = Stage(Effort(64, 1.01, 4, Spacing(0.08, 1.2), heavy=(3, 2, 1), rounds=2, time=0.4), 0.0)
 
 
 def raise_bounds(prepared: PreparedProblem, candidates: Sequence[Candidate], energy: float, deadline: Deadline) -> None:
     """Raise the lower bounds of candidates that lie below `energy` [J], that of a motion, in time."""
     shared = PairBounds.of(prepared)
-    if shared is None or energy <= 0:
+    if shared is None:
         return
     tight = prepared.problem.bound == "tight"
     stages = (FIRST, FINE) if tight else (QUICK, FURTHER)
     pairs = [
-        _Pair(shared, each, energy * (1 - stages[0].gap))
+        _Pair(shared, each, energy - stages[0].gap * abs(energy))
         for each in candidates
         if each.goal.tolerance is None and (tight or not each.sampled)
     ]
     for stage in stages:
-        target = energy * (1 - stage.gap)
+        target = energy - stage.gap * abs(energy)
         for pair in sorted(pairs, key=_bound_of) if tight else _least_ones(pairs):
             if _bound_of(pair) >= target:
                 break

@@ -87,8 +87,9 @@ def test_turns_that_are_no_candidates_are_bounded_too(bound: str) -> None:
 def test_nothing_changes_where_it_does_not_apply() -> None:
     for given, deadline, energy in (
         ({"objective": "mechanical", "duration_max": 3.0}, NEVER, ENOUGH),
-        ({}, Deadline.after(0.0), ENOUGH),
-        ({}, NEVER, 0.0),
+        ({}, Deadline.after(QUICK.effort.time / 2), ENOUGH),
+        ({"bound": "tight"}, Deadline.after(QUICK.effort.time / 2), ENOUGH),
+        ({}, NEVER, -1.0),
     ):
         made, found = bounded(problem(START, tcp_pose(GOAL), **given))
         before = [each.lower_bound for each in found]

@@ -13,7 +13,7 @@ from optimizer.problem.bus import Bus
 from optimizer.problem.cycle import Cycle
 from optimizer.problem.problem import Problem
 from optimizer.solution import Solution
-from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, fixed, limits, problem
+from tests.optimizer.moves import PAYLOAD, ROBOT, START, fixed, limits, problem
 from tests.selection import long_but
 
 CASES: dict[str, dict[str, Any]] = {
@@ -73,9 +73,3 @@ def test_the_plain_bound_stays_where_the_dual_one_does_not_help(name: str) -> No
     assert plain.lower_bound <= tight.lower_bound <= tight.energy.of(asked.objective)
     if name.startswith(("mechanical", "friction")):
         assert tight.lower_bound == plain.lower_bound
-
-
-def test_it_ends_before_the_deadline() -> None:
-    """Hardly any time left after the search: the plain bound is the answer's."""
-    plain = optimize(problem(START, GOAL))
-    assert optimize(problem(START, GOAL, bound="tight", deadline=1.0)).lower_bound == plain.lower_bound
