@@ -24,8 +24,8 @@ def to_compare_response(
     `failed` the error document of every other method, `answers` the complete answers that the rows are to contain."""
     energies = {method: solution.energy.of(request.objective) for method, solution in found.items()}
     best = min(energies, key=energies.__getitem__)
-    # every method has the same candidates, and therefore the same bound
-    bound = found[best].lower_bound
+    # each holds for every motion
+    bound = max(solution.lower_bound for solution in found.values())
     rows = []
     for method in request.methods:
         row: dict[str, Any] = dict.fromkeys(ROW_FIELDS)

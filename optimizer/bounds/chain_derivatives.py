@@ -16,6 +16,7 @@ bounds of `inertia_spectrum` are mostly lower.
 
 from __future__ import annotations
 
+import ctypes
 import threading
 from dataclasses import dataclass
 from functools import cached_property
@@ -29,10 +30,21 @@ from optimizer.bounds.inertia_spectrum import InertiaSpectrum
 from optimizer.kinematics.forward import joint_placements, link_frames
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.kinematics.vectors import cross
+from optimizer.native.shared_library import address, shared_library
 from optimizer.problem.arm import Arm
 
 # chains of which the inertia's terms, and bounds of several orders, are kept
 _MOST_KEPT, _BOUNDS_KEPT = 8, 32
+
+
+# in the order of the C
+_ARRAYS = ("placements", "mass", "lever", "inertia", "rotor", "gravity")
+
+
+class _Chain(ctypes.Structure):
+    """The `Chain` of the C."""
+
+    _fields_ = [("nq", ctypes.c_long)] + [(name, ctypes.c_void_p) for name in _ARRAYS]
 
 
 def _digest(chain: ChainDerivatives) -> bytes:
@@ -73,6 +85,12 @@ class ChainDerivatives:
             arm.drives.rotor_inertia,
             np.asarray(arm.gravity),
         )
+
+    @cached_property
+    def as_c(self) -> tuple[ctypes.Structure, list[Array]]:
+        """The chain as the shared library has it, and the arrays that it points to."""
+        arrays = [np.ascontiguousarray(getattr(self, name), dtype=float) for name in _ARRAYS]
+        return _Chain(self.nq, *map(address, arrays)), arrays
 
     @property
     def nq(self) -> int:
@@ -136,6 +154,15 @@ class ChainDerivatives:
 
     def joint_inertia(self, q: Array) -> Array:
         """M (n, nq, nq) [kg·m²] at q (n, nq) [rad], rotors included: momenta of unit speeds about the base."""
+        library = shared_library()
+        if library is None:
+            return self.joint_inertia_by_numpy(q)
+        q, M = np.ascontiguousarray(q, dtype=float), np.empty((len(q), self.nq, self.nq))
+        library.joint_inertias(ctypes.addressof(self.as_c[0]), len(q), address(q), address(M))
+        return M
+
+    def joint_inertia_by_numpy(self, q: Array) -> Array:
+        """The same where the shared library cannot be compiled."""
         z, o, R, c = self._frames(q)
         about_centre = R @ self.inertia @ R.transpose(0, 1, 3, 2)
         square = (c * c).sum(axis=-1)[..., None, None] * np.eye(3) - c[..., :, None] * c[..., None, :]

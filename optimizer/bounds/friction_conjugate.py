@@ -81,7 +81,9 @@ class FrictionConjugate:
             shift = sign * omega
             if self.load is not None:
                 shift = shift / np.where(shift > 0, 1 + self.load, 1 - self.load)
-            reach = np.maximum((sign * p + square * most) * most, 0.0) + np.maximum(-shift, 0.0) * fastest
+            reach = (
+                np.maximum((sign * p + np.maximum(square, 0.0) * most) * most, 0.0) + np.maximum(-shift, 0.0) * fastest
+            )
             shift = np.broadcast_to(shift, shape)[..., None, :]
             rate = (sign * p)[..., None, :] - self.constant - shift * self.slope
             v = np.clip(np.where(bent, -rate / np.where(bent, 2 * second, -1.0), high), low, high)

@@ -53,6 +53,11 @@ class GridCells:
         """The point on the path."""
         return len(self.axes[0]) * len(self.axes[1]) // 2
 
+    @property
+    def count(self) -> int:
+        """Number of cells."""
+        return (len(self.axes[0]) - 1) * (len(self.axes[1]) - 1)
+
     def points(self) -> Array:
         """Positions (n · m, 2) [rad]."""
         return np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -68,7 +73,7 @@ class GridCells:
         if library is None:
             return self.deviation_by_numpy(value, mean, curvature, joints)
         S, nq = mean.shape
-        result = np.empty((S, 2, (len(self.axes[0]) - 1) * (len(self.axes[1]) - 1), len(at)))
+        result = np.empty((S, 2, self.count, len(at)))
         given = *self.axes, at, value, mean, curvature.along, curvature.across
         plain = [np.ascontiguousarray(each) for each in given]
         library.cell_deviation(S, nq, *map(len, self.axes), len(at), *map(address, (*plain, result)))
@@ -84,7 +89,7 @@ class GridCells:
         """Σ h² / 8 · second (S, 2, k) over the sides of each cell (S, cells, k)."""
         first, other = (np.diff(axis) ** 2 / 8 for axis in self.axes)
         both = second[:, 0, None, None] * first[:, None, None] + second[:, 1, None, None] * other[:, None]
-        return np.asarray(both.reshape(len(second), -1, second.shape[-1]))
+        return np.asarray(both.reshape(len(second), self.count, second.shape[-1]))
 
     def beyond(self, half: Array) -> Array:
         """inf for the cells (S, cells) beyond boxes of these half sides (S, 2) [rad], where no motion is, else 0."""
@@ -108,4 +113,4 @@ class GridCells:
         value = corners.reshape(*corners.shape[:-2], n, m, corners.shape[-1])
         value = reduce(value[..., 1:, :, :], value[..., :-1, :, :])
         value = reduce(value[..., 1:, :], value[..., :-1, :])
-        return value.reshape(*corners.shape[:-2], -1, corners.shape[-1])
+        return value.reshape(*corners.shape[:-2], self.count, corners.shape[-1])

@@ -13,15 +13,6 @@ from optimizer.bounds.chain_derivatives import ChainDerivatives
 from optimizer.bounds.path_curvature import STEP
 from optimizer.native.shared_library import address, shared_library
 
-# in the order of the C
-_CHAIN = ("placements", "mass", "lever", "inertia", "rotor", "gravity")
-
-
-class _Chain(ctypes.Structure):
-    """The `Chain` of the C."""
-
-    _fields_ = [("nq", ctypes.c_long)] + [(name, ctypes.c_void_p) for name in _CHAIN]
-
 
 @dataclass(frozen=True)
 class GridPoints:
@@ -48,11 +39,9 @@ class GridPoints:
         S, nq, K = len(x) - 1, chain.nq, len(offsets)
         scalar, by_joint = (S, 2, K), (S, 2, K, nq)
         points = cls(*map(np.zeros, (scalar, by_joint, scalar, by_joint, (S + 1, nq))))
-        arm = [np.ascontiguousarray(getattr(chain, name), dtype=float) for name in _CHAIN]
         path = [np.ascontiguousarray(each) for each in (x, omega, offsets, needed)]
         result = points.gravity, points.slope, points.kinetic, points.momentum, points.rows
-        of = _Chain(nq, *map(address, arm))
-        library.grid_points(ctypes.addressof(of), S, K, STEP, *map(address, (*path, *result)))
+        library.grid_points(ctypes.addressof(chain.as_c[0]), S, K, STEP, *map(address, (*path, *result)))
         return points
 
     @classmethod

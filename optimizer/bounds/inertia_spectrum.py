@@ -16,11 +16,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.fft import fftn
 
 from models.robot import Array
 
-# samples of a joint, the size of n by the order of a discrete Fourier transform
-_SAMPLES, _WAVES = 5, (0.0, 1.0, 2.0, 2.0, 1.0)
+# samples of a joint
+_SAMPLES = 5
 # the samples of more joints than this are too many
 _MOST_JOINTS = 7
 # relative to the greatest entry: rounding of the samples and of their transform
@@ -29,7 +30,7 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class InertiaSpectrum:
-    """Sizes |n| (K, nq) of terms, and of their coefficients (K, nq, nq) [kg·m²]."""
+    """Sizes |n| (K, nq) of terms, and sums (K, nq, nq) [kg·m²] of the sizes of their coefficients."""
 
     waves: Array
     size: Array
@@ -43,12 +44,17 @@ class InertiaSpectrum:
         q = np.concatenate([np.zeros((_SAMPLES**turning, 1)), _grid(angles, turning)], axis=1)
         upper = np.triu_indices(joints)
         samples = inertia(q)[:, *upper].reshape(*(_SAMPLES for _ in range(turning)), -1)
-        size = np.abs(np.fft.fftn(samples, axes=range(turning))).reshape(len(q), -1) / len(q)
-        waves = np.concatenate([np.zeros((len(q), 1)), _grid(np.array(_WAVES), turning)], axis=1)
+        size = np.abs(fftn(samples, axes=range(turning))) / len(q)
         size += _ROUNDING / len(q) * np.abs(samples).max()
-        full = np.zeros((len(q), joints, joints))
-        full[:, *upper] = size
-        full[:, *upper[::-1]] = size
+        # a bound takes no more of a term than its size and the sizes |n|: those of n and -n go together
+        for axis in range(turning):
+            zero, one, two, minus_two, minus_one = np.moveaxis(size, axis, 0)
+            size = np.stack([zero, one + minus_one, two + minus_two], axis=axis)
+        together = size.reshape(-1, size.shape[-1])
+        waves = np.concatenate([np.zeros((len(together), 1)), _grid(np.arange(3.0), turning)], axis=1)
+        full = np.zeros((len(waves), joints, joints))
+        full[:, *upper] = together
+        full[:, *upper[::-1]] = together
         return cls(waves, full)
 
     def bound(self, order: int) -> Array:

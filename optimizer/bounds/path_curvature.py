@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from math import prod
 
 import numpy as np
 
@@ -89,5 +90,5 @@ def _along(direction: Array, bound: Array) -> Array:
 
 def _along_each(direction: Array, bound: Array) -> Array:
     """Bounds (S, nq, ...) on derivatives, along one direction (S, nq) each: (S, ...)."""
-    flat = bound.reshape(*bound.shape[:2], -1)
+    flat = bound.reshape(*bound.shape[:2], prod(bound.shape[2:]))
     return np.asarray((direction[:, None] @ flat).reshape(len(bound), *bound.shape[2:]))

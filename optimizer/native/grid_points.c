@@ -79,6 +79,21 @@ static void joint_inertia(const Chain *chain, const Link *links, double *M) {
   }
 }
 
+/* The inertia (n, nq, nq) at n configurations (n, nq) [rad]. */
+void joint_inertias(const Chain *chain, long n, const double *q, double *M) {
+  const long nq = chain->nq;
+  double cosine[nq], sine[nq];
+  Link links[nq];
+  for (long k = 0; k < n; ++k) {
+    for (long j = 0; j < nq; ++j) {
+      cosine[j] = cos(q[nq * k + j]);
+      sine[j] = sin(q[nq * k + j]);
+    }
+    links_of(chain, cosine, sine, links);
+    joint_inertia(chain, links, M + nq * nq * k);
+  }
+}
+
 static void times(long nq, const double *A, const double *x, double *y) {
   for (long j = 0; j < nq; ++j) {
     y[j] = 0.0;

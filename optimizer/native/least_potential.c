@@ -9,7 +9,8 @@ void least_potential(long B, long S, long nq, long n, long m, const long *at, co
                      const double *hold, const double *weight, const double *fast, const double *slow,
                      const double *turned, double *result) {
   const long K = n * m, cells = (n - 1) * (m - 1), others = nq - 2;
-  double corner[K], moved[cells], stiffness[others], more[others];
+  /* an arm of two joints has no others */
+  double corner[K], moved[cells], stiffness[others + 1], more[others + 1];
   for (long s = 0; s < S; ++s) {
     const double *own_slope = slope + nq * s, *own_half = half + nq * s;
     for (long b = 0; b < B; ++b) result[S * b + s] = 0.0;

@@ -34,6 +34,7 @@ _FUNCTIONS = {
     "witness_points": ([_ARRAY, _ARRAY, _LONG, *5 * [_ARRAY]], None),
     "separations": ([_ARRAY, _ARRAY, _LONG, *6 * [_ARRAY]], None),
     "gradients": ([_ARRAY, _ARRAY, _LONG, *5 * [_ARRAY]], None),
+    "joint_inertias": ([_ARRAY, _LONG, *2 * [_ARRAY]], None),
     "grid_points": ([_ARRAY, *2 * [_LONG], _DOUBLE, *9 * [_ARRAY]], None),
     "cell_deviation": ([*5 * [_LONG], *8 * [_ARRAY]], None),
     "least_potential": ([*5 * [_LONG], *15 * [_ARRAY], _DOUBLE, *7 * [_ARRAY]], None),

@@ -29,7 +29,7 @@ WIDE static double greatest(const Friction *of, long joint, double p, double ome
     const double sign = (p < 0) == (way == 0) ? -1.0 : 1.0;
     const double shift = sign * omega / (sign * omega > 0 ? 1 + load : 1 - load);
     /* against p there is mostly nothing to be gained */
-    if (way && greater((sign * p + square * most) * most, 0.0) + greater(-shift, 0.0) * torque <= best) break;
+    if (way && greater((sign * p + greater(square, 0.0) * most) * most, 0.0) + greater(-shift, 0.0) * torque <= best) break;
     /* without a branch, so that several intervals go at once */
     for (long k = 0; k < count; ++k) {
       const double low = first[k], high = lesser(last[k], most), second = square - slope[k];

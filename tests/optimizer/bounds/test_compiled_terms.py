@@ -90,6 +90,14 @@ def test_points(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ARMS)
+def test_inertia(name: str) -> None:
+    chain = ChainDerivatives.of(ARMS[name])
+    q = np.random.default_rng(3).uniform(-np.pi, np.pi, (50, chain.nq))
+    assert_same(chain.joint_inertia(q), chain.joint_inertia_by_numpy(q))
+    assert chain.joint_inertia(q[::2]).tobytes() == chain.joint_inertia(q)[::2].tobytes()
+
+
+@pytest.mark.parametrize("name", ARMS)
 def test_least_potential_and_greatest_speed_terms(name: str) -> None:
     """For cells of durations side by side, and for one duration, with light and heavy weights."""
     for seed in range(3):
@@ -110,6 +118,19 @@ def test_least_potential_and_greatest_speed_terms(name: str) -> None:
                 conjugate = SpeedConjugate(friction, case.arm.active_limits, terms, case.loss, durations)
                 for found, expected in zip(conjugate(weights), conjugate.by_numpy(weights), strict=True):
                     assert_same(found, expected)
+
+
+def test_an_arm_of_two_joints_has_none_beside_the_grid() -> None:
+    whole, rng = ChainDerivatives.of(ARMS["ur5e"]), np.random.default_rng(2)
+    arrays = (whole.placements, whole.mass, whole.lever, whole.inertia, whole.rotor)
+    chain = ChainDerivatives(*(each[:2] for each in arrays), whole.gravity)
+    reference = Reference(rng.normal(size=(STEPS + 1, 2)), rng.normal(size=(STEPS + 1, 2)) * 10)
+    half = rng.uniform(0.1, 1, (STEPS, 2))
+    potential = LeastPotential(path_terms(chain, reference, np.array([0.01, 0.01]), half, (0, 1), Spacing()))
+    weights, beta = Weights(0.5, np.array([1.0, 2.0]), np.array([0.5, 0.5])), np.array([1.0, 0.8])
+    found = potential(weights, beta, 0.9 * beta)
+    assert_same(found, potential.by_numpy(weights, beta, 0.9 * beta))
+    assert np.isfinite(found).all()
 
 
 def test_deviation_of_cells() -> None:
