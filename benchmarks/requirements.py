@@ -76,6 +76,7 @@ def _solver(found: Results) -> Iterator[Requirement]:
 
 def _http(found: Results) -> Iterator[Requirement]:
     yield from _percentiles("request, joint to pose", found["wall"]["joint to pose"], p50=100, p95=250)
+    yield from _gap("request, joint to pose", found["gap"], p50=5, p90=10)
 
 
 def _scenes(found: Results) -> Iterator[Requirement]:
@@ -104,13 +105,13 @@ def _success(found: Results) -> Iterator[Requirement]:
     valid = PERCENT * found["valid_fraction"]
     yield Requirement(task, "valid answers [%]", "mean", valid, 99.9, at_least=True, digits=2)
     yield Requirement(task, "errors found in answers", "count", len(found["errors"]), 0)
-    yield from _gap(task, found["gap"], p50=10, p90=22)
+    yield from _gap(task, found["gap"], p50=5, p90=13)
     excess = PERCENT * found["relative_excess"]
     yield Requirement(task, "energy above time scaling, same duration [%]", "maximum", excess, 1, digits=2)
 
 
 def _tight(found: Results) -> Iterator[Requirement]:
-    yield from _gap("request, joint to pose, tight bound", found["gap"], p50=5, p90=10)
+    yield from _gap("request, joint to pose, tight bound", found["gap"], p50=4, p90=8)
 
 
 def _gap(task: str, gap: Results, p50: float, p90: float) -> Iterator[Requirement]:
