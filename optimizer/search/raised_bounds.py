@@ -23,8 +23,8 @@ from optimizer.search.candidates import Candidate
 from optimizer.search.dual_cells import DurationCells, Effort, PairBounds
 from optimizer.search.turns_left_out import bound_of_turns_left_out
 
-# pairs that a stage raises at most without "tight"
-MOST_RAISED = 16
+# pairs that a stage raises at most without "tight", and the gap that a bound is raised to at most
+MOST_RAISED, LEAST_GAP = 16, 0.03
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Stage:
     gap: float
 
 
-QUICK = Stage(Effort(16, 1.04, 12, Spacing(0.16, 1.35), heavy=(2,), rounds=0, time=0.1), 0.03)
+QUICK = Stage(Effort(12, 1.04, 12, Spacing(0.18, 1.35), heavy=(2,), rounds=0, time=0.1), 0.05)
 FURTHER = Stage(Effort(24, 1.03, 8, Spacing(0.12, 1.25), heavy=(2,), rounds=1, time=0.1), 0.08)
 # for "tight"
 FIRST = Stage(QUICK.effort, 0.0)
@@ -50,7 +50,7 @@ def raise_bounds(prepared: PreparedProblem, candidates: Sequence[Candidate], ene
     tight = prepared.problem.bound == "tight"
     stages = (FIRST, FINE) if tight else (QUICK, FURTHER)
     pairs = [
-        _Pair(shared, each, energy - stages[0].gap * abs(energy))
+        _Pair(shared, each, energy - (0 if tight else LEAST_GAP) * abs(energy))
         for each in candidates
         if each.goal.tolerance is None and (tight or not each.sampled)
     ]

@@ -17,7 +17,7 @@ from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.search import candidates as search
 from optimizer.search.ends import ends
-from optimizer.search.raised_bounds import QUICK, raise_bounds
+from optimizer.search.raised_bounds import LEAST_GAP, QUICK, raise_bounds
 from tests.optimizer.moves import GOAL, START, problem, tcp_pose
 from tests.selection import long_but
 
@@ -64,7 +64,7 @@ def test_the_lowest_are_raised_until_the_least_is() -> None:
     before = {id(each): each.lower_bound for each in found}
     raise_bounds(made, found, energy, NEVER)
     raised = [each for each in found if each.lower_bound != before[id(each)]]
-    assert all(before[id(each)] < each.lower_bound <= (1 - QUICK.gap) * energy for each in raised)
+    assert all(before[id(each)] < each.lower_bound <= (1 - LEAST_GAP) * energy for each in raised)
     assert min(found, key=lambda each: each.lower_bound) in raised
     assert len(raised) < len(found)
     # a second time, nothing is left to be raised
