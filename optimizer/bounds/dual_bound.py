@@ -150,14 +150,14 @@ class CellBounds:
         height, along = np.broadcast_to(self.conjugate(weights), (2, len(beta)))
         span = fast - slow
         split = np.where(span > 0, span, 1.0)
-        # what changes with the square of 1 / T: p_1 · x', and the kinetic terms on the path
-        turning = np.where(span > 0, (along[:-1] - along[1:]) / split, 0.0)
-        at_fast, at_slow = height[:-1] + fast**2 * turning, height[1:] + slow**2 * turning
+        # p_1 · x', the factor of 1 / T² that is taken out of H
+        quadratic = np.where(span > 0, (along[:-1] - along[1:]) / split, 0.0)
+        at_fast, at_slow = height[:-1] + fast**2 * quadratic, height[1:] + slow**2 * quadratic
         B = np.where(span > 0, (at_fast - at_slow) / split, 0.0)
         power = dual.base - waiting - scale * dual.rotor_power - at_slow + B * slow
         rate = power + (potential - scale**2 * dual.rates).mean(axis=1)
         gain = (1 + 2 * weights.work) * dual.potential_gain
-        return gain - B + _least(rate, turning - scale * dual.terms.kinetic_mean.mean(), self.edges)
+        return gain - B + _least(rate, quadratic - scale * dual.terms.kinetic_mean.mean(), self.edges)
 
 
 def _least(rate: Array, inverse: Array, edges: Array) -> Array:

@@ -47,12 +47,19 @@ class GridPoints:
     @classmethod
     def by_numpy(cls, chain: ChainDerivatives, x: Array, omega: Array, offsets: Array, needed: Mask) -> GridPoints:
         """The same where the shared library cannot be compiled."""
-        S, nq, K = len(x) - 1, chain.nq, len(offsets)
+        S, K = len(x) - 1, len(offsets)
         x_rate, omega_rate = np.diff(x, axis=0) * S, np.diff(omega, axis=0) * S
-        q = (x[:, None] + offsets).reshape(-1, nq)
-        torque, slope = (each.reshape(S + 1, K, *each.shape[1:]) for each in chain.gravity_torque(q))
-        M = chain.joint_inertia(q).reshape(S + 1, K, nq, nq)
-        N = (chain.joint_inertia(q + np.repeat(STEP * omega, K, axis=0)).reshape(M.shape) - M) / STEP
+        q, flat = (x[:, None] + offsets)[needed], needed.ravel()
+
+        def placed(values: Array) -> Array:
+            every = np.zeros((flat.size, *values.shape[1:]))
+            every[flat] = values
+            return every.reshape(S + 1, K, *values.shape[1:])
+
+        torque, slope = map(placed, chain.gravity_torque(q))
+        own = chain.joint_inertia(q)
+        beside = chain.joint_inertia(q + STEP * np.repeat(omega, K, axis=0)[flat])
+        M, N = placed(own), placed((beside - own) / STEP)
         momentum = _sides(
             lambda at: np.einsum("spjk,sk->spj", M[at], omega_rate) + np.einsum("spjk,sk->spj", N[at], x_rate)
         )
@@ -62,15 +69,13 @@ class GridPoints:
                 + np.einsum("sj,spjk,sk->sp", x_rate, N[at], x_rate) / 2
             )
         )
-        own = np.einsum("npjj->npj", N)
-        rows = np.abs(N).sum(axis=-1) - np.abs(own) + np.maximum(own, 0.0)
-        there = _sides(lambda at: needed[at].astype(float))
+        diagonal = np.einsum("npjj->npj", N)
         return cls(
-            there * _sides(lambda at: np.einsum("sj,spj->sp", omega[at], torque[at])),
-            there[..., None] * _sides(lambda at: np.einsum("sj,spjk->spk", omega[at], slope[at])),
-            there * kinetic,
-            there[..., None] * momentum,
-            np.where(needed[..., None], rows, 0.0).max(axis=1),
+            _sides(lambda at: np.einsum("sj,spj->sp", omega[at], torque[at])),
+            _sides(lambda at: np.einsum("sj,spjk->spk", omega[at], slope[at])),
+            kinetic,
+            momentum,
+            (np.abs(N).sum(axis=-1) - np.abs(diagonal) + np.maximum(diagonal, 0.0)).max(axis=1),
         )
 
 

@@ -32,7 +32,7 @@ class LeastPotential:
         terms, (at_terms, _) = self.terms, self._as_c
         S, nq = terms.half.shape
         result = np.empty((len(fast), S))
-        own = self._cross(weights), _hold(weights), _weight(weights), fast, slow, _turned(fast, slow), result
+        own = self._cross(weights), _hold(weights), _weight(weights), fast, slow, _excess(fast, slow), result
         library.least_potential(
             len(fast), S, nq, *map(len, terms.cells.axes), *at_terms, weights.scale, *map(address, own)
         )
@@ -63,9 +63,9 @@ class LeastPotential:
         positions, hold = cells.points(), _hold(weights)
         square = positions**2 @ hold[grid] / 2 - scale * terms.kinetic  # by 1 / T²
         along = terms.slope[:, grid] @ positions.T
-        turned = _turned(fast, slow)[:, None, None] * along
+        excess = _excess(fast, slow)[:, None, None] * along
         f2, s2 = (each[:, None, None, None] ** 2 for each in (fast, slow))
-        still = scale * (terms.gravity - (along + np.maximum(turned, 0.0))[:, :, None])
+        still = scale * (terms.gravity - (along + np.maximum(excess, 0.0))[:, :, None])
         corner = still + np.minimum(f2 * square, s2 * square)
         b2 = fast[:, None, None] ** 2
         bend = scale * (terms.gravity_curvature.across + b2 * terms.kinetic_curvature.across) + b2 * hold[grid]
@@ -82,7 +82,7 @@ class LeastPotential:
         taken, cross = np.zeros((len(fast), *terms.steepness.shape[:-1])), self._cross(weights)
         for i, joint in enumerate(terms.others):
             stiffness = hold[joint] * slow[:, None] ** 2 - scale * terms.gravity_others[:, i] - b2 * cross[:, i]
-            more = _turned(fast, slow)[:, None] * np.abs(terms.slope[:, joint]) + b2 * terms.kinetic_others[:, i]
+            more = _excess(fast, slow)[:, None] * np.abs(terms.slope[:, joint]) + b2 * terms.kinetic_others[:, i]
             s = scale * (terms.steepness[..., i] + more[:, :, None, None])
             stable, half = stiffness[:, :, None, None] > 0, terms.half[:, joint, None, None]
             divisor = np.where(stable, stiffness[:, :, None, None], 1.0)
@@ -101,6 +101,6 @@ def _weight(weights: Weights) -> Array:
     return np.asarray(weights.scale**2 * (1 + _TAU) / (2 * weights.mixing))
 
 
-def _turned(fast: Array, slow: Array) -> Array:
+def _excess(fast: Array, slow: Array) -> Array:
     """How far (B,) β Γ' exceeds the slope that it has at both ends of a cell, as a share of it; see `dual_bound`."""
     return np.asarray((fast - slow) ** 2 / (4 * fast * slow))

@@ -76,7 +76,7 @@ class SpeedConjugate:
 
     @cached_property
     def _as_c(self) -> tuple[tuple[ctypes.Structure, ...], list[NDArray[Any]]]:
-        """What does not hang on the weights, and the arrays that it points to."""
+        """What does not depend on the weights, and the arrays that it points to."""
         friction, terms, parts = self.friction, self.terms, self._parts
         path = [
             np.ascontiguousarray(each)

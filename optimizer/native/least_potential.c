@@ -7,7 +7,7 @@ void least_potential(long B, long S, long nq, long n, long m, const long *at, co
                      const double *gravity_across, const double *kinetic_along, const double *kinetic_across,
                      const double *gravity_others, const double *kinetic_others, double scale, const double *cross,
                      const double *hold, const double *weight, const double *fast, const double *slow,
-                     const double *turned, double *result) {
+                     const double *excess, double *result) {
   const long K = n * m, cells = (n - 1) * (m - 1), others = nq - 2;
   /* an arm of two joints has no others */
   double corner[K], moved[cells], stiffness[others + 1], more[others + 1];
@@ -29,7 +29,7 @@ void least_potential(long B, long S, long nq, long n, long m, const long *at, co
             const double u = first_axis[i], v = other_axis[k];
             const double along = own_slope[at[0]] * u + own_slope[at[1]] * v;
             const double square = (hold[at[0]] * u * u + hold[at[1]] * v * v) / 2 - scale * kinetic[K * end + point];
-            corner[point] = scale * (gravity[K * end + point] - along - greater(turned[b] * along, 0.0)) +
+            corner[point] = scale * (gravity[K * end + point] - along - greater(excess[b] * along, 0.0)) +
                             lesser(f2 * square, s2 * square);
           }
         double bend[2];
@@ -38,7 +38,7 @@ void least_potential(long B, long S, long nq, long n, long m, const long *at, co
         for (long i = 0; i < others; ++i) {
           const long joint = at[2 + i], o = others * s + i;
           stiffness[i] = hold[joint] * s2 - scale * gravity_others[o] - f2 * cross[o];
-          more[i] = turned[b] * fabs(own_slope[joint]) + f2 * kinetic_others[o];
+          more[i] = excess[b] * fabs(own_slope[joint]) + f2 * kinetic_others[o];
         }
         const double flat = scale * (gravity_along[s] + f2 * kinetic_along[s]);
         double least = INFINITY;

@@ -26,6 +26,7 @@ from optimizer.bounds.reference import Reference, half_sides
 from optimizer.bounds.weights import Weights
 from optimizer.deadline import Deadline
 from optimizer.energy.dwell import LinearDwell
+from optimizer.native.shared_library import shared_library
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.search.candidates import Candidate
 from optimizer.search.cruise import TINY, copper_loss
@@ -33,6 +34,8 @@ from optimizer.search.lower_bound import copper_multiplier, electrical
 from optimizer.trajectories.spline import sample
 from optimizer.trajectories.time_scalings import quintic_spline
 
+# at how many points of the straight line gravity is compared
+LINE_POINTS = 17
 # at how many durations the plain bound is compared with the target, and into how many cells one is divided at most
 PROBES, MOST_CELLS = 60, 24
 # first factor of the multipliers where gravity bends as much as confinement does, the power of that ratio that it has,
@@ -41,6 +44,8 @@ SCALE, POWER, LEAST_FACTOR, MOST_FACTOR = 0.53, -0.4, 0.2, 1.0
 STARTS = (1.0, 0.85), (0.55, 0.35)
 # by how much factors are changed at first to find better ones; share μ of κ + μ, and share of the plain η
 FACTOR_STEP, MIXING, WORK = 1.6, 0.2, 0.7
+# how many times as long bounds take without compiled code, at most
+BY_NUMPY = 20
 # a joint whose gravity torque changes by less than this with any joint carries none [N·m]
 WEIGHTLESS = 1e-9
 GRID_JOINTS = 2
@@ -52,8 +57,8 @@ class Effort:
     """How finely a pair is bounded.
 
     `steps` of the path, ratio `cell` of the durations of a cell, `group` of cells that share their boxes, `spacing` of
-    the grid, numbers of `heavy` joints that have multipliers, and `rounds` of the search for weights. A group is not
-    begun with less `time` left [s] than it takes.
+    the grid, numbers of `heavy` joints that have multipliers, and `rounds` of the search for weights. A group of an arm
+    of six joints takes `time` [s] at most by compiled code, on a machine that does nothing else.
     """
 
     steps: int
@@ -63,6 +68,13 @@ class Effort:
     heavy: tuple[int, ...]
     rounds: int
     time: float
+
+    def takes(self, joints: int) -> float:
+        """The time [s] without which a group is not begun.
+
+        There are joints**5 bounds on the third derivatives of the inertia.
+        """
+        return self.time * max(joints / 6, 1) ** 5 * (1 if shared_library() else BY_NUMPY)
 
 
 @dataclass(frozen=True)
@@ -129,7 +141,7 @@ class DurationCells:
         left = self.values < self.target
         while True:
             open_ = np.flatnonzero(left & (self.values <= self.values[~left].min(initial=np.inf)))
-            if not len(open_) or deadline.left < effort.time:
+            if not len(open_) or deadline.left < effort.takes(self.pairs.chain.nq):
                 return
             group = slice(open_[0], open_[open_ < open_[0] + effort.group][-1] + 1)
             for value in self._bounds(self.edges[group.start : group.stop + 1], self.values[group], effort, deadline):
@@ -177,7 +189,7 @@ class DurationCells:
             value = self._with_factors(dual.over(edges), self._factors, work)
             worst = float(middles[value.argmin()])
             yield value
-            if deadline.left < effort.time:
+            if deadline.left < effort.takes(self.pairs.chain.nq):
                 return
 
     def _best_factors(self, dual: DualBound, duration: float, work: float, rounds: int) -> tuple[float, float]:
@@ -238,7 +250,7 @@ class DurationCells:
     def _hold(self) -> Array:
         """Mean copper loss (nq,) [W] of each joint's gravity torque on the straight line."""
         candidate, pairs = self.candidate, self.pairs
-        share = np.linspace(0.0, 1.0, 17)[:, None]
+        share = np.linspace(0.0, 1.0, LINE_POINTS)[:, None]
         line = candidate.q_start + share * (candidate.q_goal - candidate.q_start)
         return np.asarray(pairs.loss * (pairs.chain.gravity_torque(line)[0] ** 2).mean(axis=0))
 

@@ -1,9 +1,9 @@
-"""Lower bounds of pairs, raised by the copper loss of holding and of speeding up: `dual_cells`.
+"""Lower bounds of pairs, raised by the copper loss of holding against gravity and of acceleration: `dual_cells`.
 
-The plain bound leaves most of that loss out: two thirds of the gap in the median. A pair takes some milliseconds, so
-that only those are raised whose bounds would be the answer's, the lowest first, and with more effort where the gap
-stays wide. With `"bound": "tight"` every pair below the best energy is raised as far as it goes, and may be ruled out.
-Where the dual bound does not apply the plain one stays.
+The plain bound leaves most of that loss out, which is most of the gap. A pair takes some milliseconds, so that only
+those are raised whose bounds would be the answer's, the lowest first, and with more effort where the gap stays wide.
+With `"bound": "tight"` every pair below the best energy is then raised as far as it goes, and may be ruled out: no
+bound falls by that. Where the dual bound does not apply the plain one stays.
 
 A raised bound is no higher than the plain one of full turns that no candidate has (`turns_left_out`).
 """
@@ -37,29 +37,28 @@ class Stage:
 
 QUICK = Stage(Effort(12, 1.04, 12, Spacing(0.18, 1.35), heavy=(2,), rounds=0, time=0.1), 0.05)
 FURTHER = Stage(Effort(24, 1.03, 8, Spacing(0.12, 1.25), heavy=(2,), rounds=1, time=0.1), 0.08)
-# for "tight"
-FIRST = Stage(QUICK.effort, 0.0)
-FINE = Stage(Effort(64, 1.01, 4, Spacing(0.08, 1.2), heavy=(3, 2, 1), rounds=2, time=0.4), 0.0)
+# for "tight": of every pair
+EVERY = QUICK.effort, Effort(64, 1.01, 4, Spacing(0.08, 1.2), heavy=(3, 2, 1), rounds=2, time=0.4)
 
 
 def raise_bounds(prepared: PreparedProblem, candidates: Sequence[Candidate], energy: float, deadline: Deadline) -> None:
     """Raise the lower bounds of candidates that lie below `energy` [J], that of a motion, in time."""
-    shared = PairBounds.of(prepared)
+    below = [each for each in candidates if each.lower_bound < energy and each.goal.tolerance is None]
+    shared = PairBounds.of(prepared) if below else None
     if shared is None:
         return
-    tight = prepared.problem.bound == "tight"
-    stages = (FIRST, FINE) if tight else (QUICK, FURTHER)
-    pairs = [
-        _Pair(shared, each, energy - (0 if tight else LEAST_GAP) * abs(energy))
-        for each in candidates
-        if each.goal.tolerance is None and (tight or not each.sampled)
-    ]
-    for stage in stages:
-        target = energy - stage.gap * abs(energy)
-        for pair in sorted(pairs, key=_bound_of) if tight else _least_ones(pairs):
-            if _bound_of(pair) >= target:
+    target = energy - LEAST_GAP * abs(energy)
+    pairs = [_Pair(shared, each, target) for each in below if not each.sampled and each.lower_bound < target]
+    for stage in (QUICK, FURTHER):
+        for pair in _least_ones(pairs):
+            if _bound_of(pair) >= energy - stage.gap * abs(energy):
                 break
             pair.raise_bound(stage.effort, deadline)
+    if prepared.problem.bound == "tight":
+        pairs = [_Pair(shared, each, energy) for each in below]
+        for effort in EVERY:
+            for pair in sorted(pairs, key=_bound_of):
+                pair.raise_bound(effort, deadline)
 
 
 def _least_ones(pairs: Sequence[_Pair]) -> Iterator[_Pair]:
@@ -101,7 +100,7 @@ class _Pair:
 
     def raise_bound(self, effort: Effort, deadline: Deadline) -> None:
         """Raise the candidate's bound with some effort, in time."""
-        if deadline.left < effort.time:
+        if deadline.left < effort.takes(self.shared.chain.nq) or self.candidate.lower_bound >= self.target:
             return
         for cells in self._cells:
             cells.raise_bounds(effort, deadline)

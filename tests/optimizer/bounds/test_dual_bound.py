@@ -219,7 +219,7 @@ def test_the_conjugate_is_the_greatest_value() -> None:
     assert friction is not None
     for _ in range(60):
         p, omega = rng.normal(size=6) * 20, rng.normal(size=6) * 0.3
-        square, most = rng.uniform(0, 1.5, 6), rng.uniform(0.01, 3.0, 6)
+        square, most = rng.uniform(-0.5, 1.5, 6), rng.uniform(0.01, 3.0, 6)
         value, _ = friction.greatest(p, omega, square, most)
         v = np.concatenate([np.linspace(-1, 1, 4001), np.geomspace(1e-6, 1, 400), -np.geomspace(1e-6, 1, 400)])[:, None]
         v = v * most

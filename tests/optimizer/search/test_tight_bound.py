@@ -13,9 +13,10 @@ from optimizer.problem.bus import Bus
 from optimizer.problem.cycle import Cycle
 from optimizer.problem.problem import Problem
 from optimizer.solution import Solution
-from tests.optimizer.moves import PAYLOAD, ROBOT, START, fixed, limits, problem
+from tests.optimizer.moves import PAYLOAD, ROBOT, START, fixed, limits, problem, random_moves, tcp_pose
 from tests.selection import long_but
 
+SEED, MOVES = 17, 4
 CASES: dict[str, dict[str, Any]] = {
     "as it comes": {},
     "loaded": {"payload": PAYLOAD},
@@ -73,3 +74,10 @@ def test_the_plain_bound_stays_where_the_dual_one_does_not_help(name: str) -> No
     assert plain.lower_bound <= tight.lower_bound <= tight.energy.of(asked.objective)
     if name.startswith(("mechanical", "friction")):
         assert tight.lower_bound == plain.lower_bound
+
+
+def test_it_is_never_below_the_plain_one() -> None:
+    """Of random moves to poses, in the whole of the search."""
+    for start, goal in random_moves(SEED, MOVES):
+        plain, tight = both(problem(start, tcp_pose(goal)))
+        assert plain.lower_bound <= tight.lower_bound <= tight.energy.electrical.total
