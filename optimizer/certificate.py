@@ -15,8 +15,8 @@ from optimizer.collision.close_pass import close_pass
 from optimizer.collision.model import collision_model
 from optimizer.deadline import checkpoint
 from optimizer.energy.dwell import dwell_energy, holding_power
-from optimizer.energy.limited_torque import limited_torque
 from optimizer.energy.losses import breakdown, friction_torque, relative_error
+from optimizer.energy.torque_bound import TorqueSamples, torque_bounds
 from optimizer.kinematics.orientation_tolerance import excess_angle
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.kinematics.tcp import T_last_tcp
@@ -84,7 +84,7 @@ class _Replay:
     """
 
     def __init__(self, arm: Arm, spline: Spline) -> None:
-        self.arm, self.model = arm, rigid_body_model(arm)
+        self.arm, self.model, self._spline = arm, rigid_body_model(arm), spline
         self.data = self.model.createData()
         self._last, self._T_last_tcp = self.model.njoints - 1, T_last_tcp(arm)
         self.t, curve = grid(spline.duration), spline.curve
@@ -128,9 +128,14 @@ class _Replay:
 
     @property
     def limit_ratios(self) -> dict[str, float]:
-        """The worst value / limit of position, velocity, acceleration, jerk and torque."""
-        tau_limited = limited_torque(self.arm, self.tau, self.v, self.a, self._lost)
-        return limit_ratios(self.arm.active_limits, self.q, self.v, self.a, self.jerk, tau_limited)
+        """The worst value / limit of position, velocity, acceleration and jerk; that of torque is a bound.
+
+        Between two samples, a torque may peak where a joint reverses and friction changes sign. The others are
+        polynomials, whose peaks are beyond the samples by less than the tolerance of a ratio.
+        """
+        samples = TorqueSamples(self.t[None], self.v[None], self.a[None], self.tau[None])
+        tau = torque_bounds(self.arm, self._spline.curve, self.torques, samples)[None]
+        return limit_ratios(self.arm.active_limits, self.q, self.v, self.a, self.jerk, tau)
 
     @property
     def rest_error(self) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 from models.robot import Array, Limits
 from optimizer.collision.bodies import Indices
 from optimizer.energy.limited_torque import limited_parts
+from optimizer.energy.torque_bound import TorqueSamples, torque_bounds
 from optimizer.kinematics.path_constraints import PathConstraints
 from optimizer.nlp.clearance_constraint import CLEARANCE, RESERVE, SCALE
 from optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
@@ -65,20 +66,18 @@ def initial_bounds(path: PathConstraints | None) -> Array:
 
 
 def torque_peaks(prepared: PreparedProblem, spline: Spline) -> Array:
-    """Greatest absolute limited torques (nq,) [N·m] at quadrature points and at the instants of the certificate.
+    """Greatest absolute limited torques (nq,) [N·m], bounded between samples as the certificate bounds them.
 
-    Those instants are left out of a motion that stays far from the torque limits.
+    Of a motion that stays far from the torque limits, they are those at the quadrature points.
     """
     # the samples of its energy, which is wanted next
     _, _, v, a, tau, lost = prepared.report_samples(spline)
     smooth, friction = limited_parts(prepared.arm, tau, v, a, lost)
-    peaks = np.abs(smooth + friction).max(axis=0)
     most = np.abs(smooth).max(axis=0) + np.abs(friction).max(axis=0)
     if (most <= FAR_BELOW * prepared.problem.arm.active_limits.tau_max).all():
-        return np.asarray(peaks)
-    # at a reversal of a joint friction changes sign within a millisecond
-    q, v, a = sample(spline, grid(spline.duration))
-    return np.asarray(np.maximum(peaks, np.abs(prepared.limited_torques(q, v, a)).max(axis=0)))
+        return np.asarray(np.abs(smooth + friction).max(axis=0))
+    samples = TorqueSamples.of(spline.curve, prepared.torques, grid(spline.duration)[None])
+    return torque_bounds(prepared.arm, spline.curve, prepared.torques, samples)
 
 
 def repair_factors(prepared: PreparedProblem, spline: Spline, overshoot: tuple[Array, Array]) -> Limits | None:

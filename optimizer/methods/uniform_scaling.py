@@ -17,6 +17,7 @@ from models.robot import Array
 from optimizer.energy.limited_torque import limited_torque
 from optimizer.methods.around_obstacles import around_obstacles
 from optimizer.methods.duration_intervals import fastest
+from optimizer.methods.limit_repair import torque_peaks
 from optimizer.methods.method import CONVERGED, DEADLINE_PASSED, Method, SolveResult, SolveStatus
 from optimizer.methods.path_retiming import PathRetiming
 from optimizer.methods.sqp_method import with_effort
@@ -28,8 +29,9 @@ from optimizer.trajectories.spline import Spline, lasting, least_time_scale, sam
 RATIO, PATIENCE = 1.12, 8
 # relative tolerance of the best factor
 FACTOR_TOLERANCE = 1e-5
-# the limits on rates and torque are used up to these ratios, because of rounding and of torque peaks between samples
-RATES_USED, TORQUE_USED = 1 - 1e-9, 1 - 1e-4
+# the limits on rates and torque are used up to these ratios, because of rounding; torque is bounded between samples
+# where it comes to this ratio of its limit at one: peaks between them are some thousandths above
+RATES_USED, TORQUE_USED, BOUNDED = 1 - 1e-9, 1 - 1e-4, 0.97
 
 
 @dataclass(frozen=True)
@@ -113,9 +115,13 @@ class _UniformScale:
         given, v = self._samples, self._samples.v / factor
         tau = given.static + given.moving / factor**2
         tau = limited_torque(self.prepared.arm, tau, v, given.a / factor**2)
-        if (np.abs(tau) > self.prepared.problem.arm.active_limits.tau_max * TORQUE_USED).any():
+        limit = self.prepared.problem.arm.active_limits.tau_max
+        used = float((np.abs(tau) / limit).max())
+        if used > TORQUE_USED:
             return np.inf
         if self.prepared.path is not None and (self.prepared.path.ratios(given.q, v) > TORQUE_USED).any():
             return np.inf
         spline = self._retimed(factor)
+        if used > BOUNDED and (torque_peaks(self.prepared, spline) > limit * TORQUE_USED).any():
+            return np.inf
         return spline.duration if self.interval.minimum_time else self.prepared.cost_of(spline)

@@ -10,7 +10,7 @@ import numpy as np
 
 from optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
 from optimizer.energy.interval import Known, with_interval
-from optimizer.exceptions import DeadlineExceeded, NoCollisionFreeTrajectory, NoTrajectory
+from optimizer.exceptions import DeadlineExceeded, DurationTooShort, NoCollisionFreeTrajectory, NoTrajectory
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.bus import Bus
@@ -21,6 +21,7 @@ from optimizer.search.attempts import solve, solve_from
 from optimizer.search.baselines import with_saving_intervals
 from optimizer.search.branch_and_bound import explore
 from optimizer.search.candidates import Candidate, Reason, bound, pairs
+from optimizer.search.claims import may_be_optimal
 from optimizer.search.ends import ends
 from optimizer.search.fastest import find_fastest
 from optimizer.search.free_goal_bound import family_bound_of
@@ -131,7 +132,13 @@ class Run:
     def search(self) -> Solution:
         """The solution, from candidates that are prepared, and of which some may be solved. Raises as `solution`."""
         incumbent = self.incumbent
-        without = self.without_storage() if incumbent.uses_storage else None
+        problem = self.problem
+        without = None
+        if incumbent.uses_storage:
+            # storage never makes a motion need more energy
+            without = self.solved_beside(replace(problem, arm=replace(problem.arm, bus=Bus())), share=0.5)
+        # rest does no work: any motion may rest for the time that is left
+        may_rest = problem.objective == "mechanical" and problem.duration_min != problem.duration_max
         self.explore()
         if without is not None:
             incumbent.accept_if_better(*without)
@@ -144,7 +151,10 @@ class Run:
         while (best := incumbent.best()) is not None:
             best = start_beside(incumbent, best)
             refine(incumbent, best)
-            best = incumbent.best() or best
+            longest = self.solved_beside(replace(problem, duration_min=problem.duration_max)) if may_rest else None
+            if longest is not None:
+                incumbent.accept_if_better(*longest)
+            best, may_rest = incumbent.best() or best, False
             table = compare_with_baselines(incumbent, best)
             best = incumbent.best() or best
             # a coarse motion that was not refined is no optimum
@@ -226,19 +236,17 @@ class Run:
             return activate_seeds(self.incumbent.prepared, candidates)
         return activate_deferred(candidates)
 
-    def without_storage(self) -> tuple[Candidate, SolveResult, Energy] | None:
-        """The best motion on the same bus without its energy storage, valued with it; None if time is too short.
+    def solved_beside(self, other: Problem, share: float = 1.0) -> tuple[Candidate, SolveResult, Energy] | None:
+        """The answer to another problem, whose motions this one allows, as a motion of it: no dearer than there.
 
-        Storage never makes a motion need more energy, so the answer is at least as good as this motion.
+        It gets a `share` of the time left. None if it has no answer by then.
         """
-        incumbent = self.incumbent
-        left = incumbent.deadline.left
+        incumbent, left = self.incumbent, self.incumbent.deadline.left
         if left <= 0:
             return None
-        plain = replace(self.problem, arm=replace(self.problem.arm, bus=Bus()), bound="normal", deadline=left / 2)
         try:
-            found = Run(plain, clock=self.clock).solution()
-        except DeadlineExceeded:
+            found = Run(replace(other, bound="normal", deadline=share * left), clock=self.clock).solution()
+        except (DeadlineExceeded, DurationTooShort, NoTrajectory):
             return None
         incumbent.iterations += found.solver.iterations
         incumbent.solves += found.solver.nlp_solves
@@ -296,11 +304,12 @@ class Run:
             raise self.too_late() from None
         objective = energy.of(self.problem.objective)
         least, done = self._ruled_out(objective)
+        is_proven = not incumbent.cut_short and may_be_optimal(self.problem.objective, objective, least)
         assert best.attempt is not None
         incumbent.tell(Improved(objective, spline.duration, least, best.q_goal))
         arm = self.problem.arm
         return Solution(
-            status="optimal" if done and incumbent.method.converges and not incumbent.cut_short else "feasible",
+            status="optimal" if done and is_proven and incumbent.method.converges else "feasible",
             start=Branch(best.start.label, best.q_start, best.start.target),
             goal=Branch(best.goal.label, best.q_goal, best.goal.target),
             trajectory=trajectory,

@@ -24,6 +24,8 @@ ROUNDING = 1e-9  # relative; values met exactly on the grid, up to double precis
 # relative; a peak h/2 from the nearest of the grid's samples is missed by (h/2)² · |x''| / 2|x|: for the quintic's
 # acceleration 18 (h / 2T)², 4.5e-6 at 1 ms in 1 s
 GRID_MISS = 5e-6
+# relative; the torque between two samples, by which the certificate's bound may be above the greatest sample
+BETWEEN = 5e-5
 QUADRATURE = 1e-5  # relative; Simpson on 1 ms against Gauss on other panels, both with corners of |x| inside intervals
 
 ROBOT = load_robot("ur5e")
@@ -115,7 +117,7 @@ def test_torques_agree_with_another_route(friction: str) -> None:
     expected = (np.abs(tau + ROBOT.friction_laws[friction].torque(v)) / ROBOT.limits.tau_max).max()
     assert abs(expected - (np.abs(tau) / ROBOT.limits.tau_max).max()) > 0.01
     certificate = certify(task, quintic(duration=0.5), START, GOAL, honest(task, duration=0.5))
-    assert certificate.worst_ratio["torque"] == pytest.approx(expected, rel=ROUNDING)
+    assert certificate.worst_ratio["torque"] == pytest.approx(expected, rel=BETWEEN)
     assert certificate.energy_error < QUADRATURE
 
 
@@ -125,7 +127,7 @@ def test_torques_agree_with_another_route(friction: str) -> None:
         ("velocity", "v_max", ROUNDING),
         ("acceleration", "a_max", GRID_MISS),
         ("jerk", "j_max", ROUNDING),
-        ("torque", "tau_max", ROUNDING),
+        ("torque", "tau_max", BETWEEN),
     ],
 )
 def test_a_broken_limit_shows_its_ratio(energy: Energy, name: str, field: str, tolerance: float) -> None:
