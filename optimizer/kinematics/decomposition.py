@@ -30,6 +30,7 @@ from optimizer.kinematics.jacobians import geometric_jacobian
 from optimizer.kinematics.joint_axes import JointAxes
 from optimizer.kinematics.named_branches import NamedBranches, in_order, numbered
 from optimizer.kinematics.newton import EXACT, solved
+from optimizer.kinematics.reach import REACH
 from optimizer.kinematics.spherical_wrist import ALIGNED, LABELS, SphericalWrist, branch_numbers
 from optimizer.kinematics.ur_closed_form import URClosedForm
 from optimizer.kinematics.valley import along_valleys
@@ -224,7 +225,9 @@ class DecomposedArm:
             q_more, missed_more, smallest_more = self._improved(more, link_frames(self._chain.placements, more), T)
             q, missed = np.vstack([q, q_more]), np.append(missed, missed_more)
             smallest = np.append(smallest, smallest_more)
-        done = missed < SOLVED
+        # of an arm that deviates, least errors beside a singularity are not at the edge of the reach
+        at_edge = (missed < REACH.beyond) & (smallest < REACH.singular) & self.complete
+        done = (missed < SOLVED) | at_edge
         q, missed, smallest = np.clip(wrapped(q[done]), -np.pi, np.pi), missed[done], smallest[done]
         chosen = distinct(q, missed, smallest)
         return q[chosen], smallest[chosen]

@@ -14,6 +14,7 @@ For any other arm it returns None: such an arm takes joint positions as targets,
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import compress, groupby, product, repeat
@@ -30,18 +31,17 @@ from optimizer.kinematics.full_turns import full_turn_alternatives, nearest_turn
 from optimizer.kinematics.ik_solutions import IKSolution, PrincipalSolution, Singularities
 from optimizer.kinematics.isolated import distinct
 from optimizer.kinematics.multi_start import MultiStart
+from optimizer.kinematics.reach import REACH, at_the_edge, out_of_reach
 from optimizer.kinematics.redundant_arm import RedundantArm
 from optimizer.kinematics.redundant_curve import RedundantCurve
 from optimizer.kinematics.self_motion import SelfMotion, is_point, spread
 from optimizer.kinematics.tcp import flange_pose
 from optimizer.kinematics.traced_arm import TracedArm
 from optimizer.kinematics.traced_curve import TracedCurve
-from optimizer.kinematics.ur_closed_form import ROUNDING, URClosedForm
+from optimizer.kinematics.ur_closed_form import URClosedForm
 from optimizer.problem.branches import BranchLabel
 
 # greatest error [m, rad] of the forward kinematics of a solution against the pose
-_LIKE_MILLIMETRES = 20.0
-"""Distance [m] out of reach beyond which a position was hardly meant in metres."""
 ACCURACY = 1e-9
 # members of a self-motion that stand for it; of many self-motions, so many times those of one in all, and of each at
 # least so many
@@ -223,12 +223,14 @@ class ClosedFormInverseKinematics:
             return found
         # the sum of the squares of a rotation's error is twice that of its angle
         all_, place = np.einsum("ijk,ijk->i", off, off), np.einsum("ij,ij->i", off[:, :3, 3], off[:, :3, 3])
-        missed = np.sqrt(np.maximum(place, (all_ - place) / 2))
-        chosen = np.flatnonzero(missed < ACCURACY)
+        q, missed = found.q, np.sqrt(np.maximum(place, (all_ - place) / 2))
+        isolated = np.array([curve is None for curve in found.curves], dtype=bool)
+        q, missed = at_the_edge(self._chain, q, missed, isolated & (missed >= ACCURACY), T)
+        chosen = np.flatnonzero(missed < np.where(isolated, REACH.missed, ACCURACY))
         if several:
-            chosen = chosen[distinct(found.q[chosen], missed[chosen])]
+            chosen = chosen[distinct(q[chosen], missed[chosen])]
         kept = chosen.tolist()
-        return _Reached(found.q[chosen], [found.labels[k] for k in kept], [found.curves[k] for k in kept])
+        return _Reached(q[chosen], [found.labels[k] for k in kept], [found.curves[k] for k in kept])
 
     def solve(
         self,
@@ -248,7 +250,10 @@ class ClosedFormInverseKinematics:
         except SingularPose as error:
             raise SingularPose(target, error.smallest_singular_value) from None
         if not reachable:
-            raise self._out_of_reach(T, target)
+            distance = self._form.distance_to_reach(_orthonormal(T))
+            reached = self._reached_beside(T, members, limits, distance)
+            if not len(reached.q):
+                raise out_of_reach(distance, target)
         nearest, held = nearest_turns(reached.q, limits)
         principal = reached.principal(self._form, self._chain)
         owners = list(compress(principal, held))
@@ -266,24 +271,20 @@ class ClosedFormInverseKinematics:
         distances = np.minimum(q - limits.q_min, limits.q_max - q).min(axis=1).tolist()
         return list(map(IKSolution, q, owners, distances))
 
-    def _out_of_reach(self, T: Array, target: str) -> UnreachablePose | SingularPose:
-        distance = self._form.distance_to_reach(_orthonormal(T))
-        if distance is None:
-            return UnreachablePose(
-                target,
-                None,
-                f"No arm configuration was found for the {target} pose: move the position closer to the robot's "
-                "workspace, or change the orientation.",
-            )
-        if distance <= ROUNDING:
-            return SingularPose(target, 0.0)
-        hint = "give it in metres, not millimetres, or " if distance > _LIKE_MILLIMETRES else ""
-        return UnreachablePose(
-            target,
-            distance,
-            f"The {target} pose is {distance:.4g} m out of reach in this orientation: {hint}move the position closer "
-            "to the robot's workspace, or change the orientation.",
-        )
+    def _reached_beside(self, T: Array, members: int, limits: Limits, distance: float | None) -> _Reached:
+        """What is reached beside a flange pose T (4, 4) that is out of reach by a `distance` [m] within `Reach`."""
+        nothing = _Reached(np.zeros((0, self._chain.nq)), [], [])
+        if distance is None or distance > REACH.beyond:
+            return nothing
+        for direction in product((-1.0, 0.0, 1.0), repeat=3):
+            if any(direction):
+                beside = T.copy()
+                beside[:3, 3] += REACH.beyond * np.array(direction) / np.linalg.norm(direction)
+                with suppress(SingularPose):
+                    reached = self._reached(beside, members, limits)
+                    if len(reached.q):
+                        return reached
+        return nothing
 
 
 def _wound(q: Array, owners: Sequence[PrincipalSolution], limits: Limits) -> tuple[Array, list[PrincipalSolution]]:

@@ -21,6 +21,7 @@ from optimizer.kinematics.chain import Chain
 from optimizer.kinematics.isolated import SINGULAR_VALUE, distinct, lies_on_a_curve
 from optimizer.kinematics.named_branches import in_order, numbered
 from optimizer.kinematics.newton import solved
+from optimizer.kinematics.reach import REACH
 from optimizer.kinematics.self_motion import SelfMotion
 from optimizer.problem.branches import BranchLabel, NumberedBranch
 
@@ -93,7 +94,7 @@ class MultiStart:
                 break
             starts = np.vstack([rng.uniform(-np.pi, np.pi, (ROUND, JOINTS)), self._beside(fresh[len(found) :])])
             found = fresh
-        singular = np.linalg.svd(self._chain.flange_and_jacobian(found)[1], compute_uv=False)[:, -1]
+        singular = self._smallest(found)
         for k in np.flatnonzero(singular < SINGULAR_VALUE):
             if lies_on_a_curve(self._chain, found[k], T):
                 raise SingularPose("goal", float(singular[k]))
@@ -104,10 +105,15 @@ class MultiStart:
     def _joined(self, found: Array, starts: Array, T: Array) -> Array:
         """The solutions found (n, 6) [rad], then those that starts (m, 6) lead to and that are not among them."""
         q, missed = solved(self._chain, starts, T, STEPS, HOPELESS)
-        done = missed < SOLVED
+        singular = self._smallest(q) < REACH.singular
+        done = (missed < SOLVED) | ((missed < REACH.beyond) & singular)
         q = np.vstack([found, np.clip(wrapped(q[done]), -np.pi, np.pi)])
-        smallest = np.asarray(np.linalg.svd(self._chain.flange_and_jacobian(q)[1], compute_uv=False)[:, -1])
+        smallest = self._smallest(q)
         return np.asarray(q[distinct(q, np.append(np.zeros(len(found)), missed[done]), smallest)])
+
+    def _smallest(self, q: Array) -> Array:
+        """The smallest singular values (n,) of the Jacobian at configurations (n, 6) [rad]."""
+        return np.asarray(np.linalg.svd(self._chain.flange_and_jacobian(q)[1], compute_uv=False)[:, -1])
 
     def _beside(self, found: Array) -> Array:
         """Starts (n, 6) beside nearly singular solutions (m, 6), on the side where the branch that meets them lies."""

@@ -19,6 +19,7 @@ import pinocchio as pin
 from scipy.optimize import minimize_scalar
 
 from models.robot import Array, Limits
+from optimizer.kinematics.reach import REACH
 from optimizer.kinematics.self_motion import StretchedWrist, is_point
 from optimizer.problem.branches import Label
 
@@ -139,8 +140,8 @@ class URClosedForm:
     def solve(self, T: Array) -> tuple[Array, list[Label]]:
         """The isolated configurations (n, 6) [rad] in [-pi, pi] that put the flange at T (4, 4), and their labels.
 
-        n is at most eight, and zero if T is out of reach. Where shoulder or elbow is singular, the branches that meet
-        there count once. Where the wrist is stretched there are `self_motions` instead.
+        n is at most eight, and zero if T is out of reach by more than `Reach` allows. Where shoulder or elbow is
+        singular, the branches that meet there count once. A stretched wrist has `self_motions` instead.
         """
         rows, labels = [], []
         for q1, ahead in self._shoulders(T):
@@ -158,7 +159,7 @@ class URClosedForm:
         """First angle, and the distance [m] of the last axis' origin ahead of the first axis at this angle."""
         x, y = float(T[0, 3] - self.d6 * T[0, 2]), float(T[1, 3] - self.d6 * T[1, 2])
         distance = hypot(x, y)
-        if distance < abs(self.d4) - ROUNDING:
+        if distance < abs(self.d4) - REACH.near:
             return []
         beyond = distance - abs(self.d4)
         ahead = sqrt(beyond * (distance + abs(self.d4))) if beyond > EDGE else 0.0
@@ -215,7 +216,7 @@ class URClosedForm:
         """Second and third angle, and sin(q3), that put the fourth axis at (x, z) in the arm's plane [m]."""
         least, most = self._reach
         distance = hypot(x, z)
-        if not least - ROUNDING <= distance <= most + ROUNDING:
+        if not least - REACH.near <= distance <= most + REACH.near:
             return []
         if distance < STRETCHED:
             return []  # both links of equal length, folded: the arm turns about its second axis

@@ -10,7 +10,7 @@ import numpy as np
 
 from optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
 from optimizer.energy.interval import Known, with_interval
-from optimizer.exceptions import DeadlineExceeded, DurationTooShort, NoCollisionFreeTrajectory, NoTrajectory
+from optimizer.exceptions import DeadlineExceeded, DurationTooShort, NoTrajectory
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.bus import Bus
@@ -34,6 +34,7 @@ from optimizer.search.outer_turns import explore_families
 from optimizer.search.path_ends import bound_beside, path_candidates
 from optimizer.search.raised_bounds import raise_bounds
 from optimizer.search.refinement import baselines_of, compare_with_baselines, refine
+from optimizer.search.refusals import no_trajectory
 from optimizer.search.sampled_ends import activate_deferred, between
 from optimizer.search.seeds import activate_seeds
 from optimizer.search.sliding import slides
@@ -126,7 +127,7 @@ class Run:
         answer = self.answer(candidate, baselines_of(incumbent, candidate))
         if answer is None:
             incumbent.reject(candidate)
-            raise self.no_trajectory()
+            raise no_trajectory(self.incumbent.candidates)
         return answer
 
     def search(self) -> Solution:
@@ -166,22 +167,11 @@ class Run:
             self.explore()
         if any(candidate.status is CandidateStatus.UNVISITED for candidate in incumbent.candidates):
             raise self.too_late()
-        raise self.no_trajectory()
+        raise no_trajectory(self.incumbent.candidates)
 
     def too_late(self) -> DeadlineExceeded:
         """The error for no certified motion before the deadline."""
         return DeadlineExceeded([candidate.report() for candidate in self.incumbent.candidates])
-
-    def no_trajectory(self) -> NoTrajectory:
-        """The error for no motion at all; it names the collision that stopped the best candidate, if there is one."""
-        candidates = self.incumbent.candidates
-        reports = [candidate.report() for candidate in candidates]
-        hits = [(each, each.attempt.collision) for each in candidates if each.attempt and each.attempt.collision]
-        if not hits:
-            return NoTrajectory(reports)
-        candidate, hit = max(hits, key=lambda each: each[1].min_clearance)
-        cut_short = any(each.attempt is not None and each.attempt.cut_short for each in candidates)
-        return NoCollisionFreeTrajectory(reports, hit, candidate.start.label, candidate.goal.label, cut_short)
 
     def explore(self) -> None:
         """Solve candidates until no lower bound is below the incumbent; deferred ones too while nothing is solved."""
