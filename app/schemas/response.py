@@ -274,8 +274,9 @@ class OptimizeResponse(MotionAnswer):
     duration: float = described("Duration of the motion.", "s", 1.8)
     status: Literal["optimal", "feasible"] = described(
         "`optimal`: the method converged, and every other candidate was solved, is infeasible, or was ruled out by its "
-        "lower bound or its energy. It does not say that no better motion exists: see `optimality_gap`. `feasible`: "
-        "the motion is certified, but the search was not complete, or arm configurations may have been missed.",
+        "lower bound or its energy; for mechanical work, `optimality_gap` is at most 0.01, too. It does not say that "
+        "no better motion exists: see `optimality_gap`. `feasible`: the motion is certified, but the search was not "
+        "complete, or arm configurations may have been missed.",
         None,
         "optimal",
     )
