@@ -147,6 +147,12 @@ class Settings(BaseSettings):
     deadline_grace: float = Field(
         default=5.0, gt=0, description="Time after the deadline [s] at which a worker that has not answered is killed."
     )
+    stop_grace: float = Field(
+        default=0.3,
+        gt=0,
+        description="Time [s] in which a worker must end a task that nobody wants any more; after it, the worker is "
+        "killed. Most computations look every few milliseconds, and to start a new worker takes longer.",
+    )
     shutdown_grace: float = Field(
         default=6.0,
         gt=0,

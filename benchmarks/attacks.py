@@ -21,6 +21,8 @@ import orjson
 
 from benchmarks.attack_bodies import long_search, meshes, numbers, sampled
 from benchmarks.command import parser, write_json
+from benchmarks.crowds import CROWDS
+from benchmarks.crowds import report as report_crowd
 from benchmarks.observed_attack import Attack, Outcome, observed
 from benchmarks.service import Client, Service, running
 
@@ -258,12 +260,14 @@ def line(outcome: Outcome) -> str:
 def main() -> None:
     """Runs the attacks, each on a new service; with `--soak` one after another on the same."""
     arguments = parser(__doc__)
-    arguments.add_argument("--only", nargs="+", choices=[*ATTACKS, "end"], help="these attacks only")
+    arguments.add_argument("--only", nargs="+", choices=[*ATTACKS, "end", *CROWDS], help="these attacks only")
+    arguments.add_argument("--minutes", type=float, default=8.0, help="time of the mixed crowd [min]")
+    arguments.add_argument("--kill-every", type=float, default=0.0, help="kill a worker of a crowd after each such [s]")
     arguments.add_argument("--soak", type=float, default=0.0, help="repeat them for so long on one service [s]")
     given = arguments.parse_args()
-    chosen = given.only or [*ATTACKS, "end"]
+    chosen = given.only or [*ATTACKS, "end", *CROWDS]
     attacks = {name: attack for name, attack in ATTACKS.items() if name in chosen}
-    results: dict[str, Any] = {"cores": len(os.sched_getaffinity(0)), "outcomes": []}
+    results: dict[str, Any] = {"cores": len(os.sched_getaffinity(0)), "outcomes": [], "crowds": {}}
     print("| attack | before, MiB | peak | after | /healthz p99, ms | most | honest 200 | other | slowest, s | seen |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
 
@@ -293,6 +297,8 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder, running(TMPDIR=folder) as service:
             results["left_files"] = left_files(service, Path(folder))
         print(f"files left by kill -9: {results['left_files'] or 'none'}")
+    for name in [crowd for crowd in CROWDS if crowd in chosen and not given.soak]:
+        results["crowds"][name] = [asdict(phase) for phase in report_crowd(name, given.minutes, given.kill_every)]
     write_json(given.json, results)
 
 

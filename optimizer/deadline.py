@@ -3,6 +3,8 @@
 A loop that can return what it has so far reads `Deadline.passed`. Below such loops lies work that may take long by
 itself and is of no use in part: torques at a million instants, distances of a thousand pairs, a quadratic program. It
 calls `checkpoint`, which raises DeadlinePassed once the deadline has passed that a caller further up watches.
+
+A computation whose result nobody wants any more ends at its next `checkpoint`, too: see `stoppable`.
 """
 
 from __future__ import annotations
@@ -31,8 +33,8 @@ class Deadline:
 
     @property
     def left(self) -> float:
-        """Time until the deadline [s], negative after it."""
-        return self.at - self.clock()
+        """Time until the deadline [s], negative after it, and once the computation is stopped."""
+        return min(self.at - self.clock(), -LONG_PAST) if is_stopped() else self.at - self.clock()
 
     @property
     def passed(self) -> bool:
@@ -49,6 +51,43 @@ class Deadline:
 
 
 NEVER = Deadline()
+
+LONG_PAST = 1e6
+"""Time [s] by which every deadline has passed for a computation that is stopped. It is finite, so that shares of it are
+numbers."""
+
+
+class Stopped(BaseException):
+    """Nobody wants the result of the computation. Handlers of errors let it pass: whoever runs the computation catches
+    it."""
+
+
+_wanted_no_more: ContextVar[Callable[[], bool] | None] = ContextVar("whether the computation is stopped", default=None)
+
+
+@contextmanager
+def stoppable(is_stopped: Callable[[], bool]) -> Iterator[None]:
+    """Within the context, once `is_stopped` says so, every deadline has passed, and `checkpoint` raises Stopped.
+
+    `is_stopped` is called often, must be fast, and must never take back that it is so.
+    """
+    before = _wanted_no_more.set(is_stopped)
+    try:
+        yield
+    finally:
+        _wanted_no_more.reset(before)
+
+
+def is_stopped() -> bool:
+    """Whether nobody wants the result of this computation."""
+    stopped = _wanted_no_more.get()
+    return stopped is not None and stopped()
+
+
+def end_if_stopped() -> None:
+    """Raises Stopped if the computation is stopped: for work that must be finished whatever the deadline."""
+    if is_stopped():
+        raise Stopped
 
 
 class DeadlinePassed(Exception):
@@ -72,7 +111,9 @@ def watch(deadline: Deadline) -> Iterator[None]:
 
 
 def checkpoint(needed: float = 0.0) -> None:
-    """Raises DeadlinePassed if less than `needed` [s] is left until the watched deadline; without one, does nothing."""
+    """Raises Stopped if the computation is stopped, and DeadlinePassed if less than `needed` [s] is left until the
+    watched deadline, if there is one."""
+    end_if_stopped()
     deadline = _watched.get()
     if deadline is not None and deadline.left < needed:
         raise DeadlinePassed

@@ -6,6 +6,7 @@ import asyncio
 from collections import Counter, deque
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
+from enum import Enum, auto
 from typing import Generic, Protocol, TypeVar
 
 from app.exceptions import Busy, TooManyRequests
@@ -16,7 +17,14 @@ class Usable(Protocol):
 
     @property
     def alive(self) -> bool:
-        """Whether it can run a task."""
+        """Whether it can run a task, now or once the one that it is at has ended."""
+
+    @property
+    def is_free(self) -> bool:
+        """Whether it is at no task. One that is stopped takes some time until it has ended."""
+
+    def when_free(self, call: Callable[[], object]) -> None:
+        """Calls once it is at no task, at once or later."""
 
 
 W = TypeVar("W", bound=Usable)
@@ -25,34 +33,67 @@ PATIENCE = 2.0
 """Time [s] that a client without a worker waits, before a client that has several gives one back."""
 
 
+class State(Enum):
+    """Where a place is on its way."""
+
+    IDLE = auto()
+    """It does not wait: it has not begun to, or its request is over."""
+    WAITING = auto()
+    """It stands in the line of its client."""
+    GRANTED = auto()
+    """A worker is lent to it, and its request does not know yet."""
+    WORKING = auto()
+    """Its request has the worker."""
+    YIELDING = auto()
+    """Its request has the worker and must give it back."""
+
+
 class Place(Generic[W]):
     """A request's place in the queue, from its arrival to its answer."""
 
     def __init__(self, client: str) -> None:
         self.client = client
+        self.state = State.IDLE
         self.gave_back = False
         """Whether it had to give its worker back. Then it waits until its client has no other worker."""
+        self.begins_again = False
+        """Whether its worker was taken or has died. Then it comes before the others of its client."""
         self.give_back: Callable[[], object] | None = None
-        """Stops the task at once. Set while it is in a worker and may be stopped."""
-        self.counts = False
-        """Whether it counts as one that has a worker."""
-        self.granted: asyncio.Future[W] | None = None
+        """Has the task end soon. Set while it is in a worker and may be stopped."""
+        self.granted: asyncio.Future[Loan[W]] | None = None
+
+    @property
+    def waits(self) -> bool:
+        """Whether a worker may be lent to it. One whose request has just left or timed out waits no more."""
+        return self.state is State.WAITING and self.granted is not None and not self.granted.done()
+
+
+class Loan(Generic[W]):
+    """A worker that is lent to a place, or to work that can wait (None), until it is given back and at no task."""
+
+    def __init__(self, worker: W, place: Place[W] | None) -> None:
+        self.worker, self.place = worker, place
+        self.counts = place is not None
+        """Whether it counts as a worker that the place's client has."""
+        self.is_returned = False
 
 
 class FairQueue(Generic[W]):
     """Hands workers to those who wait: first to the client that has the fewest, among equals in turn.
 
     `capacity`: most requests in workers and waiting. `share`: most of one client.
+
+    Every worker is in `_loans` from `put` until its end is seen: with None while it is idle, with its loan otherwise.
+    So it is in one state at every time, and what depends on the states is counted from them.
     """
 
     def __init__(self, capacity: int, share: int) -> None:
         self._capacity, self._share = capacity, share
         self._places: Counter[str] = Counter()
-        self._working: Counter[str] = Counter()
-        self._started: list[Place[W]] = []
         self._waiting: dict[str, deque[Place[W]]] = {}
-        self._idle: deque[W] = deque()
+        self._loans: dict[W, Loan[W] | None] = {}
         self._changed = asyncio.Event()
+        self._suspects: dict[W | Loan[W] | Place[W], str] = {}
 
     @contextmanager
     def place(self, client: str) -> Iterator[Place[W]]:
@@ -65,112 +106,162 @@ class FairQueue(Generic[W]):
         try:
             yield Place(client)
         finally:
-            _decrease(self._places, client)
+            self._places[client] -= 1
+            if not self._places[client]:  # names of clients must not pile up
+                del self._places[client]
 
     @asynccontextmanager
     async def worker(self, place: Place[W]) -> AsyncIterator[W]:
         """A worker, when it is the place's turn."""
-        worker = await self._turn(place)
-        self._started.append(place)
+        loan = await self._turn(place)
+        place.state = State.WORKING
+        try:
+            yield loan.worker
+        finally:
+            place.state, place.give_back = State.IDLE, None
+            self._return(loan)
+
+    @asynccontextmanager
+    async def spare(self) -> AsyncIterator[W]:
+        """A worker that nobody waits for, as soon as there is one."""
+        while self._next() is not None or (worker := self._idle_worker()) is None:
+            self._changed.clear()
+            await self._changed.wait()
+        loan = self._lend(worker, None)
         try:
             yield worker
         finally:
-            place.give_back = None
-            self._started.remove(place)
-            self._release(place)
-            self.put(worker)
+            self._return(loan)
 
     @property
     def someone_waits(self) -> bool:
         """Whether a request waits for a worker. May be read in any thread."""
         return bool(self._waiting)
 
+    @property
+    def is_stuck(self) -> bool:
+        """Whether a request waits for a worker, and none is at work."""
+        waits = any(place.waits for line in self._waiting.values() for place in line)
+        return waits and not any(loan is not None and loan.worker.alive for loan in self._loans.values())
+
     def put(self, worker: W) -> None:
-        """Takes a worker that has nothing to do. One that has ended is left out."""
+        """Takes a new worker, which has nothing to do. One that has ended is left out."""
         if worker.alive:
-            self._idle.append(worker)
+            self._loans[worker] = None
         self._serve()
 
-    async def spare(self) -> W:
-        """A worker that nobody waits for, as soon as there is one. It is to be given back by `put`."""
-        while True:
-            if self._next() is None and (worker := self._idle_worker()):
-                return worker
-            self._changed.clear()
-            await self._changed.wait()
+    def remove(self, worker: W) -> None:
+        """Forgets a worker that has ended."""
+        self._loans.pop(worker, None)
 
-    async def _turn(self, place: Place[W]) -> W:
+    def mend(self, workers: set[W]) -> list[str]:
+        """Puts right what can only be wrong by a defect of the queue, and tells it: `workers` are all that are alive.
+
+        A worker that the queue does not know is new to it; one that is lent to nobody is idle; one that is idle while a
+        place waits is lent. What was not so at the last call, too, may be under way in this turn of the event loop.
+        """
+        before, self._suspects = self._suspects, self._wrong(workers)
+        found = [fault for what, fault in self._suspects.items() if before.get(what) == fault]
+        for what in self._suspects.keys() & before.keys():
+            if isinstance(what, Loan):
+                self._take_back(what)
+            elif what in workers - self._loans.keys():
+                self.put(what)
+        if found:
+            self._serve()
+        return found
+
+    def _wrong(self, workers: set[W]) -> dict[W | Loan[W] | Place[W], str]:
+        """What is not as it should be, unless it is under way."""
+        wrong: dict[W | Loan[W] | Place[W], str] = {}
+        wrong |= dict.fromkeys(workers - self._loans.keys(), "a worker was neither idle nor lent")
+        for loan in [each for each in self._loans.values() if each is not None]:
+            is_over = loan.is_returned or (loan.place is not None and loan.place.state is State.IDLE)
+            if is_over and loan.worker.alive and loan.worker.is_free:
+                wrong[loan] = "a worker was lent to nobody"
+        if (place := self._next()) is not None and self._idle_worker() is not None:
+            wrong[place] = "a request waited while a worker was idle"
+        return wrong
+
+    async def _turn(self, place: Place[W]) -> Loan[W]:
         loop = asyncio.get_running_loop()
-        place.granted = loop.create_future()
+        place.granted, place.state = loop.create_future(), State.WAITING
         line = self._waiting.setdefault(place.client, deque())
-        # who gave a worker back is the first of its client
-        line.insert(0 if place.gave_back else len(line), place)
+        line.insert(0 if place.begins_again else len(line), place)
         self._serve()
         claim = loop.call_later(PATIENCE, self._claim, place)
         try:
             return await place.granted
         except asyncio.CancelledError:
-            if place.granted.cancelled():
+            if place.state is State.WAITING:
                 self._leave(place)
             else:  # it was its turn at the same time
-                self._release(place)
-                self.put(place.granted.result())
+                self._return(place.granted.result())
+            place.state = State.IDLE
             raise
         finally:
             claim.cancel()
 
     def _serve(self) -> None:
+        """Lends idle workers to those whose turn it is. It raises nothing: it runs within other requests."""
         while (place := self._next()) and (worker := self._idle_worker()):
             self._leave(place)
-            place.counts = True
-            self._working[place.client] += 1
+            if place.client in self._waiting:  # the others of its client come after all other clients
+                self._waiting[place.client] = self._waiting.pop(place.client)
+            place.state = State.GRANTED
             assert place.granted is not None
-            place.granted.set_result(worker)
+            place.granted.set_result(self._lend(worker, place))
         self._changed.set()
 
+    def _lend(self, worker: W, place: Place[W] | None) -> Loan[W]:
+        del self._loans[worker]  # the last of those that are lent
+        loan = self._loans[worker] = Loan(worker, place)
+        return loan
+
+    def _return(self, loan: Loan[W]) -> None:
+        """The borrower is done with its worker, which may have to end its task first."""
+        loan.is_returned = True
+        loan.worker.when_free(lambda: self._take_back(loan))
+
+    def _take_back(self, loan: Loan[W]) -> None:
+        if self._loans.get(loan.worker) is loan:
+            del self._loans[loan.worker]  # the last of the idle ones
+            self.put(loan.worker)
+
     def _idle_worker(self) -> W | None:
-        while self._idle:
-            worker = self._idle.popleft()
-            if worker.alive:
-                return worker
-        return None
+        return next((worker for worker, loan in self._loans.items() if loan is None and worker.alive), None)
+
+    def _working(self) -> Counter[str]:
+        """Number of workers that each client has."""
+        loans = [loan for loan in self._loans.values() if loan is not None and loan.counts and loan.worker.alive]
+        return Counter(loan.place.client for loan in loans if loan.place is not None)
 
     def _next(self) -> Place[W] | None:
         """Whose turn it is. The order of `_waiting` is that of the turns."""
-        heads = [line[0] for line in self._waiting.values()]
-        allowed = [place for place in heads if not (place.gave_back and self._working[place.client])]
-        return min(allowed, key=lambda place: self._working[place.client], default=None)
+        working = self._working()
+        heads = [next((place for place in line if place.waits), None) for line in self._waiting.values()]
+        allowed = [place for place in heads if place and not (place.gave_back and working[place.client])]
+        return min(allowed, key=lambda place: working[place.client], default=None)
 
     def _leave(self, place: Place[W]) -> None:
-        """The place waits no longer; if its client has others, these come after all other clients'."""
-        line = self._waiting.pop(place.client)
+        """The place stands in line no longer."""
+        line = self._waiting[place.client]
         line.remove(place)
-        if line:
-            self._waiting[place.client] = line
+        if not line:
+            del self._waiting[place.client]
         self._changed.set()
 
     def _claim(self, place: Place[W]) -> None:
         """Lets the client with the most workers give one back, if it has several and the place's client has none."""
-        if self._working[place.client]:
+        working = self._working()
+        if working[place.client] or not place.waits:
             return
-        stoppable = [each for each in self._started if each.give_back and self._working[each.client] > 1]
+        lent = [(loan, loan.place) for loan in self._loans.values() if loan and loan.place and loan.counts]
+        stoppable = [(loan, holder) for loan, holder in lent if holder.give_back and working[holder.client] > 1]
         # the last one of the client that has the most
-        most = max(reversed(stoppable), key=lambda each: self._working[each.client], default=None)
-        if most is not None and most.give_back is not None:
-            give_back, most.give_back = most.give_back, None
-            most.gave_back = True
-            self._release(most)  # at once: whoever claims next may not take its client's last one
+        loan, holder = max(reversed(stoppable), key=lambda each: working[each[1].client], default=(None, None))
+        if loan is not None and holder is not None and holder.give_back is not None:
+            give_back, holder.give_back = holder.give_back, None
+            holder.gave_back, holder.state = True, State.YIELDING
+            loan.counts = False  # at once: whoever claims next may not take its client's last one
             give_back()
-
-    def _release(self, place: Place[W]) -> None:
-        """The place no longer counts as one that has a worker."""
-        if place.counts:
-            place.counts = False
-            _decrease(self._working, place.client)
-
-
-def _decrease(counter: Counter[str], name: str) -> None:
-    """Counts one less; forgets what is zero, so that names of clients do not pile up."""
-    counter[name] -= 1
-    if counter[name] <= 0:
-        del counter[name]

@@ -18,7 +18,7 @@ from app.engine.result import TaskResult
 from app.engine.spare import SpareWorkers
 from app.engine.task import Task
 from app.engine.worker import Worker
-from app.exceptions import ShuttingDown, WorkerDied
+from app.exceptions import Preempted, ShuttingDown, WorkerDied
 from app.settings import Settings
 from optimizer.exceptions import DeadlineExceeded
 from optimizer.progress import Tell, nobody
@@ -27,6 +27,10 @@ logger = logging.getLogger(__name__)
 
 _FIRST_RESTART_DELAY = 0.5
 _LONGEST_RESTART_DELAY = 30.0
+_CHECK_PERIOD = 1.0
+"""Time [s] between two checks that every worker is where it should be."""
+_MOST_DEATHS = 2
+"""Workers that may die of a request that somebody waits for: the first one may have been killed by chance."""
 
 
 class Engine:
@@ -64,8 +68,10 @@ class Engine:
 
     @property
     def ready(self) -> bool:
-        """Whether all workers have been warm once, one is now, and the service is not stopping."""
-        return self._was_ready and self.warm_workers > 0 and not self._draining.is_set()
+        """Whether all workers have been warm once, one is now, no request waits while none is at work, and the service
+        is not stopping."""
+        is_served = self.warm_workers > 0 and not self._queue.is_stuck
+        return self._was_ready and is_served and not self._draining.is_set()
 
     @property
     def draining(self) -> bool:
@@ -78,6 +84,7 @@ class Engine:
         # `stop` is skipped when the operator forces the exit
         atexit.register(self._kill_all)
         self._keepers = [asyncio.create_task(self._keep(first=index == 0)) for index in range(self._settings.workers)]
+        self._keepers.append(asyncio.create_task(self._check()))
 
     async def stop(self) -> None:
         """Kills the workers and waits for their end."""
@@ -96,7 +103,8 @@ class Engine:
             return
         self._draining.set()
         self._latest_end = asyncio.get_running_loop().time() + self._settings.shutdown_grace
-        for limit in self._in_flight:
+        # one that has just run out ends by itself
+        for limit in [each for each in self._in_flight if not each.expired()]:
             limit.reschedule(min(limit.when() or self._latest_end, self._latest_end))
 
     def of_client(self, client: str) -> ClientEngine:
@@ -106,10 +114,10 @@ class Engine:
     async def run(self, task: Task, deadline: float, client: str = "", tell: Tell = nobody) -> TaskResult:
         """The task's result, within `deadline` seconds and `settings.deadline_grace`. Time in the queue counts.
 
-        Clients have their turns, see `FairQueue`. A task whose worker another client needs begins again later.
-        `tell` gets what the task finds, after a new begin from the first on.
-        If cancelled, the task leaves the queue, or its worker is killed. Raises what the task raises (see `Task.run`),
-        Busy, TooManyRequests, ShuttingDown, DeadlineExceeded or WorkerDied.
+        Clients have their turns, see `FairQueue`. A task whose worker another client needs begins again later, and once
+        one whose worker died. `tell` gets what the task finds, after a new begin from the first on.
+        If cancelled, the task leaves the queue or is stopped. Raises what the task raises (see `Task.run`), Busy,
+        TooManyRequests, ShuttingDown, DeadlineExceeded, or WorkerDied if two workers died of it.
         """
         if self._draining.is_set():
             raise ShuttingDown
@@ -128,6 +136,7 @@ class Engine:
     async def _run_in_worker(
         self, task: Task, end: float, limit: asyncio.Timeout, place: Place[Worker], tell: Tell
     ) -> TaskResult:
+        deaths = 0
         while True:
             limit.reschedule(min(end, self._latest_end))
             async with AsyncExitStack() as turn:
@@ -139,15 +148,21 @@ class Engine:
                 left = end - asyncio.get_running_loop().time()
                 if left <= 0:
                     raise DeadlineExceeded([])
-                asking = asyncio.ensure_future(worker.ask(task, left, tell))
                 if not place.gave_back:  # nobody is stopped twice
-                    place.give_back = asking.cancel
+                    place.give_back = worker.stop
                 try:
-                    return await asking
-                except asyncio.CancelledError:
-                    if place.counts or _is_cancelled():
+                    return await worker.ask(task, left, tell)
+                except Preempted:
+                    reason = "gave its worker back"
+                except WorkerDied:
+                    deaths += 1
+                    if self._draining.is_set():
+                        raise ShuttingDown from None
+                    if deaths == _MOST_DEATHS:
                         raise
-            logger.info("gave its worker back", extra={"request_id": task.request_id, "client": place.client})
+                    reason = "its worker died"
+            place.begins_again = True
+            logger.info("begins again", extra={"request_id": task.request_id, "client": place.client, "reason": reason})
 
     async def _keep(self, first: bool) -> None:
         """Keeps one worker alive: starts it, waits for its end, starts the next."""
@@ -156,11 +171,13 @@ class Engine:
             await self._first_warm.wait()
         delay = _FIRST_RESTART_DELAY
         while True:
-            worker = Worker(self._warm, self._settings.log_level, self._threads)
             try:
+                worker = Worker(self._warm, self._settings.log_level, self._threads, self._settings.stop_grace)
                 await worker.start()
-            except WorkerDied:
-                logger.error("worker did not start", extra={"retry_in": delay})
+            except Exception as error:
+                # also without memory, files or threads for it: there may be some later
+                is_told = isinstance(error, WorkerDied)
+                logger.error("worker did not start", exc_info=None if is_told else error, extra={"retry_in": delay})
                 await asyncio.sleep(delay)
                 delay = min(2 * delay, _LONGEST_RESTART_DELAY)
                 continue
@@ -168,7 +185,15 @@ class Engine:
             self._has_warmed(worker)
             await worker.ended.wait()
             self._workers.discard(worker)
+            self._queue.remove(worker)
             self.census.restarts += 1
+
+    async def _check(self) -> None:
+        """Mends what a defect of the queue has broken, so that it costs no worker."""
+        while True:
+            await asyncio.sleep(_CHECK_PERIOD)
+            for fault in self._queue.mend({worker for worker in self._workers if worker.alive}):
+                logger.error("mended the queue", extra={"fault": fault})
 
     def _has_warmed(self, worker: Worker) -> None:
         self._workers.add(worker)
@@ -194,9 +219,3 @@ class ClientEngine:
     async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
         """See `Engine.run`."""
         return await self.engine.run(task, deadline, self.client, tell)
-
-
-def _is_cancelled() -> bool:
-    """Whether the current task is being cancelled, and not only one that it waits for."""
-    current = asyncio.current_task()
-    return current is not None and current.cancelling() > 0

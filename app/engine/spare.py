@@ -17,12 +17,14 @@ from optimizer.exceptions import DeadlineExceeded
 
 @dataclass(eq=False)
 class _Run:
-    """Work on a worker. `at`: what it is at work on, since `began` [s]. `preempted`: a caller took the worker."""
+    """Work on a worker. `at`: what it is at work on, since `began` [s]. `preempted`: a caller took the worker. `over`:
+    nothing more is told of it."""
 
+    worker: Worker
     at: Work | None
     began: float
-    asking: asyncio.Task[None] | None = None
     preempted: bool = False
+    over: bool = False
 
     @property
     def is_stoppable(self) -> bool:
@@ -32,12 +34,16 @@ class _Run:
     def stop(self) -> None:
         """Takes the worker away."""
         self.preempted = True
-        if self.asking is not None:
-            self.asking.cancel()
+        self.worker.stop()
+
+    def end(self, error: Exception) -> None:
+        """The work that it is at ends with this."""
+        if self.at is not None:
+            self.at.ended(error)
 
 
 class SpareWorkers:
-    """Lends idle workers of an engine. `grace` [s] is the time after a deadline at which a worker is killed."""
+    """Lends idle workers of an engine. `grace` [s] is the time after a deadline at which a work is stopped."""
 
     def __init__(self, queue: FairQueue[Worker], workers: set[Worker], census: Census, grace: float) -> None:
         self._queue, self._workers, self._census, self._grace = queue, workers, census, grace
@@ -48,50 +54,40 @@ class SpareWorkers:
 
         It ends if there is no more work, a caller waits, or the worker is gone. The work that it was at then has ended
         with DeadlineExceeded, WorkerDied, or, if it is `stoppable`, Preempted: a caller took the worker. If cancelled,
-        the worker is killed, and what it was at has not ended.
+        the work is stopped, and has not ended.
         """
-        worker = await self._queue.spare()
-        first = take()
-        try:
+        async with self._queue.spare() as worker:
+            first = take()
             if first is not None:
                 await self._run(worker, first, take)
-        finally:
-            self._queue.put(worker)
 
     async def _run(self, worker: Worker, first: Work, take: Take) -> None:
         clock = asyncio.get_running_loop().time
-        run = self._runs[worker] = _Run(first, clock())
+        run = self._runs[worker] = _Run(worker, first, clock())
 
         def turn(ended: Work, how: Ended, following: Work | None) -> None:
-            # if the worker is being killed, the next one has not begun
+            if run.over:
+                return
+            # if the worker is being stopped, the next one has not begun
             run.at = None if run.preempted or limit.expired() else following
             if run.at is not None:
                 run.began = clock()
                 limit.reschedule(run.began + run.at.deadline + self._grace)
             ended.ended(how)
 
-        def stopped(error: Exception) -> None:
-            if run.at is not None:
-                run.at.ended(error)
-
         def following() -> Work | None:
             return None if self._queue.someone_waits else take()
 
-        run.asking = asyncio.create_task(worker.ask_all(first, following, turn))
         try:
             with self._census.works():
                 async with asyncio.timeout(first.deadline + self._grace) as limit:
-                    await run.asking
+                    await worker.ask_all(first, following, turn)
         except TimeoutError:
-            stopped(DeadlineExceeded([]))
-        except WorkerDied as error:
-            stopped(error)
-        except asyncio.CancelledError:
-            if not run.preempted:
-                raise
-            stopped(Preempted())
+            run.end(DeadlineExceeded([]))
+        except (WorkerDied, Preempted) as error:
+            run.end(error)
         finally:
-            run.asking.cancel()
+            run.over = True
             del self._runs[worker]
 
     @contextmanager

@@ -7,6 +7,7 @@ from typing import Protocol
 
 from app.engine.result import TaskResult
 from app.exceptions import ServiceError, TaskFailed
+from optimizer.deadline import Stopped, checkpoint, is_stopped
 from optimizer.exceptions import JoulepathError
 
 logger = logging.getLogger(__name__)
@@ -27,12 +28,19 @@ class Task(Protocol):
         """
 
 
-def outcome(task: Task, deadline: float) -> TaskResult | JoulepathError | ServiceError:
-    """The task's result, or the error that its caller gets; both can be pickled."""
+def outcome(task: Task, deadline: float) -> TaskResult | JoulepathError | ServiceError | Stopped:
+    """The task's result, the error that its caller gets, or that it was stopped; all can be pickled."""
+    ended: TaskResult | JoulepathError | ServiceError
     try:
-        return task.run(deadline)
+        checkpoint()
+        ended = task.run(deadline)
     except (JoulepathError, ServiceError) as error:
-        return error
+        ended = error
+    except Stopped as stopped:
+        return stopped
     except Exception:
-        logger.exception("unforeseen error", extra={"request_id": task.request_id})
-        return TaskFailed()
+        if not is_stopped():
+            logger.exception("unforeseen error", extra={"request_id": task.request_id})
+        ended = TaskFailed()
+    # a task that is stopped may end as if its deadline had passed: that is no answer for whoever gave its worker back
+    return Stopped() if is_stopped() else ended

@@ -1,4 +1,5 @@
-"""One worker process: it is started, warms up, runs one task at a time, and is killed to stop it.
+"""One worker process: it is started, warms up, and runs one task at a time. It is told to end a task that nobody wants
+any more, and killed if it does not.
 
 Each worker has a pipe of its own and shares no lock with the others. It can therefore be killed at any moment, and its
 end, whatever the cause, shows as the end of its pipe.
@@ -17,15 +18,16 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from functools import partial
 from multiprocessing.connection import Connection, wait
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from app.engine.forkserver import CONTEXT
 from app.engine.listening import listening
 from app.engine.result import TaskResult
 from app.engine.task import Task, outcome
 from app.engine.work import Ended, Take, Work
-from app.exceptions import WorkerDied
+from app.exceptions import Preempted, WorkerDied
 from app.logs import configure_logging
+from optimizer.deadline import Stopped, stoppable
 from optimizer.progress import Event, Tell, nobody
 
 logger = logging.getLogger(__name__)
@@ -38,15 +40,27 @@ Turn = Callable[[Work, Ended, Work | None], object]
 
 
 class Worker:
-    """The parent's side of a worker process."""
+    """The parent's side of a worker process.
 
-    def __init__(self, warm: Callable[[], None], log_level: str, threads: Executor) -> None:
+    Its exchanges with the process are numbered. To stop one, it writes the number into memory that both share, where
+    the process looks at every `checkpoint` of its task: it ends exchanges up to that number. A word that comes late
+    therefore ends nothing but what it was meant for. `stop_grace` [s] is the time that the process has to end it.
+    """
+
+    def __init__(self, warm: Callable[[], None], log_level: str, threads: Executor, stop_grace: float) -> None:
         self._pipe, self._child_pipe = CONTEXT.Pipe()
+        # one aligned word, which is read and written at once: it needs no lock, which a killed process could hold
+        self._stopped_up_to = CONTEXT.RawValue("Q", 0)
         self._process = CONTEXT.Process(
-            target=_serve, args=(self._child_pipe, warm, log_level), name="joulepath-worker", daemon=True
+            target=_serve,
+            args=(self._child_pipe, self._stopped_up_to, warm, log_level),
+            name="joulepath-worker",
+            daemon=True,
         )
-        self._threads = threads
-        self._killed = False
+        self._threads, self._stop_grace = threads, stop_grace
+        self._number = 0
+        self._exchange: asyncio.Future[Any] | None = None
+        self._killed, self._lost = False, False
         self.ended = asyncio.Event()
 
     @property
@@ -56,32 +70,61 @@ class Worker:
 
     @property
     def alive(self) -> bool:
-        """Whether it can run a task."""
-        return not (self._killed or self.ended.is_set())
+        """Whether it can run a task, now or once the one that it is at has ended."""
+        return not (self._killed or self._lost or self.ended.is_set())
+
+    @property
+    def is_free(self) -> bool:
+        """Whether it is at no task."""
+        return self._exchange is None or self._exchange.done()
+
+    def when_free(self, call: Callable[[], object]) -> None:
+        """Calls once it is at no task, at once or later."""
+        if self._exchange is None or self._exchange.done():
+            call()
+        else:
+            self._exchange.add_done_callback(lambda _: call())
 
     async def start(self) -> None:
-        """Starts the process and waits until it is warm. Raises WorkerDied."""
-        await self._in_thread(self._start)
-        asyncio.get_running_loop().add_reader(self._process.sentinel, self._has_ended)
+        """Starts the process and waits until it is warm. If cancelled, it kills it. Raises WorkerDied."""
+        loop = asyncio.get_running_loop()
+        try:
+            await loop.run_in_executor(self._threads, self._start)
+            loop.add_reader(self._process.sentinel, self._has_ended)
+        except BaseException as error:
+            self.kill()
+            if isinstance(error, EOFError | OSError):
+                raise WorkerDied from None
+            raise
 
     async def ask(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
-        """The task's result. If cancelled, it kills the worker, because nothing else stops a computation.
+        """The task's result. If cancelled, it stops the task.
 
-        `tell` gets what the task finds, before the result. Raises what the task raises (see `Task.run`), or WorkerDied.
+        `tell` gets what the task finds, before the result. Raises what the task raises (see `Task.run`), Preempted if
+        the task was stopped, or WorkerDied.
         """
         heard = _heard(tell, asyncio.get_running_loop())
-        ended = await self._in_thread(partial(self._exchange, task, deadline, heard))
+        ended = await self._exchanged(lambda number: self._ask(number, task, deadline, heard))
         if isinstance(ended, Exception):
             raise ended
         return ended
 
     async def ask_all(self, first: Work, take: Take, turn: Turn) -> None:
-        """Runs works one after another, until there is none. If cancelled, it kills the worker. Raises WorkerDied.
+        """Runs works one after another, until there is none. If cancelled, it stops. Raises Preempted or WorkerDied.
 
         Each gets to the process as soon as the last one has ended: the event loop, which calls `turn`, may be late.
         """
         loop = asyncio.get_running_loop()
-        await self._in_thread(partial(self._exchange_all, first, take, turn, loop))
+        await self._exchanged(lambda number: self._ask_all(number, first, take, turn, loop))
+
+    def stop(self) -> None:
+        """Has the process end what it is at, and kills it if that takes longer than the grace. Returns at once."""
+        exchange = self._exchange
+        if exchange is None or exchange.done() or self._is_stopped(self._number):
+            return
+        self._stopped_up_to.value = self._number
+        patience = asyncio.get_running_loop().call_later(self._stop_grace, self._kill_in, exchange)
+        exchange.add_done_callback(lambda _: patience.cancel())
 
     def kill(self) -> None:
         """Ends the process at once. Does nothing if it has ended."""
@@ -89,16 +132,44 @@ class Worker:
         if self._process.pid is not None:
             self._process.kill()
 
-    async def _in_thread(self, call: Callable[[], T]) -> T:
-        """The result of a call that waits for the process. If cancelled, kills the worker. Raises WorkerDied."""
+    def _kill_in(self, exchange: asyncio.Future[Any]) -> None:
+        if not exchange.done():
+            logger.info("killed, because its task did not end in time", extra={"pid": self.pid})
+            self.kill()
+
+    async def _exchanged(self, call: Callable[[int], T]) -> T:
+        """The result of an exchange with the process, in a thread. Raises WorkerDied, or Preempted if it was stopped.
+
+        The exchange goes on after a cancellation until the process has ended the task: see `when_free`.
+        """
+        assert self.is_free, "the answer to another task would be taken for that to this one"
+        self._number += 1
+        number = self._number
+        exchange = asyncio.get_running_loop().run_in_executor(self._threads, self._in_step, call, number)
+        # whoever asked may have left by then
+        exchange.add_done_callback(lambda done: done.cancelled() or done.exception())
+        self._exchange = exchange
         try:
-            return await asyncio.get_running_loop().run_in_executor(self._threads, call)
+            return await asyncio.shield(exchange)
         except (EOFError, OSError):
-            self.kill()
-            raise WorkerDied from None
+            raise (Preempted() if self._is_stopped(number) else WorkerDied()) from None
         except asyncio.CancelledError:
-            self.kill()
+            self.stop()
             raise
+
+    def _in_step(self, call: Callable[[int], T], number: int) -> T:
+        try:
+            return call(number)
+        except Preempted:
+            raise
+        except BaseException:
+            # it has ended, or it may still be at a task, whose answer nobody will read
+            self._lost = True
+            self._process.kill()
+            raise
+
+    def _is_stopped(self, number: int) -> bool:
+        return _is_stopped(self._stopped_up_to, number)
 
     def _start(self) -> None:
         self._process.start()
@@ -107,36 +178,43 @@ class Worker:
         self._child_pipe.close()
         self._pipe.recv()
 
-    def _exchange(self, task: Task, deadline: float, heard: Heard) -> Ended:
-        self._pipe.send((task, deadline, heard is not None))
-        return self._receive(heard)
+    def _ask(self, number: int, task: Task, deadline: float, heard: Heard) -> Ended:
+        self._pipe.send((number, task, deadline, heard is not None))
+        return self._receive(number, heard)
 
-    def _receive(self, heard: Heard) -> Ended:
-        received: Event | Ended = self._pipe.recv()
-        while isinstance(received, Event):
-            if heard is not None:
+    def _receive(self, number: int, heard: Heard) -> Ended:
+        """How the task ended that the process is at. Raises Preempted if it was stopped."""
+        while isinstance(received := self._pipe.recv(), Event):
+            if heard is not None and not self._is_stopped(number):
                 heard(received)
-            received = self._pipe.recv()
-        return received
+        if isinstance(received, Stopped):
+            raise Preempted
+        ended: Ended = received
+        return ended
 
-    def _exchange_all(self, first: Work, take: Take, turn: Turn, loop: asyncio.AbstractEventLoop) -> None:
-        self._send(first)
+    def _ask_all(self, number: int, first: Work, take: Take, turn: Turn, loop: asyncio.AbstractEventLoop) -> None:
+        self._send(number, first)
         work: Work | None = first
         while work is not None:
             # after a short one, the next one is there already
-            following = take() if work.is_short else None
+            following = take() if work.is_short and not self._is_stopped(number) else None
             is_sent = following is not None and following.is_short
             if following is not None and is_sent:
-                self._send(following)
-            ended = self._receive(_heard(work.tell, loop))
-            last, work = work, following or take()
+                self._send(number, following)
+            try:
+                ended = self._receive(number, _heard(work.tell, loop))
+            except Preempted:
+                if is_sent:  # it is stopped, too, and said so
+                    self._pipe.recv()
+                raise
+            last, work = work, following or (None if self._is_stopped(number) else take())
             # before the next one is sent: if the process dies of it, this one has ended
             loop.call_soon_threadsafe(turn, last, ended, work)
             if work is not None and not is_sent:
-                self._send(work)
+                self._send(number, work)
 
-    def _send(self, work: Work) -> None:
-        self._pipe.send((work.task, work.deadline, work.tell is not nobody))
+    def _send(self, number: int, work: Work) -> None:
+        self._pipe.send((number, work.task, work.deadline, work.tell is not nobody))
 
     def _has_ended(self) -> None:
         asyncio.get_running_loop().remove_reader(self._process.sentinel)
@@ -150,8 +228,8 @@ def _heard(tell: Tell, loop: asyncio.AbstractEventLoop) -> Heard:
     return None if tell is nobody else lambda event: loop.call_soon_threadsafe(tell, event)
 
 
-def _serve(pipe: Connection, warm: Callable[[], None], log_level: str) -> None:
-    """The worker process."""
+def _serve(pipe: Connection, stopped_up_to: Any, warm: Callable[[], None], log_level: str) -> None:
+    """The worker process. It ends tasks of exchanges up to the number `stopped_up_to` at their next checkpoint."""
     # Ctrl-C in a terminal and SIGTERM from a service manager reach the whole process group. Only the parent acts on
     # them: it lets requests in flight finish, and then kills its workers
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -166,12 +244,16 @@ def _serve(pipe: Connection, warm: Callable[[], None], log_level: str) -> None:
     pipe.send("warm")
     while True:
         try:
-            task, deadline, is_heard = pipe.recv()
+            number, task, deadline, is_heard = pipe.recv()
         except EOFError:
             return
-        with listening(pipe.send if is_heard else nobody):
+        with listening(pipe.send if is_heard else nobody), stoppable(partial(_is_stopped, stopped_up_to, number)):
             ended = outcome(task, deadline)
         pipe.send(ended)
+
+
+def _is_stopped(stopped_up_to: Any, number: int) -> bool:
+    return bool(stopped_up_to.value >= number)
 
 
 def _end_with_parent() -> None:

@@ -10,7 +10,7 @@ ServiceError
 ├── ClusterUnavailable  the scheduler of the cluster cannot be reached
 ├── NotReady            no worker is warm
 ├── ShuttingDown        the service stops before the request is done
-├── WorkerDied          the worker process ended during the task
+├── WorkerDied          the worker process ended during the task, and that of a second attempt
 ├── TaskFailed          the task raised an unforeseen exception
 ├── StoreUnavailable    the database cannot be reached, read or written
 ├── UnknownAnswer       no stored answer has that id

@@ -66,9 +66,9 @@ class ClusterUnavailable(ServiceError):
 
 
 class NotReady(ServiceError):
-    """No worker is warm."""
+    """No worker is warm, or requests wait and none is at work."""
 
-    MESSAGE = "The workers are warming up: try again after a few seconds."
+    MESSAGE = "The workers are starting or being replaced: try again after a few seconds."
 
 
 class ShuttingDown(ServiceError):
@@ -78,9 +78,12 @@ class ShuttingDown(ServiceError):
 
 
 class WorkerDied(ServiceError):
-    """The worker process ended during the task."""
+    """The worker process ended during the task. Who waits for the task learns it if a second one did, too."""
 
-    MESSAGE = "The process that worked on this request died: report it with the id in `instance`."
+    MESSAGE = (
+        "Two processes that worked on this request died, for example because the machine ran out of memory: try again "
+        "after some seconds, make the request smaller if that does not help, or report it with the id in `instance`."
+    )
 
 
 class TaskFailed(ServiceError):

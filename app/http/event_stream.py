@@ -24,12 +24,14 @@ from optimizer.progress import Event, Tell, forward
 logger = logging.getLogger(__name__)
 
 EVENT_STREAM = "text/event-stream"
+EVENT_SCHEMA = {"type": "object", "properties": {name: {"type": "string"} for name in ("id", "event", "data")}}
+"""One event, in the OpenAPI document."""
 Work = Callable[[Tell], Coroutine[Any, Any, TaskResult]]
 _PAUSE = 15.0
 """Time [s] without an event after which a comment tells proxies that the stream lives."""
 _MOST_WAITING = 1000
 """Events that wait for a client who does not read them; then the oldest are left out."""
-_HEADERS = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
+EVENT_STREAM_HEADERS = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
 _COMMENT = b": working\n\n"
 
 
@@ -41,7 +43,7 @@ class EventStream(StreamingResponse):
     """
 
     def __init__(self, request: Request, work: Work) -> None:
-        super().__init__((), headers=_HEADERS, media_type=EVENT_STREAM)
+        super().__init__((), headers=EVENT_STREAM_HEADERS, media_type=EVENT_STREAM)
         self._request, self._work = request, work
         self._begun = False
 

@@ -129,7 +129,7 @@ TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     UnsupportedCoding: problems.UnsupportedCoding,
     NotAcceptable: problems.NotAcceptable,
     MalformedHttp: problems.MalformedHttp,
-    WorkerDied: problems.Internal,
+    WorkerDied: problems.WorkerLost,
     TaskFailed: problems.Internal,
 }
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import asyncio
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Callable, Coroutine, Hashable, Iterable
+from typing import Any, TypeVar
+
+T = TypeVar("T")
 
 
 class Changes:
@@ -12,9 +15,12 @@ class Changes:
 
     def __init__(self) -> None:
         self._waiting: defaultdict[str, set[asyncio.Event]] = defaultdict(set)
+        self._rung = 0
+        self._reads: dict[Hashable, asyncio.Task[Any]] = {}
 
     def ring(self, job_ids: Iterable[str]) -> None:
         """Something has happened to these jobs."""
+        self._rung += 1
         for job_id in job_ids:
             for bell in self._waiting.get(job_id, ()):
                 bell.set()
@@ -43,3 +49,18 @@ class Changes:
         self._waiting[job_id].discard(bell)
         if not self._waiting[job_id]:
             del self._waiting[job_id]
+
+    async def shared(self, what: Hashable, read: Callable[[], Coroutine[Any, Any, T]]) -> T:
+        """What `read` returns. Those who ask for the same while it is read, and before more happens, share one read."""
+        key = (what, self._rung)
+        reading = self._reads.get(key)
+        if reading is None:
+            reading = self._reads[key] = asyncio.create_task(read())
+            reading.add_done_callback(lambda done: self._has_read(key, done))
+        found: T = await asyncio.shield(reading)
+        return found
+
+    def _has_read(self, key: Hashable, done: asyncio.Task[Any]) -> None:
+        del self._reads[key]
+        if not done.cancelled():
+            done.exception()  # those who asked may have left by then

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
+import json
 from collections.abc import AsyncIterator
+from dataclasses import dataclass
 from functools import partial
 
-from fastapi.sse import ServerSentEvent
+from fastapi.sse import format_sse_event
+from sqlalchemy.orm import Session
 
 from app.jobs.dispatcher import Dispatcher
 from app.store import job_events
@@ -14,22 +18,56 @@ from app.store.store import Store
 _BATCH = 500
 LOOK = 1.0
 """Time [s] after which events of other services are looked for."""
+GATHER = 0.2
+"""Least time [s] between two reads for one reader: what happens within it is sent together."""
+QUIET = 15.0
+"""Time [s] without an event after which a comment tells proxies that the stream lives."""
+_COMMENT = b": working\n\n"
 
 
-async def events_after(
-    store: Store, dispatcher: Dispatcher, job_id: str, number: int
-) -> AsyncIterator[ServerSentEvent]:
-    """The events after that of `number`, until the end of the job or of the service."""
-    bell = dispatcher.changes.listen(job_id)
+@dataclass(frozen=True)
+class _Batch:
+    """Some events as they are sent, the number of the last one, and whether nothing follows."""
+
+    text: bytes
+    count: int
+    last: int
+    over: bool
+
+
+async def events_after(store: Store, dispatcher: Dispatcher, job_id: str, number: int) -> AsyncIterator[bytes]:
+    """The events after that of `number`, until the end of the job or of the service, in the form of server-sent events.
+
+    Readers of one job that are equally far share what is read and written for them.
+    """
+    changes = dispatcher.changes
+    bell = changes.listen(job_id)
+    quiet = 0.0
     try:
         while not dispatcher.draining:
-            found, over = await store.read(partial(job_events.after, job_id=job_id, number=number, limit=_BATCH))
-            for event in found:
-                number = event.number
-                yield ServerSentEvent(data=event.data, event=event.name, id=str(number))
-            if over:
+            read = partial(_batch, job_id=job_id, number=number)
+            batch = await changes.shared((job_id, number), partial(store.read, read))
+            number = batch.last
+            if batch.text:
+                quiet = 0.0
+                yield batch.text
+            elif quiet >= QUIET:
+                quiet = 0.0
+                yield _COMMENT
+            if batch.over:
                 return
-            if not found:
-                await dispatcher.changes.wait(bell, LOOK)
+            # a batch that is not full has all that there is
+            if batch.count < _BATCH:
+                await asyncio.sleep(GATHER)
+                quiet += GATHER
+            if not batch.count:
+                await changes.wait(bell, LOOK)
+                quiet += LOOK
     finally:
-        dispatcher.changes.leave(job_id, bell)
+        changes.leave(job_id, bell)
+
+
+def _batch(session: Session, job_id: str, number: int) -> _Batch:
+    found, over = job_events.after(session, job_id, number, _BATCH)
+    texts = [format_sse_event(data_str=json.dumps(each.data), event=each.name, id=str(each.number)) for each in found]
+    return _Batch(b"".join(texts), len(found), found[-1].number if found else number, over)

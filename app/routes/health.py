@@ -26,8 +26,8 @@ async def healthz() -> Alive:
     responses=problem_responses(problems.NotReady, problems.StoreUnavailable),
 )
 async def readyz(engine: ServiceEngine, store: ServiceStore) -> Ready:
-    """200 from the time when all workers are warm until the service stops, while the database can be read and
-    written."""
+    """200 from the time when all workers are warm until the service stops, while the database can be read and written,
+    and unless requests wait and no worker is at work."""
     if not engine.ready:
         raise NotReady
     if store.fault is not None:

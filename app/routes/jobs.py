@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
 from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
-from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from app.exceptions import UnsupportedMediaType
 from app.http.disconnect import unless_disconnected
+from app.http.event_stream import EVENT_SCHEMA, EVENT_STREAM, EVENT_STREAM_HEADERS
 from app.http.openapi import problem_responses
 from app.jobs.answers import as_csv, as_lines, detail, summary
 from app.jobs.events import events_after
@@ -56,6 +55,7 @@ _OF_ONE = (problems.UnknownJob, problems.StoreUnavailable)
             problems.Busy,
             problems.ShuttingDown,
             problems.DeadlineExceeded,
+            problems.WorkerLost,
             problems.StoreUnavailable,
         ),
     },
@@ -155,7 +155,8 @@ async def retry(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> Job:
 
 async def _known(id: JobId, jobs: ServiceJobs) -> str:
     # before the stream begins: a stream cannot become a problem
-    return (await jobs.view(id)).job.id
+    view = await jobs.dispatcher.changes.shared(("view", id), partial(jobs.view, id))
+    return view.job.id
 
 
 KnownJob = Annotated[str, Depends(_known)]
@@ -164,18 +165,17 @@ KnownJob = Annotated[str, Depends(_known)]
 @router.get(
     "/{id}/events",
     summary="Events of a job",
-    response_class=EventSourceResponse,
-    responses=problem_responses(*_OF_ONE),
+    response_class=StreamingResponse,
+    responses={200: {"content": {EVENT_STREAM: {"itemSchema": EVENT_SCHEMA}}}, **problem_responses(*_OF_ONE)},
 )
-async def events(
-    job_id: KnownJob, jobs: ServiceJobs, store: ServiceStore, last: LastEventId = None
-) -> AsyncIterator[ServerSentEvent]:
+async def events(job_id: KnownJob, jobs: ServiceJobs, store: ServiceStore, last: LastEventId = None) -> Response:
     """Server-sent events: `state` (of the job), `request` (one has ended), `progress` (at most two in a second) and
     `end`. They are numbered in the job from 1. `Last-Event-ID` continues after a number, also after a restart of the
     service. The stream closes when the job has ended."""
     number = int(last) if last is not None and last.isdecimal() and len(last) < 10 else 0
-    async for event in events_after(store, jobs.dispatcher, job_id, number):
-        yield event
+    # in batches, and not event by event as FastAPI has it: hundreds may follow one job
+    found = events_after(store, jobs.dispatcher, job_id, number)
+    return StreamingResponse(found, headers=EVENT_STREAM_HEADERS, media_type=EVENT_STREAM)
 
 
 @router.get(

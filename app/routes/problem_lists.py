@@ -11,6 +11,7 @@ WORKER_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
     problems.RequestTimeout,
     problems.ShuttingDown,
     problems.DeadlineExceeded,
+    problems.WorkerLost,
     problems.StoreUnavailable,
 )
 """Of every request that a worker computes."""
@@ -21,6 +22,7 @@ ADDING_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
     problems.RequestTimeout,
     problems.ShuttingDown,
     problems.DeadlineExceeded,
+    problems.WorkerLost,
     problems.TooManyRobots,
     problems.StoreUnavailable,
 )

@@ -126,6 +126,7 @@ async def urdf(name: Name, store: ServiceStore) -> Response:
             problems.NoMeshes,
             problems.ShuttingDown,
             problems.DeadlineExceeded,
+            problems.WorkerLost,
             problems.StoreUnavailable,
         ),
     },

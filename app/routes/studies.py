@@ -40,6 +40,7 @@ router = APIRouter(prefix="/studies", tags=["studies"], route_class=LargeBodyRou
             problems.RequestTimeout,
             problems.ShuttingDown,
             problems.DeadlineExceeded,
+            problems.WorkerLost,
             problems.StoreUnavailable,
         ),
     },

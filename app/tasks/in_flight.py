@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.engine.result import TaskResult
-from app.exceptions import ServiceError
+from app.exceptions import ServiceError, WorkerDied
 from app.store.cache import Asked
 
 Compute = Callable[[float], Coroutine[Any, Any, TaskResult]]
@@ -31,13 +31,15 @@ class InFlight:
         """The answer to a request, and whether it was computed for an equal one, with the same deadline.
 
         The work goes on while somebody waits for it. Raises what it raises. If another request's work fails because of
-        the service, not of the request, this one is computed itself.
+        the service, not of the request, this one is computed itself. Work that workers died of is not begun again.
         """
         loop = asyncio.get_running_loop()
         end = loop.time() + asked.deadline
         if (known := self._works.get(asked)) is not None:
             try:
                 return await self._awaited(asked, known), True
+            except WorkerDied:
+                raise  # it would die of this one, too
             except ServiceError:
                 return await compute(end - loop.time()), False
         work = self._works[asked] = _Work(asyncio.create_task(compute(asked.deadline)))

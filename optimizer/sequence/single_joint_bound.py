@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.robot import Array, Mask
+from optimizer.deadline import end_if_stopped
 from optimizer.kinematics.angles import wrapped
 from optimizer.search.lower_bound import LeastBound
 
@@ -48,6 +49,7 @@ class SingleJointBound:
         found, level = np.full(gain.shape, -np.inf), np.floor((gain - self.low) / self.step).astype(np.intp)
         known, level = level >= 0, np.clip(level, 0, GAINS - 1)
         for j, table in self.tables.items():
+            end_if_stopped()
             apart = goal.centre[:, j] - start.centre[:, j][:, None]
             placed = start.placed[:, j][:, None] & goal.placed[:, j]
             apart = np.abs(np.where(placed, apart, wrapped(apart))) - start.half[:, j][:, None] - goal.half[:, j]

@@ -40,5 +40,5 @@ def client() -> Iterator[TestClient]:
 @pytest.fixture(scope="module")
 def server() -> Iterator[Server]:
     """`python -m app` in a process of its own, warm."""
-    with serving(workers=2, queue_size=4, deadline_grace=GRACE) as server:
+    with serving(workers=2, queue_size=4, deadline_grace=GRACE, stop_grace=GRACE) as server:
         yield server

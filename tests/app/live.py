@@ -107,6 +107,11 @@ class Server:
         self.process.send_signal(signal.SIGTERM)
         return self.process.wait(EXIT)
 
+    def is_idle(self) -> bool:
+        """Whether no request is in a worker or waits for one."""
+        found = self.get("/metrics").text
+        return "joulepath_workers_busy 0.0" in found and "joulepath_queue_length 0.0" in found
+
     def request_logged(self, path: str) -> dict[str, Any]:
         """The log's line about the last request for this path, which was answered before."""
         end = time.monotonic() + ANSWER

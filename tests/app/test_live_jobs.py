@@ -19,7 +19,7 @@ from app.schemas.errors import WorkerDied
 from app.store.database import create_database_engine
 from tests.app.databases import postgres, why_no_postgres
 from tests.app.job_clients import Event, KilledService, ended, evaluation, events, optimization, over, sent, shown
-from tests.app.live import GRACE, Server, alive, processor_time, serving, until
+from tests.app.live import GRACE, Server, processor_time, serving, until
 from tests.app.requests import long_search, move
 from tests.app.test_server import AT_WORK
 
@@ -68,7 +68,7 @@ def check_events(found: list[Event], count: int) -> None:
 @pytest.fixture(scope="module")
 def single() -> Iterator[Server]:
     """A service with one worker."""
-    with serving(workers=1, deadline_grace=GRACE) as server:
+    with serving(workers=1, deadline_grace=GRACE, stop_grace=GRACE) as server:
         yield server
 
 
@@ -77,26 +77,28 @@ def running(server: Server, path: str) -> None:
     until(lambda: shown(over(server), path)["counts"]["running"] > 0)
 
 
-def test_cancelling_kills_the_worker_that_runs(single: Server) -> None:
+def test_cancelling_stops_what_runs(single: Server) -> None:
     path = sent(over(single), [LONG, evaluation()])
     running(single, path)
     (worker,) = single.workers()
     answer = single.post(f"{path}/cancel", None)
     assert answer.status_code == 202
-    until(lambda: not alive(worker))
+    until(single.is_idle)
+    assert single.workers() == [worker], "it ends the work when it is told to"
     job = ended(over(single), path)
     assert (job["state"], job["counts"]["cancelled"]) == ("cancelled", 2)
     assert single.post(f"{path}/cancel", None).json()["state"] == "cancelled"
     assert single.post("/optimize", move()).status_code == 200
 
 
-def test_deleting_kills_the_worker_that_runs(single: Server) -> None:
+def test_deleting_stops_what_runs(single: Server) -> None:
     until(lambda: len(single.workers()) == 1)
     path = sent(over(single), [LONG])
     running(single, path)
     (worker,) = single.workers()
     assert httpx2.delete(single.url + path).status_code == 204
-    until(lambda: not alive(worker))
+    until(single.is_idle)
+    assert single.workers() == [worker]
     assert single.get(path).status_code == 404
 
 

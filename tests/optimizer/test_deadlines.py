@@ -16,7 +16,17 @@ import pytest
 from optimizer import optimize, pareto
 from optimizer.collision import coal_distance
 from optimizer.collision.model import CollisionModel
-from optimizer.deadline import NEVER, Deadline, DeadlinePassed, checkpoint, watch, watched_time_left
+from optimizer.deadline import (
+    NEVER,
+    Deadline,
+    DeadlinePassed,
+    Stopped,
+    checkpoint,
+    end_if_stopped,
+    stoppable,
+    watch,
+    watched_time_left,
+)
 from optimizer.energy.kernel_functions import Evaluation
 from optimizer.exceptions import DeadlineExceeded
 from optimizer.problem.arm import Arm
@@ -228,3 +238,26 @@ def test_each_thread_watches_its_own() -> None:
 def test_an_earlier_deadline() -> None:
     deadline = Deadline(5.0, lambda: 1.0)
     assert deadline.earlier_by(1.5).left == 2.5 and deadline.earlier_by(-1.0).left == 5.0
+
+
+def test_a_computation_that_is_stopped_ends_at_its_next_look() -> None:
+    stopped = False
+    deadline = Deadline(5.0, lambda: 1.0)
+    with stoppable(lambda: stopped):
+        checkpoint()
+        end_if_stopped()
+        assert deadline.left == 4.0 and not deadline.passed
+        with watch(NEVER):
+            stopped = True
+            assert deadline.passed and NEVER.passed and watched_time_left() < 0
+            assert np.isfinite(0.5 * deadline.left) and deadline.within(0.5 * deadline.left).passed
+            for look in (checkpoint, end_if_stopped):
+                with pytest.raises(Stopped):
+                    look()
+    assert deadline.left == 4.0
+    checkpoint()
+
+
+def test_no_handler_of_errors_catches_a_stop() -> None:
+    with stoppable(lambda: True), pytest.raises(Stopped), suppress(Exception):
+        checkpoint()

@@ -69,6 +69,7 @@ from app.schemas.errors.service import (
     UnsupportedMediaType,
     Validation,
     WorkerDied,
+    WorkerLost,
     WrongHost,
 )
 
@@ -108,6 +109,7 @@ PROBLEMS: tuple[type[ProblemDetails], ...] = (
     UnknownJob,
     JobNotCancellable,
     WorkerDied,
+    WorkerLost,
     RobotExists,
     TooManyRobots,
     UnknownLog,
@@ -212,5 +214,6 @@ __all__ = [
     "UnsupportedMediaType",
     "Validation",
     "WorkerDied",
+    "WorkerLost",
     "WrongHost",
 ]

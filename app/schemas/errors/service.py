@@ -49,8 +49,8 @@ class TooManyRequests(ProblemDetails):
 
 
 class NotReady(ProblemDetails):
-    """The workers are still starting, or all of them have ended and are being replaced. Try again after the time [s] in
-    the header `Retry-After`."""
+    """The workers are still starting, or all of them have ended and are being replaced: requests wait, and none is at
+    work. Try again after the time [s] in the header `Retry-After`."""
 
     retry_after: ClassVar[int | None] = 2
     type: Literal["/problems/not-ready"] = fixed("type", "/problems/not-ready")
@@ -141,6 +141,17 @@ class WorkerDied(ProblemDetails):
     type: Literal["/problems/worker-died"] = fixed("type", "/problems/worker-died")
     title: Literal["Worker died"] = fixed("title", "Worker died")
     status: Literal[500] = fixed("status", 500)
+
+
+class WorkerLost(ProblemDetails):
+    """Two processes that worked on this request died, one after the other, most often because the machine ran out of
+    memory. The service does not try it a third time by itself. Try again after the time [s] in the header
+    `Retry-After`; if that does not help, make the request smaller, or report it with the value of `instance`."""
+
+    retry_after: ClassVar[int | None] = 5
+    type: Literal["/problems/worker-lost"] = fixed("type", "/problems/worker-lost")
+    title: Literal["Worker lost"] = fixed("title", "Worker lost")
+    status: Literal[503] = fixed("status", 503)
 
 
 class EmptyStudy(ProblemDetails):

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import signal
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 from app.engine.listening import listener
 from app.engine.result import TaskResult
+from optimizer.deadline import Deadline, checkpoint
 from optimizer.progress import CandidatesFound
 
 
@@ -41,6 +43,50 @@ class Hold:
 
 
 @dataclass(frozen=True)
+class HoldWatching:
+    """The same, but it looks whether it is stopped."""
+
+    folder: Path
+    request_id: str = "hold-watching"
+
+    def run(self, deadline: float) -> TaskResult:
+        (self.folder / "started").touch()
+        while not (self.folder / "released").exists():
+            checkpoint()
+            time.sleep(0.001)
+        return text(os.getpid())
+
+
+@dataclass(frozen=True)
+class EndEarly:
+    """Returns what it has as soon as it is stopped, and never looks at a checkpoint."""
+
+    folder: Path
+    request_id: str = "end-early"
+
+    def run(self, deadline: float) -> TaskResult:
+        (self.folder / "started").touch()
+        end = Deadline.after(deadline)
+        while not end.passed:
+            time.sleep(0.001)
+        return text("a part")
+
+
+@dataclass(frozen=True)
+class DieOnce:
+    """Ends its worker the first time; then its process id."""
+
+    folder: Path
+    request_id: str = "die-once"
+
+    def run(self, deadline: float) -> TaskResult:
+        if not (self.folder / "died").exists():
+            (self.folder / "died").touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return text(os.getpid())
+
+
+@dataclass(frozen=True)
 class TimeLeft:
     """The time until its deadline [s]."""
 
@@ -52,11 +98,14 @@ class TimeLeft:
 
 @dataclass(frozen=True)
 class Die:
-    """Ends its worker as a crash in native code does."""
+    """Ends its worker as a crash in native code does; it notes that in the folder, if there is one."""
 
+    folder: Path | None = None
     request_id: str = "die"
 
     def run(self, deadline: float) -> TaskResult:
+        if self.folder is not None:
+            (self.folder / str(os.getpid())).touch()
         os.abort()
 
 

@@ -13,7 +13,14 @@ import pytest
 
 from app.schemas.compare import CompareResponse
 from app.schemas.cycle import CycleResponse
-from app.schemas.errors import DurationTooShort, Internal, ProblemDetails, TooManyRequests, UnreachablePose, Validation
+from app.schemas.errors import (
+    DurationTooShort,
+    ProblemDetails,
+    TooManyRequests,
+    UnreachablePose,
+    Validation,
+    WorkerLost,
+)
 from app.schemas.pareto import ParetoResponse
 from app.schemas.response import OptimizeResponse
 from tests.app.live import CLIENT, GRACE, Server, serving, until
@@ -27,7 +34,7 @@ SHORT = {"method": "time_scaling"}
 @pytest.fixture(scope="module")
 def one() -> Iterator[Server]:
     """A server with one worker, and room for a small answer only."""
-    with serving(workers=1, deadline_grace=GRACE, client_bytes_in_flight=150_000) as server:
+    with serving(workers=1, deadline_grace=GRACE, stop_grace=GRACE, client_bytes_in_flight=150_000) as server:
         yield server
 
 
@@ -125,17 +132,20 @@ def test_a_search_that_dies_is_a_problem(one: Server) -> None:
     with open_stream(one) as stream:
         lines = stream.iter_lines()
         assert next(lines) == "event: candidates"
-        (worker,) = one.workers()
-        os.kill(worker, signal.SIGKILL)
+        for _ in range(2):  # it begins again once
+            until(lambda: "joulepath_workers_busy 1.0" in one.get("/metrics").text)
+            (worker,) = one.workers()
+            os.kill(worker, signal.SIGKILL)
+            until(lambda killed=worker: one.workers() not in ([], [killed]))
         *_, (name, content) = parsed("event: candidates\n" + "".join(f"{line}\n" for line in lines))
     assert name == "problem"
-    Internal.model_validate(content)
-    until(lambda: one.workers() not in ([], [worker]))
+    WorkerLost.model_validate(content)
 
 
 def test_leaving_stops_the_work(one: Server) -> None:
     (worker,) = one.workers()
     with open_stream(one) as stream:
         assert first_event(stream) == "event: candidates"
-    until(lambda: one.workers() not in ([], [worker]))
+    until(lambda: "joulepath_workers_busy 0.0" in one.get("/metrics").text)
+    assert one.workers() == [worker], "the search ended by itself when it was told to"
     until(lambda: one.request_logged("/optimize")["status"] == 499)

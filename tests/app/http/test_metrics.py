@@ -12,14 +12,13 @@ from starlette.testclient import TestClient
 
 from app.main import create_app
 from app.settings import Settings
-from tests.app.live import CLIENT, LOCAL, Server, serving, until
+from tests.app.live import CLIENT, GRACE, LOCAL, Server, serving, until
 from tests.app.requests import long_search, move
-from tests.app.test_server import until_replaced
 
 
 @pytest.fixture(scope="module")
 def service() -> Iterator[Server]:
-    with serving(workers=1, queue_size=1) as server:
+    with serving(workers=1, queue_size=1, stop_grace=GRACE) as server:
         yield server
 
 
@@ -97,10 +96,10 @@ def test_the_queue_the_workers_and_restarts(service: Server) -> None:
             assert refused.status_code == 503
             assert value(service, "joulepath_problems_total", "busy") == 1
         until(lambda: now() == (1, 0, restarts))
+    until(lambda: now() == (0, 0, restarts))
+    assert service.workers() == before, "a worker whose client leaves stays"
+    os.kill(before[0], signal.SIGKILL)
     until(lambda: now() == (0, 0, restarts + 1))
-    until_replaced(service, before, 1)
-    os.kill(service.workers()[0], signal.SIGKILL)
-    until(lambda: now() == (0, 0, restarts + 2))
 
 
 def test_the_database_and_the_process(service: Server) -> None:
