@@ -14,6 +14,9 @@ Letter = Literal["A", "B", "C", "T"]
 # x, y, z of both ends of the axis in the link's frame, then the radius [m]
 CapsuleRow = tuple[float, float, float, float, float, float, float]
 
+# characters of a name or a path in a file that a message repeats at most
+LONGEST_NAME = 200
+
 
 class InvalidArm(ValueError):
     """A description or URDF that makes no robot. `field` is the place in the description, e.g. `drives.copper`."""

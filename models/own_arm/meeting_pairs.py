@@ -11,6 +11,7 @@ import pinocchio as pin
 from models.own_arm.link_shapes import Rows
 from models.own_arm.upright import UprightChain, turn_onto
 from models.own_arm.urdf_chain import Chain
+from models.uploads.limits import Checkpoint
 
 # random configurations over which pairs are looked at, and the share of them from which on two links cannot be apart.
 # Joints have the ranges that links leave them: a pair that meets this often with a guessed capsule says that it is too
@@ -18,7 +19,9 @@ from models.own_arm.urdf_chain import Chain
 SAMPLES, ALWAYS, OFTEN = 300, 0.95, 0.3
 
 
-def pairs_that_meet(chain: Chain, upright: UprightChain, capsules: list[Rows], guessed: list[bool]) -> list[list[int]]:
+def pairs_that_meet(
+    chain: Chain, upright: UprightChain, capsules: list[Rows], guessed: list[bool], checkpoint: Checkpoint
+) -> list[list[int]]:
     """Pairs of links, next but one or farther, whose capsules meet in nearly every configuration, or often if one of
     them is `guessed`."""
     pairs = [(a, b) for a, b in combinations(range(chain.nq + 1), 2) if a + 1 < b]
@@ -30,6 +33,7 @@ def pairs_that_meet(chain: Chain, upright: UprightChain, capsules: list[Rows], g
         for angle, placement in zip(q, upright.placements, strict=True):
             frames.append(frames[-1] * placement * pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, angle), np.zeros(3)))
         for k, pair in enumerate(pairs):
+            checkpoint()
             first, second = ([(shape, _pose(frames[i] * at)) for shape, at in shapes[i]] for i in pair)
             meets[k] += any(
                 coal.collide(a, T_a, b, T_b, request, coal.CollisionResult()) for a, T_a in first for b, T_b in second
