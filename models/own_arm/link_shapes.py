@@ -103,7 +103,7 @@ class LinkShapes:
             half = 0.0 if kind == "sphere" else float(_lengths(element, "length", what)[0]) / 2
             axis = np.array([0.0, 0.0, half])
             return np.array([-axis, axis]), float(_lengths(element, "radius", what)[0])
-        self.unknown += [each.tag for each in geometry][:1]
+        self.unknown.extend([each.tag for each in geometry][:1])
         return None
 
     def _around_mesh(self, mesh: Element, where: str) -> Around | None:
