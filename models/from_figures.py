@@ -20,6 +20,7 @@ from models.robot import (
     TorqueSide,
     link_names,
 )
+from models.shape_sizes import check_lengths
 from models.urdf import urdf_of
 
 # figures of the section `collision` that are no link's capsules
@@ -83,12 +84,14 @@ def _torque_side(limits: dict[str, Any]) -> TorqueSide:
 
 
 def _capsules(figures: dict[str, Any], model: pin.Model) -> tuple[LinkCapsule, ...]:
-    """Capsules of all links, from the base on; those of a link in the order of its figure."""
+    """Capsules of all links, from the base on; those of a link in the order of its figure. Raises ValueError."""
     rows = [
         (link, read_only(row, (7,), f"A capsule of {name}"))
         for link, name in enumerate(link_names(model))
         for row in figures["collision"][name]["value"]
     ]
+    for link, row in rows:
+        check_lengths(f"The radius of a capsule of {link_names(model)[link]!r}", row[6])
     return tuple(LinkCapsule(link, row[:6].reshape(2, 3), float(row[6])) for link, row in rows)
 
 

@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from models.robot import Array
+from optimizer.deadline import checkpoint
 from optimizer.exceptions import InvalidTable
 
 FIRST_ROW = 2
@@ -29,7 +30,9 @@ _SPREADSHEET = b"PK\x03\x04"
 
 
 def line_of(file: Lines, row: int, longest: int) -> str:
-    """The next line, which is line `row`; empty at the end of the file. Raises InvalidTable, also above `longest`."""
+    """The next line, which is line `row`; empty at the end of the file. Raises InvalidTable, also above `longest`, and
+    DeadlinePassed once a watched deadline has passed."""
+    checkpoint()
     raw = file.readline(longest + 1)
     if len(raw) > longest:
         raise InvalidTable(f"Line {row} is longer than {longest} characters: send one row per line.", row)

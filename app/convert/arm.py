@@ -7,11 +7,10 @@ import math
 import numpy as np
 
 from app.convert.identified import with_figures
-from app.convert.own_robots import own_figures_of
+from app.convert.own_robots import own_figures_of, own_robot_of
 from app.convert.pose import to_base, to_matrix
 from app.convert.scene import to_attachment, to_scene, to_tool
 from app.schemas import arm as asked
-from models.own_arm.robots import own_robot
 from models.registry import load_robot, robot_names
 from models.robot import Array, Limits, Robot
 from optimizer.exceptions import InvalidProblem, UnknownRobot
@@ -23,14 +22,14 @@ from optimizer.problem.tool_cone import ToolCone
 def robot_named(name: str) -> Robot:
     """The robot with this name: one that comes with the library, or the own robot of this request.
 
-    Raises UnknownRobot.
+    Raises UnknownRobot or InvalidProblem.
     """
     if name in robot_names():
         return load_robot(name)
     figures = own_figures_of(name)
     if figures is None:
         raise UnknownRobot(name, robot_names())
-    return own_robot(name, figures)
+    return own_robot_of(name, figures)
 
 
 def to_arm(request: asked.ArmRequest) -> Arm:

@@ -12,6 +12,7 @@ from app.convert.fields import fields
 from app.convert.pose import to_base
 from app.convert.request import to_branch, to_target, to_target_pose, to_tool_path
 from app.convert.solution import energy_fields, optimality_gap
+from app.convert.until import time_left, until
 from app.convert.warnings import DIVIDED, MISSED, NO_DEFAULT_MOTION, certified_warnings
 from app.schemas import cycle as asked
 from app.schemas.arm import MoveLimits
@@ -20,6 +21,7 @@ from app.schemas.path import StopPath as StopPathRequest
 from app.schemas.response import Clearance
 from app.schemas.stop import StopRequest
 from models.robot import Robot
+from optimizer.deadline import Deadline
 from optimizer.exceptions import InvalidProblem
 from optimizer.problem.free_order import FreeOrder
 from optimizer.problem.line import Line
@@ -36,9 +38,11 @@ _PLACE = ("label", "q", "target")
 def to_work_round(request: asked.CycleRequest, deadline: float) -> WorkRound:
     """The round of a request, of whose time `deadline` [s] is left.
 
-    Raises UnknownRobot, InvalidProblem or OutsideLimits.
+    Raises UnknownRobot, InvalidProblem, OutsideLimits or DeadlineExceeded.
     """
-    time, arm = request.time, to_arm(request)
+    end = Deadline.after(deadline)
+    with until(end):
+        time, arm = request.time, to_arm(request)
     least, most = (time.min, time.max) if isinstance(time, asked.TimeRange) else (time, time)
     return WorkRound(
         arm=arm,
@@ -57,7 +61,7 @@ def to_work_round(request: asked.CycleRequest, deadline: float) -> WorkRound:
         wait=request.wait,
         order=_to_order(request),
         sample_period=request.sample_period,
-        deadline=deadline,
+        deadline=time_left(end),
     )
 
 

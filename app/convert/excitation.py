@@ -12,22 +12,30 @@ from app.convert.arm import to_arm
 from app.convert.arm_fields import arm_fields
 from app.convert.fields import fields
 from app.convert.solution import certificate_fields, energy_fields, trajectory_fields
+from app.convert.until import time_left, until
 from app.schemas.excitation import ExcitationRequest
+from optimizer.deadline import Deadline
 from optimizer.excitation.excitation_problem import LEAST_DEADLINE, ExcitationProblem
 from optimizer.excitation.excite import Excitation
 
 
 def to_excitation_problem(request: ExcitationRequest, deadline: float) -> ExcitationProblem:
-    """The problem of a request, of whose time `deadline` [s] is left. Raises UnknownRobot or InvalidProblem."""
+    """The problem of a request, of whose time `deadline` [s] is left.
+
+    Raises UnknownRobot, InvalidProblem or DeadlineExceeded.
+    """
+    # it may have passed while the request waited
+    end = Deadline.after(max(deadline, LEAST_DEADLINE))
+    with until(end):
+        arm = to_arm(request)
     same = ("period", "harmonics", "criterion", "speed_fraction", "clearance", "mounting_plane", "starts")
     return ExcitationProblem(
-        arm=to_arm(request),
+        arm=arm,
         parts=tuple(request.parameters),
         centre=None if request.centre is None else np.array(request.centre),
         noise=None if request.noise is None else np.array(request.noise),
         sample_period=request.sample_period,
-        # it may have passed while the request waited
-        deadline=max(deadline, LEAST_DEADLINE),
+        deadline=time_left(end),
         **{name: getattr(request, name) for name in same},
     )
 

@@ -8,10 +8,12 @@ from app.convert.base64_data import decoded
 from app.schemas import own_arm as asked
 from models.own_arm.description import Collision, Description, Drives, Electronics, Motion, PerJoint
 from models.own_arm.mesh_files import in_zip
+from optimizer.deadline import checkpoint
 
 
 def to_description(arm: asked.OwnArm) -> Description:
-    """The description of the library. Raises InvalidArm or InvalidProblem for meshes that are no zip."""
+    """The description of the library. Raises InvalidArm or InvalidProblem for meshes that are no zip,
+    and DeadlinePassed once a watched deadline has passed."""
     motion, collision = arm.default_motion, arm.collision
     capsules = {name: tuple(map(_row, rows)) for name, rows in (collision.capsules or {}).items()}
     pairs = None if collision.never_meet is None else tuple((first, second) for first, second in collision.never_meet)
@@ -33,7 +35,7 @@ def to_description(arm: asked.OwnArm) -> Description:
         electronics=Electronics(**dict(arm.electronics)),
         collision=Collision(capsules, collision.radius, pairs),
         srdf=arm.srdf,
-        meshes=None if arm.meshes is None else in_zip(decoded(arm.meshes, "meshes")),
+        meshes=None if arm.meshes is None else in_zip(decoded(arm.meshes, "meshes"), checkpoint),
         default_motion=None if motion is None else Motion(motion.velocity, motion.acceleration),
     )
 

@@ -7,6 +7,11 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
 
+from models.own_arm.robots import own_robot
+from models.robot import Robot
+from models.shape_sizes import WrongSize
+from optimizer.exceptions import InvalidProblem
+
 _ROBOT: ContextVar[tuple[str, dict[str, Any]] | None] = ContextVar("own robot", default=None)
 
 
@@ -24,3 +29,11 @@ def own_figures_of(name: str) -> dict[str, Any] | None:
     """Figures of the robot of that name; None if the request brought none."""
     robot = _ROBOT.get()
     return robot[1] if robot is not None and robot[0] == name else None
+
+
+def own_robot_of(name: str, figures: dict[str, Any]) -> Robot:
+    """The robot of these figures. Raises InvalidProblem for one that was added when its shapes were not yet checked."""
+    try:
+        return own_robot(name, figures)
+    except WrongSize as error:
+        raise InvalidProblem("robot", f"The robot {name} cannot be used: {error} Add it again.") from None

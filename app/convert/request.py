@@ -6,11 +6,13 @@ import numpy as np
 
 from app.convert.arm import to_arm
 from app.convert.pose import to_base, to_base_pose, to_pose
+from app.convert.until import time_left, until
 from app.schemas import request as asked
 from app.schemas.orientation import ConeOrientedPose as ConeOrientedPoseSchema
 from app.schemas.orientation import InCone, TargetPose
 from app.schemas.path import Path, StopPath
 from models.robot import Array, Robot
+from optimizer.deadline import Deadline
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.cycle import Cycle
@@ -24,10 +26,12 @@ from optimizer.replay.sampler import MOST_SAMPLES
 def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
     """The problem of a request, of whose time `deadline` [s] is left.
 
-    Raises UnknownRobot, InvalidProblem or OutsideLimits.
+    Raises UnknownRobot, InvalidProblem, OutsideLimits or DeadlineExceeded.
     """
+    end = Deadline.after(deadline)
     shortest, longest = _duration_bounds(request)
-    path, arm = request.path, to_arm(request)
+    with until(end):
+        path, arm = request.path, to_arm(request)
     return Problem(
         start=to_target(request.start, arm.robot),
         goal=to_target(request.goal, arm.robot),
@@ -42,7 +46,7 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
         windings=request.windings,
         bound=request.bound,
         sample_period=request.sample_period,
-        deadline=deadline,
+        deadline=time_left(end),
     )
 
 

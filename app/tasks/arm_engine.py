@@ -8,13 +8,12 @@ from functools import partial
 from typing import Any, Protocol
 
 from app.convert.identified import Identified, identified_as
-from app.convert.own_robots import own_robot_named
+from app.convert.own_robots import own_robot_named, own_robot_of
 from app.engine.result import TaskResult
 from app.engine.task import Task
 from app.exceptions import UnknownFigures
 from app.store import figures, robots
 from app.store.store import Store
-from models.own_arm.robots import own_robot
 from models.registry import load_robot, robot_names
 from models.robot import Robot
 from optimizer.exceptions import UnknownRobot
@@ -110,7 +109,7 @@ async def robot_in(store: Store, name: str) -> Robot:
 
     Raises UnknownRobot; StoreUnavailable only for a robot that does not come with the service.
     """
-    return load_robot(name) if name in robot_names() else own_robot(name, await own_figures(store, name))
+    return load_robot(name) if name in robot_names() else own_robot_of(name, await own_figures(store, name))
 
 
 async def known_here(store: Store, name: str, used: str | None) -> AbstractContextManager[Any]:

@@ -15,6 +15,7 @@ from app.convert.fields import location
 from app.convert.json_text import parsed_json
 from app.convert.motion_csv import MotionCsv
 from app.convert.query import query_values
+from app.convert.until import until
 from app.engine.result import TaskResult
 from app.exceptions import InvalidRequest
 from app.http.problem_details import invalid_request
@@ -53,10 +54,11 @@ class EvaluateTask:
         settings = csv_settings(self.query)
         end = self._end(settings, began, "query")
         try:
-            arm = to_arm(settings)
             with Path(self.file).open("rb") as file:
-                table = MotionCsv.of(file, arm.robot.nq, settings.units)
-                result = evaluate(arm, to_csv_motion(settings, table), settings.sample_period, end.left)
+                with until(end):
+                    arm = to_arm(settings)
+                    motion = to_csv_motion(settings, MotionCsv.of(file, arm.robot.nq, settings.units))
+                result = evaluate(arm, motion, settings.sample_period, end.left)
         except InvalidProblem as error:
             if isinstance(error, InvalidTable | OutsideLimits):
                 raise  # about the motion
@@ -79,7 +81,9 @@ class EvaluateTask:
 
 def evaluated(request: EvaluateRequest, end: Deadline) -> Evaluation:
     """The evaluation of the motion in a request, until about `end`."""
-    return evaluate(to_arm(request), to_motion(request), request.sample_period, end.left)
+    with until(end):
+        arm, motion = to_arm(request), to_motion(request)
+    return evaluate(arm, motion, request.sample_period, end.left)
 
 
 def csv_settings(query: dict[str, str]) -> EvaluateCsvSettings:

@@ -8,12 +8,12 @@ from pydantic import ValidationError
 
 from app.convert.exported_file import to_file
 from app.convert.given_answer import paths_of_moves, to_program
+from app.convert.until import until
 from app.engine.result import TaskResult
 from app.http.problem_details import invalid_request
 from app.schemas.export import ExportFormat, ExportRequest
 from app.tasks.kept_answers import WithKeptAnswers
-from optimizer.deadline import Deadline, DeadlinePassed, watch
-from optimizer.exceptions import DeadlineExceeded
+from optimizer.deadline import Deadline
 from optimizer.exports.certified import certified
 from optimizer.exports.facts import NOT_RUN, ExportedFile
 from optimizer.exports.program import Program
@@ -44,12 +44,10 @@ class ExportTask(WithKeptAnswers):
     def run(self, deadline: float) -> ExportResult:
         """The file. Raises PartsNeeded with the answers that must be kept at hand first, and what its parts raise."""
         try:
-            with watch(Deadline.after(deadline)):
+            with until(Deadline.after(deadline)):
                 program = self._program()
                 certificates = certified(program)
                 file = to_file(self.asked, self.format, self.as_json, program)
-        except DeadlinePassed:
-            raise DeadlineExceeded([]) from None
         except ValidationError as error:
             raise invalid_request(error, "body", "answer") from None
         worst = max(ratio for each in certificates for ratio in each.worst_ratio.values())

@@ -10,9 +10,11 @@ from app.convert.arm import robot_named
 from app.convert.fields import location
 from app.convert.identification import identification_fields, residual_fields, to_options
 from app.convert.logs import stored_log
+from app.convert.until import until
 from app.engine.result import AnswerFigures, StoredAnswer, TaskResult, json_document
 from app.exceptions import InvalidRequest
 from app.schemas.identifications import IdentifyRequest
+from optimizer.deadline import Deadline
 from optimizer.exceptions import InvalidProblem
 from optimizer.identification.identify import fit
 
@@ -29,12 +31,15 @@ class IdentifyTask:
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """What was found; the curves of its residuals are stored beside it. `deadline` is not watched: whoever runs
-        the task ends it.
+        """What was found, within about `deadline` seconds; the curves of its residuals are stored beside it.
 
-        Raises UnknownRobot, EffortNotUsable, NotExcited, NothingHeldOut, NoPowerChannel, PayloadUnknown or
-        InvalidRequest.
+        Raises UnknownRobot, EffortNotUsable, NotExcited, NothingHeldOut, NoPowerChannel, PayloadUnknown, InvalidRequest
+        or DeadlineExceeded.
         """
+        with until(Deadline.after(deadline)):
+            return self._identified()
+
+    def _identified(self) -> TaskResult:
         logs = [stored_log(settings, body) for settings, body in self.logs]
         count, robot = len(self.request.logs), robot_named(logs[0].robot)
         try:

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from app.convert.arm import robot_named
 from app.convert.ik import to_collision_arm, to_ik_response
 from app.convert.pose import to_base_pose, to_matrix
+from app.convert.until import until
 from app.engine.result import TaskResult
 from app.schemas.ik import IKRequest
 from optimizer.collision.model import collision_model
+from optimizer.deadline import Deadline
 from optimizer.kinematics.inverse import required_inverse_kinematics
 
 
@@ -21,7 +23,11 @@ class IKTask:
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """The answer of `POST /ik`. `deadline` is not watched: the engine ends what takes longer."""
+        """The answer of `POST /ik`, within about `deadline` seconds. Raises DeadlineExceeded."""
+        with until(Deadline.after(deadline)):
+            return self._solved()
+
+    def _solved(self) -> TaskResult:
         request = self.request
         robot = robot_named(request.robot)
         kinematics = required_inverse_kinematics(robot, "pose")

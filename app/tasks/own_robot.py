@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.convert.own_arm import to_description
+from app.convert.until import until
 from app.engine.result import TaskResult
 from app.schemas.own_arm import OwnArm
 from models.own_arm.description import InvalidArm
 from models.own_arm.figures import own_figures
 from models.own_arm.robots import own_robot
+from optimizer.deadline import Deadline, checkpoint
 from optimizer.exceptions import InvalidProblem
 
 
@@ -22,9 +24,10 @@ class OwnRobotTask:
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """`figures` and `warnings`. `deadline` is not watched: it takes a second at most. Raises InvalidProblem."""
+        """`figures` and `warnings`, within about `deadline` seconds. Raises InvalidProblem or DeadlineExceeded."""
         try:
-            figures, warnings = own_figures(self.name, to_description(self.arm))
+            with until(Deadline.after(deadline)):
+                figures, warnings = own_figures(self.name, to_description(self.arm), checkpoint)
         except InvalidArm as error:
             raise InvalidProblem(error.field, str(error)) from None
         own_robot(self.name, figures)

@@ -8,9 +8,11 @@ from pathlib import Path
 from app.convert.arm import robot_named
 from app.convert.fields import location
 from app.convert.logs import report_fields, to_log_options
+from app.convert.until import until
 from app.engine.result import TaskResult
 from app.exceptions import InvalidRequest
 from app.schemas.logs import LogSettings
+from optimizer.deadline import Deadline
 from optimizer.exceptions import InvalidProblem, InvalidTable
 from optimizer.identification.logs.reading import read
 
@@ -25,13 +27,14 @@ class ReadLogTask:
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """The report on the log. `deadline` is not watched: the size of a body bounds the time.
+        """The report on the log, within about `deadline` seconds.
 
-        Raises UnknownRobot, InvalidTable, LogTooLarge, EffortNotUsable or InvalidRequest.
+        Raises UnknownRobot, InvalidTable, LogTooLarge, EffortNotUsable, InvalidRequest or DeadlineExceeded.
         """
         try:
             robot = robot_named(self.request.robot)
-            reading = read(Path(self.file), robot, to_log_options(self.request, self.most_bytes))
+            with until(Deadline.after(deadline)):
+                reading = read(Path(self.file), robot, to_log_options(self.request, self.most_bytes))
         except InvalidProblem as error:
             if isinstance(error, InvalidTable):
                 raise  # about the log

@@ -9,13 +9,13 @@ from pydantic import ValidationError
 
 from app.convert.given_answer import paths_of_moves, to_program
 from app.convert.replay import to_perturbation, to_planned_motion, to_replayed_motion
+from app.convert.until import until
 from app.convert.warnings import replay_warnings
 from app.engine.result import TaskResult
 from app.http.problem_details import invalid_request
 from app.schemas.replay import ReplayRequest
 from app.tasks.kept_answers import WithKeptAnswers
-from optimizer.deadline import Deadline, DeadlinePassed, watch
-from optimizer.exceptions import DeadlineExceeded
+from optimizer.deadline import Deadline
 from optimizer.simulation.controller import ControlName
 from optimizer.simulation.planned import PlannedMotion
 from optimizer.simulation.replay import replay
@@ -48,10 +48,8 @@ class ReplayTask(WithKeptAnswers):
         simulator, end = f"MuJoCo {mujoco().__version__}", Deadline.after(deadline)
         began = end.clock()
         try:
-            with watch(end):
+            with until(end):
                 planned = self._planned()
-        except DeadlinePassed:
-            raise DeadlineExceeded([]) from None
         except ValidationError as error:
             raise invalid_request(error, "body", "answer") from None
         warnings = list[str]()

@@ -12,6 +12,7 @@ from app.convert.arm_fields import arm_fields
 from app.convert.evaluation import to_evaluate_response, to_motion
 from app.convert.request import to_problem
 from app.convert.solution import certificate_fields, to_optimize_response
+from app.convert.until import time_left, until
 from app.engine.result import TaskResult
 from app.http.problem_details import problem_content
 from app.schemas.evaluate import EvaluateRequest
@@ -55,6 +56,7 @@ class _Work:
 
     def __init__(self, request: WhatifRequest, request_id: str, deadline: Deadline) -> None:
         self.request, self.request_id = request, request_id
+        self.deadline = deadline
         self.clock, self.began = deadline.clock, deadline.clock()
         self.shares = DeadlineShares(deadline, 1 + len(request.changes))
         self.collector = AnswerCollector()
@@ -101,7 +103,8 @@ class _Optimized(_Work):
     def _problem(self, asked: OptimizeRequest, k: int) -> Problem | OutsideLimits:
         change = self.request.changes[k]
         try:
-            return _located(lambda: to_problem(_changed(asked, change), asked.deadline), f"changes.{k}.arm", change)
+            left = min(asked.deadline, time_left(self.deadline))
+            return _located(lambda: to_problem(_changed(asked, change), left), f"changes.{k}.arm", change)
         except OutsideLimits as error:
             return error
 
@@ -149,8 +152,9 @@ class _Evaluated(_Work):
         """The answer. Raises the error of the base, and InvalidProblem for an invalid change."""
         asked = self.request.evaluate
         assert asked is not None
-        arm = _located(lambda: to_arm(asked), "evaluate")
-        arms = [self._arm(asked, k) for k in range(len(self.request.changes))]
+        with until(self.deadline):
+            arm = _located(lambda: to_arm(asked), "evaluate")
+            arms = [self._arm(asked, k) for k in range(len(self.request.changes))]
         base = _located(lambda: self._evaluate(arm, asked), "evaluate")
         content = {
             "answer": self.collector.add(to_evaluate_response(self.request_id, asked, base)),

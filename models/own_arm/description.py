@@ -14,6 +14,11 @@ Letter = Literal["A", "B", "C", "T"]
 # x, y, z of both ends of the axis in the link's frame, then the radius [m]
 CapsuleRow = tuple[float, float, float, float, float, float, float]
 
+# greatest radius of a capsule that a user gives [m]
+WIDEST = 1.0
+# characters of a name or a path in a file that a message repeats at most
+LONGEST_NAME = 200
+
 
 class InvalidArm(ValueError):
     """A description or URDF that makes no robot. `field` is the place in the description, e.g. `drives.copper`."""

@@ -16,6 +16,7 @@ from models.own_arm.energy_figures import drives, electronics, friction
 from models.own_arm.figure import assumed, either, per_joint, stated
 from models.own_arm.upright import UprightChain
 from models.own_arm.urdf_chain import Chain, chain_of
+from models.uploads.limits import Checkpoint, unwatched
 from models.urdf import BASE, FLANGE
 
 # kg and kg·m², m, rad: beyond these, a description is in other units
@@ -23,12 +24,14 @@ HEAVIEST, LONGEST, FARTHEST_TURN = 1e4, 50.0, 100.0
 _PLACEMENT = "x, y, z, roll, pitch, yaw"
 
 
-def own_figures(name: str, description: Description) -> tuple[dict[str, Any], list[str]]:
+def own_figures(
+    name: str, description: Description, checkpoint: Checkpoint = unwatched
+) -> tuple[dict[str, Any], list[str]]:
     """Figures of a robot with this name; and warnings: what is hardly real, and which figures are defaults.
 
-    Raises InvalidArm, which names the field of the description, and the link or joint.
+    Raises InvalidArm, which names the field of the description, and the link or joint, and what `checkpoint` raises.
     """
-    chain = chain_of(description)
+    chain = chain_of(description, checkpoint)
     upright, links = UprightChain.of(chain), _link_names(chain)
     warnings = list[str]()
     limits = _limits(description, chain)
@@ -38,7 +41,7 @@ def own_figures(name: str, description: Description) -> tuple[dict[str, Any], li
         "kinematics": _kinematics(description, chain, upright, links),
         "inertials": _inertials(description, chain, upright, warnings),
         "limits": limits,
-        "collision": collision_figures(description, chain, upright, links, warnings),
+        "collision": collision_figures(description, chain, upright, links, warnings, checkpoint),
         "drives": drives(description, chain.joints, tau_max),
         "electronics": electronics(description, chain.nq),
         "friction_table": {"knee": assumed(rules.KNEE, "rad/s", "Coulomb friction's step is spread over this speed.")},

@@ -6,7 +6,8 @@ their files were given.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
@@ -14,12 +15,14 @@ import numpy as np
 import pinocchio as pin
 
 from models.own_arm.capsule_around import capsule_around
-from models.own_arm.description import CapsuleRow, Description, InvalidArm
+from models.own_arm.description import WIDEST, CapsuleRow, Description, InvalidArm
 from models.own_arm.mesh_files import corners
-from models.own_arm.robot_xml import number, numbers
+from models.own_arm.robot_xml import numbers
 from models.own_arm.upright import UprightChain
 from models.own_arm.urdf_chain import ORIGIN, Chain
 from models.robot import Array
+from models.shape_sizes import WrongSize, check_lengths, check_scale, check_surface
+from models.uploads.limits import LIMITS, Checkpoint
 
 # largest mesh of a link, and farthest place of a shape from its joint [m]: files in millimetres need a scale
 LARGEST, FARTHEST = 5.0, 50.0
@@ -32,21 +35,26 @@ Around = tuple[Array, float]
 
 @dataclass(frozen=True)
 class LinkShapes:
-    """The links of a chain; `missing` are the files of meshes that were asked for and not given."""
+    """The links of a chain; `missing` are the files of meshes that were asked for and not given, and `unknown` the
+    kinds of shapes that are not read."""
 
     chain: Chain
     upright: UprightChain
     capsules: Mapping[str, Sequence[CapsuleRow]]
     meshes: Mapping[str, bytes]
+    checkpoint: Checkpoint
     missing: list[str] = field(default_factory=list)
+    unknown: list[str] = field(default_factory=list)
+    _seen: list[str] = field(default_factory=list)
+    _made: dict[tuple[str, str | None], Around] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, description: Description, chain: Chain, upright: UprightChain) -> LinkShapes:
+    def of(cls, description: Description, chain: Chain, upright: UprightChain, checkpoint: Checkpoint) -> LinkShapes:
         """The links of a description. Raises InvalidArm for capsules of a link that the arm does not have."""
         given = description.collision.capsules or {}
         if unknown := [name for name in given if not any(name in rigid for rigid in chain.rigid)]:
             raise InvalidArm("collision.capsules", f"The arm has no link {unknown[0]!r} from base to tip.")
-        return cls(chain, upright, given, description.meshes or {})
+        return cls(chain, upright, given, description.meshes or {}, checkpoint)
 
     def rows(self, k: int) -> Rows:
         """Capsules of all that moves with link k, 0 for the base. Raises InvalidArm."""
@@ -58,10 +66,9 @@ class LinkShapes:
         """The user's capsules of a URDF link."""
         rows = self.capsules.get(link, ())
         for row in rows:
-            if not 0 < row[6] < 1 or not np.isfinite(row).all():
-                raise InvalidArm(
-                    "collision.capsules", f"A capsule of {link!r} must have a radius above 0 and below 1 m."
-                )
+            self._count("collision.capsules", link)
+            with _of_field("collision.capsules"):
+                check_lengths(f"The radius of a capsule of {link!r}", row[6], WIDEST)
         return [_placed(self._frame(k, link), (np.array(row[:6]).reshape(2, 3), row[6])) for row in rows]
 
     def _of_urdf(self, k: int, link: str) -> Rows:
@@ -69,6 +76,7 @@ class LinkShapes:
         element = next(each for each in self.chain.root.findall("link") if each.get("name") == link)
         frame, rows = self._frame(k, link), list[list[float]]()
         for shape in element.findall("collision"):
+            self._count("urdf", link)
             where = f"A <collision> of link {link!r} has"
             geometry = shape.find("geometry")
             around = None if geometry is None else self._around(geometry, where)
@@ -78,28 +86,54 @@ class LinkShapes:
 
     def _around(self, geometry: Element, where: str) -> Around | None:
         """The capsule around a shape, in its frame; None for a shape that is not known, or not there."""
-        if (sphere := geometry.find("sphere")) is not None:
-            return np.zeros((2, 3)), number(sphere, "radius", f"{where} a <sphere>")
-        if (cylinder := geometry.find("cylinder")) is not None:
-            half = number(cylinder, "length", f"{where} a <cylinder>") / 2
-            return np.array([[0.0, 0.0, -half], [0.0, 0.0, half]]), number(cylinder, "radius", f"{where} a <cylinder>")
-        if (box := geometry.find("box")) is not None:
-            sides = numbers(box, "size", f"{where} a <box>") / 2
-            longest = int(np.argmax(sides))
-            axis = np.eye(3)[longest] * sides[longest]
-            return np.array([-axis, axis]), float(np.linalg.norm(np.delete(sides, longest)))
-        mesh = geometry.find("mesh")
-        return None if mesh is None else self._around_mesh(mesh, f"{where} a <mesh>")
+        for kind in ("sphere", "cylinder", "capsule", "box", "mesh"):
+            element = geometry.find(kind)
+            if element is None:
+                continue
+            what = f"{where} a <{kind}>"
+            if kind == "mesh":
+                return self._around_mesh(element, what)
+            if kind == "box":
+                sides = _lengths(element, "size", what, 3) / 2
+                longest = int(np.argmax(sides))
+                axis = np.eye(3)[longest] * sides[longest]
+                return np.array([-axis, axis]), float(np.linalg.norm(np.delete(sides, longest)))
+            half = 0.0 if kind == "sphere" else float(_lengths(element, "length", what)[0]) / 2
+            axis = np.array([0.0, 0.0, half])
+            return np.array([-axis, axis]), float(_lengths(element, "radius", what)[0])
+        self.unknown.extend([each.tag for each in geometry][:1])
+        return None
 
     def _around_mesh(self, mesh: Element, where: str) -> Around | None:
-        points = corners(self.meshes, mesh.get("filename", ""))
-        if points is None:
-            self.missing.append(mesh.get("filename", ""))
-            return None
-        points = points * numbers(mesh, "scale", where, "1 1 1")
+        name, scaled = mesh.get("filename", ""), mesh.get("scale")
+        if (name, scaled) not in self._made:
+            points = corners(self.meshes, name, self.checkpoint)
+            if points is None:
+                self.missing.append(name)
+                return None
+            self._made[name, scaled] = self._around_points(points, numbers(mesh, "scale", where, "1 1 1"), where)
+        return self._made[name, scaled]
+
+    def _around_points(self, points: Array, scale: Array, where: str) -> Around:
+        """The capsule around the corners of a mesh, in units of `scale` (3,) [m]."""
+        with _of_field("urdf"):
+            check_scale(f"{where} with a `scale` that", scale, points)
+        points = points * scale
         if not np.ptp(points, axis=0).max() < LARGEST:
             raise InvalidArm("meshes", f"{where} larger than {LARGEST:g} m: has the URDF its `scale`?")
-        return capsule_around(points)
+        with _of_field("meshes"):
+            check_surface(f"{where} that", points)
+        return capsule_around(points, self.checkpoint)
+
+    def _count(self, field: str, link: str) -> None:
+        """Counts a shape of a link. Raises InvalidArm for too many."""
+        self.checkpoint()
+        self._seen.append(link)
+        if len(self._seen) > LIMITS.shapes:
+            raise InvalidArm(
+                field,
+                f"With those of link {link!r}, the arm has more than {LIMITS.shapes} shapes: give fewer capsules.",
+            )
 
     def _frame(self, k: int, link: str) -> pin.SE3:
         """The frame of a URDF link in that of the link k that it moves with."""
@@ -113,6 +147,23 @@ def check_near(name: str, rows: Rows) -> None:
     """Raises InvalidArm for capsules of a link that are far away, or nowhere: the origin of a joint or a shape is."""
     if not (np.abs(np.array(rows)) < FARTHEST).all():
         raise InvalidArm("urdf", f"The shape of link {name!r} is farther than {FARTHEST:g} m from its joint.")
+
+
+def _lengths(element: Element, part: str, where: str, count: int = 1) -> Array:
+    """Lengths (count,) [m] in an attribute of a shape. Raises InvalidArm unless they are those of a body."""
+    found = numbers(element, part, where, count=count)
+    with _of_field("urdf"):
+        check_lengths(f"{where}, whose `{part}`", found)
+    return found
+
+
+@contextmanager
+def _of_field(field: str) -> Iterator[None]:
+    """Raises InvalidArm at the field for a wrong size."""
+    try:
+        yield
+    except WrongSize as error:
+        raise InvalidArm(field, str(error)) from None
 
 
 def _placed(T: pin.SE3, around: Around) -> list[float]:

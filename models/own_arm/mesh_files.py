@@ -2,56 +2,80 @@
 
 from __future__ import annotations
 
-import re
 import zipfile
 from collections.abc import Iterator, Mapping
 from io import BytesIO
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
-from models.own_arm.description import InvalidArm
+from models.own_arm.description import LONGEST_NAME, InvalidArm
 from models.robot import Array
+from models.uploads.limits import LIMITS, Checkpoint, UnreadableFile, unwatched
+from models.uploads.mesh import read_mesh
+from models.uploads.mesh_text import MeshSize
+from models.uploads.xml_tree import xml_tree
 
 # kinds that are read; of others, as of DAE, a link has its capsule from joint to joint
 KINDS = ("stl", "obj")
-# most files, bytes of all of them unpacked, and corners of one mesh
-MOST_FILES, MOST_BYTES, MOST_CORNERS = 200, 128 * 2**20, 1_500_000
+_PIECE = 1 << 20
+"""Bytes that are unpacked between two checkpoints."""
 
 
-def in_zip(content: bytes) -> dict[str, bytes]:
+def in_zip(content: bytes, checkpoint: Checkpoint = unwatched) -> dict[str, bytes]:
     """Mesh files of a zip by their paths. Raises InvalidArm."""
     try:
-        with zipfile.ZipFile(BytesIO(content)) as archive:
-            entries = [each for each in archive.infolist() if _kind(each.filename) in KINDS]
-            if len(entries) > MOST_FILES:
-                raise InvalidArm("meshes", f"The zip has {len(entries)} mesh files: at most {MOST_FILES} are read.")
-            left, found = MOST_BYTES, {}
-            for entry in entries:
-                # a size that the header states may be false
-                with archive.open(entry) as file:
-                    found[entry.filename] = file.read(left + 1)
-                left -= len(found[entry.filename])
-                if left < 0:
-                    raise InvalidArm("meshes", f"The zip unpacks to more than {MOST_BYTES >> 20} MiB of meshes.")
-            return found
-    except InvalidArm:
-        raise
-    except Exception as error:  # zipfile, and what unpacks its methods, raise many kinds for broken files
-        raise InvalidArm("meshes", "The meshes are no zip that can be read: pack them again.") from error
+        archive = zipfile.ZipFile(BytesIO(content))
+    except Exception as error:  # zipfile raises many kinds for broken files
+        raise _no_zip(error) from error
+    entries = [each for each in archive.infolist() if _kind(each.filename) in KINDS]
+    if len(entries) > LIMITS.mesh_files:
+        raise InvalidArm("meshes", f"The zip has {len(entries)} mesh files: at most {LIMITS.mesh_files} are read.")
+    left, found = LIMITS.mesh_bytes, {}
+    for entry in entries:
+        pieces = list[bytes]()
+        for piece in _unpacked(archive, entry):
+            checkpoint()
+            pieces.append(piece)
+            # a size that the header states may be false
+            left -= len(piece)
+            if left < 0:
+                most = LIMITS.mesh_bytes >> 20
+                raise InvalidArm("meshes", f"The zip unpacks to more than {most} MiB of meshes.")
+        found[entry.filename] = b"".join(pieces)
+    return found
+
+
+def _unpacked(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Iterator[bytes]:
+    """The content of a file, piece by piece. Raises InvalidArm."""
+    try:
+        with archive.open(entry) as file:
+            while piece := file.read(_PIECE):
+                yield piece
+    except Exception as error:  # what unpacks the methods of a zip raises many kinds, too
+        raise _no_zip(error) from error
+
+
+def _no_zip(error: Exception) -> InvalidArm:
+    return InvalidArm("meshes", "The meshes are no zip that can be read: pack them again.")
 
 
 def in_folder(folder: Path, urdf: str) -> dict[str, bytes]:
-    """The mesh files that the text of a URDF names, as far as they are in a folder."""
+    """The mesh files that the text of a URDF names, as far as they are in a folder; none for a text that is no XML."""
+    try:
+        named = (each.get("filename", "") for each in xml_tree(urdf).iter("mesh"))
+    except UnreadableFile:
+        return {}
     found = {}
-    for reference in re.findall(r'<mesh[^>]*filename\s*=\s*"([^"]+)"', urdf)[:MOST_FILES]:
+    for reference in islice(dict.fromkeys(named), LIMITS.mesh_files):
         file = next((each for each in _below(folder, reference) if each.is_file()), None)
-        if file is not None and _kind(reference) in KINDS and file.stat().st_size <= MOST_BYTES:
+        if file is not None and _kind(reference) in KINDS and file.stat().st_size <= LIMITS.mesh_bytes:
             found[reference] = file.read_bytes()
     return found
 
 
-def corners(meshes: Mapping[str, bytes], reference: str) -> Array | None:
+def corners(meshes: Mapping[str, bytes], reference: str, checkpoint: Checkpoint = unwatched) -> Array | None:
     """Corners (n, 3) of the mesh that a URDF names, in its own units; None if it is not among the files.
 
     Raises InvalidArm for a file that is none, or if several files fit.
@@ -59,15 +83,13 @@ def corners(meshes: Mapping[str, bytes], reference: str) -> Array | None:
     path = _file_of(meshes, reference)
     if path is None:
         return None
-    import trimesh  # only arms with meshes need it
-
+    most = MeshSize()
     try:
-        mesh = trimesh.load_mesh(BytesIO(meshes[path]), file_type=_kind(path), process=False)
-        found = np.asarray(mesh.vertices, dtype=float).reshape(-1, 3)
-    except Exception as error:  # trimesh raises many kinds for broken files
-        raise InvalidArm("meshes", f"{reference!r} is no {_kind(path)} file that can be read.") from error
-    if not 4 <= len(found) <= MOST_CORNERS or not np.isfinite(found).all():
-        raise InvalidArm("meshes", f"{reference!r} must have from 4 to {MOST_CORNERS} finite corners.")
+        found, _ = read_mesh(_kind(path), meshes[path], most, checkpoint)
+    except UnreadableFile as error:
+        raise InvalidArm("meshes", f"{reference[:LONGEST_NAME]!r} {error}") from error
+    if len(found) < 4 or not np.isfinite(found).all():
+        raise InvalidArm("meshes", f"{reference[:LONGEST_NAME]!r} must have from 4 to {most.corners} finite corners.")
     return found
 
 
@@ -82,7 +104,7 @@ def _file_of(meshes: Mapping[str, bytes], reference: str) -> str | None:
     best = max(map(agreement, meshes), default=0)
     fitting = [path for path in meshes if best and agreement(path) == best]
     if len(fitting) > 1 and len({meshes[path] for path in fitting}) > 1:
-        raise InvalidArm("meshes", f"Several files fit {reference!r}: {', '.join(sorted(fitting)[:3])}.")
+        raise InvalidArm("meshes", f"Several files fit {reference[:LONGEST_NAME]!r}: {', '.join(sorted(fitting)[:3])}.")
     return fitting[0] if fitting else None
 
 
@@ -93,8 +115,8 @@ def _below(folder: Path, reference: str) -> Iterator[Path]:
 
 def _parts(path: str) -> list[str]:
     """Parts of a path or a URL, without scheme and steps up."""
-    plain = re.sub(r"^[a-z]+://", "", path).replace("\\", "/")
-    return [part for part in plain.split("/") if part not in ("", ".", "..")]
+    plain = path.partition("://")[2] or path
+    return [part for part in plain.replace("\\", "/").split("/") if part not in ("", ".", "..")]
 
 
 def _kind(path: str) -> str:

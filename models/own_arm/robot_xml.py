@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from models.own_arm.description import InvalidArm
 from models.robot import Array
+from models.uploads.limits import Checkpoint, UnreadableFile
+from models.uploads.xml_tree import xml_tree
 
 
-def robot_element(text: str, field: str) -> Element:
+def robot_element(text: str, field: str, checkpoint: Checkpoint) -> Element:
     """The root element of a description, `field` being "urdf" or "srdf". Raises InvalidArm."""
     kind = field.upper()
-    # entities may grow without end
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise InvalidArm(field, f"The {kind} has a document type: leave it out.")
     try:
-        root = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError) as error:
-        raise InvalidArm(field, f"The {kind} is not XML: {error}.") from None
+        root = xml_tree(text, checkpoint)
+    except UnreadableFile as error:
+        raise InvalidArm(field, f"The {kind} {error}") from None
     if root.tag != "robot":
         raise InvalidArm(field, f"The root element of {'an' if kind == 'SRDF' else 'a'} {kind} is <robot>.")
     return root
@@ -33,8 +31,9 @@ def numbers(element: Element | None, part: str, where: str, default: str = "", c
     <axis>".
     """
     text = default if element is None else element.get(part, default)
+    words = text.split(maxsplit=count)
     try:
-        values = np.array([float(each) for each in text.split()])
+        values = np.array([float(each) for each in words])
     except ValueError:
         values = np.zeros(0)
     if values.shape != (count,) or not np.isfinite(values).all():

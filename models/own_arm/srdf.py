@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from models.own_arm.robot_xml import robot_element
+from models.uploads.limits import Checkpoint
 
 
-def disabled_pairs(text: str) -> list[tuple[str, str]]:
+def disabled_pairs(text: str, checkpoint: Checkpoint) -> list[tuple[str, str]]:
     """Links of each `<disable_collisions>`. Raises InvalidArm for a text that is no SRDF.
 
     Such lists are found by sampling: they are taken as the user's word.
     """
-    root = robot_element(text, "srdf")
+    root = robot_element(text, "srdf", checkpoint)
     return [(each.get("link1", ""), each.get("link2", "")) for each in root.iter("disable_collisions")]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NoReturn
@@ -14,9 +13,10 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pinocchio as pin
 
-from models.own_arm.description import Description, InvalidArm
+from models.own_arm.description import LONGEST_NAME, Description, InvalidArm
 from models.own_arm.robot_xml import number, numbers, robot_element
 from models.robot import Array
+from models.uploads.limits import Checkpoint, unwatched
 
 MOST_JOINTS, MOST_ELEMENTS = 16, 5_000
 MOST_NAMES = 12
@@ -62,9 +62,9 @@ class Chain:
         return len(self.joints)
 
 
-def chain_of(description: Description) -> Chain:
+def chain_of(description: Description, checkpoint: Checkpoint = unwatched) -> Chain:
     """The chain of a description. Raises InvalidArm, which names the link or joint."""
-    root = _parsed(description.urdf)
+    root = _parsed(description.urdf, checkpoint)
     tree = _Tree.of(root)
     locked = dict(description.locked or {})
     base = description.base or tree.root
@@ -142,24 +142,21 @@ class _Tree:
         return 0
 
 
-def _parsed(text: str) -> Element:
+def _parsed(text: str, checkpoint: Checkpoint) -> Element:
     """The root element of a URDF."""
-    # generated files still quote their macros in comments
-    plain = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
-    if "<xacro:" in plain or "${" in plain:
+    root = robot_element(text, "urdf", checkpoint)
+    # comments are not in the tree: generated files still quote their macros there
+    if any(_is_xacro(each) for each in root.iter()):
         _refuse("urdf", "This is xacro: make a URDF of it first, by `xacro arm.urdf.xacro > arm.urdf`.")
-    root = robot_element(_declared(text), "urdf")
     if sum(1 for _ in root) > MOST_ELEMENTS:
         _refuse("urdf", f"The URDF has more than {MOST_ELEMENTS} links and joints.")
     return root
 
 
-def _declared(text: str) -> str:
-    """The text with its prefixes declared: readers of URDF take tags and attributes of tools without."""
-    used = set(re.findall(r"</?([A-Za-z][\w.-]*):", text)) | set(re.findall(r"\s([A-Za-z][\w.-]*):[\w.-]+\s*=", text))
-    missing = used - set(re.findall(r"xmlns:([\w.-]+)\s*=", text)) - {"xml", "xmlns"}
-    names = "".join(f' xmlns:{prefix}="{prefix}"' for prefix in sorted(missing))
-    return re.sub(r"<robot\b", f"<robot{names}", text, count=1)
+def _is_xacro(element: Element) -> bool:
+    """Whether a macro, or an expression, is left in an element."""
+    texts = (*element.attrib.values(), element.text or "", element.tail or "")
+    return element.tag.startswith("xacro:") or any("${" in text for text in texts)
 
 
 def _check_chain(moving: list[Element]) -> None:
@@ -167,7 +164,7 @@ def _check_chain(moving: list[Element]) -> None:
     if not 1 <= len(moving) <= MOST_JOINTS:
         _refuse("tip", f"Between base and tip {len(moving)} joints move: from 1 to {MOST_JOINTS} are possible.")
     for joint in moving:
-        name, kind = _name(joint), joint.get("type")
+        name, kind = _name(joint), str(joint.get("type"))[:LONGEST_NAME]
         if kind not in TURNING:
             _refuse("urdf", f"Joint {name!r} is {kind}: only revolute joints can move. Give its position in `locked`.")
         if joint.find("mimic") is not None:
@@ -206,8 +203,7 @@ def _merged(
             joint.set("type", "revolute")
             limit.attrib.update({"lower": repr(-CONTINUOUS), "upper": repr(CONTINUOUS)})
     for link in bare.findall("link"):
-        for shape in (*link.findall("visual"), *link.findall("collision")):
-            link.remove(shape)
+        link[:] = [each for each in link if each.tag not in ("visual", "collision")]
     names = {_name(joint): k for k, joint in enumerate(moving, start=1)}
     given = {f"joint {k}": _name(joint) for k, joint in enumerate(bare.findall("joint"))}
     for unique, joint in zip(given, bare.findall("joint"), strict=True):
@@ -294,8 +290,8 @@ def _limit(joint: Element, part: str) -> float:
 def _end(joint: Element, side: str) -> str:
     end = joint.find(side)
     link = None if end is None else end.get("link")
-    if not link:
-        _refuse("urdf", f"Joint {_name(joint)!r} has no <{side}> link.")
+    if not link or len(link) > LONGEST_NAME:
+        _refuse("urdf", f"Joint {_name(joint)!r} has no <{side}> link of up to {LONGEST_NAME} characters.")
     return link
 
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeVar
+
 import numpy as np
 
 from models.arrays import read_only
 from models.robot import Array
+from models.shape_sizes import SIZES, WrongSize, check_lengths
 from optimizer.exceptions import InvalidProblem
 
-# sizes and distances [m] outside of these are a mistake of units
-SMALLEST, LARGEST = 1e-4, 100.0
+Checked = TypeVar("Checked")
+
 # of a rotation matrix: one assembled in double precision is orthonormal to about 1e-15
 ORTHONORMAL = 1e-9
 # a vector shorter than this has no direction [any unit]
@@ -22,6 +26,19 @@ def frozen(values: object, shape: tuple[int, ...], field: str) -> Array:
         return read_only(values, shape, field)
     except ValueError as error:
         raise InvalidProblem(field, str(error)) from None
+
+
+def sized(field: str, check: Callable[[], Checked]) -> Checked:
+    """What a check of a shape's size returns. Raises InvalidProblem at the field where it raises WrongSize."""
+    try:
+        return check()
+    except WrongSize as error:
+        raise InvalidProblem(field, str(error)) from None
+
+
+def check_sizes(field: str, lengths: float | Array) -> None:
+    """Raises InvalidProblem unless radii, lengths or edges [m] are those of a body."""
+    sized(field, lambda: check_lengths(field, lengths))
 
 
 def per_joint(values: object, count: int, field: str, least: float, most: float) -> Array:
@@ -54,8 +71,8 @@ def rigid_transform(values: object, field: str) -> Array:
 
 
 def placement(values: object, field: str) -> Array:
-    """Pose (4, 4) of a body, with its origin at most LARGEST from that of the frame. Raises InvalidProblem."""
+    """Pose (4, 4) of a body, with its origin at most SIZES.largest from that of the frame. Raises InvalidProblem."""
     T = rigid_transform(values, field)
-    if np.abs(T[:3, 3]).max() > LARGEST:
-        raise InvalidProblem(field, f"{field} must lie within {LARGEST:g} m of the origin.")
+    if np.abs(T[:3, 3]).max() > SIZES.largest:
+        raise InvalidProblem(field, f"{field} must lie within {SIZES.largest:g} m of the origin.")
     return T

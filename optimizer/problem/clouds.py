@@ -11,8 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from models.robot import Array
+from models.shape_sizes import SIZES, check_extent
 from optimizer.exceptions import InvalidProblem
-from optimizer.problem.arrays import LARGEST, SMALLEST, frozen
+from optimizer.problem.arrays import check_sizes, frozen, sized
 
 # most points, occupied voxels and triangles of an obstacle, and of all obstacles of a scene together: they bound the
 # memory and the time of a request
@@ -38,9 +39,7 @@ class Points:
         points = frozen(self.points, (-1, 3), "points")
         _count("points", len(points), MOST_POINTS, "points: thin the cloud out, for example to one point per voxel")
         _within_reach("points", points)
-        # written so that NaN is refused
-        if not SMALLEST <= self.radius <= LARGEST:
-            raise InvalidProblem("radius", f"radius must be between {SMALLEST:g} and {LARGEST:g} m.")
+        check_sizes("radius", self.radius)
         object.__setattr__(self, "points", points)
 
 
@@ -55,8 +54,7 @@ class Voxels:
     cells: Whole
 
     def __post_init__(self) -> None:
-        if not SMALLEST <= self.size <= LARGEST:
-            raise InvalidProblem("size", f"size must be between {SMALLEST:g} and {LARGEST:g} m.")
+        check_sizes("size", self.size)
         cells = np.unique(np.array(self.cells, dtype=np.int64).reshape(-1, 3), axis=0)
         _count("cells", len(cells), MOST_VOXELS, "occupied cells: use larger voxels")
         if np.abs(cells).max() > MOST_ALONG_EDGE:
@@ -80,6 +78,7 @@ class TriangleMesh:
         corners = frozen(self.corners, (-1, 3, 3), "data")
         _count("data", len(corners), MOST_TRIANGLES, "triangles: simplify the mesh")
         _within_reach("data", corners)
+        sized("data", lambda: check_extent("data", corners.reshape(-1, 3)))
         edges = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max(axis=1)
         double_area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
         kept = double_area > FLAT_TRIANGLE * edges**2
@@ -125,5 +124,5 @@ def _count(field: str, count: int, most: int, remedy: str) -> None:
 
 
 def _within_reach(field: str, points: Array) -> None:
-    if np.abs(points).max() > LARGEST:
-        raise InvalidProblem(field, f"{field} must lie within {LARGEST:g} m of the origin of the pose.")
+    if np.abs(points).max() > SIZES.largest:
+        raise InvalidProblem(field, f"{field} must lie within {SIZES.largest:g} m of the origin of the pose.")

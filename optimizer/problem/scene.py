@@ -6,18 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from models.robot import Array
+from models.shape_sizes import SIZES, hull_of_body
 from optimizer.exceptions import InvalidProblem
-from optimizer.problem.arrays import LARGEST, SMALLEST, frozen, placement
+from optimizer.problem.arrays import check_sizes, frozen, placement, sized
 from optimizer.problem.clouds import MOST_PARTS_IN_SCENE, Cloud, parts_of
 from optimizer.problem.names import check_name, first_repeated
 
 # most obstacles in a scene, and most vertices of a mesh: they bound the work of a request
 MOST_OBSTACLES, MOST_VERTICES = 64, 256
-# least ratio of the smallest to the largest extent of a hull: below it, the hull is flat
-FLAT = 1e-6
 # clearance [m] that an obstacle asks for unless told otherwise: what the place of a body in a cell is known to
 DEFAULT_MARGIN = 5e-3
 
@@ -29,7 +27,7 @@ class Sphere:
     radius: float
 
     def __post_init__(self) -> None:
-        _size("radius", self.radius)
+        check_sizes("radius", self.radius)
 
 
 @dataclass(frozen=True)
@@ -40,8 +38,8 @@ class _AlongZ:
     length: float
 
     def __post_init__(self) -> None:
-        _size("radius", self.radius)
-        _size("length", self.length)
+        check_sizes("radius", self.radius)
+        check_sizes("length", self.length)
 
 
 @dataclass(frozen=True)
@@ -62,8 +60,7 @@ class Box:
 
     def __post_init__(self) -> None:
         size = frozen(self.size, (3,), "size")
-        for edge in size.tolist():
-            _size("size", edge)
+        check_sizes("size", size)
         object.__setattr__(self, "size", size)
 
 
@@ -74,7 +71,7 @@ class HalfSpace:
 
 @dataclass(frozen=True)
 class Mesh:
-    """The convex hull of `vertices` (n, 3) [m]. Raises InvalidProblem if they lie in a plane."""
+    """The convex hull of `vertices` (n, 3) [m]. Raises InvalidProblem if they lie in a plane, or close together."""
 
     vertices: Array
 
@@ -82,16 +79,10 @@ class Mesh:
         vertices = frozen(self.vertices, (-1, 3), "vertices")
         if not 4 <= len(vertices) <= MOST_VERTICES:
             raise InvalidProblem("vertices", f"vertices must be 4 to {MOST_VERTICES} points.")
-        if np.abs(vertices).max() > LARGEST:
-            raise InvalidProblem("vertices", f"vertices must lie within {LARGEST:g} m of the origin.")
-        extents = np.linalg.svd(vertices - vertices.mean(axis=0), compute_uv=False)
-        if extents[2] <= FLAT * extents[0] or extents[2] < SMALLEST * FLAT:
-            raise InvalidProblem("vertices", "vertices lie in a plane: give points of a body with a volume.")
-        try:
-            hull = ConvexHull(vertices)
-        except QhullError:
-            raise InvalidProblem("vertices", "vertices lie in a plane: give points of a body with a volume.") from None
-        object.__setattr__(self, "vertices", frozen(vertices[hull.vertices], (-1, 3), "vertices"))
+        if np.abs(vertices).max() > SIZES.largest:
+            raise InvalidProblem("vertices", f"vertices must lie within {SIZES.largest:g} m of the origin.")
+        hull = sized("vertices", lambda: hull_of_body("vertices", vertices))
+        object.__setattr__(self, "vertices", frozen(hull, (-1, 3), "vertices"))
 
 
 Shape = Sphere | Capsule | Cylinder | Box | HalfSpace | Mesh | Cloud
@@ -177,7 +168,7 @@ def capsule_between(first: Array, second: Array, radius: float, touches: Sequenc
     length = float(np.linalg.norm(along))
     T = np.eye(4)
     T[:3, 3] = ends.mean(axis=0)
-    if length < SMALLEST:
+    if length < SIZES.smallest:
         return Attachment(Sphere(radius + length / 2), T, touches)
     z = along / length
     # any x axis normal to z
@@ -185,9 +176,3 @@ def capsule_between(first: Array, second: Array, radius: float, touches: Sequenc
     x /= np.linalg.norm(x)
     T[:3, :3] = np.column_stack([x, np.cross(z, x), z])
     return Attachment(Capsule(radius, length), T, touches)
-
-
-def _size(name: str, value: float) -> None:
-    # written so that NaN is refused
-    if not SMALLEST <= value <= LARGEST:
-        raise InvalidProblem(name, f"{name} must be between {SMALLEST:g} and {LARGEST:g} m.")

@@ -18,6 +18,7 @@ from scipy.special import stdtrit
 
 from models.robot import Array, Mask
 from models.uncertainty.ranges import P95
+from optimizer.deadline import checkpoint
 
 Numbers = npt.NDArray[np.int64]
 
@@ -46,6 +47,7 @@ class Grouped:
         order = np.argsort(group, kind="stable")
         edges = np.searchsorted(group[order], np.arange(count + 1))
         for k in range(count):
+            checkpoint()
             rows = order[edges[k] : edges[k + 1]]
             root = np.sqrt(weight[rows])
             part = root[:, None] * np.hstack([block[rows] for block in blocks])

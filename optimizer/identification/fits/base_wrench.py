@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from models.robot import Array
+from optimizer.deadline import checkpoint
 from optimizer.energy.link_regressor import BODY
 from optimizer.identification.arm.base_parameters import independent_columns
 from optimizer.identification.estimates.grouped import Grouped, jackknife, left_out, solve
@@ -34,6 +35,7 @@ def base_wrench_regressor(model: pin.Model, q: Array, v: Array, a: Array) -> Arr
     data = model.createData()
     found = np.empty((len(q), 6, BODY * model.nq))
     for row in range(len(q)):
+        checkpoint()
         pin.rnea(model, data, q[row], v[row], a[row])
         pin.forwardKinematics(model, data, q[row])
         for joint in range(1, model.njoints):

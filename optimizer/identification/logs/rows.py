@@ -5,16 +5,17 @@ from __future__ import annotations
 import gzip
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from io import BufferedIOBase, BufferedReader, BytesIO
+from io import BufferedIOBase, BufferedReader, BytesIO, RawIOBase
 from itertools import islice
 from pathlib import Path
-from typing import cast
+from typing import Any, BinaryIO
 from zlib import error as ZlibError
 
 import numpy as np
 
 from models.robot import Array
 from optimizer.csv_table import line_of, names_of, numbers_of, with_points, wrong_length
+from optimizer.deadline import checkpoint
 from optimizer.exceptions import InvalidTable
 from optimizer.identification.logs.head import LONGEST_LINE, Head, is_comment
 from optimizer.identification.logs.log_errors import LogTooLarge
@@ -27,11 +28,36 @@ MOST_DROPPED = 0.1
 _GZIP = b"\x1f\x8b"
 
 
+class _Watched(RawIOBase):
+    """A file whose every reading looks at the watched deadline: gzip may have millions of members with nothing in
+    them."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+
+    def readable(self) -> bool:
+        """It is."""
+        return True
+
+    def readinto(self, buffer: Any, /) -> int:
+        """As of a file. Raises DeadlinePassed."""
+        checkpoint()
+        view = memoryview(buffer)
+        data = self._file.read(len(view))
+        view[: len(data)] = data
+        return len(data)
+
+    def close(self) -> None:
+        """Closes the file, too."""
+        self._file.close()
+        super().close()
+
+
 class Source:
     """The bytes of a log, unpacked if they are gzip, at most `most` of them. Raises LogTooLarge, InvalidTable."""
 
     def __init__(self, source: Path | bytes, most: int = MOST_BYTES) -> None:
-        raw = BufferedReader(cast(BufferedReader, BytesIO(source))) if isinstance(source, bytes) else source.open("rb")
+        raw = BufferedReader(_Watched(BytesIO(source) if isinstance(source, bytes) else source.open("rb", buffering=0)))
         self._raw = raw
         packed = raw.peek(2)[:2] == _GZIP
         self._file: BufferedIOBase = gzip.GzipFile(fileobj=raw) if packed else raw

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.robot import Array, Mask, Robot
+from optimizer.deadline import checkpoint
 from optimizer.energy.link_regressor import rigid_regressor, rigid_torques
 from optimizer.exceptions import InvalidProblem
 from optimizer.identification.logs.log import Log, Move
@@ -91,6 +92,7 @@ def rows_of(robot: Robot, logs: Sequence[Log], regressor: bool = False) -> Rows:
     every = _stride(logs, MOST_REGRESSORS if regressor else MOST_ROWS)
     pieces, moves, number = [], 0, 0
     for number, log in enumerate(logs):
+        checkpoint()
         piece, moves = _rows_of_log(robot, log, number, moves, every)
         if regressor:
             model = robot.model.copy()

@@ -21,6 +21,7 @@ from models.own_arm.figures import own_figures
 from models.own_arm.mesh_files import corners, in_folder, in_zip
 from models.registry import load_robot
 from models.robot import Array, LinkCapsule
+from models.uploads.limits import LIMITS
 from tests.models.own_arm.arms import RICH, RICH_ARM, robot
 from tests.models.test_capsule_cover import meshes as arm_folder
 from tests.selection import long_but
@@ -110,7 +111,7 @@ def test_a_missing_mesh_is_told() -> None:
     ("files", "words"),
     [
         ({"forearm.stl": b"solid nothing"}, "must have from 4"),
-        ({"forearm.stl": b"\x00" * 80 + b"\xff\xff\xff\x7f"}, "must have from 4"),
+        ({"forearm.stl": b"\x00" * 80 + b"\xff\xff\xff\x7f"}, "shorter than its header says"),
         ({"forearm.stl": stl(trimesh.creation.box((9e3, 1.0, 1.0)))}, "larger than 5 m"),
         (
             {"a/meshes/forearm.stl": stl(BLOCK), "b/meshes/forearm.stl": stl(trimesh.creation.icosphere())},
@@ -136,10 +137,10 @@ def test_the_longest_agreement_of_paths_counts() -> None:
 def test_a_zip_that_is_none_or_too_large(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InvalidArm, match="no zip"):
         in_zip(b"PK")
-    monkeypatch.setattr("models.own_arm.mesh_files.MOST_BYTES", 10_000)
+    monkeypatch.setattr("models.own_arm.mesh_files.LIMITS", dataclasses.replace(LIMITS, mesh_bytes=10_000))
     with pytest.raises(InvalidArm, match="unpacks to more"):
         in_zip(zipped({"a.stl": b"0" * 20_000}))
-    monkeypatch.setattr("models.own_arm.mesh_files.MOST_FILES", 1)
+    monkeypatch.setattr("models.own_arm.mesh_files.LIMITS", dataclasses.replace(LIMITS, mesh_files=1))
     with pytest.raises(InvalidArm, match="2 mesh files"):
         in_zip(zipped({"a.stl": b"0", "b.obj": b"0"}))
 

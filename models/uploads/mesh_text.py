@@ -1,0 +1,83 @@
+"""Corners and faces of mesh files in text, without all else that such files may hold.
+
+trimesh keeps groups, materials and solids apart, and its time grows with the square of their number. They do not matter
+here: each file becomes one of corners and triangles alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from io import BytesIO
+from itertools import pairwise
+
+from models.uploads.limits import LIMITS, Checkpoint, UnreadableFile
+
+
+@dataclass(frozen=True)
+class MeshSize:
+    """Most corners and triangles of a mesh."""
+
+    corners: int = LIMITS.mesh_corners
+    triangles: int = LIMITS.mesh_triangles
+
+    def check(self, corners: int, triangles: int) -> None:
+        """Raises UnreadableFile if a mesh has more."""
+        if corners > self.corners:
+            raise UnreadableFile(f"has more than {self.corners} corners: simplify the mesh.")
+        if triangles > self.triangles:
+            raise UnreadableFile(f"has more than {self.triangles} triangles: simplify the mesh.")
+
+
+def plain_obj(content: bytes, most: MeshSize, checkpoint: Checkpoint) -> bytes:
+    """An OBJ with the corners of another one, and its faces as triangles. Raises UnreadableFile."""
+    corners, faces = list[bytes](), list[bytes]()
+    # a backslash joins lines
+    for line in _lines(content.replace(b"\r\n", b"\n").replace(b"\\\n", b""), checkpoint):
+        kind = line[:2].rstrip()
+        if kind not in (b"v", b"f") and not line[:1].isspace():
+            continue
+        if len(line) > LIMITS.mesh_line:
+            raise UnreadableFile(f"has a line of more than {LIMITS.mesh_line} bytes.")
+        words = line.split()
+        if words[:1] == [b"v"]:
+            if len(words) < 4:
+                raise UnreadableFile("has a corner of fewer than three coordinates.")
+            corners.append(b"v " + b" ".join(words[1:4]))
+        elif words[:1] == [b"f"]:
+            indices = [_index(word, len(corners)) for word in words[1:]]
+            faces += [b"f %d %d %d" % (indices[0], *pair) for pair in pairwise(indices[1:])]
+        most.check(len(corners), len(faces))
+    return b"\n".join([*corners, *faces])
+
+
+def _index(word: bytes, corners: int) -> int:
+    """The number of a face's corner, from 1; negative ones count back from the last corner above the face."""
+    try:
+        index = int(word.partition(b"/")[0])
+    except ValueError:
+        index = 0
+    if index < 0:
+        index += corners + 1
+    if index < 1:
+        raise UnreadableFile("has a face with a corner that there is not.")
+    return index
+
+
+def plain_stl(content: bytes, most: MeshSize, checkpoint: Checkpoint) -> bytes:
+    """An STL in text with the triangles of another one, as one solid. Raises UnreadableFile."""
+    found, count = [b"solid"], 0
+    for line in _lines(content, checkpoint):
+        place = line.lower().find(b"vertex")
+        if place >= 0:
+            found.append(line[place:])
+            count += line.lower().count(b"vertex")
+            most.check(count, count // 3)
+    return b"\n".join([*found, b"endsolid\n"])
+
+
+def _lines(content: bytes, checkpoint: Checkpoint) -> Iterator[bytes]:
+    for number, line in enumerate(BytesIO(content)):
+        if number % LIMITS.mesh_lines == 0:
+            checkpoint()
+        yield line
