@@ -57,7 +57,9 @@ def link_copies(folder: Path) -> None:
 
 def needed(library: Path) -> set[str]:
     """Names of the shared libraries that one asks for."""
-    listing = subprocess.run(["readelf", "--dynamic", str(library)], capture_output=True, text=True, check=True).stdout
+    listing = subprocess.run(
+        ["readelf", "--dynamic", str(library)], capture_output=True, encoding="utf-8", check=True
+    ).stdout
     return set(re.findall(r"\(NEEDED\).*\[(.+)\]", listing))
 
 
