@@ -32,6 +32,11 @@ class Patience:
     compiler: float = 300.0
     """Time [s] after which a compiler counts as hung and is killed: the largest kernel takes half a minute, and
     ten times as long on a machine with much else to do."""
+    command: float = 60.0
+    """The same [s], where somebody waits for the command that compiles before it computes."""
+    rest: float = 3600.0
+    """Time [s] for which a compiler that hung is not tried again for the same library, by any process: every command
+    and every new worker would wait for it."""
     warm_up: float = 5.0
     """Time [s] for which a worker's warm-up waits for the shared library, which takes half a second."""
     look: float = 0.05
@@ -66,13 +71,17 @@ def compiler() -> str | None:
     return shutil.which(os.environ.get("CC", "cc")) or shutil.which("gcc") or shutil.which("clang")
 
 
+class CompilerHangs(RuntimeError):
+    """The C compiler, or another process that compiles the same, takes longer than anybody waits."""
+
+
 def compile_library(
     target: Path, flags: Sequence[str], source: Callable[[], str], patience: Patience = PATIENCE
 ) -> None:
     """Compile C to the library `target`, once however many threads and processes ask. `source` gives the code.
 
-    Raises RuntimeError if there is no compiler, if it fails, or if it or the process that compiles this library already
-    takes longer than `patience`, OSError if the cache cannot be written.
+    Raises RuntimeError if there is no compiler or it fails, CompilerHangs if it takes longer than `patience` or did so
+    lately, OSError if the cache cannot be written.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
     with target.with_suffix(".lock").open("wb") as lock:
@@ -82,16 +91,33 @@ def compile_library(
         command = compiler()
         if command is None:
             raise RuntimeError("no C compiler found")
+        hung = target.with_suffix(".hung")
+        if _hung_lately(hung, command, patience):
+            raise CompilerHangs(f"the C compiler {command} hung: it is tried again {patience.rest / 60:g} min later")
         with workplace(target) as folder:
             library, seal = folder / "library.so", folder / "library.sha256"
             code = folder / "library.c"
             code.write_text(source(), encoding="utf-8")
-            _run([command, *flags, str(code), "-o", str(library), "-lm"], folder / "log", lock, patience)
+            try:
+                _run([command, *flags, str(code), "-o", str(library), "-lm"], folder / "log", lock, patience)
+            except CompilerHangs:
+                hung.write_text(command, encoding="utf-8", errors="surrogateescape")
+                raise
             seal.write_text(hashlib.sha256(library.read_bytes()).hexdigest(), encoding="ascii")
             # the seal first: a library without its seal counts as damaged, a seal without its library as absent
             seal.replace(seal_path(target))
             library.replace(target)
+            hung.unlink(missing_ok=True)
     _prune(target.parent)
+
+
+def _hung_lately(note: Path, command: str, patience: Patience) -> bool:
+    """Whether this compiler was killed for this library; of another one, or long ago, the note says nothing."""
+    try:
+        is_recent = time.time() - note.stat().st_mtime < patience.rest
+        return is_recent and note.read_text(encoding="utf-8", errors="surrogateescape") == command
+    except OSError:
+        return False
 
 
 def _wait_for(lock: IO[bytes], patience: Patience) -> None:
@@ -102,7 +128,7 @@ def _wait_for(lock: IO[bytes], patience: Patience) -> None:
             return
         except BlockingIOError:
             if time.monotonic() > end:
-                raise RuntimeError(f"another process has been compiling it for {patience.compiler:g} s") from None
+                raise CompilerHangs(f"another process has been compiling it for {patience.compiler:g} s") from None
         time.sleep(patience.look)
 
 
@@ -120,7 +146,7 @@ def _run(command: Sequence[str], log: Path, lock: IO[bytes], patience: Patience)
         try:
             code = process.wait(patience.compiler)
         except subprocess.TimeoutExpired:
-            raise RuntimeError(f"the C compiler {command[0]} does not end within {patience.compiler:g} s") from None
+            raise CompilerHangs(f"the C compiler {command[0]} does not end within {patience.compiler:g} s") from None
         finally:
             _kill(process)
             _running.discard(process)

@@ -13,7 +13,14 @@ from pathlib import Path
 import pytest
 
 from optimizer.native import library_cache
-from optimizer.native.library_cache import Patience, cache_directory, compile_library, mark_used
+from optimizer.native.library_cache import (
+    CompilerHangs,
+    Patience,
+    cache_directory,
+    compile_library,
+    is_intact,
+    mark_used,
+)
 
 HASTY = Patience(compiler=0.5, look=0.01)
 ENDED = 20.0  # s; for a process that was killed to be gone, on a machine with much else to do
@@ -74,10 +81,27 @@ def test_a_compiler_that_hangs_is_killed_with_all_that_it_started(tmp_path: Path
         compile_library(target, (), lambda: "", HASTY)
     assert len(hung.read_text().split()) == 2
     until_gone(hung)
-    # nothing but the lock is left, and it is free
-    assert [path.name for path in target.parent.iterdir()] == ["arm.lock"]
+    # nothing but the lock and a note are left, and the lock is free
+    assert sorted(path.name for path in target.parent.iterdir()) == ["arm.hung", "arm.lock"]
     with target.with_suffix(".lock").open("wb") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def test_a_compiler_that_hung_rests(tmp_path: Path, hung: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another process does not try it again either, until an hour later; another compiler is tried at once."""
+    target, note = tmp_path / "arm.so", tmp_path / "arm.hung"
+    for _ in range(3):
+        with pytest.raises(CompilerHangs):
+            compile_library(target, (), str, HASTY)
+    assert len(hung.read_text().split()) == 2
+    an_hour_ago = time.time() - HASTY.rest
+    os.utime(note, (an_hour_ago, an_hour_ago))
+    with pytest.raises(CompilerHangs):
+        compile_library(target, (), str, HASTY)
+    assert len(hung.read_text().split()) == 4
+    monkeypatch.delenv("CC")
+    compile_library(target, ("-shared",), str)
+    assert is_intact(target) and not note.exists()
 
 
 def test_a_program_that_ends_takes_a_hung_compiler_along(tmp_path: Path, hung: Path) -> None:
