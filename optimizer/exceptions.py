@@ -22,7 +22,6 @@ JoulepathError
 │   └── NoCollisionFreeTrajectory
 ├── NotCertified            a motion to export failed its certificate
 ├── FormatUnsuitable        a motion cannot be written in a format
-├── SimulatorMissing        MuJoCo is not installed: see `simulation`
 └── DeadlineExceeded        no motion certified in time
 
 Those of logs are in `identification.log_errors`, that of excitations in `excitation.errors`.

@@ -298,15 +298,6 @@ class NoCollisionFreeTrajectory(_SearchError):
     )
 
 
-class SimulatorMissing(ProblemDetails):
-    """MuJoCo, which plays the motions of `POST /replay`, is an optional part of the service and is not installed. The
-    operator installs it with `pip install 'joulepath[mujoco]'` and restarts the service. All other requests work."""
-
-    type: Literal["/problems/simulator-missing"] = fixed("type", "/problems/simulator-missing")
-    title: Literal["Simulator missing"] = fixed("title", "Simulator missing")
-    status: Literal[501] = fixed("status", 501)
-
-
 class DeadlineExceeded(_SearchError):
     """The deadline passed before any motion was certified. The wait for a free worker counts. Allow a longer
     `deadline`, or try again when the service is less busy."""
