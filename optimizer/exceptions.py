@@ -101,10 +101,11 @@ class InvalidTable(InvalidProblem):
 
 
 class UnknownRobot(JoulepathError):
-    """No robot is named `name`; `known` are the names of all."""
+    """No robot is named `name`; `known` are the names that would do."""
 
     def __init__(self, name: str, known: Sequence[str]) -> None:
-        super().__init__(f"There is no robot of that name: use one of {', '.join(known)}.")
+        names = f"use one of {', '.join(known)}" if known else "none has been added"
+        super().__init__(f"There is no robot of that name: {names}.")
         self.name, self.known = name, list(known)
 
 

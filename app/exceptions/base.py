@@ -22,6 +22,7 @@ ServiceError
 ├── TooManyDeaths       the request ended its worker process again and again
 ├── EmptyStudy          the study has no iteration yet
 ├── RobotExists         the name of a robot is taken
+│   └── BundledRobot        by a robot that comes with the service
 ├── TooManyRobots       the service holds as many robots of users as it may
 ├── UnknownLog          no log has that id
 ├── UnknownIdentification   no identification has that id

@@ -16,7 +16,9 @@ class UnknownRobot(ProblemDetails):
     type: Literal["/problems/unknown-robot"] = fixed("type", "/problems/unknown-robot")
     title: Literal["Unknown robot"] = fixed("title", "Unknown robot")
     status: Literal[404] = fixed("status", 404)
-    known: list[str] = described("Names of all robots.", None, ["ur10e", "ur3e", "ur5e"])
+    known: list[str] = described(
+        "Names of all robots; where a robot is deleted, of those that were added.", None, ["ur10e", "ur3e", "ur5e"]
+    )
 
 
 class NoMeshes(ProblemDetails):
