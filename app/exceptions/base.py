@@ -7,7 +7,7 @@ ServiceError
 │   ├── TooManyWaiting                            too many requests of jobs wait
 │   └── TooManyRequests     the client has its share of the queue
 │       └── TooManyConnectionsOfClient, TooManyBytesOfClient
-├── ClusterUnavailable  the scheduler of the cluster cannot be reached
+├── ClusterUnavailable  the scheduler of the cluster cannot be used
 ├── NotReady            no worker is warm
 ├── ShuttingDown        the service stops before the request is done
 ├── WorkerDied          the worker process ended during the task

@@ -66,7 +66,16 @@ SERVICE_ERRORS: list[ServiceError] = [
     *(service.StoreUnavailable(cause) for cause in service.StoreUnavailable.MESSAGES),
     *(kind() for kind in (service.UnknownStudy, service.UnknownIteration, service.KeyReused, service.NotFound)),
     *(kind() for kind in (service.MethodNotAllowed, service.BodyTooLarge, service.UnsupportedMediaType)),
-    *(kind() for kind in (service.RobotExists, service.TooManyRobots, service.AnswerInUse, service.NoMeshes)),
+    *(
+        kind()
+        for kind in (
+            service.RobotExists,
+            service.BundledRobot,
+            service.TooManyRobots,
+            service.AnswerInUse,
+            service.NoMeshes,
+        )
+    ),
     *(kind() for kind in (service.UnknownFigures, service.FiguresInUse, service.TooManyFigures)),
     *(kind() for kind in (service.NoKey, service.WrongKey, service.CrossSite, service.WrongHost)),
     service.RoleTooLow("read", "compute"),
