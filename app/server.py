@@ -6,7 +6,6 @@ import asyncio
 import ctypes
 import errno
 import math
-import os
 import socket
 
 import uvicorn
@@ -101,12 +100,8 @@ def listen(host: str, port: int) -> list[socket.socket]:
     except OSError as error:
         for each in sockets:
             each.close()
-        remedy = _REMEDIES.get(error.errno, "choose another address by JOULEPATH_HOST or --host")
-        raise WrongSettings(
-            f"The service cannot listen on {host}, port {port} ({os.strerror(error.errno)}): {remedy}."
-            if not isinstance(error, socket.gaierror)
-            else f"JOULEPATH_HOST={host!r} is no address of this machine ({error.strerror}): {remedy}."
-        ) from None
+        remedy = _REMEDIES.get(error.errno or 0, "choose another address by JOULEPATH_HOST or --host")
+        raise WrongSettings(f"The service cannot listen on {host}, port {port} ({error.strerror}): {remedy}.") from None
     return sockets
 
 

@@ -85,12 +85,12 @@ def follow(
         raise InvalidProblem("points", "The path needs at least one point.")
     search = _Search(arm)
     limits = arm.active_limits
-    if deadline.passed:
-        raise DeadlineExceeded([])
     points, last = list[PathPoint](), guess
     for target in targets:
         wanted = target.T if isinstance(target, Pose) else frozen(target, (3,), "points")
-        if points and deadline.passed:
+        if deadline.passed:
+            if not points:
+                raise DeadlineExceeded([])
             start = search.found(wanted, last)
             points.append(PathPoint(start.q, start.position, start.rotation, start.singular_value, "deadline"))
             continue
