@@ -149,6 +149,8 @@ class Cluster:
                         extra={"scheduler": self.address, "reason": str(error) or kind},
                     )
                     told = kind
+                if isinstance(error, _Unsuitable):  # each attempt leaves a traceback in its log
+                    await asyncio.sleep(_PATIENCE)
             await asyncio.sleep(LOOK)
 
     async def _check(self, client: Client) -> None:
