@@ -83,7 +83,7 @@ def loaded_files(get: Callable[[str], str]) -> set[str]:
         found.add(path)
         text = get(path)
         if path.endswith(".js"):
-            imports = re.findall(r"""(?:^|[;}])\s*(?:import|export)\b[^;'"]*?['"]([^'"]+)['"]""", text, re.M)
+            imports = re.findall(r"""^\s*(?:import|export)\s*(?:[\w$*{}\s,]+?\bfrom\s*)?['"]([^'"]+)['"]""", text, re.M)
             imports += re.findall(r"""\bimport\(\s*['"]([^'"]+)['"]\s*\)""", text)
             for name in imports:
                 known = next((key for key in sorted(names, key=len, reverse=True) if name.startswith(key)), None)
