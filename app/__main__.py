@@ -9,7 +9,8 @@ from types import FrameType
 
 
 def main() -> None:
-    """Serves until SIGTERM or Ctrl-C, then exits with 0; with 1 and a message if a setting is wrong."""
+    """Serves until SIGTERM or Ctrl-C, then exits with 0; with 1 and a message if a setting is wrong, or if another
+    program has the address."""
     # for the time before uvicorn handles signals, and after: when it is done, it raises the signal again
     signal.signal(signal.SIGTERM, _exit)
     signal.signal(signal.SIGINT, _exit)
@@ -29,10 +30,10 @@ def main() -> None:
     try:
         settings = read_settings()
         check_access(settings)
+        configure_logging(settings.log_level)
+        serve(settings)
     except WrongSettings as error:
         sys.exit(str(error))
-    configure_logging(settings.log_level)
-    serve(settings)
 
 
 def _exit(signum: int, frame: FrameType | None) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import ctypes
+import errno
 import math
 import socket
 
@@ -16,7 +17,7 @@ from app.engine.pool import Engine
 from app.http.connection import Ceilings, Connection
 from app.jobs.jobs import Jobs
 from app.main import create_app
-from app.settings import Settings
+from app.settings import Settings, WrongSettings
 
 _REFUSING_TIME = 0.25
 """Time [s] in which new requests still get a response (`shutting-down`), until load balancers know of the shutdown."""
@@ -25,6 +26,14 @@ _SETTLING_TIME = 0.05
 _M_MMAP_THRESHOLD = -3
 """Parameter of glibc's `mallopt`: the size [byte] from which a block is mapped by itself."""
 _LARGE_BLOCK = 1 << 16
+_BACKLOG = 2048
+"""Connections that wait to be accepted: as uvicorn has it."""
+_REMEDIES = {
+    errno.EADDRINUSE: "another program has this address, perhaps another service. End it, or choose another port by "
+    "--port, JOULEPATH_PORT or PORT (`make serve PORT=8001`); 0 takes a free one",
+    errno.EACCES: "ports below 1024 are not for everyone. Choose a larger one by --port, JOULEPATH_PORT or PORT",
+    errno.EADDRNOTAVAIL: "this machine does not have this address. Choose one that it has by --host or JOULEPATH_HOST",
+}
 _CHECK_PERIOD = 0.5
 """Time [s] between two checks of the connections."""
 
@@ -74,8 +83,31 @@ class _Server(uvicorn.Server):
         return [each for each in self.server_state.connections if isinstance(each, Connection)]
 
 
+def listen(host: str, port: int) -> list[socket.socket]:
+    """Sockets that listen on every address of a host. Raises WrongSettings if nobody can listen there."""
+    sockets = list[socket.socket]()
+    try:
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+        for family, kind, protocol, _, address in dict.fromkeys(found):
+            sockets.append(one := socket.socket(family, kind, protocol))
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            if family == socket.AF_INET6:
+                # as asyncio has it: a name may have an address of either kind
+                one.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
+            one.bind(address)
+            # two processes may bind the same address, and only one of them may listen
+            one.listen(_BACKLOG)
+    except OSError as error:
+        for each in sockets:
+            each.close()
+        remedy = _REMEDIES.get(error.errno or 0, "choose another address by JOULEPATH_HOST or --host")
+        raise WrongSettings(f"The service cannot listen on {host}, port {port} ({error.strerror}): {remedy}.") from None
+    return sockets
+
+
 def serve(settings: Settings) -> None:
-    """Serves in this process until a signal arrives."""
+    """Serves in this process until a signal arrives. Raises WrongSettings if nobody can listen on its address."""
+    sockets = listen(settings.host, settings.port)
     _give_memory_back()
     app = create_app(settings)
     log_access(settings)
@@ -94,7 +126,7 @@ def serve(settings: Settings) -> None:
         # the server ends the connections before this
         timeout_graceful_shutdown=math.ceil(settings.shutdown_grace) + 1,
     )
-    _Server(config, app).run()
+    _Server(config, app).run(sockets)
 
 
 def _give_memory_back() -> None:

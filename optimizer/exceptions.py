@@ -22,7 +22,6 @@ JoulepathError
 │   └── NoCollisionFreeTrajectory
 ├── NotCertified            a motion to export failed its certificate
 ├── FormatUnsuitable        a motion cannot be written in a format
-├── SimulatorMissing        MuJoCo is not installed: see `simulation`
 └── DeadlineExceeded        no motion certified in time
 
 Those of logs are in `identification.log_errors`, that of excitations in `excitation.errors`.
@@ -102,10 +101,11 @@ class InvalidTable(InvalidProblem):
 
 
 class UnknownRobot(JoulepathError):
-    """No robot is named `name`; `known` are the names of all."""
+    """No robot is named `name`; `known` are the names that would do."""
 
     def __init__(self, name: str, known: Sequence[str]) -> None:
-        super().__init__(f"There is no robot of that name: use one of {', '.join(known)}.")
+        names = f"use one of {', '.join(known)}" if known else "none has been added"
+        super().__init__(f"There is no robot of that name: {names}.")
         self.name, self.known = name, list(known)
 
 

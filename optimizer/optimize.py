@@ -9,6 +9,8 @@ from optimizer.deadline import Clock
 from optimizer.energy.kernel import kernel_for
 from optimizer.linear_algebra import one_thread
 from optimizer.methods import METHODS
+from optimizer.native.library_cache import PATIENCE
+from optimizer.native.shared_library import shared_library
 from optimizer.problem.arm import Arm
 from optimizer.problem.problem import Problem
 from optimizer.progress import Tell, forward, nobody
@@ -33,6 +35,7 @@ def warm_up(robot_name: str) -> None:
     """Load a robot and its kernel and solve a small problem, so that the first request does not wait for them."""
     robot = load_robot(robot_name)
     kernel_for(robot)
+    shared_library(PATIENCE.warm_up)
     middle = (robot.limits.q_min + robot.limits.q_max) / 2
     for method, solver in METHODS.items():
         # what takes seconds would keep the others waiting

@@ -11,6 +11,8 @@ import sys
 from pathlib import Path
 
 PACKAGES = ("app", "optimizer", "models")
+LATE = ("mujoco",)
+"""Packages that are imported only when they are needed."""
 ONLY_INSIDE = ("app.store.migrations.env",)
 """Modules that only their caller can import: Alembic runs this one."""
 
@@ -22,6 +24,8 @@ def main() -> None:
         for module in pkgutil.walk_packages([package], f"{package}."):
             if not module.name.endswith("__main__") and module.name not in ONLY_INSIDE:
                 importlib.import_module(module.name)
+    for name in LATE:
+        importlib.import_module(name)
 
 
 if __name__ == "__main__":

@@ -24,7 +24,9 @@ LAST = 20
 def install(lockfile: Path) -> int:
     """Exit code of pip, with one line for every package that it takes."""
     count, seen = 0, list[str]()
-    process = subprocess.Popen([*PIP, "-r", str(lockfile)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    process = subprocess.Popen(
+        [*PIP, "-r", str(lockfile)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8"
+    )
     assert process.stdout is not None
     for line in process.stdout:
         seen = [*seen[1 - LAST :], line]

@@ -18,9 +18,14 @@ BUILD_FOLDERS = [
     "casadi/cbc", "casadi/clp", "casadi/cmake", "casadi/highs", "casadi/include", "casadi/pkgconfig", "casadi/tools",
     "cmeel.prefix/bin", "cmeel.prefix/include", "cmeel.prefix/lib/cmake", "cmeel.prefix/lib/pkgconfig",
     "cmeel.prefix/lib64/cmake", "cmeel.prefix/lib64/pkgconfig", "cmeel.prefix/share/doc",
-    "matplotlib/mpl-data/sample_data", "numpy/_core/include", "numpy/_core/lib",
+    "matplotlib/mpl-data/sample_data", "mujoco/doc", "mujoco/include", "mujoco/introspect", "mujoco/studio",
+    "mujoco/sysid", "mujoco/testdata", "mujoco/usd", "numpy/_core/include", "numpy/_core/lib",
 ]  # fmt: skip
-BUILD_FILES = ["**/*.a", "**/*.la", "**/*.pyx", "**/*.pxd", "**/*.hpp", "**/tests"]
+BUILD_FILES = [
+    "**/*.a", "**/*.la", "**/*.pyx", "**/*.pxd", "**/*.hpp", "**/tests",
+    # its tests, its viewer, and many simulations at once
+    "mujoco/*_test.py", "mujoco/_batch.*", "mujoco/_render_filament.*", "mujoco/_rollout.*", "mujoco/_simulate.*",
+]  # fmt: skip
 # CasADi's plugins of these kinds are many and heavy, and loaded by name: these stay.
 CASADI_KINDS = ["archiver", "conic", "graphmodel", "modelicaparser", "nlpsol", "onnx"]
 CASADI_PLUGINS = ["conic_daqp", "conic_qpoases", "conic_qrqp", "nlpsol_ipopt", "nlpsol_qrsqp", "nlpsol_sqpmethod"]
@@ -57,7 +62,9 @@ def link_copies(folder: Path) -> None:
 
 def needed(library: Path) -> set[str]:
     """Names of the shared libraries that one asks for."""
-    listing = subprocess.run(["readelf", "--dynamic", str(library)], capture_output=True, text=True, check=True).stdout
+    listing = subprocess.run(
+        ["readelf", "--dynamic", str(library)], capture_output=True, encoding="utf-8", check=True
+    ).stdout
     return set(re.findall(r"\(NEEDED\).*\[(.+)\]", listing))
 
 

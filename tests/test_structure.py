@@ -117,3 +117,59 @@ def test_the_architecture_page_names_every_room(package: str) -> None:
     assert table, f"docs/architecture.md has no section {package}/"
     cells = [row.split("|")[1] for row in table.splitlines() if row.startswith("|")]
     assert contents(package) <= {word for cell in cells for word in re.findall(r"`(\w+)`", cell)}
+
+
+def unencoded(path: Path) -> Iterator[str]:
+    """Where a file reads or writes text in whatever encoding the locale of the process has."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call):
+            called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            named = {word.arg: word.value for word in node.keywords}
+            # `open` may be that of an archive or of the store, which has no mode
+            position = 1 if isinstance(node.func, ast.Name) or called == "fdopen" else 0
+            at = 0 if called.endswith("TemporaryFile") else position
+            mode = named.get("mode", node.args[at] if len(node.args) > at else None)
+            text_mode = (
+                isinstance(mode, ast.Constant) and isinstance(mode.value, str) and set(mode.value) <= set("rwax+t")
+            )
+            is_text = (
+                called in ("read_text", "write_text")
+                or (called in ("open", "fdopen", "NamedTemporaryFile", "TemporaryFile") and text_mode)
+                or (called == "open" and isinstance(node.func, ast.Name) and mode is None)
+                or bool(named.keys() & {"text", "universal_newlines"})
+            )
+            if is_text and "encoding" not in named:
+                yield f"{name(path)}:{node.lineno}"
+
+
+def test_no_text_depends_on_the_locale() -> None:
+    """`LC_ALL=C` with `PYTHONUTF8=0` makes ASCII of what names no encoding."""
+    assert [where for path in sources() for where in unencoded(path)] == []
+
+
+@pytest.mark.parametrize(
+    ("code", "found"),
+    [
+        ("Path(f).read_text()", 1),
+        ("(Path(f) / n).write_text(t)", 1),
+        ("open(f)", 1),
+        ("open(f, 'w')", 1),
+        ("path.open('w')", 1),
+        ("NamedTemporaryFile('w', dir=d)", 1),
+        ("run(c, text=True)", 1),
+        ("os.fdopen(d, 'w')", 1),
+        ("path.open('rb')", 0),
+        ("open(f, encoding='utf-8')", 0),
+        ("run(c, text=True, encoding='utf-8')", 0),
+        ("store.open()", 0),
+        ("archive.open(entry)", 0),
+        ("NamedTemporaryFile(dir=d)", 0),
+    ],
+)
+def test_what_depends_on_the_locale_is_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str, found: int
+) -> None:
+    monkeypatch.setattr(f"{__name__}.ROOT", tmp_path)
+    path = tmp_path / "some.py"
+    path.write_text(code, encoding="utf-8")
+    assert len(list(unencoded(path))) == found

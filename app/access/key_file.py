@@ -102,7 +102,7 @@ def changing(file: Path) -> Iterator[list[ApiKey]]:
 def _replace(file: Path, entries: Sequence[ApiKey]) -> None:
     """A service that reads meanwhile sees the old file or the new one, never a part."""
     text = _HEAD + yaml.safe_dump(_ENTRIES.dump_python(list(entries)), sort_keys=False)
-    with NamedTemporaryFile("w", dir=file.parent, prefix=f".{file.name}.", delete=False) as new:
+    with NamedTemporaryFile("w", encoding="utf-8", dir=file.parent, prefix=f".{file.name}.", delete=False) as new:
         try:
             new.write(text)
             new.flush()

@@ -6,6 +6,7 @@ import signal
 import sys
 import uuid
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -104,17 +105,22 @@ def refused(error: Exception, request_id: str | None = None) -> Refused:
 def compile_kernel_of(robot_name: str) -> None:
     """Compiles the robot's kernel if the cache does not have it: a process that ends earlier would leave none.
 
-    Without a C compiler, and for a robot that nobody knows, nothing happens.
+    Without a C compiler, and for a robot that nobody knows, nothing happens. One that hangs is told and given up.
     """
     from app.cli.store import robot_named
     from app.exceptions import StoreUnavailable
     from optimizer.energy.kernel_cache import compile_kernel
     from optimizer.exceptions import UnknownRobot
+    from optimizer.native.library_cache import PATIENCE, CompilerHangs
 
     try:
-        compile_kernel(robot_named(robot_name))
+        compile_kernel(robot_named(robot_name), patience=replace(PATIENCE, compiler=PATIENCE.command))
     except (UnknownRobot, StoreUnavailable):
         return  # the answer says so
+    except CompilerHangs as error:
+        click.echo(
+            f"Without a compiled kernel, the computation takes longer: {error}. Name another one by CC.", err=True
+        )
     except (RuntimeError, OSError):
         return  # CasADi's virtual machine evaluates the same expressions
 

@@ -9,6 +9,13 @@ import click
 
 @click.command(
     epilog="""\b
+Exit codes:
+    0  ended by SIGTERM or Ctrl-C
+    1  a setting is wrong, or another program has the port: standard error says which, and what to do
+    2  wrong usage
+    3  the service cannot start: the log on standard error says why
+
+\b
 Example:
   joulepath serve --port 8080"""
 )
@@ -17,7 +24,7 @@ Example:
 def serve(host: str | None, port: int | None) -> None:
     """Starts the HTTP service, as `python -m app` does.
 
-    All other settings are environment variables, see docs/settings.md. SIGTERM and Ctrl-C end the service with 0.
+    All other settings are environment variables, see docs/settings.md.
     """
     # worker processes read the settings, too
     if host is not None:

@@ -9,7 +9,7 @@ import uuid
 from concurrent.futures import CancelledError as Cancelled
 from typing import TYPE_CHECKING, Any
 
-from app.cluster.machine import RESOURCE, compute
+from app.cluster.machine import RESOURCES, compute, resource, version
 from app.engine.work import Ended, Take, Work
 from app.exceptions import ClusterUnavailable, WorkerDied
 from optimizer.progress import nobody
@@ -29,6 +29,10 @@ _PATIENCE = 5.0
 """Time [s] in which the scheduler must answer."""
 
 
+class _Unsuitable(Exception):
+    """The scheduler cannot pass on what is sent to the machines; the message says why."""
+
+
 class Cluster:
     """A Dask cluster whose scheduler listens at `address`."""
 
@@ -36,6 +40,7 @@ class Cluster:
         self.address = address
         self._client: Client | None = None
         self._workers: dict[str, int] = {}
+        self._others: set[str] = set()
         self._topic = f"joulepath-{uuid.uuid4().hex}"
         self._works: dict[str, list[Work]] = {}
         self._releasing: set[asyncio.Task[None]] = set()
@@ -88,7 +93,7 @@ class Cluster:
         self._works[key] = works
         # short ones share a process with others, which are at the machine when it has ended these
         is_long = len(works) == 1 and expected >= TOGETHER
-        use = {RESOURCE: 1.0 if is_long else 1.0 / PER_PROCESS}
+        use = {resource(): 1.0 if is_long else 1.0 / PER_PROCESS}
         future = client.submit(compute, asked, key, self._topic, key=key, pure=False, retries=0, resources=use)
         try:
             ended: list[Ended] = await future.result()
@@ -127,22 +132,46 @@ class Cluster:
     async def _keep(self) -> None:
         from distributed import Client
 
-        is_told = False
+        told: str | None = None
         while True:
             try:
                 async with Client(self.address, asynchronous=True, timeout=_PATIENCE, set_as_default=False) as client:
+                    await self._check(client)
                     client.subscribe_topic(self._topic, self._heard)
                     logger.info("cluster reached", extra={"scheduler": self.address})
-                    is_told = False
+                    told = None
                     await self._watch(client)
-            except (OSError, TimeoutError) as error:
-                if not is_told:
+            except (OSError, TimeoutError, Cancelled, _Unsuitable) as error:
+                kind = type(error).__name__
+                if told != kind:
                     logger.error(
-                        "the scheduler of the cluster cannot be reached: jobs wait until it can",
-                        extra={"scheduler": self.address, "reason": str(error)},
+                        "the scheduler of the cluster cannot be used: jobs wait until it can",
+                        extra={"scheduler": self.address, "reason": str(error) or kind},
                     )
-                    is_told = True
+                    told = kind
+                if isinstance(error, _Unsuitable):  # each attempt leaves a traceback in its log
+                    await asyncio.sleep(_PATIENCE)
             await asyncio.sleep(LOOK)
+
+    async def _check(self, client: Client) -> None:
+        """Raises _Unsuitable unless the scheduler has this version of this package.
+
+        It reads tasks before it passes them on.
+        """
+        try:
+            async with asyncio.timeout(_PATIENCE):
+                found = await client.run_on_scheduler(version)
+        except (OSError, TimeoutError, Cancelled):
+            raise
+        except Exception as error:
+            raise _Unsuitable(
+                f"the scheduler cannot import this package: install joulepath[cluster] there ({error!r})"
+            ) from None
+        if found != version():
+            raise _Unsuitable(
+                "the scheduler has another version of this package: install the same one on all machines "
+                f"(there {found}, here {version()})"
+            )
 
     async def _watch(self, client: Client) -> None:
         """Until the connection is lost. Raises OSError or TimeoutError if the scheduler does not answer."""
@@ -152,13 +181,24 @@ class Cluster:
             while client.status == "running":
                 async with asyncio.timeout(_PATIENCE):
                     known = await scheduler.identity()
-                found = {name: int(each["resources"].get(RESOURCE, 0)) for name, each in known["workers"].items()}
+                has = {name: each["resources"] for name, each in known["workers"].items()}
+                found = {name: int(each.get(resource(), 0)) for name, each in has.items()}
                 self._workers = {name: count for name, count in found.items() if count}
+                self._tell_others({name for name, each in has.items() if any(map(_is_ours, each)) and not found[name]})
                 self._client = client
                 await asyncio.sleep(LOOK)
         finally:
             self._client = None
         raise OSError("the connection was lost")
+
+    def _tell_others(self, others: set[str]) -> None:
+        """Says once of each machine of another version why it gets nothing to do."""
+        if new := others - self._others:
+            logger.warning(
+                "machines of another version get no work: install the same one there",
+                extra={"machines": sorted(new), "version": version()},
+            )
+        self._others = others
 
     def _heard(self, event: tuple[float, dict[str, Any]]) -> None:
         """Something that a task has found."""
@@ -167,3 +207,7 @@ class Cluster:
         if works is not None:
             for index, each in pickle.loads(message["events"]):
                 works[index].tell(each)
+
+
+def _is_ours(name: str) -> bool:
+    return name.startswith(RESOURCES)

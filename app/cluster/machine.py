@@ -7,8 +7,11 @@ here, which has it computed by a process of the engine, and kills that process o
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import pickle
-from functools import partial
+from functools import cache, partial
+from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
@@ -23,13 +26,37 @@ from optimizer.progress import Event, nobody
 if TYPE_CHECKING:
     from distributed import Worker
 
-RESOURCE = "joulepath"
-"""Dask's name for one process of an engine. A worker without this module has none, and gets no task of ours."""
+RESOURCES = "joulepath-"
+"""What the resources of all versions begin with."""
 LOOK = 0.2
 """Time [s] between two looks at whether the result is still wanted, and at what was found."""
 _WANTED = ("executing", "long-running", "resumed")
 """States of a task, in a Dask worker, whose result somebody waits for."""
 _engines: WeakKeyDictionary[Worker, Engine] = WeakKeyDictionary()
+
+_PACKAGES = ("app", "optimizer", "models")
+_CODE = ("*.py", "*.c", "*.yaml")
+
+
+@cache
+def version() -> str:
+    """A digest of the code and the figures of this installation: objects that travel are read by the same ones only."""
+    digest = hashlib.sha256()
+    for package in _PACKAGES:
+        folder = Path(str(find_spec(package).origin)).parent  # type: ignore[union-attr]
+        for file in sorted(file for kind in _CODE for file in folder.rglob(kind)):
+            digest.update(f"{package}/{file.relative_to(folder)}\n".encode())
+            digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def resource() -> str:
+    """Dask's name for one process of an engine of this version.
+
+    A worker without this module, or of another version, has none, and gets no task of ours.
+    """
+    return f"{RESOURCES}{version()}"
+
 
 Asked = tuple[Task, float, bool]
 """A task, its deadline [s], and whether somebody listens to what it finds."""
@@ -41,7 +68,7 @@ async def dask_setup(worker: Worker) -> None:
     _engines[worker] = engine = Engine(settings, partial(warm, settings.robots))
     engine.start()
     for resources in (worker.state.total_resources, worker.state.available_resources):
-        resources[RESOURCE] = float(settings.workers)
+        resources[resource()] = float(settings.workers)
 
 
 async def dask_teardown(worker: Worker) -> None:

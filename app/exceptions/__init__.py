@@ -25,6 +25,7 @@ from app.exceptions.queue import (
 )
 from app.exceptions.stored import (
     AnswerInUse,
+    BundledRobot,
     EmptyStudy,
     JobNotCancellable,
     KeyReused,
@@ -56,6 +57,7 @@ from app.exceptions.transport import (
 __all__ = [
     "AnswerInUse",
     "BodyTooLarge",
+    "BundledRobot",
     "Busy",
     "ClientDisconnected",
     "ClusterUnavailable",

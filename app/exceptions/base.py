@@ -7,7 +7,7 @@ ServiceError
 │   ├── TooManyWaiting                            too many requests of jobs wait
 │   └── TooManyRequests     the client has its share of the queue
 │       └── TooManyConnectionsOfClient, TooManyBytesOfClient
-├── ClusterUnavailable  the scheduler of the cluster cannot be reached
+├── ClusterUnavailable  the scheduler of the cluster cannot be used
 ├── NotReady            no worker is warm
 ├── ShuttingDown        the service stops before the request is done
 ├── WorkerDied          the worker process ended during the task, and that of a second attempt
@@ -22,6 +22,7 @@ ServiceError
 ├── TooManyDeaths       the request ended its worker process again and again
 ├── EmptyStudy          the study has no iteration yet
 ├── RobotExists         the name of a robot is taken
+│   └── BundledRobot        by a robot that comes with the service
 ├── TooManyRobots       the service holds as many robots of users as it may
 ├── UnknownLog          no log has that id
 ├── UnknownIdentification   no identification has that id

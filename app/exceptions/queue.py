@@ -57,10 +57,11 @@ class TooManyWaiting(Busy):
 
 
 class ClusterUnavailable(ServiceError):
-    """The scheduler of the cluster cannot be reached."""
+    """The scheduler of the cluster cannot be reached, or has not this version of the package."""
 
     MESSAGE = (
-        "The scheduler of the cluster does not answer: jobs wait until it does. Requests that are answered at once are "
+        "The scheduler of the cluster does not answer, or does not have the same version of joulepath as this service, "
+        "whose log says which: jobs wait until it does. Requests that are answered at once are "
         "computed by this service meanwhile."
     )
 

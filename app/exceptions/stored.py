@@ -76,11 +76,17 @@ class EmptyStudy(ServiceError):
 
 
 class RobotExists(ServiceError):
-    """The name of a robot is taken, or is that of a robot that comes with the service."""
+    """The name of a robot is taken."""
+
+    MESSAGE = "A robot has this name: use another name, or replace the robot (`PUT`, on the command line `--replace`)."
+
+
+class BundledRobot(RobotExists):
+    """The robot comes with the service: nobody adds, replaces or deletes it."""
 
     MESSAGE = (
-        "A robot has this name: use another one. PUT replaces a robot that was added; the robots that come with the "
-        "service cannot be changed or deleted."
+        "This robot comes with the service and can be neither replaced nor deleted: only robots that were added can. "
+        "Give a robot of your own another name."
     )
 
 

@@ -59,7 +59,6 @@ from optimizer import exceptions as optimizer_errors
 from optimizer.excitation.errors import ExcitationInfeasible
 from optimizer.identification import errors as identification_errors
 from optimizer.identification.logs.log_errors import EffortNotUsable, LogTooLarge
-from optimizer.simulation.simulator import SimulatorMissing
 
 TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     InvalidRequest: problems.Validation,
@@ -90,7 +89,6 @@ TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     optimizer_errors.NoTrajectory: problems.NoTrajectory,
     optimizer_errors.NotCertified: problems.NotCertified,
     optimizer_errors.FormatUnsuitable: problems.FormatUnsuitable,
-    SimulatorMissing: problems.SimulatorMissing,
     optimizer_errors.DeadlineExceeded: problems.DeadlineExceeded,
     Busy: problems.Busy,
     TooManyRequests: problems.TooManyRequests,

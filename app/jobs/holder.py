@@ -21,14 +21,16 @@ def is_gone(holder: str) -> bool:
 
 def _machine() -> str:
     """The boot of the machine and the namespace of process ids: within both, an id and its start are unique."""
-    boot = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+    boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
     return f"{boot} {Path('/proc/self/ns/pid').readlink().name}"
 
 
 def _start_of(pid: int) -> int | None:
     """Start of a process in ticks since the boot; None if there is none."""
     try:
-        state, *fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        state, *fields = (
+            Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
+        )
     except OSError:
         return None
     return None if state == "Z" else int(fields[18])

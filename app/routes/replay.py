@@ -28,7 +28,6 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
         problems.UnknownAnswer,
         problems.UnknownFigures,
         problems.NotCertified,
-        problems.SimulatorMissing,
     ),
 )
 async def replay(

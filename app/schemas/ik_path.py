@@ -62,7 +62,8 @@ class IKPathRequest(RobotWithTcp):
         le=1,
     )
     deadline: float = described(
-        "Wall time from the arrival of the request, including the wait for a worker.",
+        "Wall time from the arrival of the request, including the wait for a worker. After it, no further point is "
+        "tried.",
         "s",
         10.0,
         default=10.0,
@@ -98,8 +99,11 @@ class PathPoint(Response):
     )
     reached: bool = described("Whether the errors are within `tolerance`.", None, True)
     written: bool = described("Whether the configuration is part of `trajectory`.", None, True)
-    reason: Literal["unreachable", "near_singular", "outside_limits"] | None = described(
-        "Why it is not part of `trajectory`; null if it is.", None, "near_singular"
+    reason: Literal["unreachable", "near_singular", "outside_limits", "deadline"] | None = described(
+        "Why it is not part of `trajectory`; null if it is. `deadline`: no time was left to search for it, and `q` is "
+        "where the search would have begun.",
+        None,
+        "near_singular",
     )
 
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import logging
 import sqlite3
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from alembic import command
@@ -23,6 +26,8 @@ OPENED = "opened"
 _MIGRATIONS = Path(__file__).parent / "migrations"
 _LOCK_TIMEOUT = 2.0
 """Longest wait [s] of a statement for another process's transaction."""
+_RETRY = 0.02
+"""Time [s] between two attempts to get a lock for which SQLite does not wait by itself."""
 _MIGRATION_TIMEOUT = 30.0
 """The same, while another process may be migrating the tables."""
 _SERVER_TIMEOUT = 5.0
@@ -40,10 +45,15 @@ def create_database_engine(url: str) -> Engine:
     parsed = make_url(url)
     if parsed.get_backend_name() == "sqlite":
         return _sqlite(parsed)
+    return _postgresql(parsed, _SERVER_TIMEOUT)
+
+
+def _postgresql(url: URL, timeout: float) -> Engine:
+    """An engine that waits `timeout` [s] for each answer of the server."""
     # pg8000: its licence permits redistribution, and it needs no C library
     engine = create_engine(
-        parsed.set(drivername="postgresql+pg8000"),
-        connect_args={"timeout": _SERVER_TIMEOUT},
+        url.set(drivername="postgresql+pg8000"),
+        connect_args={"timeout": timeout},
         # after a restart of the server, the connections of the pool are closed
         pool_pre_ping=True,
         pool_timeout=_SERVER_TIMEOUT,
@@ -77,7 +87,8 @@ def _sqlite(url: URL) -> Engine:
         connection.isolation_level = None  # `begin` below starts each transaction, also around DDL
         # FULL: a committed transaction survives a killed process and a power failure
         # secure_delete=FAST: with ON, the default of some builds, deleting needs as much space as what is deleted
-        for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "secure_delete=FAST"):
+        _keep_log(connection)
+        for pragma in ("synchronous=FULL", "foreign_keys=ON", "secure_delete=FAST"):
             connection.execute(f"PRAGMA {pragma}")
         connection.execute("SELECT count(*) FROM sqlite_master")  # opens the log, too
         record.info[OPENED] = {} if file is None else identity(file)
@@ -91,6 +102,20 @@ def _sqlite(url: URL) -> Engine:
         connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
 
     return engine
+
+
+def _keep_log(connection: sqlite3.Connection) -> None:
+    """Has the file keep a write-ahead log. Where two processes do so to a new file at once, SQLite fails one of them
+    instead of waiting."""
+    end = time.monotonic() + _LOCK_TIMEOUT
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode=WAL")
+            return
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode & 0xFF != sqlite3.SQLITE_BUSY or time.monotonic() > end:
+                raise
+        time.sleep(_RETRY)
 
 
 def migrate(engine: Engine) -> None:
@@ -108,11 +133,26 @@ def migrate(engine: Engine) -> None:
         present = MigrationContext.configure(connection).get_current_revision()
     if present == ScriptDirectory.from_config(config).get_current_head():
         return
-    with engine.execution_options(writes=True, migrates=True).begin() as connection:
-        if connection.dialect.name == "postgresql":
-            connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _MIGRATION_LOCK})
+    with _migrating(engine) as connection:
         config.attributes["connection"] = connection
         command.upgrade(config, "head")
+
+
+@contextmanager
+def _migrating(engine: Engine) -> Iterator[Connection]:
+    """A transaction in which no other process changes the tables."""
+    if engine.dialect.name == "sqlite":
+        with engine.execution_options(writes=True, migrates=True).begin() as connection:
+            yield connection
+        return
+    # a connection of the pool would give up on the lock, or on a long change of a table, after `_SERVER_TIMEOUT`
+    patient = _postgresql(engine.url, _MIGRATION_TIMEOUT + _SERVER_TIMEOUT)
+    try:
+        with patient.execution_options(migrates=True).begin() as connection:
+            connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _MIGRATION_LOCK})
+            yield connection
+    finally:
+        patient.dispose()
 
 
 def room_inside(session: Session) -> int:

@@ -7,16 +7,16 @@ from sqlalchemy.orm import Session
 
 from app.access.client import Client
 from app.access.rules import check_owner
-from app.exceptions import RobotExists, TooManyRobots
+from app.exceptions import BundledRobot, RobotExists, TooManyRobots
 from app.store.tables import OwnRobot
 from models.registry import robot_names
 from optimizer.exceptions import UnknownRobot
 
 
 def check_own(name: str) -> None:
-    """Raises RobotExists for a robot that comes with the service: nobody adds, replaces or deletes it."""
+    """Raises BundledRobot for a robot that comes with the service: nobody adds, replaces or deletes it."""
     if name in robot_names():
-        raise RobotExists
+        raise BundledRobot
 
 
 def all_of(session: Session) -> list[OwnRobot]:
@@ -28,8 +28,12 @@ def get(session: Session, name: str) -> OwnRobot:
     """The robot of this name. Raises UnknownRobot, which knows the names of all robots."""
     found = session.get(OwnRobot, name)
     if found is None:
-        raise UnknownRobot(name, [*robot_names(), *session.scalars(select(OwnRobot.name).order_by(OwnRobot.name))])
+        raise UnknownRobot(name, [*robot_names(), *_own_names(session)])
     return found
+
+
+def _own_names(session: Session) -> list[str]:
+    return list(session.scalars(select(OwnRobot.name).order_by(OwnRobot.name)))
 
 
 def add(session: Session, robot: OwnRobot, most: int) -> None:
@@ -59,10 +63,13 @@ def put(session: Session, robot: OwnRobot, most: int, client: Client) -> bool:
 def delete(session: Session, name: str, client: Client) -> None:
     """Deletes a robot.
 
-    Raises RobotExists for one that comes with the service, UnknownRobot if there is none, or NotOwner.
+    Raises BundledRobot for one that comes with the service, UnknownRobot if there is none, which then knows those that
+    were added, or NotOwner.
     """
     check_own(name)
-    robot = get(session, name)
+    robot = session.get(OwnRobot, name)
+    if robot is None:
+        raise UnknownRobot(name, _own_names(session))
     check_owner(client, robot.owner)
     session.delete(robot)
 

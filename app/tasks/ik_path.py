@@ -11,6 +11,7 @@ from app.convert.fields import fields
 from app.convert.pose import to_base, to_base_pose, to_matrix
 from app.engine.result import TaskResult
 from app.schemas.ik_path import IKPathRequest
+from optimizer.deadline import Deadline
 from optimizer.kinematics.path_following import follow
 from optimizer.problem.arm import Arm
 
@@ -23,7 +24,8 @@ class IKPathTask:
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """The answer of `POST /ik/path`. `deadline` is not watched: a thousand points take less than a second."""
+        """The answer of `POST /ik/path`, with the points that were tried within about `deadline` seconds."""
+        end = Deadline.after(deadline)
         request = self.request
         arm = Arm(robot=robot_named(request.robot), T_flange_tcp=to_matrix(request.tcp))
         T_base_frame = to_base(request.frame, arm.robot)
@@ -32,7 +34,7 @@ class IKPathTask:
             if request.points is not None
             else [to_base_pose(pose, arm.robot) for pose in request.poses or []]
         )
-        found = follow(arm, targets, np.array(request.guess), request.tolerance, request.near_singular)
+        found = follow(arm, targets, np.array(request.guess), request.tolerance, request.near_singular, end)
         written = [(t, point.q) for t, point in zip(request.t, found, strict=True) if point.written]
         names = ("q", "position_error", "rotation_error", "smallest_singular_value", "reached", "written", "reason")
         return TaskResult.of_json(

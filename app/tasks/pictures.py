@@ -53,7 +53,7 @@ class PictureTask:
         path = _path(self.robot)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            with path.with_suffix(".lock").open("w") as lock:
+            with path.with_suffix(".lock").open("wb") as lock:
                 fcntl.flock(lock, fcntl.LOCK_EX)
                 content = kept(self.robot) or _written(path, picture(self.robot))
         except OSError as error:

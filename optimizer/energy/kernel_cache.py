@@ -15,7 +15,7 @@ from optimizer.energy import inverse_dynamics, kernel_expressions, kernel_source
 from optimizer.energy.kernel_expressions import SYMBOLICS, build
 from optimizer.energy.kernel_source import PORTABLE, Vectors, source, vectors
 from optimizer.native import library_cache
-from optimizer.native.library_cache import cache_directory, compile_library
+from optimizer.native.library_cache import PATIENCE, Patience, cache_directory, compile_library
 
 # at -O1 it takes twice as long to compile, and runs a tenth faster: the code is one long run of multiplications. All
 # processors round alike without contraction
@@ -50,15 +50,15 @@ def library_paths(robot: Robot) -> list[Path]:
     return list(dict.fromkeys(library_path(robot, using) for using in (vectors(), PORTABLE)))
 
 
-def compile_kernel(robot: Robot, portable: bool = False) -> Path:
+def compile_kernel(robot: Robot, portable: bool = False, patience: Patience = PATIENCE) -> Path:
     """Compile a robot's functions, once however many threads and processes ask. Returns the path of the library.
 
     It is for this machine's processor, or, if `portable`, for every one of its kind, which takes twice as long to run.
-    Raises RuntimeError if there is no compiler or it fails, OSError if the cache cannot be written.
+    Raises as `compile_library`.
     """
     count, flags = using = PORTABLE if portable else vectors()
     target = library_path(robot, using)
-    compile_library(target, (*COMPILER_FLAGS, *flags), lambda: _source(robot, count))
+    compile_library(target, (*COMPILER_FLAGS, *flags), lambda: _source(robot, count), patience)
     return target
 
 

@@ -58,7 +58,7 @@ static inline void give(const lanes *y, long size, long first, long count, doubl
 def vectors() -> Vectors:
     """The longest vectors of this machine's processor."""
     try:
-        return AVX2 if " avx2 " in _CPU.read_text().replace("\n", " ") else PORTABLE
+        return AVX2 if " avx2 " in _CPU.read_text(encoding="utf-8", errors="replace").replace("\n", " ") else PORTABLE
     except OSError:
         return PORTABLE
 

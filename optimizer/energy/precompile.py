@@ -18,6 +18,13 @@ if __name__ == "__main__":
     wanted = [name for name in sys.argv[1:] if name != "--portable"] or robot_names()
     if unknown := set(wanted) - set(robot_names()):
         sys.exit(f"There is no robot named {', '.join(sorted(unknown))}: use some of {', '.join(robot_names())}.")
-    print(compile_shared())
-    for name in wanted:
-        print(compile_kernel(load_robot(name), portable))
+    try:
+        print(compile_shared())
+        for name in wanted:
+            print(compile_kernel(load_robot(name), portable))
+    except (RuntimeError, OSError) as error:
+        sys.exit(
+            f"The kernels cannot be compiled: {error}\nName a C compiler that works by CC, or a folder for the "
+            "kernels by JOULEPATH_CACHE_DIR. The service also works without them (`make serve JOULEPATH_ROBOTS=`), "
+            "more slowly."
+        )

@@ -17,7 +17,8 @@ import numpy as np
 import pinocchio as pin
 
 from models.robot import Array
-from optimizer.exceptions import InvalidProblem
+from optimizer.deadline import NEVER, Deadline
+from optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from optimizer.kinematics.angles import nearest_turn
 from optimizer.kinematics.tcp import T_last_tcp
 from optimizer.problem.arm import Arm
@@ -31,12 +32,14 @@ CONVERGED = 1e-13
 LONGEST_STEP = 0.5
 LEAST_DAMPING, FIRST_DAMPING, MOST_DAMPING = 1e-15, 1e-3, 1e10
 
-Reason = Literal["unreachable", "near_singular", "outside_limits"]
+Reason = Literal["unreachable", "near_singular", "outside_limits", "deadline"]
 
 
 @dataclass(frozen=True)
 class PathPoint:
     """Result for one point: the nearest q (nq,) [rad] found, its errors [m, rad] and smallest singular value.
+
+    A point for which no time was left has the configuration from which its search would have begun.
 
     The singular value is of the TCP's Jacobian: its three translational rows [m] for a position, all six [m, rad] for
     a pose. `rotation_error` is None for a position.
@@ -51,7 +54,7 @@ class PathPoint:
     @property
     def reached(self) -> bool:
         """Whether the TCP reaches the point."""
-        return self.reason != "unreachable"
+        return self.reason not in ("unreachable", "deadline")
 
     @property
     def written(self) -> bool:
@@ -60,14 +63,21 @@ class PathPoint:
 
 
 def follow(
-    arm: Arm, targets: Sequence[Pose] | Array, guess: Array, tolerance: float = 1e-6, near_singular: float = 1e-2
+    arm: Arm,
+    targets: Sequence[Pose] | Array,
+    guess: Array,
+    tolerance: float = 1e-6,
+    near_singular: float = 1e-2,
+    deadline: Deadline = NEVER,
 ) -> list[PathPoint]:
     """Configurations along a path of positions (n, 3) [m] or poses of the TCP in the base frame.
 
     The search for the first point starts from `guess` (nq,) [rad], for each other point from the last configuration
     that is part of the motion. If that fails, it starts once more from `guess`. A point is reached if its error is at
     most `tolerance` [m, rad]. `near_singular` is the least smallest singular value of a configuration that is part of
-    the motion. Raises InvalidProblem or OutsideLimits.
+    the motion. No search for a point begins after `deadline`.
+
+    Raises InvalidProblem or OutsideLimits, or DeadlineExceeded if the deadline passes before the first search.
     """
     guess = frozen(guess, (arm.robot.nq,), "guess")
     arm.check_inside("guess", guess)
@@ -75,9 +85,15 @@ def follow(
         raise InvalidProblem("points", "The path needs at least one point.")
     search = _Search(arm)
     limits = arm.active_limits
-    points, last = [], guess
+    points, last = list[PathPoint](), guess
     for target in targets:
         wanted = target.T if isinstance(target, Pose) else frozen(target, (3,), "points")
+        if deadline.passed:
+            if not points:
+                raise DeadlineExceeded([])
+            start = search.found(wanted, last)
+            points.append(PathPoint(start.q, start.position, start.rotation, start.singular_value, "deadline"))
+            continue
         attempts = [search.solve(wanted, last)]
         if attempts[0].worst > tolerance and last is not guess:
             attempts.append(search.solve(wanted, guess))
@@ -132,7 +148,12 @@ class _Search:
             else:
                 damping *= 10
         # full turns of a joint reach the same pose: the configuration nearest to the start is meant
-        q = nearest_turn(q, start)
+        return self.found(wanted, nearest_turn(q, start))
+
+    def found(self, wanted: Array, q: Array) -> _Found:
+        """How far a configuration is from a position (3,) or pose (4, 4)."""
+        error = self._error(wanted, q)
+        jacobian = self._jacobian(q)[: len(error)]
         return _Found(
             q,
             float(np.linalg.norm(error[:3])),

@@ -6,18 +6,45 @@ is noticed before it is loaded.
 
 from __future__ import annotations
 
+import atexit
 import fcntl
 import hashlib
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 # users may bring any number of arms, each with a library of about a megabyte
 MOST_LIBRARIES = 200
+
+
+@dataclass(frozen=True)
+class Patience:
+    """How long a C compiler is waited for."""
+
+    compiler: float = 300.0
+    """Time [s] after which a compiler counts as hung and is killed: the largest kernel takes half a minute, and
+    ten times as long on a machine with much else to do."""
+    command: float = 60.0
+    """The same [s], where somebody waits for the command that compiles before it computes."""
+    rest: float = 3600.0
+    """Time [s] for which a compiler that hung is not tried again for the same library, by any process: every command
+    and every new worker would wait for it."""
+    warm_up: float = 5.0
+    """Time [s] for which a worker's warm-up waits for the shared library, which takes half a second."""
+    look: float = 0.05
+    """Time [s] between two attempts to get the lock that another process holds while it compiles."""
+
+
+PATIENCE = Patience()
+_running: set[subprocess.Popen[bytes]] = set()
 
 
 def cache_directory() -> Path:
@@ -44,33 +71,101 @@ def compiler() -> str | None:
     return shutil.which(os.environ.get("CC", "cc")) or shutil.which("gcc") or shutil.which("clang")
 
 
-def compile_library(target: Path, flags: Sequence[str], source: Callable[[], str]) -> None:
+class CompilerHangs(RuntimeError):
+    """The C compiler, or another process that compiles the same, takes longer than anybody waits."""
+
+
+def compile_library(
+    target: Path, flags: Sequence[str], source: Callable[[], str], patience: Patience = PATIENCE
+) -> None:
     """Compile C to the library `target`, once however many threads and processes ask. `source` gives the code.
 
-    Raises RuntimeError if there is no compiler or it fails, OSError if the cache cannot be written.
+    Raises RuntimeError if there is no compiler or it fails, CompilerHangs if it takes longer than `patience` or did so
+    lately, OSError if the cache cannot be written.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
-    with (target.with_suffix(".lock")).open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with target.with_suffix(".lock").open("wb") as lock:
+        _wait_for(lock, patience)
         if is_intact(target):
             return
         command = compiler()
         if command is None:
             raise RuntimeError("no C compiler found")
+        hung = target.with_suffix(".hung")
+        if _hung_lately(hung, command, patience):
+            raise CompilerHangs(f"the C compiler {command} hung: it is tried again {patience.rest / 60:g} min later")
         with workplace(target) as folder:
             library, seal = folder / "library.so", folder / "library.sha256"
             code = folder / "library.c"
-            code.write_text(source())
-            run = subprocess.run(
-                [command, *flags, str(code), "-o", str(library), "-lm"], capture_output=True, text=True
-            )
-            if run.returncode:
-                raise RuntimeError(f"the C compiler failed: {run.stderr[-500:]}")
-            seal.write_text(hashlib.sha256(library.read_bytes()).hexdigest())
+            code.write_text(source(), encoding="utf-8")
+            try:
+                _run([command, *flags, str(code), "-o", str(library), "-lm"], folder / "log", lock, patience)
+            except CompilerHangs:
+                hung.write_text(command, encoding="utf-8", errors="surrogateescape")
+                raise
+            seal.write_text(hashlib.sha256(library.read_bytes()).hexdigest(), encoding="ascii")
             # the seal first: a library without its seal counts as damaged, a seal without its library as absent
             seal.replace(seal_path(target))
             library.replace(target)
+            hung.unlink(missing_ok=True)
     _prune(target.parent)
+
+
+def _hung_lately(note: Path, command: str, patience: Patience) -> bool:
+    """Whether this compiler was killed for this library; of another one, or long ago, the note says nothing."""
+    try:
+        is_recent = time.time() - note.stat().st_mtime < patience.rest
+        return is_recent and note.read_text(encoding="utf-8", errors="surrogateescape") == command
+    except OSError:
+        return False
+
+
+def _wait_for(lock: IO[bytes], patience: Patience) -> None:
+    end = time.monotonic() + patience.compiler
+    while True:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        except BlockingIOError:
+            if time.monotonic() > end:
+                raise CompilerHangs(f"another process has been compiling it for {patience.compiler:g} s") from None
+        time.sleep(patience.look)
+
+
+def _run(command: Sequence[str], log: Path, lock: IO[bytes], patience: Patience) -> None:
+    """Run the compiler, with all processes that it starts in a group of their own.
+
+    It inherits the lock: if this process is killed, no other one starts a second compiler beside it.
+    """
+    with log.open("wb") as output:
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True, pass_fds=[lock.fileno()],
+        )  # fmt: skip
+        _running.add(process)
+        try:
+            code = process.wait(patience.compiler)
+        except subprocess.TimeoutExpired:
+            raise CompilerHangs(f"the C compiler {command[0]} does not end within {patience.compiler:g} s") from None
+        finally:
+            _kill(process)
+            _running.discard(process)
+    if code:
+        raise RuntimeError(f"the C compiler failed: {log.read_text(encoding='utf-8', errors='replace')[-500:]}")
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    if process.poll() is None:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+@atexit.register
+def _kill_all() -> None:
+    # a thread that waits for a compiler does not outlive the program
+    for process in list(_running):
+        _kill(process)
 
 
 @contextmanager

@@ -1,8 +1,8 @@
 """The library that every arm shares: forward kinematics, distances and the terms of dual bounds, of many
 configurations at once.
 
-It serves on every processor of this kind. Where there is none, since there is no compiler or no place for it, numpy
-computes the same, several times as slowly.
+It serves on every processor of this kind. Where there is none, since there is no compiler or no place for it, and while
+the compiler runs, numpy computes the same, several times as slowly.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import ctypes
 import hashlib
 import logging
 import os
-from functools import cache
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +44,7 @@ _FUNCTIONS = {
 
 def source() -> str:
     """The C of the library."""
-    return "".join((Path(__file__).parent / name).read_text() for name in SOURCES)
+    return "".join((Path(__file__).parent / name).read_text(encoding="utf-8") for name in SOURCES)
 
 
 def library_path() -> Path:
@@ -62,22 +62,57 @@ def compile_shared() -> Path:
     return path
 
 
-@cache
-def shared_library() -> ctypes.CDLL | None:
-    """The library, compiled if that has not been done, which takes half a second; None if it cannot be."""
-    if compiler() is None and not is_intact(library_path()):
-        return None
-    try:
-        path = compile_shared()
-        library = ctypes.CDLL(str(path))
-    except (RuntimeError, OSError) as error:
-        log.warning("the shared library is not compiled, numpy serves: %s", error)
-        return None
-    mark_used(path)
-    for name, (arguments, result) in _FUNCTIONS.items():
-        function = getattr(library, name)
-        function.argtypes, function.restype = arguments, result
-    return library
+class _Loader:
+    """Loads the library once, for any number of threads. A thread of its own compiles it where it is missing, so that
+    no caller's deadline depends on the compiler; it is tried once."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._tried = False
+        self._library: ctypes.CDLL | None = None
+        self._compiling: threading.Thread | None = None
+
+    def get(self, patience: float) -> ctypes.CDLL | None:
+        if not self._tried:
+            with self._lock:
+                if not self._tried:
+                    self._begin()
+                    self._tried = True
+        if patience and self._compiling is not None:
+            self._compiling.join(patience)
+        # read once: the thread only ever sets it
+        return self._library
+
+    def _begin(self) -> None:
+        if is_intact(library_path()):
+            self._load()
+        elif compiler() is not None:
+            self._compiling = threading.Thread(target=self._load, name="library-compiler", daemon=True)
+            self._compiling.start()
+
+    def _load(self) -> None:
+        try:
+            path = compile_shared()
+            library = ctypes.CDLL(str(path))
+        except (RuntimeError, OSError) as error:
+            log.warning("the shared library is not compiled, numpy serves: %s", error)
+            return
+        mark_used(path)
+        for name, (arguments, result) in _FUNCTIONS.items():
+            function = getattr(library, name)
+            function.argtypes, function.restype = arguments, result
+        self._library = library
+
+
+_loader = _Loader()
+
+
+def shared_library(patience: float = 0.0) -> ctypes.CDLL | None:
+    """The library; None if it cannot be compiled, or if that takes longer than `patience` [s] yet.
+
+    The first call has it compiled in the background, which takes half a second, if that has not been done.
+    """
+    return _loader.get(patience)
 
 
 def address(array: np.ndarray[Any, Any]) -> int:

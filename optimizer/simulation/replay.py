@@ -84,7 +84,7 @@ def replay(
     """A motion played under each controller, and under the first of them on changed arms.
 
     `step` [s] is that of simulation and controller. `perturb` has the fractions by which quantities of the arm are
-    raised and lowered, one at a time. Raises SimulatorMissing; InvalidProblem if the motion takes too many steps;
+    raised and lowered, one at a time. Raises InvalidProblem if the motion takes too many steps,
     DeadlineExceeded after `deadline` [s].
     """
     try:

@@ -23,7 +23,7 @@ AT_REST = 1e-9
 class SimulatedArm:
     """A MuJoCo model of an arm. `carry` changes its masses and friction without compiling it again.
 
-    `bodies` are the names of the bodies by the number of their geom. Raises SimulatorMissing.
+    `bodies` are the names of the bodies by the number of their geom.
     """
 
     def __init__(self, arm: Arm) -> None:

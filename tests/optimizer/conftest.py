@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 from models.registry import load_robot
 from optimizer.energy import kernel
 from optimizer.energy.kernel_cache import compile_kernel
+from optimizer.native.library_cache import PATIENCE
 from optimizer.native.shared_library import shared_library
 
 
@@ -24,7 +25,7 @@ def _one_thread() -> Iterator[None]:
 def _compiled() -> Iterator[None]:
     """Many motions of the default robot take a while without it. The few of another one take less than its compiler."""
     compile_kernel(load_robot("ur5e"))
-    assert shared_library() is not None, "make installs a compiler where there is none"
+    assert shared_library(PATIENCE.compiler) is not None, "make installs a compiler where there is none"
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(kernel, "compiler", lambda: None)
         yield

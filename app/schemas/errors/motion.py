@@ -16,7 +16,9 @@ class UnknownRobot(ProblemDetails):
     type: Literal["/problems/unknown-robot"] = fixed("type", "/problems/unknown-robot")
     title: Literal["Unknown robot"] = fixed("title", "Unknown robot")
     status: Literal[404] = fixed("status", 404)
-    known: list[str] = described("Names of all robots.", None, ["ur10e", "ur3e", "ur5e"])
+    known: list[str] = described(
+        "Names of all robots; where a robot is deleted, of those that were added.", None, ["ur10e", "ur3e", "ur5e"]
+    )
 
 
 class NoMeshes(ProblemDetails):
@@ -296,15 +298,6 @@ class NoCollisionFreeTrajectory(_SearchError):
     cut_short: bool = described(
         "Whether the deadline ended the search for a collision-free path. If so, allow a longer deadline.", None, False
     )
-
-
-class SimulatorMissing(ProblemDetails):
-    """MuJoCo, which plays the motions of `POST /replay`, is an optional part of the service and is not installed. The
-    operator installs it with `pip install 'joulepath[mujoco]'` and restarts the service. All other requests work."""
-
-    type: Literal["/problems/simulator-missing"] = fixed("type", "/problems/simulator-missing")
-    title: Literal["Simulator missing"] = fixed("title", "Simulator missing")
-    status: Literal[501] = fixed("status", 501)
 
 
 class DeadlineExceeded(_SearchError):

@@ -105,9 +105,9 @@ class UnknownStudy(ProblemDetails):
 
 
 class ClusterUnavailable(ProblemDetails):
-    """The scheduler of the cluster that works on jobs cannot be reached. Jobs are accepted, and wait until it can.
-    Requests that are answered at once are computed by the service itself. Try again after the time [s] in the header
-    `Retry-After`."""
+    """The scheduler of the cluster that works on jobs cannot be reached, or does not have the same version of joulepath
+    as the service, whose log says which. Jobs are accepted, and wait until it can be used. Requests that are answered
+    at once are computed by the service itself. Try again after the time [s] in the header `Retry-After`."""
 
     retry_after: ClassVar[int | None] = 5
     type: Literal["/problems/cluster-unavailable"] = fixed("type", "/problems/cluster-unavailable")

@@ -42,4 +42,8 @@ def test_what_makes_no_robot(here: Here, tmp_path: Path) -> None:
     code, problem = here.problem("robots", "add", str(file), "--name", "arm_1")
     (error,) = problem["errors"]
     assert code == 2 and error["loc"] == ["body", "tip"] and "no link 'hand'" in error["msg"]
-    assert here.problem("robots", "remove", "ur5e")[1]["type"] == "/problems/robot-exists"
+    problem = here.problem("robots", "remove", "ur5e")[1]
+    assert problem["type"] == "/problems/robot-exists" and "neither replaced nor deleted" in problem["detail"]
+    # only what was added can be removed
+    problem = here.problem("robots", "remove", "arm_2")[1]
+    assert (problem["known"], problem["detail"]) == ([], "There is no robot of that name: none has been added.")

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import dask
 import pytest
 from distributed import Scheduler, Worker
 
-from app.cluster.link import PER_PROCESS, Cluster
+from app.cluster import link
+from app.cluster import machine as app_machine
+from app.cluster.link import LOOK, PER_PROCESS, Cluster
+from app.cluster.machine import RESOURCES
 from app.engine.result import TaskResult
 from app.engine.task import Task
 from app.engine.work import Ended, Work, result_of, taking
@@ -18,7 +28,7 @@ from app.exceptions import ClusterUnavailable, TaskFailed, WorkerDied
 from optimizer.exceptions import OutsideLimits
 from optimizer.progress import CandidatesFound, Event
 from tests.app.engine.simple_tasks import Count, Die, Fail, Hold, ProcessId
-from tests.app.live import alive
+from tests.app.live import ROOT, alive
 
 PATIENCE = 120.0
 """What a busy machine may take for anything below [s]; no test waits for it to pass."""
@@ -213,3 +223,122 @@ def test_those_whose_machine_died_are_tried_one_by_one(monkeypatch: pytest.Monke
 
     with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
         with_cluster(test, monkeypatch)
+
+
+@contextmanager
+def scheduler_process(folder: Path, **environment: str) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
+    """A scheduler as a process of its own, with the package that is in a folder; and its address."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    command = ["-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
+    others = os.environ | {"PYTHONPATH": str(folder)} | environment
+    with (folder / "scheduler.log").open("ab") as log:
+        process = subprocess.Popen([sys.executable, *command], cwd=folder, env=others, stdout=log, stderr=log)
+    try:
+        yield process, f"tcp://127.0.0.1:{port}"
+    finally:
+        process.kill()
+        process.wait()
+
+
+async def refused_by(cluster: Cluster, caplog: pytest.LogCaptureFixture, reason: str) -> None:
+    """Until the log has the reason why nothing is sent to the cluster, which it says once."""
+
+    def told() -> list[str]:
+        records = [record for record in caplog.records if record.name == "app.cluster.link"]
+        return [vars(record)["reason"] for record in records if "cannot be used" in record.message]
+
+    await until(lambda: bool(told()))
+    await asyncio.sleep(3 * LOOK)
+    (found,) = told()
+    assert reason in found
+    assert cluster.slots == 0
+    with pytest.raises(ClusterUnavailable):
+        assert cluster.workers
+    with pytest.raises(ClusterUnavailable):
+        await result_of(cluster.run, ProcessId(), LONG)
+
+
+def other_version(folder: Path) -> None:
+    """A copy of this package with one character more."""
+    for package in ("app", "optimizer", "models"):
+        shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("static", "__pycache__"))
+    with (folder / "optimizer" / "deadline.py").open("a", encoding="utf-8") as file:
+        file.write("#")
+
+
+@pytest.mark.parametrize(
+    ("there", "reason"),
+    [
+        ("nothing", "cannot import this package"),
+        pytest.param("another", "has another version", marks=pytest.mark.long),
+    ],
+)
+def test_a_scheduler_without_this_version_gets_nothing(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, there: str, reason: str
+) -> None:
+    """It reads what it passes on, and would fail every request."""
+
+    async def run(address: str) -> None:
+        cluster = Cluster(address)
+        cluster.start()
+        try:
+            await refused_by(cluster, caplog, reason)
+        finally:
+            await cluster.stop()
+
+    if there == "another":
+        other_version(tmp_path)
+    with scheduler_process(tmp_path) as (_, address):
+        asyncio.run(run(address))
+
+
+def test_a_machine_of_another_version_gets_nothing(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def test(cluster: Cluster, scheduler: Scheduler) -> None:
+        monkeypatch.setattr(app_machine, "resource", lambda: f"{RESOURCES}another")
+        async with machine(scheduler, workers=4) as other:
+            await until(lambda: len(scheduler.workers) == 2)
+            monkeypatch.undo()
+            await until(lambda: any("another version" in record.message for record in caplog.records))
+            assert cluster.slots == PER_PROCESS
+            pids = await asyncio.gather(*(start(cluster, ProcessId()) for _ in range(6)))
+            assert len(set(pids)) == 1
+            assert other.address not in cluster.workers
+        await asyncio.sleep(3 * LOOK)
+        (record,) = (record for record in caplog.records if "another version" in record.message)
+        assert vars(record)["machines"] == [other.address]
+
+    with_cluster(test, monkeypatch)
+
+
+@pytest.mark.long
+def test_a_scheduler_that_hangs_and_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Its connections stay open, and say nothing."""
+    monkeypatch.setattr(link, "_PATIENCE", 1.0)
+    monkeypatch.setenv("JOULEPATH_ROBOTS", "")
+
+    async def run(process: subprocess.Popen[bytes], address: str) -> None:
+        cluster = Cluster(address)
+        cluster.start()
+        try:
+            async with Worker(address, nthreads=1, memory_limit=0, preload=["app.cluster"], dashboard=False):
+                await until(lambda: cluster.slots == PER_PROCESS)
+                running = start(cluster, hold(tmp_path / "runs"))
+                await until((tmp_path / "runs" / "started").exists)
+                process.send_signal(signal.SIGSTOP)
+                await until(lambda: cluster.slots == 0)
+                with pytest.raises(ClusterUnavailable):
+                    await running
+                with pytest.raises(ClusterUnavailable):
+                    await result_of(cluster.run, ProcessId(), LONG)
+                process.send_signal(signal.SIGCONT)
+                await until(lambda: cluster.slots == PER_PROCESS)
+                await start(cluster, ProcessId())
+        finally:
+            await cluster.stop()
+
+    with scheduler_process(tmp_path, PYTHONPATH=str(ROOT)) as (process, address):
+        asyncio.run(run(process, address))

@@ -19,7 +19,6 @@ from optimizer.exceptions import JoulepathError
 from optimizer.excitation.errors import ExcitationInfeasible
 from optimizer.identification import errors as identification_errors
 from optimizer.identification.logs.log_errors import EffortNotUsable, LogTooLarge
-from optimizer.simulation.simulator import SimulatorMissing
 from optimizer.solution import CandidateReport, Clearance, UnreachableTarget
 
 CANDIDATE = CandidateReport("left/up/flip", "left/up/flip", np.zeros(6), np.ones(6), "failed", "no step left", 12.5)
@@ -54,7 +53,6 @@ ERRORS: list[JoulepathError] = [
     exceptions.ContradictoryOrder("before", "No order is possible.", ["pick", "place"]),
     exceptions.NotCertified(2, "its velocity is at 1.2 of the limit", {"velocity": 1.2, "torque": np.nan}),
     exceptions.FormatUnsuitable("urscript", "This robot has 7 joints: use ros2."),
-    SimulatorMissing(),
     exceptions.PathInfeasible(0.5, [exceptions.PathAttempt("left/up/flip", 0.6, "singular")]),
 ]
 
@@ -68,7 +66,16 @@ SERVICE_ERRORS: list[ServiceError] = [
     *(service.StoreUnavailable(cause) for cause in service.StoreUnavailable.MESSAGES),
     *(kind() for kind in (service.UnknownStudy, service.UnknownIteration, service.KeyReused, service.NotFound)),
     *(kind() for kind in (service.MethodNotAllowed, service.BodyTooLarge, service.UnsupportedMediaType)),
-    *(kind() for kind in (service.RobotExists, service.TooManyRobots, service.AnswerInUse, service.NoMeshes)),
+    *(
+        kind()
+        for kind in (
+            service.RobotExists,
+            service.BundledRobot,
+            service.TooManyRobots,
+            service.AnswerInUse,
+            service.NoMeshes,
+        )
+    ),
     *(kind() for kind in (service.UnknownFigures, service.FiguresInUse, service.TooManyFigures)),
     *(kind() for kind in (service.NoKey, service.WrongKey, service.CrossSite, service.WrongHost)),
     service.RoleTooLow("read", "compute"),

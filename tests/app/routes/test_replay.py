@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from typing import Any
 
 import pytest
@@ -11,9 +9,7 @@ from starlette.testclient import TestClient
 
 from app.schemas import errors as problems
 from app.schemas.examples.own_arm import ARM
-from app.schemas.replay import ReplayRequest, ReplayResponse
-from app.tasks.replay import ReplayTask
-from optimizer.simulation.simulator import SimulatorMissing
+from app.schemas.replay import ReplayResponse
 from tests.app.requests import HOME, NEAR, PATIENT, move
 from tests.app.routes.test_problems import refused
 
@@ -206,10 +202,3 @@ def test_a_motion_that_takes_long_is_ended(client: TestClient) -> None:
     request = {"configurations": [HOME, NEAR], "time_per_segment": 90.0, "sample_period": 1.0}
     body = {"answer": client.post("/evaluate", json=request).json(), "deadline": 0.05}
     refused(client.post("/replay", json=body), problems.DeadlineExceeded)
-
-
-def test_without_mujoco(monkeypatch: pytest.MonkeyPatch, loaded: dict[str, Any]) -> None:
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    request = ReplayRequest.model_validate(json.loads(json.dumps({"answer": loaded})))
-    with pytest.raises(SimulatorMissing):
-        ReplayTask(request, "id").run(10.0)

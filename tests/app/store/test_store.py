@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import sqlite3
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Awaitable, Callable
 from datetime import timedelta
@@ -26,7 +28,7 @@ from app.exceptions import StoreUnavailable, UnknownAnswer
 from app.schemas import answers as schemas
 from app.schemas import errors as problems
 from app.settings import Settings
-from app.store import answers
+from app.store import answers, database
 from app.store.database import create_database_engine, migrate
 from app.store.store import Store
 from app.store.store_answers import store_answers
@@ -104,6 +106,47 @@ def test_several_processes_may_migrate_at_once(url: str) -> None:
     processes = [subprocess.Popen([sys.executable, "-c", code, url], cwd=ROOT) for _ in range(4)]
     assert [process.wait(60) for process in processes] == [0] * 4
     assert tables(url) == []
+
+
+def test_a_new_file_that_another_process_makes_is_waited_for(tmp_path: Path) -> None:
+    """SQLite itself does not wait where a file without a log is to get one."""
+    file = tmp_path / "joulepath.db"
+    other = sqlite3.connect(file, isolation_level=None, check_same_thread=False)
+    other.execute("BEGIN IMMEDIATE")
+    timer = threading.Timer(0.3, other.execute, ["COMMIT"])
+    timer.start()
+    engine = create_database_engine(f"sqlite:///{file}")
+    with engine.connect() as connection:
+        assert connection.exec_driver_sql("PRAGMA journal_mode").scalar_one() == "wal"
+    timer.join()
+    other.close()
+
+
+@pytest.mark.skipif(MISSING is not None, reason=str(MISSING))
+def test_a_service_waits_while_another_one_migrates(server: Postgres, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also for longer than PostgreSQL may take for an ordinary answer: the first request is not refused."""
+    monkeypatch.setattr(database, "_SERVER_TIMEOUT", 0.5)
+    with create_database_engine(server.url).begin() as connection:
+        connection.execute(text("DROP SCHEMA public CASCADE"))
+        connection.execute(text("CREATE SCHEMA public"))
+    locked = threading.Event()
+
+    def migrate_slowly() -> None:
+        with create_database_engine(server.url).begin() as connection:
+            connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": database._MIGRATION_LOCK})
+            locked.set()
+            time.sleep(3 * database._SERVER_TIMEOUT)
+
+    async def test(store: Store) -> None:
+        await store.open()
+        assert store.fault is None
+        assert await store.read(lambda session: session.scalar(select(func.count()).select_from(Answer))) == 0
+
+    other = threading.Thread(target=migrate_slowly)
+    other.start()
+    assert locked.wait(30)
+    with_store(server.url, test)
+    other.join()
 
 
 def test_answers_are_kept_whole(url: str) -> None:

@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
 
 from optimizer.native import library_cache
-from optimizer.native.library_cache import cache_directory, mark_used
+from optimizer.native.library_cache import (
+    CompilerHangs,
+    Patience,
+    cache_directory,
+    compile_library,
+    is_intact,
+    mark_used,
+)
+
+HASTY = Patience(compiler=0.5, look=0.01)
+ENDED = 20.0  # s; for a process that was killed to be gone, on a machine with much else to do
 
 
 def test_the_cache_is_where_the_user_says_or_at_home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -33,3 +48,89 @@ def test_libraries_that_rested_longest_leave(tmp_path: Path, monkeypatch: pytest
     # a folder that is gone is no error
     mark_used(tmp_path / "none" / "arm.so")
     library_cache._prune(tmp_path / "none")
+
+
+@pytest.fixture
+def hung(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The file with the ids of a compiler that hangs, and of the process that it has started."""
+    compiler, ids = tmp_path / "compiler", tmp_path / "ids"
+    compiler.write_text(f"#!/bin/sh\nsleep 1000 &\necho $$ $! >> {ids}\nwait\n", encoding="utf-8")
+    compiler.chmod(0o755)
+    monkeypatch.setenv("CC", str(compiler))
+    return ids
+
+
+def is_there(process: str) -> bool:
+    """Whether it runs: what was killed may stay for its parent to ask about."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def until_gone(ids: Path) -> None:
+    end = time.monotonic() + ENDED
+    while any(is_there(each) for each in ids.read_text().split()):
+        assert time.monotonic() < end, "the compiler still runs"
+        time.sleep(0.02)
+
+
+def test_a_compiler_that_hangs_is_killed_with_all_that_it_started(tmp_path: Path, hung: Path) -> None:
+    target = tmp_path / "cache" / "arm.so"
+    with pytest.raises(RuntimeError, match=r"does not end within 0\.5 s"):
+        compile_library(target, (), lambda: "", HASTY)
+    assert len(hung.read_text().split()) == 2
+    until_gone(hung)
+    # nothing but the lock and a note are left, and the lock is free
+    assert sorted(path.name for path in target.parent.iterdir()) == ["arm.hung", "arm.lock"]
+    with target.with_suffix(".lock").open("wb") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def test_a_compiler_that_hung_rests(tmp_path: Path, hung: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another process does not try it again either, until an hour later; another compiler is tried at once."""
+    target, note = tmp_path / "arm.so", tmp_path / "arm.hung"
+    for _ in range(3):
+        with pytest.raises(CompilerHangs):
+            compile_library(target, (), str, HASTY)
+    assert len(hung.read_text().split()) == 2
+    an_hour_ago = time.time() - HASTY.rest
+    os.utime(note, (an_hour_ago, an_hour_ago))
+    with pytest.raises(CompilerHangs):
+        compile_library(target, (), str, HASTY)
+    assert len(hung.read_text().split()) == 4
+    monkeypatch.delenv("CC")
+    compile_library(target, ("-shared",), str)
+    assert is_intact(target) and not note.exists()
+
+
+def test_a_program_that_ends_takes_a_hung_compiler_along(tmp_path: Path, hung: Path) -> None:
+    code = (
+        "import sys, threading, time; from pathlib import Path\n"
+        "from optimizer.native.library_cache import compile_library\n"
+        "threading.Thread(target=compile_library, args=(Path(sys.argv[1]), (), str), daemon=True).start()\n"
+        "while not Path(sys.argv[2]).exists(): time.sleep(0.02)\n"
+    )
+    subprocess.run([sys.executable, "-c", code, tmp_path / "arm.so", hung], check=True, timeout=60)
+    until_gone(hung)
+
+
+def test_killed_processes_leave_one_hung_compiler_at_most(tmp_path: Path, hung: Path) -> None:
+    """It has inherited the lock: whoever comes later gives up instead of starting another one."""
+    code = (
+        "import sys; from pathlib import Path; from optimizer.native.library_cache import compile_library\n"
+        "compile_library(Path(sys.argv[1]), (), str)\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code, tmp_path / "arm.so"])
+    end = time.monotonic() + ENDED
+    while not hung.exists():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    process.kill()
+    process.wait()
+    try:
+        with pytest.raises(RuntimeError, match="another process has been compiling it"):
+            compile_library(tmp_path / "arm.so", (), str, HASTY)
+        assert len(hung.read_text().split()) == 2
+    finally:
+        os.killpg(int(hung.read_text().split()[0]), signal.SIGKILL)

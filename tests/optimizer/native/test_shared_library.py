@@ -31,10 +31,10 @@ print(shared_library() is not None, answer.certificate.valid, answer.energy.elec
 """
 
 
-def run(**environment: str) -> tuple[list[str], str]:
-    """What MOTION prints in a process of its own, as words; and its log."""
+def run(script: str = MOTION, **environment: str) -> tuple[list[str], str]:
+    """What a script prints in a process of its own, as words; and its log."""
     found = subprocess.run(
-        [sys.executable, "-c", MOTION], env=os.environ | environment, capture_output=True, text=True, timeout=300
+        [sys.executable, "-c", script], env=os.environ | environment, capture_output=True, text=True, timeout=300
     )
     assert found.returncode == 0, found.stderr
     return found.stdout.split(), found.stderr
@@ -52,9 +52,25 @@ def test_the_answer_is_the_same_without_it(tmp_path: Path) -> None:
         assert log in said
 
 
+def test_nobody_waits_for_a_compiler_that_hangs(tmp_path: Path) -> None:
+    """It is started once for each library, numpy and the virtual machine serve, and the answers are the same."""
+    compiler, calls = tmp_path / "compiler", tmp_path / "calls"
+    compiler.write_text(f"#!/bin/sh\necho $$ >> {calls}\nexec sleep 1000\n", encoding="utf-8")
+    compiler.chmod(0o755)
+    script = (
+        f"{MOTION}answer = optimize(Problem(arm=arm, start=START, goal=GOAL, deadline=100))\nprint(shared_library())"
+    )
+    compiled, _ = run()
+    hung, said = run(script, CC=str(compiler), JOULEPATH_CACHE_DIR=str(tmp_path / "cache"))
+    assert (hung[0], hung[1], hung[3], said) == ("False", "True", "None", "")
+    assert float(hung[2]) == pytest.approx(float(compiled[2]), rel=1e-6)
+    # that of all arms, and that of this one
+    assert len(calls.read_text().split()) == 2
+
+
 def test_it_is_made_once_and_made_anew_when_damaged(tmp_path: Path) -> None:
     environment = os.environ | {"JOULEPATH_CACHE_DIR": str(tmp_path)}
-    script = "from optimizer.native.shared_library import shared_library; print(shared_library())"
+    script = "from optimizer.native.shared_library import shared_library; print(shared_library(60))"
 
     def load() -> float:
         found = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True)

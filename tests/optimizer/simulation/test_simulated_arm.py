@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from dataclasses import replace
 from typing import Any
@@ -20,7 +21,7 @@ from optimizer.problem.clouds import Points
 from optimizer.problem.scene import Attachment, Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Scene, Shape, Sphere
 from optimizer.simulation.shapes import unsimulated
 from optimizer.simulation.simulated_arm import SimulatedArm, with_changes
-from optimizer.simulation.simulator import SimulatorMissing
+from optimizer.simulation.simulator import mujoco
 from tests.models.own_arm.arms import RICH_ARM
 from tests.models.own_arm.arms import robot as own_arm
 from tests.optimizer.moves import PAYLOAD, START, TILTED
@@ -145,7 +146,7 @@ def ball_distance(arm: Arm) -> float:
 @pytest.mark.parametrize("name", SHAPES)
 def test_bodies_touch_where_our_distances_say(name: str) -> None:
     """Margins are no bodies: a contact is a touch."""
-    simulator = pytest.importorskip("mujoco")
+    simulator = mujoco()
     for gap in (1e-3, -1e-3):
         arm = beside(SHAPES[name], gap, margin=0.02)
         simulated = SimulatedArm(arm)
@@ -161,7 +162,7 @@ def test_bodies_touch_where_our_distances_say(name: str) -> None:
 
 
 def test_the_arm_does_not_touch_itself_where_links_meet() -> None:
-    simulator = pytest.importorskip("mujoco")
+    simulator = mujoco()
     for name in robot_names():
         arm = Arm(robot=load_robot(name))
         simulated, model = SimulatedArm(arm), collision_model(arm)
@@ -185,7 +186,13 @@ def test_obstacles_of_many_parts_are_named() -> None:
     assert unsimulated(replace(arm, collisions=False)) == SimulatedArm(replace(arm, collisions=False)).bodies == []
 
 
-def test_without_mujoco_the_error_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(SimulatorMissing, match=r"joulepath\[mujoco\]"):
-        SimulatedArm(Arm(robot=load_robot("ur5e")))
+def test_only_a_replay_imports_mujoco() -> None:
+    """It takes 20 MB of memory in each process, which no other request has to pay."""
+    code = (
+        "import sys, app.main, app.server, app.tasks.replay, optimizer.simulation.replay\n"
+        "from tests.optimizer.moves import problem; from optimizer import optimize\n"
+        "optimize(problem()); print('mujoco' in sys.modules)\n"
+        "from optimizer.simulation.simulator import mujoco; mujoco(); print('mujoco' in sys.modules)\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert (run.stdout.split(), run.stderr) == (["False", "True"], "")
