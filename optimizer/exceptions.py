@@ -219,7 +219,7 @@ class RoundTooShort(JoulepathError):
 
     def __init__(self, shortest: float, dwells: float) -> None:
         super().__init__(
-            f"The fastest round found takes {shortest:.4f} s, of which it dwells {dwells:.4g} s: allow at least as "
+            f"The fastest round found takes {_rounded_up(shortest)} s, of which it dwells {dwells:.4g} s: allow at least as "
             "much."
         )
         self.shortest, self.dwells = shortest, dwells
@@ -264,11 +264,33 @@ class PathInfeasible(JoulepathError):
 
 
 class DurationTooShort(JoulepathError):
-    """No motion is that fast; `shortest` [s] is the least feasible duration."""
+    """No motion was found that is that fast.
 
-    def __init__(self, shortest: float) -> None:
-        super().__init__(f"No motion within the limits is that short: allow at least {shortest:.4f} s.")
-        self.shortest = shortest
+    `shortest` [s] is the duration of the fastest motion found, which is certified: it is found again in this duration.
+    None if no motion was found at all. No motion takes less than `bound` [s], 0 where that is not known; `proven`:
+    none is faster than `shortest` by more than 0.1 %. `cut_short`: the deadline ended the search.
+    """
+
+    def __init__(
+        self, bound: float, shortest: float | None = None, proven: bool = False, cut_short: bool = False
+    ) -> None:
+        if shortest is None:
+            message = (
+                f"Every motion takes at least {_rounded_up(bound)} s, and none was found that keeps the limits in any "
+                "duration: allow more time, and relax a limit if that does not help."
+            )
+        else:
+            fastest = "The fastest motion within the limits" if proven else "The fastest motion found within the limits"
+            message = f"{fastest} takes {_rounded_up(shortest)} s: allow at least as much."
+        if cut_short:
+            message += " The deadline ended the search: with a longer one a faster motion may be found."
+        super().__init__(message)
+        self.bound, self.shortest, self.proven, self.cut_short = bound, shortest, proven, cut_short
+
+
+def _rounded_up(duration: float) -> str:
+    """A duration [s] in tenths of milliseconds, none less: it is to be enough when it is asked for."""
+    return f"{math.ceil(duration * 1e4) / 1e4:.4f}"
 
 
 class TorqueInfeasible(JoulepathError):

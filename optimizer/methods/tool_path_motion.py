@@ -54,6 +54,7 @@ class ToolPathMotion(Method):
 
     # every candidate follows a curve of its own, which no other candidate's solution tells anything of
     most_solved = 64
+    takes_guesses = True
 
     def solve(self) -> SolveResult:
         """The time scaling of least cost."""
@@ -77,10 +78,10 @@ class ToolPathMotion(Method):
         if all(result.spline is None for result in results) and not self._holds_speed:
             # what the first space cannot express, a finer one may: a motion that is nearly the fastest one
             results.append(self._kept(path, self.interval, self._scaling(FINER_SCALING)))
-        found = self._clear(min(results, key=lambda result: self.prepared.cost_of(result.spline)))
+        found = self._clear(min(results, key=lambda result: self.cost_of(result.spline)))
         if found.spline is None and self._may_turn():
             self._turn(self._paced(path), self._scaling(1), np.inf, results)
-            found = min([found, *results], key=lambda result: self.prepared.cost_of(result.spline))
+            found = min([found, *results], key=lambda result: self.cost_of(result.spline))
         return with_effort(found, results)
 
     def _clear(self, found: SolveResult) -> SolveResult:
@@ -117,7 +118,7 @@ class ToolPathMotion(Method):
         def is_best(trace: Trace, path: Spline, result: SolveResult) -> bool:
             nonlocal best
             results.append(result)
-            cost = prepared.cost_of(result.spline)
+            cost = self.cost_of(result.spline)
             if result.spline is None or cost >= best:
                 return False
             best = cost
@@ -154,7 +155,7 @@ class ToolPathMotion(Method):
                 return np.inf
             result = self._clear(self._kept(followed[1], self.interval, self._scaling(1)))
             results.append(replace(result, status=SolveStatus.FAILED, spline=None))
-            found.append((self.prepared.cost_of(result.spline), *followed, replace(result, iterations=0, solves=0)))
+            found.append((self.cost_of(result.spline), *followed, replace(result, iterations=0, solves=0)))
             return found[-1][0]
 
         try_angles(cost, cost(0.0))
@@ -182,11 +183,11 @@ class ToolPathMotion(Method):
                 else:
                     results.append(self._kept(path, self.interval, scaling, law))
                 if self._may_turn():
-                    least = min(self.prepared.cost_of(result.spline) for result in results)
+                    least = min(self.cost_of(result.spline) for result in results)
                     self._turn(law, scaling, least, results)
         except DeadlinePassed:
             results.append(SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED))
-        return with_effort(min(results, key=lambda result: self.prepared.cost_of(result.spline)), results)
+        return with_effort(min(results, key=lambda result: self.cost_of(result.spline)), results)
 
     def _scaling(self, finer: int) -> Basis:
         """The space of the time scaling, so many times finer than the first one."""

@@ -55,21 +55,21 @@ class UniformScaling(Method):
         collision = self.prepared.surroundings.worst_violation(given)
         if collision is not None:
             return around_obstacles(self, "the time-optimal motion", collision, self._along)
-        return _UniformScale(self, given).solve()
+        return UniformScale(self, given).solve()
 
     def _along(self, path: Spline) -> SolveResult:
         """The time-optimal motion along a path, scaled."""
         found = PathRetiming(self.prepared, path, fastest(self.prepared)).solve()
         if found.spline is None:
             return found
-        return with_effort(scaled := _UniformScale(self, found.spline).solve(), [found, scaled])
+        return with_effort(scaled := UniformScale(self, found.spline).solve(), [found, scaled])
 
 
-class _UniformScale:
+class UniformScale:
     """The factor on the time of a `given` motion, and the number of energies evaluated."""
 
-    def __init__(self, method: UniformScaling, given: Spline) -> None:
-        self.prepared, self.interval, self.deadline = method.prepared, method.interval, method.deadline
+    def __init__(self, method: Method, given: Spline) -> None:
+        self.prepared, self.deadline, self._cost_of = method.prepared, method.deadline, method.cost_of
         self.t_min, self.t_max = method.t_min, method.t_max
         self.given, self.evaluations = given, 0
         q, v, a = sample(given, grid(given.duration))
@@ -117,5 +117,4 @@ class _UniformScale:
             return np.inf
         if self.prepared.path is not None and (self.prepared.path.ratios(given.q, v) > TORQUE_USED).any():
             return np.inf
-        spline = self._retimed(factor)
-        return spline.duration if self.interval.minimum_time else self.prepared.cost_of(spline)
+        return self._cost_of(self._retimed(factor))

@@ -136,7 +136,7 @@ class Run:
         if without is not None:
             incumbent.accept_if_better(*without)
         if incumbent.best() is None:
-            find_fastest(incumbent)
+            find_fastest(incumbent, self.known)
         if incumbent.method.most_solved is None:
             incumbent.candidates += free_goal.refine_goals(incumbent) + self_motions.refine(incumbent)
             incumbent.tell_candidates()
@@ -154,9 +154,20 @@ class Run:
                 return answer
             incumbent.reject(best)
             self.explore()
+        if (answer := self._fastest_as_it_is()) is not None:
+            return answer
         if any(candidate.status is CandidateStatus.UNVISITED for candidate in incumbent.candidates):
             raise self.too_late()
         raise self.no_trajectory()
+
+    def _fastest_as_it_is(self) -> Solution | None:
+        """The solution that the fastest motion is where no motion is left that the certificate confirms; None if it
+        takes longer than allowed, or is not found in time."""
+        if self.incumbent.deadline.passed:
+            return None
+        find_fastest(self.incumbent, self.known, improve=False)
+        best = self.incumbent.best()
+        return None if best is None else self.answer(best, baselines_of(self.incumbent, best))
 
     def too_late(self) -> DeadlineExceeded:
         """The error for no certified motion before the deadline."""

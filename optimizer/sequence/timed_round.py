@@ -158,7 +158,9 @@ class TimedSearch:
         found = list[PricedMotion]()
         for each in self.search.pairs(nodes):
             if each not in self._fastest:
-                self._fastest[each] = fastest_motion(self.legs[each[0]], *each[1:], self.search.search_end)
+                own = self.search.solutions.get(each)
+                known = [] if own is None else [own.trajectory.spline]
+                self._fastest[each] = fastest_motion(self.legs[each[0]], *each[1:], self.search.search_end, known)
             motion = self._fastest[each]
             if motion is None:
                 return None
