@@ -219,8 +219,8 @@ class RoundTooShort(JoulepathError):
 
     def __init__(self, shortest: float, dwells: float) -> None:
         super().__init__(
-            f"The fastest round found takes {_rounded_up(shortest)} s, of which it dwells {dwells:.4g} s: allow at least as "
-            "much."
+            f"The fastest round found takes {_rounded_up(shortest)} s, of which it dwells {dwells:.4g} s: allow at "
+            "least as much."
         )
         self.shortest, self.dwells = shortest, dwells
 

@@ -131,13 +131,9 @@ class FastestMotion(ABC):
 
     def _note(self, result: SolveResult) -> None:
         """Take the motion of a result if it is the fastest one, and confirmed."""
-        self.add_effort(result)
         self.cut_short |= result.cut_short or result.status is SolveStatus.OUT_OF_TIME
         if result.spline is not None and result.spline.duration < self.duration and self.confirms(result.spline):
             self.best = result.spline
-
-    def add_effort(self, result: SolveResult) -> None:
-        """Take note of the effort of an attempt."""
 
     @cached_property
     def _solver(self) -> Method:

@@ -141,11 +141,7 @@ class FreeSpline(SqpMethod):
         """The motion of least energy from planned paths, solved to the end; `failed` if there is none."""
         known = self.best_known
         best = super().from_planned_paths(failed)
-        if (
-            best.spline is None
-            or self.may_refine(best.spline)
-            or self.cost_of(best.spline) > above(known, POLISHED)
-        ):
+        if best.spline is None or self.may_refine(best.spline) or self.cost_of(best.spline) > above(known, POLISHED):
             return best
         polished = self._polished(best.spline)
         if polished.spline is None or self.cost_of(polished.spline) >= self.cost_of(best.spline):

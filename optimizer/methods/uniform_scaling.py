@@ -70,7 +70,7 @@ class UniformScale:
 
     def __init__(self, method: Method, given: Spline) -> None:
         self.prepared, self.deadline, self._cost_of = method.prepared, method.deadline, method.cost_of
-        self.t_min, self.t_max = method.t_min, method.t_max
+        self.t_min, self.t_max, self._fastest = method.t_min, method.t_max, method.interval.minimum_time
         self.given, self.evaluations = given, 0
         q, v, a = sample(given, grid(given.duration))
         still = np.zeros_like(q)
@@ -95,7 +95,12 @@ class UniformScale:
         if np.isinf(costs[best]):
             return SolveResult(SolveStatus.FAILED, "found no time scale within the limits", self.evaluations)
         factor, low, high = factors[best], factors[max(best - 1, 0)], factors[min(best + 1, len(factors) - 1)]
-        if high > low:
+        if self._fastest:
+            # the least factor within the limits
+            while factor - low > FACTOR_TOLERANCE * factor:
+                middle = (low + factor) / 2
+                low, factor = (middle, factor) if np.isinf(self._cost(middle)) else (low, middle)
+        elif high > low:
             found = minimize_scalar(
                 self._cost, bounds=(low, high), method="bounded", options={"xatol": FACTOR_TOLERANCE * factor}
             )

@@ -101,9 +101,7 @@ class _FastestOfPair(FastestMotion):
         return certify(self.problem, spline, self.q_start, self.q_goal, self.prepared.energy(spline)).valid
 
 
-def fastest_motion(
-    leg: Leg, s: int, g: int, deadline: Deadline, known: Sequence[Spline] = ()
-) -> PricedMotion | None:
+def fastest_motion(leg: Leg, s: int, g: int, deadline: Deadline, known: Sequence[Spline] = ()) -> PricedMotion | None:
     """The motion of a pair of least duration, certified; None if none is found before the deadline.
 
     It is no slower than the motions `known` of this pair.

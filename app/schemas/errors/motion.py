@@ -233,15 +233,27 @@ class CycleTooShort(ProblemDetails):
 
 class DurationTooShort(ProblemDetails):
     """No motion within the limits was found for the largest allowed duration: `duration`, its `max`, or the time of the
-    `cycle`. Allow at least `shortest`, or let the optimiser choose the duration."""
+    `cycle`. Allow at least `shortest`, for which there is a certified motion, or let the optimiser choose the duration.
+    """
 
     type: Literal["/problems/duration-too-short"] = fixed("type", "/problems/duration-too-short")
     title: Literal["Duration too short"] = fixed("title", "Duration too short")
     status: Literal[422] = fixed("status", 422)
-    shortest: float = described(
-        "Duration of the fastest motion found. If none was found: a lower bound on the duration of every motion.",
+    shortest: float | None = described(
+        "Duration of the fastest motion found, which is certified: asked for again, it is answered. Null if no motion "
+        "was found in any duration.",
         "s",
         0.83,
+    )
+    bound: float = described(
+        "No motion takes less: the time that the joints need for their displacement within the limits on velocity, "
+        "acceleration and jerk. 0 where the end configurations are not all known.",
+        "s",
+        0.8298,
+    )
+    proven: bool = described("Whether no motion is faster than `shortest` by more than 0.1 %.", None, True)
+    cut_short: bool = described(
+        "Whether the deadline ended the search: with a longer one a faster motion may be found.", None, False
     )
 
 
