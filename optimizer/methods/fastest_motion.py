@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -26,7 +26,7 @@ from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 from optimizer.trajectories.ruckig_motion import time_optimal_spline
 from optimizer.trajectories.seven_segment import shortest_duration
-from optimizer.trajectories.spline import Spline, sampled
+from optimizer.trajectories.spline import Spline, least_time_scale, sampled
 
 Attempt = Callable[[], SolveResult]
 
@@ -42,6 +42,14 @@ class FastestSettings:
     prices: tuple[float, ...] = (100.0, 1000.0)
     """Prices of time [W] of the continuation from a slow motion to the fastest one. At the first a UR5e's motions take
     some 3 % more time than the fastest ones, from any initial guess."""
+
+    jerks: tuple[float, ...] = (1.0, 1e-2, 1e-4)
+    """Shares of the jerk limits with which Ruckig's motion is tried in turn. Where a motion takes minutes and a phase of
+    constant jerk some milliseconds, rounding takes its jerk far beyond the limit; with less jerk, phases are longer."""
+
+    jump: float = 2e-3
+    """Time [s] in which acceleration reaches its limit where no limit on jerk is in force: no spline has an acceleration
+    that jumps, and the certificate looks once a millisecond."""
 
     gain: float = 1e-3
     """Relative decrease of the duration below which no further solve from the fastest motion follows."""
@@ -183,7 +191,16 @@ class FastestMotion(ABC):
 
     @cached_property
     def _ruckig(self) -> Spline:
-        return time_optimal_spline(self.prepared.problem.arm.active_limits, self.q_start, self.q_goal)
+        """Ruckig's motion; with less jerk where its phases are too short for a spline within the limits."""
+        limits, found = self.prepared.problem.arm.active_limits, dict[float, Spline]()
+        most = np.where(np.isinf(limits.j_max), limits.a_max / self.settings.jump, limits.j_max)
+        for share in self.settings.jerks:
+            spline = time_optimal_spline(replace(limits, j_max=share * most), self.q_start, self.q_goal)
+            needed = max(least_time_scale(spline, limits.rates), 1.0)
+            found[spline.duration * needed] = spline
+            if needed <= 1 + self.settings.proven:
+                break
+        return found[min(found)]
 
     @property
     def _takes_ruckig(self) -> bool:
