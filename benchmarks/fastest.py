@@ -4,8 +4,8 @@
     python -m benchmarks.fastest --count 400 --starts 20 --robot panda
 
 A move is asked for in a tenth of the time that its joints need, which is refused with `shortest`. Every other move has
-a payload of up to the robot's rating, and of four moves two are within ±1.5 rad and two general. Then faster motions are
-looked for: by minimum-time solves from random smooth motions, and by `optimize` without a duration, and in 99 % of
+a payload of up to the robot's rating, and of four moves two are within ±1.5 rad and two general. Then faster motions
+are looked for: by minimum-time solves from random smooth motions, and by `optimize` without a duration, and in 99 % of
 `shortest`. What the certificate confirms counts. Collisions are ignored.
 """
 

@@ -275,10 +275,8 @@ class DurationTooShort(JoulepathError):
         self, bound: float, shortest: float | None = None, proven: bool = False, cut_short: bool = False
     ) -> None:
         if shortest is None:
-            message = (
-                f"Every motion takes at least {_rounded_up(bound)} s, and none was found that keeps the limits in any "
-                "duration: allow more time, and relax a limit if that does not help."
-            )
+            at_least = f"Every motion takes at least {_rounded_up(bound)} s, and none" if bound else "No motion"
+            message = f"{at_least} within the limits was found in any duration: allow more time, or relax a limit."
         else:
             fastest = "The fastest motion within the limits" if proven else "The fastest motion found within the limits"
             message = f"{fastest} takes {_rounded_up(shortest)} s: allow at least as much."

@@ -44,12 +44,13 @@ class FastestSettings:
     some 3 % more time than the fastest ones, from any initial guess."""
 
     jerks: tuple[float, ...] = (1.0, 1e-2, 1e-4)
-    """Shares of the jerk limits with which Ruckig's motion is tried in turn. Where a motion takes minutes and a phase of
-    constant jerk some milliseconds, rounding takes its jerk far beyond the limit; with less jerk, phases are longer."""
+    """Shares of the jerk limits with which Ruckig's motion is tried in turn. Where a motion takes minutes and a phase
+    of constant jerk some milliseconds, rounding takes its jerk far beyond the limit; with less jerk, phases are longer.
+    """
 
     jump: float = 2e-3
-    """Time [s] in which acceleration reaches its limit where no limit on jerk is in force: no spline has an acceleration
-    that jumps, and the certificate looks once a millisecond."""
+    """Time [s] in which acceleration reaches its limit where no limit on jerk is in force: no spline has an
+    acceleration that jumps, and the certificate looks once a millisecond."""
 
     gain: float = 1e-3
     """Relative decrease of the duration below which no further solve from the fastest motion follows."""
@@ -65,8 +66,8 @@ class FastestMotion(ABC):
     """The search for the fastest motion from q_start to q_goal (nq,) [rad], whatever durations the problem allows.
 
     `best` is the fastest motion that is confirmed so far, None if there is none. `known` are motions between the same
-    ends. A motion of at most `wanted` [s] is tried for even if one that is slower counts as the fastest. `cut_short`:
-    the deadline ended the search.
+    ends. With `wanted` [s] the search ends with the first motion that takes no longer, and not before. `cut_short`: the
+    deadline ended the search.
     """
 
     def __init__(
@@ -76,7 +77,7 @@ class FastestMotion(ABC):
         q_goal: Array,
         known: Sequence[Spline] = (),
         settings: FastestSettings | None = None,
-        wanted: float = np.inf,
+        wanted: float | None = None,
     ) -> None:
         self.prepared, self.q_start, self.q_goal, self.known = prepared, q_start, q_goal, known
         self.wanted = wanted
@@ -122,7 +123,7 @@ class FastestMotion(ABC):
 
     def look_thoroughly(self) -> None:
         """Try the other starts, and solve again from the fastest motion as long as that gains time."""
-        if self._solver.takes_guesses and not self.is_proven:
+        if self._solver.takes_guesses and not (self.is_proven or self._is_done):
             self._try_all(self._thorough())
 
     def _try_all(self, attempts: Iterator[Attempt]) -> None:
@@ -131,7 +132,7 @@ class FastestMotion(ABC):
             with watch(self.deadline):
                 for attempt in attempts:
                     self._note(attempt())
-                    if self.is_proven and self.duration <= self.wanted:
+                    if self._is_done:
                         return
         except DeadlinePassed:
             self.cut_short = True
@@ -142,6 +143,10 @@ class FastestMotion(ABC):
         self.cut_short |= result.cut_short or result.status is SolveStatus.OUT_OF_TIME
         if result.spline is not None and result.spline.duration < self.duration and self.confirms(result.spline):
             self.best = result.spline
+
+    @property
+    def _is_done(self) -> bool:
+        return self.is_proven if self.wanted is None else self.duration <= self.wanted
 
     @cached_property
     def _solver(self) -> Method:

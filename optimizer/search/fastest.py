@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,12 +16,15 @@ from optimizer.search.attempts import solve_from, solver_of
 from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.missed_branches import all_known
-from optimizer.search.sampled_ends import activate_deferred
-from optimizer.solution import CandidateStatus
+from optimizer.search.sampled_ends import fastest_samples
+from optimizer.solution import CandidateStatus, Energy
 from optimizer.trajectories.spline import Spline, lasting, sampled
 
 # motions that obstacles stop are not too slow if so many times the shortest duration is allowed
 AMPLE = 20.0
+# share of the time after which attempts along a path, none of which has led to a motion in the time that is allowed,
+# give way to the search for the fastest motion
+SHARE_IN_VAIN = 0.5
 # joint positions that differ by less are the same [rad]
 SAME = 1e-9
 
@@ -60,7 +63,7 @@ class _FastestOfCandidate(FastestMotion):
         candidate: Candidate,
         known: Sequence[Spline],
         settings: FastestSettings | None = None,
-        wanted: float = np.inf,
+        wanted: float | None = None,
     ) -> None:
         ends = np.array([candidate.q_start, candidate.q_goal])
         own = [each for each in known if np.abs(each.control_points[[0, -1]] - ends).max() < SAME]
@@ -81,19 +84,26 @@ class _FastestOfCandidate(FastestMotion):
         self.incumbent.add_effort(result)
 
 
-def fastest(incumbent: Incumbent, known: Sequence[Spline] = (), wanted: float = np.inf) -> Fastest | None:
+def fastest(incumbent: Incumbent, known: Sequence[Spline] = (), wanted: float | None = None) -> Fastest | None:
     """The fastest motion over all candidates; None if none is found. The durations that the problem allows do not
     count.
 
-    It is no slower than the motions `known` between ends of candidates, if the certificate confirms them. `wanted` [s]:
-    see `FastestMotion`.
+    It is no slower than the motions `known` between ends of candidates, if the certificate confirms them. With `wanted`
+    [s] it is the first motion found that takes no longer, if there is one.
     """
     settings = FastestSettings()
-    activate_deferred(incumbent.candidates)
-    open_candidates = [each for each in incumbent.candidates if each.holdable and not each.deferred]
+    candidates = incumbent.candidates
+    open_candidates = [each for each in candidates if each.holdable and not each.deferred]
+    open_candidates += fastest_samples(candidates)
     searches, cut_short = list[_FastestOfCandidate](), False
     # what cannot beat the fastest motion known by more than counts is not looked at
     enough = np.inf
+
+    def take_note(search: _FastestOfCandidate) -> None:
+        nonlocal enough
+        is_wanted = wanted is not None and search.duration <= wanted
+        enough = 0.0 if is_wanted else min(enough, search.duration / (1 + settings.proven))
+
     for candidate in sorted(open_candidates, key=lambda each: each.shortest):
         if candidate.shortest >= enough:
             break
@@ -102,12 +112,12 @@ def fastest(incumbent: Incumbent, known: Sequence[Spline] = (), wanted: float = 
             break
         searches.append(_FastestOfCandidate(incumbent, candidate, known, settings, wanted))
         searches[-1].look_quickly()
-        enough = min(enough, searches[-1].duration / (1 + settings.proven))
+        take_note(searches[-1])
     searches.sort(key=lambda each: each.duration)
     for search in searches[: settings.most_thorough]:
         if search.bound < enough:
             search.look_thoroughly()
-            enough = min(enough, search.duration / (1 + settings.proven))
+            take_note(search)
     best = min(searches, key=lambda each: each.duration, default=None)
     if best is None or best.best is None:
         return None
@@ -134,6 +144,30 @@ def least_duration(incumbent: Incumbent) -> float:
     return max(min(each.shortest for each in candidates), incumbent.prepared.least_time)
 
 
+def explore_or_find_fastest(
+    incumbent: Incumbent,
+    explore: Callable[[], None],
+    known: Sequence[Spline] = (),
+    beside: tuple[Candidate, SolveResult, Energy] | None = None,
+) -> None:
+    """Solve candidates by `explore`; if none has a motion in the time that is allowed, take the fastest motion.
+
+    The motion `beside` counts as well. Along a path, attempts in vain take long: they leave time for the search of the
+    fastest motion. Raises DurationTooShort.
+    """
+    if incumbent.problem.tool_path is not None and incumbent.problem.duration_max is not None:
+        end, incumbent.end = incumbent.end, incumbent.end.within(SHARE_IN_VAIN * incumbent.end.left)
+        explore()
+        incumbent.end = end
+        if incumbent.best() is None:
+            find_fastest(incumbent, known)
+    explore()
+    if beside is not None:
+        incumbent.accept_if_better(*beside)
+    if incumbent.best() is None:
+        find_fastest(incumbent, known)
+
+
 def find_fastest(incumbent: Incumbent, known: Sequence[Spline] = (), improve: bool = True) -> None:
     """Called when no candidate has a motion within `duration_max`: take the fastest motion if it is in time.
 
@@ -145,11 +179,7 @@ def find_fastest(incumbent: Incumbent, known: Sequence[Spline] = (), improve: bo
     shortest = min(candidate.shortest for candidate in incumbent.candidates)
     if longest is None or (_are_stopped_by_obstacles(incumbent) and longest > AMPLE * shortest):
         return
-    found = fastest(incumbent, known)
-    if found is not None and longest < found.duration <= longest * (1 + FastestSettings().proven):
-        # one that is faster by less than counts may just be fast enough
-        faster = fastest(incumbent, known, longest)
-        found = faster if faster is not None and faster.duration <= longest else found
+    found = fastest(incumbent, known, longest if longest >= shortest else None)
     if found is None:
         if shortest > longest:
             raise DurationTooShort(least_duration(incumbent), cut_short=incumbent.deadline.passed)
@@ -158,6 +188,7 @@ def find_fastest(incumbent: Incumbent, known: Sequence[Spline] = (), improve: bo
         raise found.too_slow
     candidate = found.candidate
     spline = lasting(found.spline, max(found.duration, incumbent.problem.duration_min or 0.0))
+    candidate.deferred = False
     if candidate.reason is Reason.NOT_CONFIRMED:
         candidate.settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
     try:

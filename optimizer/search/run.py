@@ -22,7 +22,7 @@ from optimizer.search.baselines import with_saving_intervals
 from optimizer.search.branch_and_bound import explore
 from optimizer.search.candidates import Candidate, Reason, bound, pairs
 from optimizer.search.ends import ends
-from optimizer.search.fastest import find_fastest
+from optimizer.search.fastest import explore_or_find_fastest, find_fastest
 from optimizer.search.free_goal_bound import family_bound_of
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.least_work import explore_least_work
@@ -132,11 +132,7 @@ class Run:
         """The solution, from candidates that are prepared, and of which some may be solved. Raises as `solution`."""
         incumbent = self.incumbent
         without = self.without_storage() if incumbent.uses_storage else None
-        self.explore()
-        if without is not None:
-            incumbent.accept_if_better(*without)
-        if incumbent.best() is None:
-            find_fastest(incumbent, self.known)
+        explore_or_find_fastest(incumbent, self.explore, self.known, without)
         if incumbent.method.most_solved is None:
             incumbent.candidates += free_goal.refine_goals(incumbent) + self_motions.refine(incumbent)
             incumbent.tell_candidates()
@@ -154,20 +150,13 @@ class Run:
                 return answer
             incumbent.reject(best)
             self.explore()
-        if (answer := self._fastest_as_it_is()) is not None:
-            return answer
+        if any(each.reason is Reason.NOT_CONFIRMED for each in incumbent.candidates):
+            find_fastest(incumbent, self.known, improve=False)
+            if (last := incumbent.best()) is not None and (answer := self.answer(last, baselines_of(incumbent, last))):
+                return answer
         if any(candidate.status is CandidateStatus.UNVISITED for candidate in incumbent.candidates):
             raise self.too_late()
         raise self.no_trajectory()
-
-    def _fastest_as_it_is(self) -> Solution | None:
-        """The solution that the fastest motion is where no motion is left that the certificate confirms; None if it
-        takes longer than allowed, or is not found in time."""
-        if self.incumbent.deadline.passed:
-            return None
-        find_fastest(self.incumbent, self.known, improve=False)
-        best = self.incumbent.best()
-        return None if best is None else self.answer(best, baselines_of(self.incumbent, best))
 
     def too_late(self) -> DeadlineExceeded:
         """The error for no certified motion before the deadline."""
