@@ -16,14 +16,15 @@ from optimizer.search.attempts import solve_from, solver_of
 from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.missed_branches import all_known
+from optimizer.search.outer_turns import families_of
 from optimizer.search.sampled_ends import fastest_samples
 from optimizer.solution import CandidateStatus, Energy
 from optimizer.trajectories.spline import Spline, lasting, sampled
 
 # motions that obstacles stop are not too slow if so many times the shortest duration is allowed
 AMPLE = 20.0
-# share of the time after which attempts along a path, none of which has led to a motion in the time that is allowed,
-# give way to the search for the fastest motion
+# share of the time after which candidates, none of which has had a motion in the time that is allowed, give way to the
+# search for the fastest motion
 SHARE_IN_VAIN = 0.5
 # joint positions that differ by less are the same [rad]
 SAME = 1e-9
@@ -152,16 +153,22 @@ def explore_or_find_fastest(
 ) -> None:
     """Solve candidates by `explore`; if none has a motion in the time that is allowed, take the fastest motion.
 
-    The motion `beside` counts as well. Along a path, attempts in vain take long: they leave time for the search of the
+    The motion `beside` counts as well. While several candidates are tried in vain, time is left for the search of the
     fastest motion. Raises DurationTooShort.
     """
-    if incumbent.problem.tool_path is not None and incumbent.problem.duration_max is not None:
+    limited, candidates = incumbent.problem.duration_max is not None, incumbent.candidates
+    if limited and len(candidates) > 1 and not families_of(incumbent):
         end, incumbent.end = incumbent.end, incumbent.end.within(SHARE_IN_VAIN * incumbent.end.left)
         explore()
-        incumbent.end = end
+        was_late, incumbent.end = incumbent.deadline.passed, end
         if incumbent.best() is None:
             find_fastest(incumbent, known)
-    explore()
+        if was_late:
+            # what was left open is solved in the rest of the time
+            incumbent.cut_short = any(each.attempt is not None and each.attempt.cut_short for each in candidates)
+            explore()
+    else:
+        explore()
     if beside is not None:
         incumbent.accept_if_better(*beside)
     if incumbent.best() is None:
