@@ -12,8 +12,8 @@ from optimizer.trajectories.quadrature import lobatto_nodes
 from optimizer.trajectories.spline import Spline, least_time_scale
 from optimizer.trajectories.time_scalings import SampledMotion, standstill
 
-# shares of the jerk limits with which a motion is asked for in turn: where a joint just reaches its greatest acceleration
-# or speed, Ruckig may find the lengths of its phases negative by rounding
+# shares of the jerk limits with which a motion is asked for in turn: where a joint just reaches its greatest
+# acceleration, Ruckig may find the lengths of its phases negative by rounding
 JERKS = (1.0, 1 - 1e-9, 1 - 1e-7, 1 - 1e-5)
 # fractions of the duration within which jumps of jerk become one, as long as the motion exceeds its limits by more
 CLOSEST, WITHIN = (1e-5, 4e-5, 2e-4, 1e-3), 1 + 1e-6
