@@ -83,7 +83,7 @@ def problems(robot: Robot, seed: int, count: int, torque: float = 1.0) -> Iterat
 
 def refused(problem: Problem) -> DurationTooShort | None:
     """The refusal of a tenth of the time that the joints need; None if the move is refused for another reason."""
-    least = float(shortest_duration(np.subtract(problem.goal, problem.start), problem.arm.active_limits))
+    least = float(shortest_duration(np.asarray(problem.goal) - np.asarray(problem.start), problem.arm.active_limits))
     try:
         optimize(replace(problem, duration_max=max(least / 10, LEAST_DURATION)))
     except DurationTooShort as error:
