@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.missed_branches import all_known
 from optimizer.search.outer_turns import families_of
+from optimizer.search.quicker_ends import with_quicker_ends
 from optimizer.search.sampled_ends import fastest_samples
 from optimizer.solution import CandidateStatus, Energy
 from optimizer.trajectories.spline import Spline, lasting, sampled
@@ -26,6 +28,8 @@ AMPLE = 20.0
 # share of the time after which candidates, none of which has had a motion in the time that is allowed, give way to the
 # search for the fastest motion
 SHARE_IN_VAIN = 0.5
+# samples whose ends are moved to where they are quicker, at most: each takes some 50 ms
+MOST_MOVED = 12
 # joint positions that differ by less are the same [rad]
 SAME = 1e-9
 
@@ -93,9 +97,7 @@ def fastest(incumbent: Incumbent, known: Sequence[Spline] = (), wanted: float | 
     [s] it is the first motion found that takes no longer, if there is one.
     """
     settings = FastestSettings()
-    candidates = incumbent.candidates
-    open_candidates = [each for each in candidates if each.holdable and not each.deferred]
-    open_candidates += fastest_samples(candidates)
+    open_candidates = _tried(incumbent)
     searches, cut_short = list[_FastestOfCandidate](), False
     # what cannot beat the fastest motion known by more than counts is not looked at
     enough = np.inf
@@ -122,6 +124,8 @@ def fastest(incumbent: Incumbent, known: Sequence[Spline] = (), wanted: float | 
     best = min(searches, key=lambda each: each.duration, default=None)
     if best is None or best.best is None:
         return None
+    if all(each is not best.candidate for each in incumbent.candidates):
+        incumbent.candidates.append(best.candidate)
     bound = least_duration(incumbent)
     return Fastest(
         best.candidate,
@@ -130,6 +134,19 @@ def fastest(incumbent: Incumbent, known: Sequence[Spline] = (), wanted: float | 
         proven=best.duration <= bound * (1 + settings.proven),
         cut_short=cut_short or any(each.cut_short for each in searches),
     )
+
+
+def _tried(incumbent: Incumbent) -> list[Candidate]:
+    """The candidates of which the fastest may be one: all but samples, the samples of least duration, and others of the
+    same targets that are quicker still."""
+    candidates, prepared = incumbent.candidates, incumbent.prepared
+    tried = [each for each in candidates if each.holdable and not each.deferred] + fastest_samples(candidates)
+    samples = [] if prepared.problem.tool_path is not None else [each for each in tried if each.sampled]
+    quicker = list[Candidate | None]()
+    with suppress(DeadlinePassed), watch(incumbent.deadline):
+        for each in sorted(samples, key=lambda each: each.shortest)[:MOST_MOVED]:
+            quicker.append(with_quicker_ends(prepared, each))
+    return tried + [each for each in quicker if each is not None and each.holdable]
 
 
 def fastest_of(incumbent: Incumbent, candidate: Candidate, known: Sequence[Spline] = ()) -> Spline | None:
