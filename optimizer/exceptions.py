@@ -264,30 +264,22 @@ class PathInfeasible(JoulepathError):
 
 
 class DurationTooShort(JoulepathError):
-    """No motion was found that is that fast.
+    """No motion was found that is that fast. `shortest` [s] is the duration of the fastest one found, which is
+    certified and found again when it is asked for; None if there is none. No motion takes less than `bound` [s], 0
+    where that is not known; `proven`: `shortest` is within 0.1 % of it. `cut_short`: the deadline ended the search."""
 
-    `shortest` [s] is the duration of the fastest motion found, which is certified: it is found again in this duration.
-    None if no motion was found at all. No motion takes less than `bound` [s], 0 where that is not known; `proven`:
-    none is faster than `shortest` by more than 0.1 %. `cut_short`: the deadline ended the search.
-    """
-
-    def __init__(
-        self, bound: float, shortest: float | None = None, proven: bool = False, cut_short: bool = False
-    ) -> None:
+    def __init__(self, bound: float, shortest: float | None = None, proven: bool = False, late: bool = False) -> None:
+        found = "The fastest motion" if proven else "The fastest motion found"
+        message = f"{found} within the limits takes {_rounded_up(shortest or 0.0)} s: allow at least as much."
         if shortest is None:
-            at_least = f"Every motion takes at least {_rounded_up(bound)} s, and none" if bound else "No motion"
-            message = f"{at_least} within the limits was found in any duration: allow more time, or relax a limit."
-        else:
-            fastest = "The fastest motion within the limits" if proven else "The fastest motion found within the limits"
-            message = f"{fastest} takes {_rounded_up(shortest)} s: allow at least as much."
-        if cut_short:
-            message += " The deadline ended the search: with a longer one a faster motion may be found."
-        super().__init__(message)
-        self.bound, self.shortest, self.proven, self.cut_short = bound, shortest, proven, cut_short
+            found = f"Every motion takes at least {_rounded_up(bound)} s, and none" if bound else "No motion"
+            message = f"{found} within the limits was found in any duration: allow more time, or relax a limit."
+        super().__init__(message + late * " The deadline ended the search: with a longer one it may find a faster one.")
+        self.bound, self.shortest, self.proven, self.cut_short = bound, shortest, proven, late
 
 
 def _rounded_up(duration: float) -> str:
-    """A duration [s] in tenths of milliseconds, none less: it is to be enough when it is asked for."""
+    """A duration [s] in tenths of milliseconds, none less: it is to be enough when asked for."""
     return f"{math.ceil(duration * 1e4) / 1e4:.4f}"
 
 

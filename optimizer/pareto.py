@@ -158,22 +158,19 @@ class _Search:
         energy is one more.
         """
         self.fastest_run.prepare()
-        found, answer, known = fastest(self.fastest_run.incumbent), None, list[Spline]()
+        found, answer = fastest(self.fastest_run.incumbent), None
         self.note_end(self.fastest_run)
         if found is None:
             run = self.run([])
             try:
                 answer = run.solution()
-                known = [answer.trajectory.spline]
-                found = fastest(run.incumbent, known)
+                found = fastest(run.incumbent, [answer.trajectory.spline])
             finally:
                 self.note_end(run)
                 self.solves += run.incumbent.solves
-        longest = self.problem.duration_max
-        if found is None:
-            assert answer is not None
-            return answer.trajectory.spline, answer
-        if longest is not None and found.duration > longest:
+            if found is None:
+                return answer.trajectory.spline, answer
+        if found.duration > (self.problem.duration_max or math.inf):
             raise found.too_slow
         return found.spline, answer
 

@@ -206,7 +206,7 @@ def find_fastest(incumbent: Incumbent, known: Sequence[Spline] = (), improve: bo
     found = fastest(incumbent, known, longest if longest >= shortest else None)
     if found is None:
         if shortest > longest:
-            raise DurationTooShort(least_duration(incumbent), cut_short=incumbent.deadline.passed)
+            raise DurationTooShort(least_duration(incumbent), late=incumbent.deadline.passed)
         return
     if found.duration > longest:
         raise found.too_slow

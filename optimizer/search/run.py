@@ -275,6 +275,8 @@ class Run:
         solve_from(incumbent, candidate, sampled(known), fine=self.problem.method == "time_scaling")
         result = solve(incumbent, candidate)
         if result.spline is None:
+            # as it is known, it is no optimum
+            incumbent.cut_short |= candidate.attempt is not None and candidate.attempt.spline is known
             return
         incumbent.accept_if_better(candidate, result, prepared.energy(result.spline))
         if incumbent.method.may_refine(result.spline) and candidate.attempt is not result:

@@ -240,21 +240,13 @@ class DurationTooShort(ProblemDetails):
     title: Literal["Duration too short"] = fixed("title", "Duration too short")
     status: Literal[422] = fixed("status", 422)
     shortest: float | None = described(
-        "Duration of the fastest motion found, which is certified: asked for again, it is answered. Null if no motion "
-        "was found in any duration.",
-        "s",
-        0.83,
+        "Duration of the fastest motion found, a certified one. Null if none was found in any duration.", "s", 0.83
     )
     bound: float = described(
-        "No motion takes less: the time that the joints need for their displacement within the limits on velocity, "
-        "acceleration and jerk. 0 where the end configurations are not all known.",
-        "s",
-        0.8298,
+        "No motion takes less: the joints need so long within their limits. 0 where this is not known.", "s", 0.8298
     )
     proven: bool = described("Whether no motion is faster than `shortest` by more than 0.1 %.", None, True)
-    cut_short: bool = described(
-        "Whether the deadline ended the search: with a longer one a faster motion may be found.", None, False
-    )
+    cut_short: bool = described("The deadline ended the search: a longer one may find a faster motion.", None, False)
 
 
 class TorqueInfeasible(ProblemDetails):
