@@ -54,6 +54,12 @@ def refused(asked: Problem, duration: float = TOO_SHORT) -> DurationTooShort:
     return caught.value
 
 
+def named(error: DurationTooShort) -> float:
+    """The duration [s] that a refusal names."""
+    assert error.shortest is not None
+    return error.shortest
+
+
 def assert_answered(asked: Problem, error: DurationTooShort, shares: tuple[float, ...] = (1.0, 1.02)) -> None:
     """What the refusal names is answered, as a fixed duration and as the longest one, and a little more as well."""
     assert error.shortest is not None
@@ -68,7 +74,7 @@ def test_one_bad_local_optimum_is_not_the_shortest_duration() -> None:
     asked = local()
     error = refused(asked, 0.7301)
     assert error.proven and not error.cut_short
-    assert error.bound <= error.shortest <= 0.7311
+    assert error.bound <= named(error) <= 0.7311
     assert_answered(asked, error)
     # a motion that is faster by less than counts is answered, too: Ruckig's takes no more than the bound
     exact = optimize(replace(asked, **fixed(error.bound * (1 + 1e-6))))
@@ -82,7 +88,7 @@ def test_a_baseline_within_the_limits_is_no_faster_than_the_shortest_duration() 
     ruckig = next(each for each in optimize(asked).baselines if each.name == "ruckig")
     assert ruckig.within_limits and ruckig.duration == pytest.approx(40.03, abs=0.01)
     error = refused(asked, 39.0)
-    assert error.proven and error.shortest <= ruckig.duration * (1 + PROVEN)
+    assert error.proven and named(error) <= ruckig.duration * (1 + PROVEN)
     answer = optimize(replace(asked, duration_max=41.0))
     assert answer.certificate.valid and answer.duration <= 41.0
     assert_answered(asked, error)
@@ -122,7 +128,7 @@ def test_no_motion_in_hand_is_faster(index: int) -> None:
     theirs = [each.duration for each in free.baselines if each.within_limits]
     others: list[MethodName] = ["lagrange", "uniform_scaling", "time_scaling"]
     theirs += [refused(replace(asked, method=method)).shortest or np.inf for method in others]
-    assert error.shortest <= min([free.duration, *theirs]) * (1 + PROVEN)
+    assert named(error) <= min([free.duration, *theirs]) * (1 + PROVEN)
 
 
 MOVES: dict[str, Problem] = {
@@ -158,7 +164,7 @@ def test_other_robots(name: str) -> None:
     asked = Problem(arm=Arm(robot=robot, collisions=False, payload=payload), start=start, goal=goal, deadline=300.0)
     error = refused(asked)
     # these moves are as fast as the joints alone, or hardly slower
-    assert error.shortest <= 1.003 * error.bound
+    assert named(error) <= 1.003 * error.bound
     assert_answered(asked, error)
 
 
@@ -170,7 +176,7 @@ def _ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
 
 def test_equal_ends_take_the_least_duration() -> None:
     error = refused(problem(goal=START), LEAST_DURATION / 2)
-    assert error.shortest == error.bound == LEAST_DURATION and error.proven
+    assert named(error) == error.bound == LEAST_DURATION and error.proven
 
 
 @pytest.mark.long
@@ -180,7 +186,7 @@ def test_phases_of_milliseconds_in_minutes() -> None:
     v_max[3] = 1e-3
     asked = problem(limits=replace(ROBOT.limits, v_max=v_max))
     error = refused(asked, 5.0)
-    assert error.proven and error.shortest < 300.1
+    assert error.proven and named(error) < 300.1
     assert_answered(asked, error, (1.0,))
 
 
@@ -189,7 +195,7 @@ def test_without_a_limit_on_jerk() -> None:
     robot = replace(ROBOT, limits=replace(ROBOT.limits, j_max=np.full(6, np.inf)))
     asked = problem(robot=robot, payload=Payload(4.5, np.array([0.05, 0.05, 0.12])))
     error = refused(asked)
-    assert error.bound <= error.shortest <= error.bound + 3e-3
+    assert error.bound <= named(error) <= error.bound + 3e-3
     assert_answered(asked, error)
 
 
