@@ -219,11 +219,32 @@ BODIES: dict[str, dict[str, Any]] = {
                 {
                     "name": "post",
                     "shape": "box",
-                    "size": [0.1, 0.1, 0.5],
-                    "pose": {"position": [-0.3, -0.5, 0.25], "quaternion": [0.0, 0.0, 0.0, 1.0]},
+                    "size": [0.2, 0.2, 0.9],
+                    "pose": {"position": [-0.45, -0.45, 0.45], "quaternion": [0.0, 0.0, 0.0, 1.0]},
                 }
             ]
         },
+    },
+}
+
+
+BODIES["a Panda with a heavy part between obstacles"] = {
+    "robot": "panda",
+    "start": {"q": [-0.9, 0.2, 0.0, -1.9, 0.0, 2.1, 0.8]},
+    "goal": {"q": [0.9, 0.2, 0.0, -1.9, 0.0, 2.1, 0.8]},
+    "payload": {"mass": 2.9, "com": [0.0, 0.0, 0.06]},
+    "objective": "mechanical",
+    "duration": TOO_SHORT,
+    "scene": {
+        "obstacles": [
+            {
+                "name": name,
+                "shape": "box",
+                "size": [0.2, 0.08, height],
+                "pose": {"position": [0.5, y, height / 2], "quaternion": [0.0, 0.0, 0.0, 1.0]},
+            }
+            for name, y, height in (("low", -0.1, 0.7), ("high", 0.2, 0.85))
+        ]
     },
 }
 
