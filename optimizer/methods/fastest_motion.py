@@ -131,14 +131,14 @@ class FastestMotion(ABC):
         try:
             with watch(self.deadline):
                 for attempt in attempts:
-                    self._note(attempt())
+                    self.take_note(attempt())
                     if self._is_done:
                         return
         except DeadlinePassed:
             self.cut_short = True
         self.cut_short |= self.deadline.passed
 
-    def _note(self, result: SolveResult) -> None:
+    def take_note(self, result: SolveResult) -> None:
         """Take the motion of a result if it is the fastest one, and confirmed."""
         self.cut_short |= result.cut_short or result.status is SolveStatus.OUT_OF_TIME
         if result.spline is not None and result.spline.duration < self.duration and self.confirms(result.spline):
@@ -220,7 +220,7 @@ class FastestMotion(ABC):
         result = line.solve()
         if result.spline is not None:
             if "ruckig" in self._solver.accepted_baselines:
-                self._note(result)
+                self.take_note(result)
             yield result.spline
 
     def _continued(self) -> Iterator[Attempt]:
@@ -230,7 +230,7 @@ class FastestMotion(ABC):
             p = self.prepared.parameters(electrical=1.0, time=price)
             solver = self.solver(DurationInterval(p, LEAST_DURATION, LONGEST_DURATION, price=price))
             result = solver.solve() if spline is None else solver.solve_from(*sampled(spline), fine=False)
-            self._note(result)
+            self.take_note(result)
             spline = spline if result.spline is None else result.spline
         if spline is not None:
             yield self._from(spline)

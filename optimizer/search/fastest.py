@@ -85,8 +85,8 @@ class _FastestOfCandidate(FastestMotion):
     def confirms(self, spline: Spline) -> bool:
         return self.incumbent.certified(self.candidate, spline, self.prepared.energy(spline)).valid
 
-    def add_effort(self, result: SolveResult) -> None:
-        self.incumbent.add_effort(result)
+    def take_note(self, result: SolveResult) -> None:
+        super().take_note(self.incumbent.add_effort(result))
 
 
 def fastest(incumbent: Incumbent, known: Sequence[Spline] = (), wanted: float | None = None) -> Fastest | None:
@@ -127,13 +127,9 @@ def fastest(incumbent: Incumbent, known: Sequence[Spline] = (), wanted: float | 
     if all(each is not best.candidate for each in incumbent.candidates):
         incumbent.candidates.append(best.candidate)
     bound = least_duration(incumbent)
-    return Fastest(
-        best.candidate,
-        best.best,
-        bound,
-        proven=best.duration <= bound * (1 + settings.proven),
-        cut_short=cut_short or any(each.cut_short for each in searches),
-    )
+    proven = best.duration <= bound * (1 + settings.proven)
+    cut_short = not proven and (cut_short or any(each.cut_short for each in searches))
+    return Fastest(best.candidate, best.best, bound, proven, cut_short)
 
 
 def _tried(incumbent: Incumbent) -> list[Candidate]:
