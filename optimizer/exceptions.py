@@ -219,8 +219,8 @@ class RoundTooShort(JoulepathError):
 
     def __init__(self, shortest: float, dwells: float) -> None:
         super().__init__(
-            f"The fastest round found takes {shortest:.4f} s, of which it dwells {dwells:.4g} s: allow at least as "
-            "much."
+            f"The fastest round found takes {_rounded_up(shortest)} s, of which it dwells {dwells:.4g} s: allow at "
+            "least as much."
         )
         self.shortest, self.dwells = shortest, dwells
 
@@ -264,11 +264,23 @@ class PathInfeasible(JoulepathError):
 
 
 class DurationTooShort(JoulepathError):
-    """No motion is that fast; `shortest` [s] is the least feasible duration."""
+    """No motion was found that is that fast. `shortest` [s] is the duration of the fastest one found, which is
+    certified and found again when it is asked for; None if there is none. No motion takes less than `bound` [s], 0
+    where that is not known; `proven`: `shortest` is within 0.1 % of it. `cut_short`: the deadline ended the search."""
 
-    def __init__(self, shortest: float) -> None:
-        super().__init__(f"No motion within the limits is that short: allow at least {shortest:.4f} s.")
-        self.shortest = shortest
+    def __init__(self, bound: float, shortest: float | None = None, proven: bool = False, late: bool = False) -> None:
+        found = "The fastest motion" if proven else "The fastest motion found"
+        message = f"{found} within the limits takes {_rounded_up(shortest or 0.0)} s: allow at least as much."
+        if shortest is None:
+            found = f"Every motion takes at least {_rounded_up(bound)} s, and none" if bound else "No motion"
+            message = f"{found} within the limits was found in any duration: allow more time, or relax a limit."
+        super().__init__(message + late * " The deadline ended the search: with a longer one it may find a faster one.")
+        self.bound, self.shortest, self.proven, self.cut_short = bound, shortest, proven, late
+
+
+def _rounded_up(duration: float) -> str:
+    """A duration [s] in tenths of milliseconds, none less: it is to be enough when asked for."""
+    return f"{math.ceil(duration * 1e4) / 1e4:.4f}"
 
 
 class TorqueInfeasible(JoulepathError):

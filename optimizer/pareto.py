@@ -33,7 +33,7 @@ from optimizer.exceptions import DeadlineExceeded, DurationTooShort, InvalidProb
 from optimizer.linear_algebra import one_thread
 from optimizer.problem.problem import Problem
 from optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, forward, nobody
-from optimizer.search.fastest import fastest, fastest_from, fastest_of
+from optimizer.search.fastest import fastest, fastest_of
 from optimizer.search.reserve import report_time
 from optimizer.search.run import Run
 from optimizer.search.sampled_ends import between
@@ -131,8 +131,6 @@ class _Search:
         self.tell(CandidatesFound(self.n))
         spline, found = self.fastest()
         problem = self.problem
-        if problem.duration_max is not None and spline.duration > problem.duration_max:
-            raise DurationTooShort(spline.duration)
         first = max(spline.duration, problem.duration_min or 0.0)
         # first, so that the fastest motion is known even if the deadline passes before the other end is
         self.solve(first, [spline])
@@ -156,24 +154,25 @@ class _Search:
     def fastest(self) -> tuple[Spline, Solution | None]:
         """The fastest motion, and the answer of least energy if it had to be found first. Raises what `optimize` does.
 
-        The minimum-time solve may fail on a candidate on which the least-energy solve does not. Then the motion of
-        least energy is its initial guess; if it fails again, that motion is the fastest one known.
+        Where no candidate has a motion from the starts that the fastest one is looked for from, the motion of least
+        energy is one more.
         """
         self.fastest_run.prepare()
-        found = fastest(self.fastest_run.incumbent)
+        found, answer = fastest(self.fastest_run.incumbent), None
         self.note_end(self.fastest_run)
-        if found is not None:
-            return found[1], None
-        run = self.run([])
-        try:
-            answer = run.solution()
-            known, incumbent = answer.trajectory.spline, run.incumbent
-            candidate = between(incumbent.prepared, incumbent.candidates, answer.start.q, answer.goal.q)
-            faster = fastest_from(incumbent, candidate, known)
-        finally:
-            self.note_end(run)
-            self.solves += run.incumbent.solves
-        return (known if faster is None or faster.duration > known.duration else faster), answer
+        if found is None:
+            run = self.run([])
+            try:
+                answer = run.solution()
+                found = fastest(run.incumbent, [answer.trajectory.spline])
+            finally:
+                self.note_end(run)
+                self.solves += run.incumbent.solves
+            if found is None:
+                return answer.trajectory.spline, answer
+        if found.duration > (self.problem.duration_max or math.inf):
+            raise found.too_slow
+        return found.spline, answer
 
     def note_end(self, run: Run) -> None:
         """Note if the deadline ended a search for a fastest motion: it has but a share of the time."""

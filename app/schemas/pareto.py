@@ -89,7 +89,7 @@ class ParetoResponse(Answer):
         None,
         "optimal",
     )
-    shortest: float = described("Shortest feasible duration found, over all candidates.", "s", 0.7462)
+    shortest: float = described("Duration of the fastest motion found, over all candidates.", "s", 0.7462)
     points: Annotated[list[ParetoPoint], Field(min_length=1)] = part("Points of the front, in order of duration.")
     dropped: list[ParetoDropped] = part("Durations that were solved and are not points of the front.")
     solver: ParetoSolver = part("Effort of the computation.")

@@ -26,7 +26,7 @@ def around_obstacles(method: Method, own: str, collision: Clearance, law: Law) -
     A candidate is not solved further if its own path needs at least as much energy as the best motion known, even
     without obstacles.
     """
-    if np.isfinite(method.best_known) and _energy_without_obstacles(method) >= method.best_known:
+    if np.isfinite(method.best_known) and _cost_without_obstacles(method) >= method.best_known:
         return SolveResult(SolveStatus.PRUNED, NO_BETTER, collision=collision)
     patience = method.deadline.within(PATIENCE * max(method.deadline.left, 0.0))
     planned, found = plan(method), list[SolveResult]()
@@ -40,7 +40,7 @@ def around_obstacles(method: Method, own: str, collision: Clearance, law: Law) -
         found.append(along_path(method, path, law))
     solved = [result for result in found if result.spline is not None]
     if solved:
-        return with_effort(min(solved, key=lambda result: method.prepared.cost_of(result.spline)), found)
+        return with_effort(min(solved, key=lambda result: method.cost_of(result.spline)), found)
     if method.deadline.passed:
         return with_effort(SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED), found)
     return with_effort(replace(failed, reason=f"{failed.reason}; {found[0].reason}"), found)
@@ -66,9 +66,9 @@ def along_path(method: Method, path: Array, law: Law) -> SolveResult:
     return replace(result, reason=f"{result.reason}{ALONG_PLANNED_PATH}")
 
 
-def _energy_without_obstacles(method: Method) -> float:
-    """Energy [J], in the objective, of the method's motion without collision checking; infinite if it finds none."""
+def _cost_without_obstacles(method: Method) -> float:
+    """Cost of the method's motion without collision checking; infinite if it finds none."""
     problem = method.prepared.problem
     free = PreparedProblem.of(replace(problem, arm=replace(problem.arm, collisions=False)))
-    result = type(method)(free, method.q_start, method.q_goal, method.deadline, method.interval).solve()
-    return free.cost_of(result.spline)
+    alike = type(method)(free, method.q_start, method.q_goal, method.deadline, method.interval)
+    return alike.cost_of(alike.solve().spline)

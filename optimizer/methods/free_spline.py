@@ -118,17 +118,17 @@ class FreeSpline(SqpMethod):
         """Whether a motion may have left obstacles on the wrong side."""
         if found.spline is None or found.unhindered is None or found.cut_short:
             return False
-        return self.prepared.cost_of(found.spline) > above(found.unhindered, WAY_OUT)
+        return self.cost_of(found.spline) > above(found.unhindered, WAY_OUT)
 
     def _compared_with_planned_paths(self, found: SolveResult) -> SolveResult:
         """A motion, or that of least energy from planned paths, if it needs less."""
-        energy = self.prepared.cost_of(found.spline)
+        energy = self.cost_of(found.spline)
         self.best_known = min(self.best_known, energy)
         planned = self.from_planned_paths(found)
         late = planned.cut_short or planned.status is SolveStatus.OUT_OF_TIME
         if planned.spline is found.spline:
             return replace(found, cut_short=late)
-        better = planned.spline is not None and self.prepared.cost_of(planned.spline) < energy
+        better = planned.spline is not None and self.cost_of(planned.spline) < energy
         return with_effort(planned if better else replace(found, cut_short=late), [found, planned])
 
     @property
@@ -141,14 +141,10 @@ class FreeSpline(SqpMethod):
         """The motion of least energy from planned paths, solved to the end; `failed` if there is none."""
         known = self.best_known
         best = super().from_planned_paths(failed)
-        if (
-            best.spline is None
-            or self.may_refine(best.spline)
-            or self.prepared.cost_of(best.spline) > above(known, POLISHED)
-        ):
+        if best.spline is None or self.may_refine(best.spline) or self.cost_of(best.spline) > above(known, POLISHED):
             return best
         polished = self._polished(best.spline)
-        if polished.spline is None or self.prepared.cost_of(polished.spline) >= self.prepared.cost_of(best.spline):
+        if polished.spline is None or self.cost_of(polished.spline) >= self.cost_of(best.spline):
             return with_effort(best, [best, polished])
         reason = f"{polished.reason}{FROM_PLANNED_PATH}"
         return with_effort(replace(polished, reason=reason), [best, polished])

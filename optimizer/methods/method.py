@@ -80,9 +80,11 @@ class Method(ABC):
     most_solved: ClassVar[int | None] = None
     # whether it has `solve_evenly`
     evenly_spaced: ClassVar[bool] = False
+    # whether it has `solve_from`
+    takes_guesses: ClassVar[bool] = False
     # whether it ends in a local optimum
     converges: ClassVar[bool] = True
-    # energy of the best motion known [J], in the objective: motions that collide and need more are not solved further
+    # cost of the best motion known, as of `cost_of`: motions that collide and cost more are not solved further
     best_known: float = np.inf
     # goals (nq,) [rad] of other candidates from the same start: as long as no motion is known, a path to any may do
     other_goals: Callable[[], Sequence[Array]] = tuple
@@ -110,6 +112,15 @@ class Method(ABC):
     @abstractmethod
     def solve(self) -> SolveResult:
         """Solve without an initial guess from elsewhere (cold start)."""
+
+    def cost_of(self, spline: Spline | None) -> float:
+        """What the interval makes least: the duration [s], or the objective with the price of time [J].
+
+        It is infinite if there is no motion.
+        """
+        if spline is None or self.interval.minimum_time:
+            return np.inf if spline is None else spline.duration
+        return self.prepared.cost_of(spline) + self.interval.price * spline.duration
 
     @staticmethod
     def may_refine(found: Spline) -> bool:

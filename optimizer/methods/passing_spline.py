@@ -64,14 +64,8 @@ class PassingSpline(SqpMethod):
             tried.append(self.solve_from(*sampled(known), fine=False))
             if known.duration >= motion.duration:
                 tried.append(SolveResult(SolveStatus.SOLVED, STOPPING, spline=known))
-        best = min(tried, key=lambda result: self._cost(result.spline))
+        best = min(tried, key=lambda result: self.cost_of(result.spline))
         return with_effort(best if best.spline is not None else tried[-1], [*tried, *rests])
-
-    def _cost(self, spline: Spline | None) -> float:
-        """What the interval makes least: the energy [J], or the duration [s]; inf without a motion."""
-        if spline is not None and self.interval.minimum_time:
-            return spline.duration
-        return self.prepared.cost_of(spline)
 
     @staticmethod
     def may_refine(found: Spline) -> bool:

@@ -103,6 +103,7 @@ class SqpMethod(Method):
 
     start_curve: HeldPose | None = None
     goal_curve: HeldPose | None = None
+    takes_guesses: ClassVar[bool] = True
     # whether the deadline may well end a solve: then what it has so far counts
     takes_long: ClassVar[bool] = False
 
@@ -160,7 +161,7 @@ class SqpMethod(Method):
                     cut_short=late, unhindered=unhindered,
                 )  # fmt: skip
             if collision is not None and not len(stage.pairs):
-                unhindered = self.prepared.cost_of(check.spline)
+                unhindered = self.cost_of(check.spline)
                 if unhindered >= self.best_known:
                     return SolveResult(SolveStatus.PRUNED, NO_BETTER, iterations, solves)
                 if self.was_postponed or (np.isfinite(self.best_known) and collision.min_clearance < -DEEP):
@@ -207,10 +208,10 @@ class SqpMethod(Method):
                 continue
             result = self.along_path(q, t)
             found.append(replace(result, reason=f"{result.reason}{FROM_PLANNED_PATH}"))
-            self.best_known = min(self.best_known, prepared.cost_of(result.spline))
+            self.best_known = min(self.best_known, self.cost_of(result.spline))
         if not found:
             return failed
-        best = min(found, key=lambda result: (prepared.cost_of(result.spline), result.status is not SolveStatus.PRUNED))
+        best = min(found, key=lambda result: (self.cost_of(result.spline), result.status is not SolveStatus.PRUNED))
         return with_effort(failed if best.status is SolveStatus.FAILED else best, found)
 
     @abstractmethod

@@ -37,6 +37,11 @@ class TimeScaling(FreeSpline):
         """The collision on the straight line; None if there is none."""
         return self.prepared.surroundings.worst_violation(quintic_spline(self.q_start, self.q_goal, 1.0))
 
+    @property
+    def collides(self) -> bool:
+        """Whether the straight line collides."""
+        return self._collision is not None
+
     def solve(self) -> SolveResult:
         """From toppra's time-optimal scaling; along planned paths if the straight line collides."""
         if self._collision is not None:

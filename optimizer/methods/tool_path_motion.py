@@ -12,13 +12,14 @@ from scipy.integrate import cumulative_trapezoid
 from models.robot import Array
 from optimizer.deadline import DeadlinePassed, watch
 from optimizer.kinematics.course_tracing import Trace, path_ratios
-from optimizer.methods.duration_intervals import DurationInterval
+from optimizer.methods.duration_intervals import DurationInterval, fastest
 from optimizer.methods.end_angle import try_angles
 from optimizer.methods.even_speed import EvenSpeed
 from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
 from optimizer.methods.path_retiming import PathRetiming
 from optimizer.methods.sqp_method import with_effort
 from optimizer.methods.tool_turning import TurnedAtEnd, turned_paths
+from optimizer.problem.problem import LONGEST_DURATION
 from optimizer.problem.tool_path import ToolPath
 from optimizer.trajectories import quintic, ramped
 from optimizer.trajectories.bspline import DEGREE, Basis, clamped
@@ -36,6 +37,8 @@ RAMPS = (0.1, 0.5)
 ON_RAMP = 0.8
 # instants at which the path's tolerances are checked; samples of the path per control point, to measure along it
 CHECKED, SAMPLED = 2000, 16
+# a finer time scaling makes no motion faster by so much
+NEARLY = 1.1
 NOT_FINER = "there is no other space of time scalings"
 TOO_SLOW = (
     "found no motion within the limits that keeps path.speed.min between its ramps: give a smaller one, a longer "
@@ -54,6 +57,7 @@ class ToolPathMotion(Method):
 
     # every candidate follows a curve of its own, which no other candidate's solution tells anything of
     most_solved = 64
+    takes_guesses = True
 
     def solve(self) -> SolveResult:
         """The time scaling of least cost."""
@@ -75,13 +79,28 @@ class ToolPathMotion(Method):
                 return SolveResult(SolveStatus.INFEASIBLE, OUT_OF_REACH.format(*slow))
         results = [self._kept(path, interval, self._scaling(1)) for interval in self._intervals()]
         if all(result.spline is None for result in results) and not self._holds_speed:
-            # what the first space cannot express, a finer one may: a motion that is nearly the fastest one
-            results.append(self._kept(path, self.interval, self._scaling(FINER_SCALING)))
-        found = self._clear(min(results, key=lambda result: self.prepared.cost_of(result.spline)))
+            results += self._nearly_fastest(path)
+        found = self._clear(min(results, key=lambda result: self.cost_of(result.spline)))
         if found.spline is None and self._may_turn():
             self._turn(self._paced(path), self._scaling(1), np.inf, results)
-            found = min([found, *results], key=lambda result: self.prepared.cost_of(result.spline))
+            found = min([found, *results], key=lambda result: self.cost_of(result.spline))
         return with_effort(found, results)
+
+    def _nearly_fastest(self, path: Spline) -> list[SolveResult]:
+        """Attempts where the first space has no motion: what it cannot express, a finer one may, a motion that is
+        nearly the fastest one.
+
+        In a limited time they begin from the fastest motion of the first space; if that takes far longer, none is made.
+        """
+        law, results = None, list[SolveResult]()
+        if self.t_max < LONGEST_DURATION:
+            fast = self._kept(path, fastest(self.prepared), self._scaling(1))
+            results.append(replace(fast, status=SolveStatus.FAILED, spline=None))
+            if fast.spline is not None and fast.spline.duration > NEARLY * self.t_max:
+                reason = f"along the path, the fastest motion found takes {fast.spline.duration:.4f} s"
+                return [*results, SolveResult(SolveStatus.INFEASIBLE, reason)]
+            law = None if fast.spline is None else _on_path(path, *sampled(fast.spline))
+        return [*results, self._kept(path, self.interval, self._scaling(FINER_SCALING), law)]
 
     def _clear(self, found: SolveResult) -> SolveResult:
         """The result; without a motion if that collides."""
@@ -117,7 +136,7 @@ class ToolPathMotion(Method):
         def is_best(trace: Trace, path: Spline, result: SolveResult) -> bool:
             nonlocal best
             results.append(result)
-            cost = prepared.cost_of(result.spline)
+            cost = self.cost_of(result.spline)
             if result.spline is None or cost >= best:
                 return False
             best = cost
@@ -154,7 +173,7 @@ class ToolPathMotion(Method):
                 return np.inf
             result = self._clear(self._kept(followed[1], self.interval, self._scaling(1)))
             results.append(replace(result, status=SolveStatus.FAILED, spline=None))
-            found.append((self.prepared.cost_of(result.spline), *followed, replace(result, iterations=0, solves=0)))
+            found.append((self.cost_of(result.spline), *followed, replace(result, iterations=0, solves=0)))
             return found[-1][0]
 
         try_angles(cost, cost(0.0))
@@ -182,11 +201,11 @@ class ToolPathMotion(Method):
                 else:
                     results.append(self._kept(path, self.interval, scaling, law))
                 if self._may_turn():
-                    least = min(self.prepared.cost_of(result.spline) for result in results)
+                    least = min(self.cost_of(result.spline) for result in results)
                     self._turn(law, scaling, least, results)
         except DeadlinePassed:
             results.append(SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED))
-        return with_effort(min(results, key=lambda result: self.prepared.cost_of(result.spline)), results)
+        return with_effort(min(results, key=lambda result: self.cost_of(result.spline)), results)
 
     def _scaling(self, finer: int) -> Basis:
         """The space of the time scaling, so many times finer than the first one."""

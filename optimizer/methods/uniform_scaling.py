@@ -57,22 +57,22 @@ class UniformScaling(Method):
         collision = self.prepared.surroundings.worst_violation(given)
         if collision is not None:
             return around_obstacles(self, "the time-optimal motion", collision, self._along)
-        return _UniformScale(self, given).solve()
+        return UniformScale(self, given).solve()
 
     def _along(self, path: Spline) -> SolveResult:
         """The time-optimal motion along a path, scaled."""
         found = PathRetiming(self.prepared, path, fastest(self.prepared)).solve()
         if found.spline is None:
             return found
-        return with_effort(scaled := _UniformScale(self, found.spline).solve(), [found, scaled])
+        return with_effort(scaled := UniformScale(self, found.spline).solve(), [found, scaled])
 
 
-class _UniformScale:
+class UniformScale:
     """The factor on the time of a `given` motion, and the number of energies evaluated."""
 
-    def __init__(self, method: UniformScaling, given: Spline) -> None:
-        self.prepared, self.interval, self.deadline = method.prepared, method.interval, method.deadline
-        self.t_min, self.t_max = method.t_min, method.t_max
+    def __init__(self, method: Method, given: Spline) -> None:
+        self.prepared, self.deadline, self._cost_of = method.prepared, method.deadline, method.cost_of
+        self.t_min, self.t_max, self._fastest = method.t_min, method.t_max, method.interval.minimum_time
         self.given, self.evaluations = given, 0
         q, v, a = sample(given, grid(given.duration))
         still = np.zeros_like(q)
@@ -97,7 +97,12 @@ class _UniformScale:
         if np.isinf(costs[best]):
             return SolveResult(SolveStatus.FAILED, "found no time scale within the limits", self.evaluations)
         factor, low, high = factors[best], factors[max(best - 1, 0)], factors[min(best + 1, len(factors) - 1)]
-        if high > low:
+        if self._fastest:
+            # the least factor within the limits
+            while factor - low > FACTOR_TOLERANCE * factor:
+                middle = (low + factor) / 2
+                low, factor = (middle, factor) if np.isinf(self._cost(middle)) else (low, middle)
+        elif high > low:
             found = minimize_scalar(
                 self._cost, bounds=(low, high), method="bounded", options={"xatol": FACTOR_TOLERANCE * factor}
             )
@@ -124,4 +129,4 @@ class _UniformScale:
         spline = self._retimed(factor)
         if used > BOUNDED and (torque_peaks(self.prepared, spline) > limit * TORQUE_USED).any():
             return np.inf
-        return spline.duration if self.interval.minimum_time else self.prepared.cost_of(spline)
+        return self._cost_of(spline)

@@ -28,7 +28,8 @@ class Incumbent:
     """State of one search, shared by all of its stages.
 
     `candidates` are all start and goal pairs, `iterations` and `solves` the effort over all attempts. `cut_short` says
-    that the deadline ended a part of the search although there is a motion: with more time there might be a better one.
+    that the deadline ended a part of the search although there is a motion, or that this was not optimised: there might
+    be a better one.
     `end` is the instant at which the answer is due, `longest` [s] the longest duration that the answer is known to
     have, perhaps. `tell` gets what is found; `proven` [J] is what no motion goes below, None if that is not known yet.
     """

@@ -23,7 +23,7 @@ from optimizer.search.branch_and_bound import explore
 from optimizer.search.candidates import Candidate, Reason, bound, pairs
 from optimizer.search.claims import may_be_optimal
 from optimizer.search.ends import ends
-from optimizer.search.fastest import find_fastest
+from optimizer.search.fastest import explore_or_find_fastest, find_fastest
 from optimizer.search.free_goal_bound import family_bound_of
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.least_work import explore_least_work
@@ -133,18 +133,13 @@ class Run:
     def search(self) -> Solution:
         """The solution, from candidates that are prepared, and of which some may be solved. Raises as `solution`."""
         incumbent = self.incumbent
-        problem = self.problem
-        without = None
+        problem, without = self.problem, None
         if incumbent.uses_storage:
             # storage never makes a motion need more energy
             without = self.solved_beside(replace(problem, arm=replace(problem.arm, bus=Bus())), share=0.5)
         # rest does no work: any motion may rest for the time that is left
         may_rest = problem.objective == "mechanical" and problem.duration_min != problem.duration_max
-        self.explore()
-        if without is not None:
-            incumbent.accept_if_better(*without)
-        if incumbent.best() is None:
-            find_fastest(incumbent)
+        explore_or_find_fastest(incumbent, self.explore, self.known, without)
         if incumbent.method.most_solved is None:
             incumbent.candidates += free_goal.refine_goals(incumbent) + self_motions.refine(incumbent)
             incumbent.tell_candidates()
@@ -165,6 +160,10 @@ class Run:
                 return answer
             incumbent.reject(best)
             self.explore()
+        if any(each.reason is Reason.NOT_CONFIRMED for each in incumbent.candidates):
+            find_fastest(incumbent, self.known, improve=False)
+            if (last := incumbent.best()) is not None and (answer := self.answer(last, baselines_of(incumbent, last))):
+                return answer
         if any(candidate.status is CandidateStatus.UNVISITED for candidate in incumbent.candidates):
             raise self.too_late()
         raise no_trajectory(self.incumbent.candidates)
@@ -273,6 +272,8 @@ class Run:
         solve_from(incumbent, candidate, sampled(known), fine=self.problem.method == "time_scaling")
         result = solve(incumbent, candidate)
         if result.spline is None:
+            # as it is known, it is no optimum
+            incumbent.cut_short |= candidate.attempt is not None and candidate.attempt.spline is known
             return
         incumbent.accept_if_better(candidate, result, prepared.energy(result.spline))
         if incumbent.method.may_refine(result.spline) and candidate.attempt is not result:

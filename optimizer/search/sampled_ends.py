@@ -52,6 +52,16 @@ def activate_deferred(candidates: Sequence[Candidate], batch: int = BATCH, most_
     return opened > 0
 
 
+def fastest_samples(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """The deferred samples of least proven duration: at most BATCH, and at most ALIKE of a pair of branches."""
+    alike, chosen = Counter[tuple[str, str, int]](), list[Candidate]()
+    for candidate in sorted((e for e in candidates if e.deferred and e.holdable), key=lambda e: e.shortest):
+        alike[_kind(candidate)] += 1
+        if alike[_kind(candidate)] <= ALIKE and len(chosen) < BATCH:
+            chosen.append(candidate)
+    return chosen
+
+
 def _kind(candidate: Candidate) -> tuple[str, str, int]:
     """The pair of branches that a candidate is of, and its target."""
     return candidate.start.label, candidate.goal.label, candidate.goal.target

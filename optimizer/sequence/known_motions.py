@@ -23,8 +23,8 @@ from optimizer.problem.arm import Arm
 from optimizer.problem.problem import Problem
 from optimizer.trajectories.spline import Spline
 
-# how a motion was looked for: as the search of a round tries it, to the end, or at a price of time
-Stage = Literal["tried", "finished", "priced"]
+# how a motion was looked for: as the search of a round tries it, to the end, at a price of time, or for its duration
+Stage = Literal["tried", "finished", "priced", "fastest"]
 # fields of a problem on which its best motion does not hang
 _ASIDE = ("arm", "sample_period", "deadline")
 

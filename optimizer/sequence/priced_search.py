@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from optimizer.certificate import certify
 from optimizer.deadline import Deadline, DeadlinePassed, watch
 from optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from optimizer.methods import solver_for
-from optimizer.methods.duration_intervals import DurationInterval, fastest
-from optimizer.methods.method import SolveResult
+from optimizer.methods.duration_intervals import DurationInterval
+from optimizer.methods.fastest_motion import FastestMotion
+from optimizer.methods.method import Method, SolveResult
 from optimizer.problem.problem import LEAST_DURATION
 from optimizer.sequence.known_motions import KnownMotion, known_motions
 from optimizer.sequence.lazy_search import SHARE_OF_A_LEG, LazySearch
@@ -79,9 +81,40 @@ class MoveOfALeg:
         return min(allowed, key=lambda motion: motion.value(price), default=found)
 
 
-def fastest_motion(leg: Leg, s: int, g: int, deadline: Deadline) -> PricedMotion | None:
-    """The motion of a pair of least duration; None if none is found before the deadline."""
-    return _solved(leg, s, g, fastest(leg.prepared), deadline)
+class _FastestOfPair(FastestMotion):
+    """The search for the fastest motion of a pair, nodes `s` and `g` of a leg."""
+
+    def __init__(self, leg: Leg, s: int, g: int, deadline: Deadline, known: Sequence[Spline]) -> None:
+        self._deadline = deadline
+        super().__init__(leg.prepared_for(s, g), leg.start.q[s], leg.goal.q[g], known)
+        problem = leg.prepared.problem
+        self.problem = replace(problem, start=self.q_start, goal=self.q_goal, passes=leg.passes(s, g))
+
+    @property
+    def deadline(self) -> Deadline:
+        return self._deadline
+
+    def solver(self, interval: DurationInterval) -> Method:
+        return solver_for(self.prepared, self.q_start, self.q_goal, self.deadline, interval)
+
+    def confirms(self, spline: Spline) -> bool:
+        return certify(self.problem, spline, self.q_start, self.q_goal, self.prepared.energy(spline)).valid
+
+
+def fastest_motion(leg: Leg, s: int, g: int, deadline: Deadline, known: Sequence[Spline] = ()) -> PricedMotion | None:
+    """The motion of a pair of least duration, certified; None if none is found before the deadline.
+
+    It is no slower than the motions `known` of this pair.
+    """
+    search, motions = _FastestOfPair(leg, s, g, deadline, known), known_motions()
+    key = motions.key("fastest", search.problem, list(known))
+    before = motions.recall(key)
+    spline = search.run() if before is None else before.spline
+    if spline is None:
+        return None
+    if not search.cut_short:
+        motions.keep(key, KnownMotion(spline, None))
+    return PricedMotion(spline, leg.prepared.cost_of(spline))
 
 
 def _solved(

@@ -129,6 +129,11 @@ class TimedSearch:
         priced = self._fast_search
         chain = self._explored(priced)
         fast = self.fastest(chain)
+        if fast is None or duration_of(fast) > self.time:
+            # the motions by which the chain was found may be far slower than the fastest ones
+            other = self.fastest_round()
+            if other is not None and (fast is None or duration_of(other[1]) < duration_of(fast)):
+                chain, fast = other
         if fast is None:
             raise DeadlineExceeded([]) if priced.cut_short or self.search.search_end.passed else NoTrajectory([])
         if duration_of(fast) > self.time:
@@ -158,7 +163,9 @@ class TimedSearch:
         found = list[PricedMotion]()
         for each in self.search.pairs(nodes):
             if each not in self._fastest:
-                self._fastest[each] = fastest_motion(self.legs[each[0]], *each[1:], self.search.search_end)
+                own = self.search.solutions.get(each)
+                known = [] if own is None else [own.trajectory.spline]
+                self._fastest[each] = fastest_motion(self.legs[each[0]], *each[1:], self.search.search_end, known)
             motion = self._fastest[each]
             if motion is None:
                 return None

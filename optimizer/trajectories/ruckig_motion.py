@@ -12,6 +12,9 @@ from optimizer.trajectories.quadrature import lobatto_nodes
 from optimizer.trajectories.spline import Spline, least_time_scale
 from optimizer.trajectories.time_scalings import SampledMotion, standstill
 
+# shares of the jerk limits with which a motion is asked for in turn: where a joint just reaches its greatest
+# acceleration, Ruckig may find the lengths of its phases negative by rounding
+JERKS = (1.0, 1 - 1e-9, 1 - 1e-7, 1 - 1e-5)
 # fractions of the duration within which jumps of jerk become one, as long as the motion exceeds its limits by more
 CLOSEST, WITHIN = (1e-5, 4e-5, 2e-4, 1e-3), 1 + 1e-6
 
@@ -86,12 +89,16 @@ def _ruckig(limits: Limits, q_start: Array, q_goal: Array) -> ruckig.Trajectory:
     given = ruckig.InputParameter(len(q_start))
     given.current_position, given.target_position = q_start.tolist(), q_goal.tolist()
     given.max_velocity, given.max_acceleration = limits.v_max.tolist(), limits.a_max.tolist()
-    given.max_jerk = limits.j_max.tolist()
-    found = ruckig.Trajectory(len(q_start))
-    result = ruckig.Ruckig(len(q_start)).calculate(given, found)
-    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
-        raise RuntimeError(f"Ruckig found no motion: {result}")
-    return found
+    for share in JERKS:
+        given.max_jerk = (share * limits.j_max).tolist()
+        found = ruckig.Trajectory(len(q_start))
+        try:
+            result = ruckig.Ruckig(len(q_start)).calculate(given, found)
+        except ruckig.RuckigError as error:
+            result = error
+        if result in (ruckig.Result.Working, ruckig.Result.Finished):
+            return found
+    raise RuntimeError(f"Ruckig found no motion: {result}")
 
 
 def _breaks(found: ruckig.Trajectory) -> Array:

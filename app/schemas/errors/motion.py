@@ -235,16 +235,20 @@ class CycleTooShort(ProblemDetails):
 
 class DurationTooShort(ProblemDetails):
     """No motion within the limits was found for the largest allowed duration: `duration`, its `max`, or the time of the
-    `cycle`. Allow at least `shortest`, or let the optimiser choose the duration."""
+    `cycle`. Allow at least `shortest`, for which there is a certified motion, or let the optimiser choose the duration.
+    """
 
     type: Literal["/problems/duration-too-short"] = fixed("type", "/problems/duration-too-short")
     title: Literal["Duration too short"] = fixed("title", "Duration too short")
     status: Literal[422] = fixed("status", 422)
-    shortest: float = described(
-        "Duration of the fastest motion found. If none was found: a lower bound on the duration of every motion.",
-        "s",
-        0.83,
+    shortest: float | None = described(
+        "Duration of the fastest motion found, a certified one. Null if none was found in any duration.", "s", 0.83
     )
+    bound: float = described(
+        "No motion takes less: the joints need so long within their limits. 0 where this is not known.", "s", 0.8298
+    )
+    proven: bool = described("Whether no motion is faster than `shortest` by more than 0.1 %.", None, True)
+    cut_short: bool = described("The deadline ended the search: a longer one may find a faster motion.", None, False)
 
 
 class TorqueInfeasible(ProblemDetails):

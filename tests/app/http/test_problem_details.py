@@ -32,6 +32,7 @@ ERRORS: list[JoulepathError] = [
     exceptions.UnreachablePose("goal", None, "The goal pose is out of reach."),
     exceptions.NoReachableTarget("start", [UnreachableTarget("start", 0, "The start pose is out of reach.")]),
     exceptions.SingularPose("goal", 1e-9),
+    exceptions.DurationTooShort(0.8, 0.83, proven=False, late=True),
     exceptions.DurationTooShort(0.8),
     exceptions.TorqueInfeasible("elbow_joint", 200.0, 150.0),
     exceptions.NoTrajectory([CANDIDATE]),

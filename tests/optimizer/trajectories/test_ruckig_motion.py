@@ -30,3 +30,14 @@ def test_its_states_are_those_of_ruckig(robot: str) -> None:
         assert np.abs(np.stack(ruckig_motion._states(found, t), axis=1) - expected).max() < ROUNDING
         whole = ruckig_motion.time_optimal_positions(limits, start, goal, np.array([0.0, 1.0]))
         assert np.abs(whole - [start, goal]).max() < ROUNDING
+
+
+def test_a_joint_that_just_reaches_its_greatest_acceleration() -> None:
+    """There 0.05 rad are twice a³ / j²: of half of these moves Ruckig says that it has none."""
+    limits = load_robot("ur5e").limits
+    for first in np.round(np.arange(-3, 3, 0.25), 2):
+        q_start = np.array([first, 0.0, 0.0, 0.0, 0.0, 0.0])
+        q_goal = np.array([first + 0.05, 0.0, 0.0, 0.0, 0.0, 0.0])
+        found = ruckig_motion.time_optimal(limits, q_start, q_goal)
+        # jerk alone: 4 (d / 2j)^(1/3)
+        assert found.duration == pytest.approx(4 * np.cbrt(0.05 / 400), rel=1e-6)

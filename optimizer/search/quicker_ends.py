@@ -1,0 +1,73 @@
+"""Ends of a candidate that are samples of a target, moved within it to where the joints need the least time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.deadline import checkpoint
+from optimizer.kinematics.angles import nearest_turn
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.search.candidates import Candidate
+from optimizer.search.ends import EndConfiguration
+from optimizer.search.sampled_ends import nearest_configuration, with_ends
+from optimizer.trajectories.seven_segment import shortest_duration
+
+
+@dataclass(frozen=True)
+class QuickerEndsSettings:
+    """How long quicker ends are looked for."""
+
+    trials: int = 120
+    """Random steps from the best ends so far: with the steps below, the last ones are some 1e-3 rad."""
+
+    first_step: float = 0.3
+    """Standard deviation of the first steps [rad]: about the distance of neighbouring samples."""
+
+    longer: float = 1.5
+    """Factor on the step after one that helped."""
+
+    shorter: float = 0.9
+    """Factor on the step after one that did not: together they keep one step in five helpful."""
+
+    worth: float = 1e-3
+    """Relative decrease of the duration that is worth another candidate."""
+
+
+def with_quicker_ends(
+    prepared: PreparedProblem, candidate: Candidate, settings: QuickerEndsSettings | None = None
+) -> Candidate | None:
+    """A candidate for the same targets whose proven least duration is shorter; None if none is found near by.
+
+    Ends by DeadlinePassed if the watched deadline passes.
+    """
+    settings = settings or QuickerEndsSettings()
+    limits, rng = prepared.arm.active_limits, np.random.default_rng(0)
+    q_start, q_goal, least, step = candidate.q_start, candidate.q_goal, candidate.shortest, settings.first_step
+    for _ in range(settings.trials):
+        checkpoint()
+        ends = [
+            _moved(prepared, end, q, step * rng.normal(size=len(q)))
+            for end, q in ((candidate.start, q_start), (candidate.goal, q_goal))
+        ]
+        step *= settings.shorter
+        if ends[0] is None or ends[1] is None:
+            continue
+        duration = float(shortest_duration(ends[1] - ends[0], limits))
+        if duration < least:
+            (q_start, q_goal), least = (ends[0], ends[1]), duration
+            step *= settings.longer / settings.shorter
+    if least > candidate.shortest * (1 - settings.worth):
+        return None
+    return with_ends(prepared, candidate, q_start, q_goal)
+
+
+def _moved(prepared: PreparedProblem, end: EndConfiguration, q: Array, by: Array) -> Array | None:
+    """The configuration (nq,) [rad] of a sampled end that is nearest to one moved from q, in the same turn; q itself of
+    another end, None if the target is not reached there."""
+    if not end.sampled:
+        return q
+    found = nearest_configuration(prepared, end, q + by)
+    return None if found is None else nearest_turn(found, q)

@@ -1,0 +1,285 @@
+"""The fastest motion: what a refusal names is no slower than a motion in hand, and is answered when it is asked for."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.convert.request import to_problem
+from app.schemas.request import OptimizeRequest
+from models.registry import load_robot
+from models.robot import Robot
+from optimizer.exceptions import DurationTooShort, RoundTooShort
+from optimizer.methods.fastest_motion import FastestSettings
+from optimizer.optimize import optimize
+from optimizer.optimize_round import optimize_round
+from optimizer.pareto import pareto
+from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.bus import Bus
+from optimizer.problem.problem import LEAST_DURATION, MethodName, Problem
+from optimizer.problem.stops import Stop
+from optimizer.problem.work_round import WorkRound
+from tests.optimizer.clocks import CountingClock
+from tests.optimizer.moves import CEILING, GOAL, PAYLOAD, ROBOT, START, fixed, limits, problem, tcp_pose
+from tests.selection import long_but
+
+# a move whose minimum-time solve from one start ends at four times the fastest motion
+LOCAL = [-1.477, -1.808, 1.483, 1.913, 0.829, -1.357], [-0.341, -2.823, 1.001, 1.472, 0.493, -2.509]
+# a move that lasts as long as joint 6 needs at 0.05 rad/s
+SLOW = [0.5, -0.3, 0.4, -1.2, -1.1, 0.0], [-0.5, -0.3, -0.4, -1.2, -1.1, 2.0]
+# relative; what counts as the fastest motion may exceed the fastest one by this
+PROVEN = FastestSettings().proven
+ROUNDING = 1e-9
+# a time in which no arm gets anywhere [s]
+TOO_SHORT = 0.05
+
+
+def local(**given: Any) -> Problem:
+    return problem(*map(np.array, LOCAL), **given)
+
+
+def slow() -> Problem:
+    v_max = ROBOT.limits.v_max.copy()
+    v_max[5] = 0.05
+    return problem(*map(np.array, SLOW), limits=replace(ROBOT.limits, v_max=v_max))
+
+
+def refused(asked: Problem, duration: float = TOO_SHORT) -> DurationTooShort:
+    with pytest.raises(DurationTooShort) as caught:
+        optimize(replace(asked, **fixed(duration)))
+    return caught.value
+
+
+def named(error: DurationTooShort) -> float:
+    """The duration [s] that a refusal names."""
+    assert error.shortest is not None
+    return error.shortest
+
+
+def assert_answered(asked: Problem, error: DurationTooShort, shares: tuple[float, ...] = (1.0, 1.02)) -> None:
+    """What the refusal names is answered, as a fixed duration and as the longest one, and a little more as well."""
+    assert error.shortest is not None
+    for share in shares:
+        answer = optimize(replace(asked, **fixed(share * error.shortest)))
+        assert answer.certificate.valid and answer.duration == share * error.shortest
+    answer = optimize(replace(asked, duration_min=None, duration_max=error.shortest))
+    assert answer.certificate.valid and answer.duration <= error.shortest
+
+
+def test_one_bad_local_optimum_is_not_the_shortest_duration() -> None:
+    asked = local()
+    error = refused(asked, 0.7301)
+    assert error.proven and not error.cut_short
+    assert error.bound <= named(error) <= 0.7311
+    assert_answered(asked, error)
+    # a motion that is faster by less than counts is answered, too: Ruckig's takes no more than the bound
+    exact = optimize(replace(asked, **fixed(error.bound * (1 + 1e-6))))
+    assert exact.certificate.valid
+    # it stands as it was found, and is not sold as the optimum
+    assert exact.status == "feasible"
+
+
+def test_a_baseline_within_the_limits_is_no_faster_than_the_shortest_duration() -> None:
+    asked = slow()
+    ruckig = next(each for each in optimize(asked).baselines if each.name == "ruckig")
+    assert ruckig.within_limits and ruckig.duration == pytest.approx(40.03, abs=0.01)
+    error = refused(asked, 39.0)
+    assert error.proven and named(error) <= ruckig.duration * (1 + PROVEN)
+    answer = optimize(replace(asked, duration_max=41.0))
+    assert answer.certificate.valid and answer.duration <= 41.0
+    assert_answered(asked, error)
+
+
+def test_a_front_begins_at_the_fastest_motion() -> None:
+    front = pareto(local(), 5)
+    assert front.status == "optimal"
+    assert front.shortest <= 0.7311 and front.points[0].duration == front.shortest
+    # the optimum of this duration, not just a motion of it
+    assert front.points[0].energy.electrical.total == pytest.approx(76.74, rel=1e-3)
+    assert len(front.points) == 5
+
+
+def test_a_round_takes_any_time_from_the_fastest_one_on() -> None:
+    start, goal = map(np.array, LOCAL)
+    arm = Arm(robot=ROBOT, collisions=False)
+    asked = WorkRound(arm=arm, start=start, stops=[Stop(name="there", target=goal)])
+    with pytest.raises(RoundTooShort) as caught:
+        optimize_round(replace(asked, **fixed(1.4)))
+    shortest = caught.value.shortest
+    assert shortest <= 2 * 0.7311
+    for duration in (shortest, 1.65):
+        found = optimize_round(replace(asked, **fixed(duration)))
+        assert found.duration == pytest.approx(duration, rel=ROUNDING)
+        assert all(move.solution.certificate.valid for move in found.moves)
+
+
+@pytest.mark.parametrize("index", long_but([0, 5, 11], range(16)))
+def test_no_motion_in_hand_is_faster(index: int) -> None:
+    """Moves of ±1.5 rad, every other one with 4 kg: of 118 alike, 16 were refused for up to ten times too long."""
+    rng = np.random.default_rng([11, index])
+    start, goal = rng.uniform(-1.5, 1.5, (2, 6))
+    payload = Payload(4.0, rng.uniform([-0.05, -0.05, 0.0], [0.05, 0.05, 0.12])) if index % 2 else Payload()
+    asked = problem(start, goal, payload=payload)
+    free, error = optimize(asked), refused(asked)
+    theirs = [each.duration for each in free.baselines if each.within_limits]
+    others: list[MethodName] = ["lagrange", "uniform_scaling", "time_scaling"]
+    theirs += [refused(replace(asked, method=method)).shortest or np.inf for method in others]
+    assert named(error) <= min([free.duration, *theirs]) * (1 + PROVEN)
+
+
+MOVES: dict[str, Problem] = {
+    "time_scaling": problem(method="time_scaling", payload=PAYLOAD),
+    "lagrange": problem(method="lagrange", payload=PAYLOAD),
+    "uniform_scaling": problem(method="uniform_scaling", payload=PAYLOAD),
+    "polynomial_ga": problem(method="polynomial_ga", payload=PAYLOAD),
+    "one joint": problem(goal=START + np.array([0.0, 0.0, 0.7, 0.0, 0.0, 0.0])),
+    "hardly any torque": problem(
+        payload=Payload(5.0, np.array([0.05, -0.05, 0.12])), limits=limits(tau_max=[40, 105, 60, 14, 14, 14])
+    ),
+    "on a wall": problem(gravity=np.array([9.81, 0.0, 0.0]), payload=Payload(4.0, np.array([0.0, 0.0, 0.1]))),
+    "on the ceiling": problem(gravity=CEILING, payload=PAYLOAD),
+    "between poses": problem(tcp_pose(START), tcp_pose(GOAL), payload=Payload(4.5, np.array([0.05, 0.05, 0.12]))),
+    "storage on the bus": problem(bus=Bus(mode="storage")),
+    "mechanical": problem(objective="mechanical", duration_max=3.0),
+    "slow tool": problem(tcp_speed=0.25, elbow_speed=0.5),
+    "through a pass": problem(passes=(0.5 * (START + GOAL) + 0.2,)),
+}
+
+
+@pytest.mark.parametrize("name", long_but(["lagrange", "uniform_scaling", "hardly any torque", "between poses"], MOVES))
+def test_what_is_named_is_answered(name: str) -> None:
+    assert_answered(MOVES[name], refused(MOVES[name]))
+
+
+@pytest.mark.parametrize("name", long_but(["panda"], ["panda", "ur20", "kr10_r1100", "xarm7", "ur3e", "fr3"]))
+def test_other_robots(name: str) -> None:
+    robot = load_robot(name)
+    rng = np.random.default_rng(5)
+    start, goal = rng.uniform(*_ranges(robot), (2, robot.nq))
+    payload = Payload(0.9 * robot.rated_payload, np.array([0.0, 0.0, 0.08]))
+    asked = Problem(arm=Arm(robot=robot, collisions=False, payload=payload), start=start, goal=goal, deadline=300.0)
+    error = refused(asked)
+    # these moves are as fast as the joints alone, or hardly slower
+    assert named(error) <= 1.003 * error.bound
+    assert_answered(asked, error)
+
+
+def _ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+    """Ranges of joint positions (nq,) [rad] within ±2.5 rad; where a joint's range has none of that, its own."""
+    lower, upper = np.maximum(robot.limits.q_min, -2.5), np.minimum(robot.limits.q_max, 2.5)
+    return np.where(lower < upper, lower, robot.limits.q_min), np.where(lower < upper, upper, robot.limits.q_max)
+
+
+def test_equal_ends_take_the_least_duration() -> None:
+    error = refused(problem(goal=START), LEAST_DURATION / 2)
+    assert named(error) == error.bound == LEAST_DURATION and error.proven
+
+
+@pytest.mark.long
+def test_phases_of_milliseconds_in_minutes() -> None:
+    """Joint 4 at 1 mrad/s: jerk lasts 4 ms of 300 s. No spline of few knots has such phases."""
+    v_max = ROBOT.limits.v_max.copy()
+    v_max[3] = 1e-3
+    asked = problem(limits=replace(ROBOT.limits, v_max=v_max))
+    error = refused(asked, 5.0)
+    assert error.proven and named(error) < 300.1
+    assert_answered(asked, error, (1.0,))
+
+
+def test_without_a_limit_on_jerk() -> None:
+    """Acceleration may jump there, which no spline's does: 2 ms more than the joints need."""
+    robot = replace(ROBOT, limits=replace(ROBOT.limits, j_max=np.full(6, np.inf)))
+    asked = problem(robot=robot, payload=Payload(4.5, np.array([0.05, 0.05, 0.12])))
+    error = refused(asked)
+    assert error.bound <= named(error) <= error.bound + 3e-3
+    assert_answered(asked, error)
+
+
+BODIES: dict[str, dict[str, Any]] = {
+    "along a path": {
+        "start": {"pose": {"position": [0.4, -0.15, 0.15], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
+        "goal": {"pose": {"position": [0.4, 0.15, 0.15], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
+        "path": {},
+    },
+    "to any turn of the tool": {
+        "start": {"q": START.tolist()},
+        "goal": {"pose": {"position": [0.4, 0.2, 0.35], "orientation": "free"}},
+        "collisions": False,
+    },
+    "among obstacles": {
+        "start": {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]},
+        "goal": {"q": [1.6, -1.2, 1.4, -1.77, -1.57, 0.0]},
+        "payload": {"mass": 4.0, "com": [0.0, 0.0, 0.08]},
+        "scene": {
+            "obstacles": [
+                {
+                    "name": "post",
+                    "shape": "box",
+                    "size": [0.2, 0.2, 0.9],
+                    "pose": {"position": [-0.45, -0.45, 0.45], "quaternion": [0.0, 0.0, 0.0, 1.0]},
+                }
+            ]
+        },
+    },
+}
+
+
+BODIES["a Panda with a heavy part between obstacles"] = {
+    "robot": "panda",
+    "start": {"q": [-0.9, 0.2, 0.0, -1.9, 0.0, 2.1, 0.8]},
+    "goal": {"q": [0.9, 0.2, 0.0, -1.9, 0.0, 2.1, 0.8]},
+    "payload": {"mass": 2.9, "com": [0.0, 0.0, 0.06]},
+    "objective": "mechanical",
+    "duration": TOO_SHORT,
+    "scene": {
+        "obstacles": [
+            {
+                "name": name,
+                "shape": "box",
+                "size": [0.2, 0.08, height],
+                "pose": {"position": [0.5, y, height / 2], "quaternion": [0.0, 0.0, 0.0, 1.0]},
+            }
+            for name, y, height in (("low", -0.1, 0.7), ("high", 0.2, 0.85))
+        ]
+    },
+}
+
+
+@pytest.mark.parametrize("name", long_but(["to any turn of the tool"], BODIES))
+def test_requests_of_other_kinds(name: str) -> None:
+    asked = to_problem(OptimizeRequest.model_validate(BODIES[name]), 300.0)
+    assert_answered(asked, refused(asked))
+
+
+@pytest.mark.parametrize("tick", long_but([0.02], [0.002, 0.005, 0.02, 0.1, 0.5]))
+def test_a_search_that_is_cut_short_says_so(tick: float) -> None:
+    """On a clock that each reading moves on: the search ends somewhere between its first start and its last."""
+    tight = replace(MOVES["hardly any torque"], **fixed(TOO_SHORT))
+    with pytest.raises(DurationTooShort) as caught:
+        optimize(replace(tight, deadline=2.0), clock=CountingClock(tick))
+    error = caught.value
+    assert not error.proven and ("deadline" in str(error)) == error.cut_short
+    # at such a pace no start comes to its end in time
+    assert error.cut_short or tick < 0.02
+    if error.shortest is None:
+        assert error.cut_short and error.bound > TOO_SHORT
+    else:
+        answer = optimize(replace(tight, **fixed(error.shortest)))
+        assert answer.certificate.valid
+
+
+def test_the_words_of_a_refusal_are_enough() -> None:
+    """The duration in words is rounded up: what a person types from it is answered."""
+    asked = local()
+    words = str(refused(asked))
+    told = float(next(each for each in words.split() if each[0].isdigit()))
+    assert optimize(replace(asked, **fixed(told))).certificate.valid
+
+
+def test_a_refusal_is_the_same_whatever_was_asked_for() -> None:
+    errors = [refused(local(), duration) for duration in (0.1, 0.3, 0.7301)]
+    assert all(a.shortest == b.shortest for a, b in itertools.pairwise(errors))
