@@ -52,14 +52,12 @@ def priced_motion(
 class MoveOfALeg:
     """The move of a pair, nodes `s` and `g` of a leg, at several prices of time; it lasts `longest` [s] at most.
 
-    It begins with the motions `known`, and keeps those that it finds.
+    It begins with the motions `known`, to which it puts those that it finds.
     """
 
-    def __init__(
-        self, leg: Leg, s: int, g: int, longest: float, deadline: Deadline, known: Sequence[PricedMotion]
-    ) -> None:
+    def __init__(self, leg: Leg, s: int, g: int, longest: float, deadline: Deadline, known: list[PricedMotion]) -> None:
         self.leg, self.s, self.g, self.longest, self.deadline = leg, s, g, longest, deadline
-        self.known = list(known)
+        self.known = known
 
     def at(self, price: float) -> PricedMotion:
         """The motion of least objective + price · duration. Raises NoTrajectory, or DeadlineExceeded.
@@ -79,9 +77,14 @@ class MoveOfALeg:
         return min(allowed, key=lambda motion: motion.value(price), default=found)
 
 
-def fastest_motion(leg: Leg, s: int, g: int, deadline: Deadline) -> PricedMotion | None:
-    """The motion of a pair of least duration; None if none is found before the deadline."""
-    return _solved(leg, s, g, fastest(leg.prepared), deadline)
+def fastest_motion(
+    leg: Leg, s: int, g: int, deadline: Deadline, guess: Spline | None = None
+) -> PricedMotion | None:
+    """The motion of a pair of least duration; None if none is found before the deadline.
+
+    `guess` is a motion of the same pair, from which it is looked for.
+    """
+    return _solved(leg, s, g, fastest(leg.prepared), deadline, guess)
 
 
 def _solved(
