@@ -77,9 +77,7 @@ class MoveOfALeg:
         return min(allowed, key=lambda motion: motion.value(price), default=found)
 
 
-def fastest_motion(
-    leg: Leg, s: int, g: int, deadline: Deadline, guess: Spline | None = None
-) -> PricedMotion | None:
+def fastest_motion(leg: Leg, s: int, g: int, deadline: Deadline, guess: Spline | None = None) -> PricedMotion | None:
     """The motion of a pair of least duration; None if none is found before the deadline.
 
     `guess` is a motion of the same pair, from which it is looked for.

@@ -109,7 +109,7 @@ class TimedSearch:
             return None
         self.exact = False
         at, wait = self.cheapest_wait(nodes, waited)
-        price = -float(self._powers(at)[nodes[at + 1]])
+        price = -self.waiting_power(nodes, at)
         energy = needed + wait + self.search.dwells(nodes)
         return Timed(nodes, Shared(price, lengths, needed, waited), at, wait, energy)
 
@@ -136,9 +136,7 @@ class TimedSearch:
         if pair not in self._motions:
             own = self.search.solutions.get(pair)
             objective = self.asked.objective
-            self._motions[pair] = (
-                [] if own is None else [PricedMotion(own.trajectory.spline, own.energy.of(objective))]
-            )
+            self._motions[pair] = [] if own is None else [PricedMotion(own.trajectory.spline, own.energy.of(objective))]
         return self._motions[pair]
 
     def _of_the_fastest(self) -> Timed:
@@ -207,7 +205,7 @@ class TimedSearch:
         )
         try:
             if self._rests_count:
-                waiting = min(float(self._powers(k)[nodes[k + 1]]) for k in self.places)
+                waiting = min(self.waiting_power(nodes, k) for k in self.places)
                 shared = sharing.fill(self.time, waiting, fast)
             else:
                 shared = sharing.fill_for_work(self.time, fast)
@@ -236,6 +234,10 @@ class TimedSearch:
         hold = float(holding_powers(planned, leg.goal)[node])
         dwell = rest_energy(self.asked, planned, planned.dwell, hold)
         return rest_energy(self.asked, planned, planned.dwell + waited, hold) - dwell
+
+    def waiting_power(self, nodes: list[int], move: int) -> float:
+        """What every further second of a long wait after a move adds to the objective [W]."""
+        return float(self._powers(move)[nodes[move + 1]]) if self._rests_count else 0.0
 
     def _powers(self, move: int) -> Array:
         return long_wait_powers(self.asked, self.asked.moves[move], self.legs[move].goal)
