@@ -142,9 +142,10 @@ class Run:
             incumbent.tell_candidates()
             incumbent.tell_best()
         while (best := incumbent.best()) is not None:
-            best = start_beside(incumbent, best)
-            refine(incumbent, best)
-            best = incumbent.best() or best
+            if not best.refused:
+                best = start_beside(incumbent, best)
+                refine(incumbent, best)
+                best = incumbent.best() or best
             table = compare_with_baselines(incumbent, best)
             best = incumbent.best() or best
             # a coarse motion that was not refined is no optimum

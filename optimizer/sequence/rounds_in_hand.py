@@ -161,7 +161,7 @@ def simple_rounds(timing: TimedSearch, chains: Sequence[list[int]], fastest: boo
     `fastest` moves."""
     search, found = timing.search, list[RoundInHand]()
     for nodes in chains:
-        solutions = [own for pair in search.pairs(nodes) if (own := search.solutions.get(pair)) is not None]
+        solutions = [search.solutions[pair] for pair in search.pairs(nodes) if pair in search.solutions]
         if search.asked.objective == "mechanical":
             # of least mechanical work no move has a duration of its own: the fastest moves are slowed
             own = [each.spline for each in timing.fastest(nodes) or []]
