@@ -166,7 +166,7 @@ def test_wherever_the_deadline_ends_a_round_with_a_part(readings: int, monkeypat
     assert all(energy(found) <= each * (1 + ROUNDING) for each in cheapest_known(asked))
 
 
-@pytest.mark.parametrize("seed", long_but([3], range(20)))
+@pytest.mark.parametrize("seed", long_but([1], range(20)))
 def test_rounds_need_no_more_than_any_simpler_one_at_any_time(seed: int) -> None:
     """Nor than a faster round of ours that waits: slower rounds may wait, too."""
     asked = near_rounds(seed)
