@@ -93,7 +93,8 @@ def compare_with_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseli
                 solve_from(incumbent, candidate, (motions[name].q, motions[name].t), fine)
         best = incumbent.best() or best
         table, candidate = _table(incumbent, best)
-    accepted, known = incumbent.method.accepted_baselines, np.inf
+    accepted = incumbent.method.accepted_baselines
+    known: float | None = np.inf
     # one of another duration moves those that are compared in ours
     while (better := _better(incumbent, table, accepted)) and best.energy != known:
         known = best.energy

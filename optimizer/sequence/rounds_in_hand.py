@@ -150,10 +150,15 @@ def _solved_in(timing: TimedSearch, pair: Pair, length: float) -> Solution:
     except NoTrajectory:
         if best is None:
             raise
-    if best is not None and (found is None or found.energy.of(objective) > cost_of(best) * (1 + SLACK)):
-        found = search.solve_in(*pair, length, [best])
-    assert found is not None
-    return found
+    if best is None or (found is not None and found.energy.of(objective) <= cost_of(best) * (1 + SLACK)):
+        assert found is not None
+        return found
+    try:
+        return search.solve_in(*pair, length, [best])
+    except (NoTrajectory, DeadlineExceeded):
+        if found is None:
+            raise
+        return found
 
 
 def simple_rounds(timing: TimedSearch, chains: Sequence[list[int]], fastest: bool) -> list[RoundInHand]:
@@ -185,6 +190,6 @@ def _with_wait(
     """The round of these motions with no more of a wait than the least time asks for; none if it takes too long."""
     asked, moving = timing.asked, sum(spline.duration for spline in motions)
     until = asked.nearest_duration(moving + asked.dwelling) - asked.dwelling
-    if len(motions) < len(timing.legs) or until < moving:
+    if len(motions) < len(timing.legs) or until < moving * (1 - ROUNDING):
         return []
     return [RoundInHand.of(timing, nodes, motions, None, solutions, until)]
