@@ -22,9 +22,11 @@ from optimizer.exceptions import DeadlineExceeded, RoundTooShort
 from optimizer.optimize import optimize
 from optimizer.optimize_round import optimize_round
 from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.free_order import FreeOrder
 from optimizer.problem.problem import Problem
 from optimizer.problem.stops import Stop
 from optimizer.problem.work_round import WorkRound
+from optimizer.sequence.order_search import OrderSearch
 from optimizer.sequence.round_search import RoundSearch
 from optimizer.sequence.round_solution import RoundSolution
 from optimizer.sequence.timed_round import TimedSearch
@@ -222,4 +224,35 @@ def test_simple_rounds_that_are_not_confirmed_are_no_answer(monkeypatch: pytest.
     found = optimize_round(in_time(HARD, 1.5))
     (alike,) = (each for each in found.baselines if each.name == "same_factor")
     assert not alike.within_limits and alike.electrical < energy(found)
+    assert_no_dearer_than_its_baselines(found)
+
+
+def test_a_chain_that_is_finished_is_the_answer_once_the_time_is_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The search went on to another chain, and had no time left to finish that."""
+    search = RoundSearch(HARD, CountingClock(0.0))
+    explored = [RoundSearch(HARD, CountingClock(0.0)).run()]
+
+    def explore(_: RoundSearch) -> list[int]:
+        if not explored:
+            raise DeadlineExceeded([])
+        return explored.pop()
+
+    nodes = list(explored[0])
+    monkeypatch.setattr(RoundSearch, "explore", explore)
+    assert search.run() == nodes and search.cut_short
+    assert all(each in search.solutions for each in search.pairs(nodes))
+
+
+def test_the_given_order_is_the_answer_where_a_free_one_needs_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = pick_and_place(2, 3, windings=False, closed=False)
+    stops = [replace(stop, payload=None) for stop in asked.stops]
+    asked = replace(asked, stops=stops, order=FreeOrder())
+    best = optimize_round(asked)
+    by_name = {stop.name: stop for stop in asked.stops}
+    given = replace(asked, stops=[by_name[name] for name in best.order])
+    worse = replace(asked, stops=[by_name[name] for name in (best.order[2], best.order[0], best.order[1])], order=None)
+    monkeypatch.setattr(OrderSearch, "run", lambda self: worse)
+    found = optimize_round(given)
+    assert found.order == best.order and found.status == "feasible"
+    assert energy(found) == pytest.approx(energy(best), rel=CONVERGED) and energy(found) < energy(optimize_round(worse))
     assert_no_dearer_than_its_baselines(found)
