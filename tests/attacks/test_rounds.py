@@ -29,6 +29,7 @@ from optimizer.problem.work_round import WorkRound
 from optimizer.sequence.order_search import OrderSearch
 from optimizer.sequence.round_search import RoundSearch
 from optimizer.sequence.round_solution import RoundSolution
+from optimizer.sequence.rounds_in_hand import simple_rounds
 from optimizer.sequence.timed_round import TimedSearch
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import AMPLE, ROBOT, fixed
@@ -219,12 +220,15 @@ def test_a_search_that_fails_leaves_the_rounds_in_hand(where: str, monkeypatch: 
     assert found.price_of_time < 0
 
 
-def test_simple_rounds_that_are_not_confirmed_are_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Sped up, the moves in their own time need less and break limits."""
-    found = optimize_round(in_time(HARD, 1.5))
-    (alike,) = (each for each in found.baselines if each.name == "same_factor")
-    assert not alike.within_limits and alike.electrical < energy(found)
-    assert_no_dearer_than_its_baselines(found)
+def test_simple_rounds_that_are_not_confirmed_are_no_answer() -> None:
+    """Sped up by half, the moves in their own time break limits; as they are, with a wait, they do not."""
+    search = RoundSearch(HARD, CountingClock(0.0))
+    nodes = search.run()
+    for duration, confirmed in ((free().duration / 1.5, False), (free().duration * 1.5, True)):
+        rounds = simple_rounds(TimedSearch(search, duration), [nodes], fastest=False)
+        (alike,) = (each for each in rounds if each.name == "same_factor")
+        assert alike.held is confirmed and (alike.certified() is not None) is confirmed
+        assert len(rounds) == 1 + confirmed
 
 
 def test_a_chain_that_is_finished_is_the_answer_once_the_time_is_up(monkeypatch: pytest.MonkeyPatch) -> None:
