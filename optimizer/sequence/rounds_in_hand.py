@@ -58,7 +58,9 @@ class RoundInHand:
     ) -> RoundInHand:
         """The round that waits, where it draws least, for what its motions leave of the time: that of `timing`, or
         `until` [s] without dwells."""
-        waited = max((timing.time if until is None else until) - sum(spline.duration for spline in motions), 0.0)
+        end = timing.time if until is None else until
+        waited = end - sum(spline.duration for spline in motions)
+        waited = waited if waited > ROUNDING * end else 0.0
         at, wait_energy = timing.cheapest_wait(nodes, waited)
         return cls(timing, nodes, list(motions), at, waited, wait_energy, name, solutions)
 

@@ -222,13 +222,13 @@ def test_a_search_that_fails_leaves_the_rounds_in_hand(where: str, monkeypatch: 
 
 def test_simple_rounds_that_are_not_confirmed_are_no_answer() -> None:
     """Sped up by half, the moves in their own time break limits; as they are, with a wait, they do not."""
-    search = RoundSearch(HARD, CountingClock(0.0))
-    nodes = search.run()
     for duration, confirmed in ((free().duration / 1.5, False), (free().duration * 1.5, True)):
+        search = RoundSearch(in_time(HARD, duration), CountingClock(0.0))
+        nodes = search.run()
         rounds = simple_rounds(TimedSearch(search, duration), [nodes], fastest=False)
         (alike,) = (each for each in rounds if each.name == "same_factor")
         assert alike.held is confirmed and (alike.certified() is not None) is confirmed
-        assert len(rounds) == 1 + confirmed
+        assert len(rounds) == 1 + confirmed and alike.waited == 0
 
 
 def test_a_chain_that_is_finished_is_the_answer_once_the_time_is_up(monkeypatch: pytest.MonkeyPatch) -> None:
