@@ -148,7 +148,7 @@ def excess(answer: RoundSolution, own: RoundSolution | None) -> float:
 
 def _torque_at(arm: Arm, q: Array) -> Array:
     still = np.zeros((1, len(q)))
-    return Plant(arm).torques(q[None], still, still)[0]
+    return np.asarray(Plant(arm).torques(q[None], still, still)[0])
 
 
 def _sums(answer: RoundSolution) -> dict[str, float]:

@@ -35,7 +35,7 @@ from optimizer.trajectories.spline import Spline
 
 # shares of the deadline that the search leaves to the motions of its answer, and these to certify a simpler round that
 # needs less
-RESERVED, KEPT = 0.3, 0.05
+RESERVED, KEPT = 0.3, 0.08
 # routes through passes that are tried for a pair at most, and while none has a motion
 MOST_ROUTES, MOST_FAILED = 3, 10
 # stops beyond which the proof that no chain is better is worth less than its time: a pair that is not solved weighs so
@@ -254,7 +254,8 @@ class RoundSearch(LazySearch):
 
         Raises DeadlineExceeded if no time is left.
         """
-        leg, before, end = self.legs[k], float(self.legs[k].cost[s, g]), self._end_of(k)
+        leg, before = self.legs[k], float(self.legs[k].cost[s, g])
+        end = self._end_of(k, 0.0 if self.asked.any_time else KEPT * self.asked.deadline)
         if share < 1:
             end = end.within(share * end.left)
         problem, known = self._problem_of(k, s, g, end.left), self._known(k, s, g)

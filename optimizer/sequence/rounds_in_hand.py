@@ -104,8 +104,6 @@ class RoundInHand:
         """It with its `solutions`; None if one is not confirmed, or not in time."""
         if self.solutions is not None:
             return self
-        if not self.held:
-            return None
         pairs = zip(self.search.pairs(self.nodes), self.motions, strict=True)
         try:
             return replace(self, solutions=[self.search.as_it_is(*pair, spline) for pair, spline in pairs])

@@ -94,6 +94,8 @@ class TimedSearch:
 
     def _of_the_own(self, nodes: list[int]) -> Timed | None:
         """A chain whose motions are known, with its time shared; as they are, if that is not done in time."""
+        if self.search.search_end.passed and (known := self.as_it_is(nodes)) is not None:
+            return known
         try:
             found = self._of(nodes)
         except DeadlineExceeded:
@@ -160,6 +162,9 @@ class TimedSearch:
 
         It is that by bounds; where one of its moves has no motion, as among obstacles, that of a search.
         """
+        if self.search.search_end.passed and "_fast_search" not in vars(self):
+            # its bounds alone take the time that rounds in hand need for their certificates
+            return None
         with suppress(DeadlineExceeded, NoSequence):
             for find in (self._fast_search.least, partial(self._explored, self._fast_search)):
                 nodes = find()
