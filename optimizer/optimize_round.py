@@ -10,30 +10,29 @@ from dataclasses import dataclass, replace
 
 from optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
 from optimizer.exceptions import DeadlineExceeded, JoulepathError, NoTrajectory
+from optimizer.in_hand import least_certified
 from optimizer.linear_algebra import one_thread
 from optimizer.problem.work_round import WorkRound
 from optimizer.progress import Improved, Tell, forward, nobody, only_improved
-from optimizer.sequence.against_stopping import SHARE, Rested, Wait, as_passed, start_from, stopping_baselines
+from optimizer.sequence.against_stopping import SHARE, Rested, as_passed, start_from, stopping_baselines
 from optimizer.sequence.divided_paths import with_divided_paths
 from optimizer.sequence.free_orientations import with_free_orientations
-from optimizer.sequence.layers import Layer
+from optimizer.sequence.move_problem import LEAST_TIME
+from optimizer.sequence.moves import moves_of
 from optimizer.sequence.order_search import OrderSearch
-from optimizer.sequence.passing_leg import passes_of
 from optimizer.sequence.proven_bound import proven_bound
-from optimizer.sequence.rests import dwell_energies, rest_sensitivity
 from optimizer.sequence.round_baselines import (
+    compared_again,
     controller_default,
-    fastest_then_wait,
     given_order,
     move_by_move,
     of_chain,
-    same_factor,
 )
-from optimizer.sequence.round_search import LEAST_TIME, RoundSearch
+from optimizer.sequence.round_search import RoundSearch
 from optimizer.sequence.round_solution import Move, Needed, RoundBaseline, RoundSolution, needed_by
+from optimizer.sequence.rounds_in_hand import RoundInHand, shared, simple_rounds
 from optimizer.sequence.stored_round import with_storage
-from optimizer.sequence.timed_round import Timed, TimedSearch
-from optimizer.solution import Branch, Solution
+from optimizer.sequence.timed_round import TimedSearch
 
 # relative: what a round in a given time may need above the least of its chain, and still be optimal
 WELL_SHARED = 1e-3
@@ -82,12 +81,21 @@ def _optimized(asked: WorkRound, clock: Clock, tell: Tell) -> RoundSolution:
     # unsolved moves weigh more than their bounds on mechanical work
     by_bounds = asked.objective == "electrical"
     # the bound of the best order does not hold for the others
-    return replace(
+    found = replace(
         found,
         status=found.status if orders.exact and found.price_of_time == 0 and by_bounds else "feasible",
         lower_bound=min(orders.bound, found.lower_bound),
-        baselines=[*found.baselines, *([] if baseline is None else [baseline])],
     )
+    return found if baseline is None else _no_dearer_than(asked, found, baseline)
+
+
+def _no_dearer_than(asked: WorkRound, found: RoundSolution, baseline: RoundBaseline) -> RoundSolution:
+    """The round with one more baseline, which becomes the answer itself if it needs less."""
+    found = replace(found, baselines=[*found.baselines, baseline])
+    if baseline.saving >= 0:
+        return found
+    found = replace(found, status="feasible", moves=list(baseline.moves), price_of_time=0.0)
+    return replace(found, baselines=[compared_again(asked, each, found.needed) for each in found.baselines])
 
 
 def _divided(asked: WorkRound, clock: Clock) -> WorkRound:
@@ -121,7 +129,7 @@ def _in_given_order(asked: WorkRound, clock: Clock, tell: Tell) -> RoundSolution
 class _Found:
     """The moves of a chain, the price of time [W], and the bound [J] that holds for any time; `timing` is the search in
     a given time, if there was one, and `shared`: its time is shared so that no chain can be better. `greedy` is the
-    chain of `move_by_move`."""
+    chain of `move_by_move`; `simple` are the rounds that take no search."""
 
     nodes: list[int]
     moves: list[Move]
@@ -130,6 +138,7 @@ class _Found:
     timing: TimedSearch | None = None
     shared: bool = True
     greedy: list[int] | None = None
+    simple: Sequence[RoundInHand] = ()
 
 
 def _searched(asked: WorkRound, clock: Clock, tell: Tell, stopping: RoundSolution | None = None) -> RoundSolution:
@@ -168,7 +177,7 @@ def _best_of(search: RoundSearch) -> _Found:
     if asked.objective == "mechanical":
         assert asked.duration_max is not None
         # slower moves do less work: the round has no time of its own
-        return _in_time(search, asked.duration_max, None)
+        return _in_time(search, asked.duration_max, [])
     nodes = search.run()
     # what passes has the round with rests instead
     greedy = move_by_move(search) if asked.compared and not asked.passes else None
@@ -180,46 +189,46 @@ def _best_of(search: RoundSearch) -> _Found:
     duration = asked.nearest_duration(own)
     if duration == own:
         bound = proven_bound(asked, search.legs, search.end)
-        return _Found(nodes, _moves(search, nodes, moving, {}), 0.0, bound, greedy=greedy)
-    found = _in_time(search, duration, nodes)
+        return _Found(nodes, moves_of(search, nodes, moving, {}), 0.0, bound, greedy=greedy)
+    chains = [nodes, *([greedy] if greedy is not None and greedy != nodes else [])]
+    found = _in_time(search, duration, chains)
     # energies of nearly fastest moves are flat: rounding must not turn the price's sign
     price = max(found.price, 0.0) if duration < own else min(found.price, 0.0)
     return replace(found, price=price, greedy=greedy)
 
 
-def _in_time(search: RoundSearch, duration: float, nodes: list[int] | None) -> _Found:
-    """The best round found in a duration [s], from a chain on whose motions are known, or from the fastest one."""
-    timing = TimedSearch(search, duration)
-    timed, moving = _moving(search, timing, timing.run(nodes), nodes)
-    bound = proven_bound(search.asked, search.legs, search.end)
-    waits = {timed.at: (timed.shared.waited, timed.wait_energy)}
-    moves = _moves(search, timed.nodes, moving, waits, timing.sought)
-    needed = needed_by(moves).of(search.asked.objective)
-    shared = needed - timed.least <= WELL_SHARED * abs(needed)
-    return _Found(timed.nodes, moves, timed.shared.price, bound, timing, timing.exact and shared)
-
-
-def _moving(
-    search: RoundSearch, timing: TimedSearch, timed: Timed, nodes: list[int] | None
-) -> tuple[Timed, list[Solution]]:
-    """The certified motions of a round in its time; if some are not found, those of the chain `nodes` as they are."""
-
-    def motion(pair: tuple[int, int, int], length: float) -> Solution:
-        own = search.solutions.get(pair)
-        return own if own is not None and own.duration == length else search.solve_in(*pair, length)
-
+def _in_time(search: RoundSearch, duration: float, chains: Sequence[list[int]]) -> _Found:
+    """The best round found in a duration [s], from the first of the `chains` whose motions are known, or from the
+    fastest one; never one that needs more than a simple round in hand."""
+    timing, timed, best = TimedSearch(search, duration), None, None
+    failure: JoulepathError = NoTrajectory([])
     try:
-        return timed, list(map(motion, search.pairs(timed.nodes), timed.shared.lengths))
-    except (NoTrajectory, DeadlineExceeded):
-        known = None if nodes is None else timing.as_it_is(nodes)
-        if known is None:
-            raise
-        return known, [search.solutions[each] for each in search.pairs(known.nodes)]
+        timed = timing.run(chains[0] if chains else None)
+        best = shared(timing, timed)
+    except (NoTrajectory, DeadlineExceeded) as error:
+        failure = error
+    chains = [*chains, *([timed.nodes] if timed is not None and timed.nodes not in chains else [])]
+    simple = simple_rounds(timing, chains, best is None or (search.asked.compared and not search.asked.passes))
+    found = least_certified([*([] if best is None else [best]), *simple])
+    if found is None:
+        raise failure
+    bound = proven_bound(search.asked, search.legs, search.end)
+    needed, waits = found.cost, {found.at: (found.waited, found.wait_energy)}
+    is_shared = timed is not None and needed - timed.least <= WELL_SHARED * abs(needed)
+    return _Found(
+        found.nodes,
+        moves_of(search, found.nodes, found.solutions or [], waits, timing.sought),
+        timed.shared.price if timed is not None and found is best else found.price,
+        bound,
+        timing,
+        timing.exact and is_shared,
+        simple=simple,
+    )
 
 
 def _as_stopping(search: RoundSearch, rested: Rested, better: bool = True) -> _Found:
     """The chain of the round with rests, `better` where it passes if the search finds that."""
-    moves = _moves(search, rested.nodes, *as_passed(search, rested, better))
+    moves = moves_of(search, rested.nodes, *as_passed(search, rested, better))
     bound = proven_bound(search.asked, search.legs, search.end)
     return _Found(rested.nodes, moves, rested.solution.price_of_time, bound, shared=False)
 
@@ -228,21 +237,13 @@ def _baselines(search: RoundSearch, found: _Found, ours: Needed) -> list[RoundBa
     """The round in other ways, as far as they are known."""
     if search.asked.passes or not search.asked.compared:
         return []
-    nodes, timing = found.nodes, found.timing
     compared = [
-        None if found.greedy is None else _by_moves(search, found.greedy, ours),
-        controller_default(search, nodes[0], ours),
+        None if found.greedy is None else of_chain(search, found.greedy, "move_by_move", ours),
+        controller_default(search, found.nodes[0], ours),
+        # moves slowed alike are those of our chain
+        *(each.baseline(ours) for each in found.simple if each.name != "same_factor" or each.nodes == found.nodes),
     ]
-    if timing is not None:
-        compared += [same_factor(timing, nodes, ours), fastest_then_wait(timing, ours)]
     return [each for each in compared if each is not None]
-
-
-def _by_moves(search: RoundSearch, nodes: list[int], ours: Needed) -> RoundBaseline | None:
-    """The baseline of choosing move by move, with its moves."""
-    baseline = of_chain(search, nodes, "move_by_move", ours)
-    solutions = [search.solutions[each] for each in search.pairs(nodes)]
-    return None if baseline is None else replace(baseline, moves=_moves(search, nodes, solutions, {}))
 
 
 def _is_done(search: RoundSearch, found: _Found) -> bool:
@@ -251,45 +252,3 @@ def _is_done(search: RoundSearch, found: _Found) -> bool:
     converged = all(move.solution.status == "optimal" for move in found.moves)
     open_ = sampled or search.cut_short or search.failed or search.leaves_better
     return converged and found.shared and not open_
-
-
-def _reached(layer: Layer, node: int) -> Branch:
-    """A configuration of a stop, with the one of its targets that it reaches."""
-    end = layer.ends[layer.end[node]]
-    return Branch(end.label, layer.q[node], end.target)
-
-
-def _moves(
-    search: RoundSearch,
-    nodes: list[int],
-    found: list[Solution],
-    waits: dict[int, Wait],
-    sought: Sequence[set[int]] = (),
-) -> list[Move]:
-    """The moves of a chain, in their order, with the waits after some of them.
-
-    For the kinds `sought` of each leg motions were looked for beside those of the search.
-    """
-    asked, t0, moves = search.asked, 0.0, list[Move]()
-    for (k, s, g), solution in zip(search.pairs(nodes), found, strict=True):
-        leg = search.legs[k]
-        wait, wait_energy = waits.get(k, (0.0, 0.0))
-        rest = asked.moves[k].dwell + wait
-        moves.append(
-            Move(
-                planned=asked.moves[k],
-                # between joint positions, the motion knows of no target
-                solution=replace(solution, start=_reached(leg.start, s), goal=_reached(leg.goal, g)),
-                t0=t0,
-                dwell_energy=float(dwell_energies(asked, asked.moves[k], leg.goal)[g]),
-                wait=wait,
-                wait_energy=wait_energy,
-                pairs=int((leg.kind >= 0).sum()),
-                kinds=len(leg.pair),
-                solved=len(leg.solved.keys() | (sought[k] if sought else set())),
-                sensitivity=solution.sensitivity + rest_sensitivity(asked, asked.moves[k], rest, leg.goal.q[g]),
-                passes=passes_of(leg, s, g, solution.trajectory.spline),
-            )
-        )
-        t0 += moves[-1].duration
-    return moves

@@ -7,6 +7,7 @@ same motion on the changed arm (`same_motion`), and the energy of a motion optim
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from optimizer.certificate import certify
@@ -20,9 +21,11 @@ from optimizer.problem.problem import Problem, narrowed
 from optimizer.search.incumbent import SLACK
 from optimizer.search.run import Run
 from optimizer.solution import Certificate, Energy, Solution
+from optimizer.trajectories.spline import Spline
 
-# least deadline of a search [s]
-LEAST_TIME = 1e-3
+# least deadline of a search [s]; shares of the time that the first search leaves to the base motion, and of what is
+# left then for a search from it
+LEAST_TIME, KEPT, SOLVED = 1e-3, 0.05, 0.8
 
 
 @dataclass(frozen=True)
@@ -44,9 +47,10 @@ def whatif(base: Solution, problem: Problem, clock: Clock = time.perf_counter) -
     """Compare the answer `base` with that of `problem`, the same motion for a changed arm with as many joints.
 
     The changed problem is solved on its own. If the base motion is feasible on the changed arm and needs less energy
-    than the new motion, the problem is solved again with a warm start from it. The result then needs no more energy
-    than the base motion, unless the deadline passes first. `problem.deadline` [s] holds for all of it. Raises
-    DeadlineExceeded if it passes before the base motion is certified on the changed arm.
+    than the new motion, or there is none, the problem is solved again with a warm start from it; where time is too
+    short for that, the base motion is the answer. So no answer needs more energy than a feasible base motion.
+    `problem.deadline` [s] holds for all of it. Raises DeadlineExceeded if it passes before the base motion is certified
+    on the changed arm.
     """
     deadline = Deadline.after(problem.deadline, clock)
     spline, prepared = base.trajectory.spline, PreparedProblem.of(problem)
@@ -58,18 +62,29 @@ def whatif(base: Solution, problem: Problem, clock: Clock = time.perf_counter) -
             energy = with_interval(energy, prepared.sensitivity(spline), spline.duration, problem.arm)
     except DeadlinePassed:
         raise DeadlineExceeded([]) from None
-    problem = replace(problem, deadline=max(deadline.left, LEAST_TIME))
+    found: Solution | None = None
+    failure: JoulepathError | None = None
     try:
-        found = optimize(problem, clock)
+        found = optimize(replace(problem, deadline=max(deadline.left - KEPT * problem.deadline, LEAST_TIME)), clock)
     except JoulepathError as error:
-        return Changed(energy, certificate, None, error)
-    left = deadline.left
-    same, best = energy.of(problem.objective), found.energy.of(problem.objective)
-    if certificate.valid and same < best * (1 - SLACK) and left > 0:
-        try:
-            again = Run(replace(problem, deadline=left), [spline], clock).solution()
-        except JoulepathError:
-            # the time left was too short: the first answer counts
-            return Changed(energy, certificate, found, None)
-        found = min(found, again, key=lambda each: each.energy.of(problem.objective))
-    return Changed(energy, certificate, found, None)
+        failure = error
+    same, objective = energy.of(problem.objective), problem.objective
+    if certificate.valid and not deadline.passed and (found is None or same < found.energy.of(objective) * (1 - SLACK)):
+        again = _from_known(problem, spline, deadline)
+        known = [each for each in (found, again) if each is not None]
+        found = min(known, key=lambda each: each.energy.of(objective), default=None)
+    return Changed(energy, certificate, found, failure if found is None else None)
+
+
+def _from_known(problem: Problem, spline: Spline, deadline: Deadline) -> Solution | None:
+    """The solution from a feasible motion on, or this motion as it is; None if there is no time for that either."""
+
+    def run(share: float, known: list[Spline]) -> Run:
+        return Run(replace(problem, deadline=max(share * deadline.left, LEAST_TIME)), known, deadline.clock)
+
+    with suppress(JoulepathError):
+        return run(SOLVED, [spline]).solution()
+    with suppress(JoulepathError):
+        last = run(1.0, [])
+        return last.as_it_is(spline) if last.incumbent.allows(spline.duration) else None
+    return None

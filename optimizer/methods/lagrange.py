@@ -35,6 +35,7 @@ class Lagrange(SqpMethod):
         "ruckig_slowed",
         "controller_default",
     )
+    accepted_baselines: ClassVar[tuple[BaselineName, ...]] = ("quintic",)
 
     def solve(self) -> SolveResult:
         """From the time-optimal jerk-limited motion; if that finds no motion, from the quintic.

@@ -21,6 +21,7 @@ from optimizer.collision.state_validity import StateValidityChecker
 from optimizer.methods.limit_repair import torque_peaks
 from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
 from optimizer.methods.planned_paths import FROM_PLANNED_PATH, no_polynomial_around, plan, to_goal, without_path
+from optimizer.solution import BaselineName
 from optimizer.trajectories import quintic
 from optimizer.trajectories.polynomial import PolynomialBasis, polynomials
 from optimizer.trajectories.spline import least_time_scale, retimed, spline_of, time_scales
@@ -51,6 +52,7 @@ class PolynomialGA(Method):
 
     # each takes seconds: only the candidates of least lower bound are solved
     most_solved: ClassVar[int | None] = 3
+    accepted_baselines: ClassVar[tuple[BaselineName, ...]] = ("quintic",)
     converges: ClassVar[bool] = False
 
     # generations so far, and the least cost [J] of the first population

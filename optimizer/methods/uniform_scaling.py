@@ -9,6 +9,7 @@ it is the time-optimal motion along smooth planned paths.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -21,6 +22,7 @@ from optimizer.methods.limit_repair import torque_peaks
 from optimizer.methods.method import CONVERGED, DEADLINE_PASSED, Method, SolveResult, SolveStatus
 from optimizer.methods.path_retiming import PathRetiming
 from optimizer.methods.sqp_method import with_effort
+from optimizer.solution import BaselineName
 from optimizer.trajectories.quadrature import grid
 from optimizer.trajectories.ruckig_motion import time_optimal_spline
 from optimizer.trajectories.spline import Spline, lasting, least_time_scale, sample
@@ -50,6 +52,8 @@ class _Samples:
 
 class UniformScaling(Method):
     """Solves a candidate by the factor that scales the time of its time-optimal motion."""
+
+    accepted_baselines: ClassVar[tuple[BaselineName, ...]] = ("ruckig", "ruckig_slowed")
 
     def solve(self) -> SolveResult:
         """The factor of least cost within the limits and the allowed durations; on planned paths after a collision."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from enum import Enum
 from itertools import product
@@ -71,6 +72,8 @@ class Candidate:
     attempt: SolveResult | None = field(default=None, repr=False)
     holdable: bool = True
     deferred: bool = False
+    earlier: Candidate | None = field(default=None, repr=False)
+    refused: bool = False
     sampled: bool = field(init=False)
 
     def __post_init__(self) -> None:
@@ -95,6 +98,23 @@ class Candidate:
         """Take the ends and the bounds of another candidate for the same targets."""
         self.start, self.goal, self.q_start, self.q_goal = to.start, to.goal, to.q_start, to.q_goal
         self.lower_bound, self.shortest, self.sampled = to.lower_bound, to.shortest, to.sampled
+
+    def take(self, result: SolveResult, energy: float) -> None:
+        """Take a motion of a result, whose objective is `energy` [J]; the one before stays in hand."""
+        self.earlier = None if self.energy is None else copy(self)
+        self.attempt, self.energy = result, energy
+        self.settle(CandidateStatus.SOLVED, Reason.METHOD, result.reason)
+
+    def refuse(self) -> None:
+        """Go back to the motion before the last one, which the certificate did not confirm; without one, it failed."""
+        before, self.refused = self.earlier, True
+        if before is None:
+            self.energy = self.attempt = None
+            self.settle(CandidateStatus.FAILED, Reason.NOT_CONFIRMED)
+            return
+        self.move(before)
+        self.attempt, self.energy, self.earlier = before.attempt, before.energy, before.earlier
+        self.settle(CandidateStatus.SOLVED, before.reason, before.message)
 
     def report(self) -> CandidateReport:
         """The candidate as the answer reports it."""

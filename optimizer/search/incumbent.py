@@ -78,27 +78,31 @@ class Incumbent:
         return result
 
     def accept_if_better(
-        self, candidate: Candidate, result: SolveResult, energy: Energy, moved: Candidate | None = None
+        self,
+        candidate: Candidate,
+        result: SolveResult,
+        energy: Energy,
+        moved: Candidate | None = None,
+        certified: bool = False,
     ) -> None:
         """Take a result as the candidate's own if the candidate has none or one of more energy.
 
-        `moved` is the candidate with the ends of the motion, if these have moved. A candidate that the certificate did
-        not confirm takes no further result.
+        `moved` is the candidate with the ends of the motion, if these have moved. A candidate of which the certificate
+        refused a motion takes no further result, unless that is `certified` already.
         """
-        objective = energy.of(self.problem.objective)
-        if candidate.reason is Reason.NOT_CONFIRMED:
-            return
-        if candidate.energy is None or objective < candidate.energy:
-            candidate.attempt, candidate.energy = result, objective
+        objective, closed = energy.of(self.problem.objective), candidate.refused and not certified
+        if not closed and (candidate.energy is None or objective < candidate.energy):
+            candidate.take(result, objective)
             if moved is not None:
                 candidate.move(moved)
-            candidate.settle(CandidateStatus.SOLVED, Reason.METHOD, result.reason)
             self.tell_best()
 
     def reject(self, candidate: Candidate) -> None:
-        """Drop a motion that the certificate did not confirm. Candidates that its energy pruned are open again."""
-        candidate.settle(CandidateStatus.FAILED, Reason.NOT_CONFIRMED)
-        candidate.energy = candidate.attempt = None
+        """Drop a motion that the certificate did not confirm: the candidate has the one before it again.
+
+        Candidates that its energy pruned are open again.
+        """
+        candidate.refuse()
         for other in self.candidates:
             if other.status is CandidateStatus.PRUNED:
                 other.settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
-from models.robot import Array
 from optimizer.deadline import DeadlinePassed, watch
 from optimizer.methods.free_spline import TIGHT
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.search.attempts import solve_from
 from optimizer.search.baselines import baselines, guesses, nearest
-from optimizer.search.candidates import Candidate, Reason
+from optimizer.search.candidates import Candidate
 from optimizer.search.incumbent import SLACK, Incumbent
 from optimizer.search.passing import stopping_baselines
 from optimizer.search.path_baselines import path_baselines
@@ -28,6 +30,8 @@ from optimizer.trajectories.time_scalings import quintic_spline
 SURPLUS_VALUES = (0.75, 0.5, 0.25)
 # factors tried for the duration of a baseline: where jumps of jerk are close, rounding takes jerk beyond its limit
 SLOWER = (1.0, 1 + 1e-5)
+# why a baseline of less energy is not the answer
+NOT_CONFIRMED = "the certificate did not confirm it, or not before the deadline"
 
 
 def refine(incumbent: Incumbent, candidate: Candidate) -> None:
@@ -78,32 +82,36 @@ def compare_with_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseli
     """
     if incumbent.problem.tool_path is not None or incumbent.problem.passes:
         return baselines_of(incumbent, best)
-    for last, fine in ((False, False), (False, True), (True, True)):
-        table, q_nearest = _table(incumbent, best)
-        usable = incumbent.method.accepted_baselines if last else incumbent.method.guess_baselines
-        better = [
-            each.name
-            for each in table
-            if each.name in usable and each.within_limits and each.saving < -SLACK and incumbent.allows(each.duration)
-        ]
-        if not better:
-            return table
-        candidate = next(
-            each
-            for each in incumbent.candidates
-            if (each.q_start == best.q_start).all() and (each.q_goal == q_nearest).all()
-        )
-        if candidate.reason is Reason.NOT_CONFIRMED:
-            return table
-        if last:
-            accept_baseline(incumbent, candidate, better)
+    table, candidate = _table(incumbent, best)
+    for fine in (False, True):
+        better = _better(incumbent, table, incumbent.method.guess_baselines)
+        if not better or candidate.refused:
             break
-        motions = guesses(incumbent.problem, best.q_start, q_nearest, best.duration)
+        motions = guesses(incumbent.problem, best.q_start, candidate.q_goal, best.duration)
         for name in better:
             if not incumbent.deadline.passed:
                 solve_from(incumbent, candidate, (motions[name].q, motions[name].t), fine)
         best = incumbent.best() or best
-    return _table(incumbent, incumbent.best() or best)[0]
+        table, candidate = _table(incumbent, best)
+    accepted = incumbent.method.accepted_baselines
+    known: float | None = np.inf
+    # one of another duration moves those that are compared in ours
+    while (better := _better(incumbent, table, accepted)) and best.energy != known:
+        known = best.energy
+        accept_baseline(incumbent, candidate, better)
+        best = incumbent.best() or best
+        table, candidate = _table(incumbent, best)
+    # what needs less all the same is not confirmed, and no motion in hand
+    return [replace(each, reason=NOT_CONFIRMED) if each.name in better else each for each in table]
+
+
+def _better(incumbent: Incumbent, table: list[Baseline], names: Sequence[BaselineName]) -> list[BaselineName]:
+    """Those of the named baselines that are feasible and need less than the motion they are compared with."""
+    return [
+        each.name
+        for each in table
+        if each.name in names and each.within_limits and each.saving < -SLACK and incumbent.allows(each.duration)
+    ]
 
 
 def baselines_of(incumbent: Incumbent, best: Candidate) -> list[Baseline]:
@@ -116,8 +124,8 @@ def baselines_of(incumbent: Incumbent, best: Candidate) -> list[Baseline]:
     return _table(incumbent, best)[0]
 
 
-def _table(incumbent: Incumbent, best: Candidate) -> tuple[list[Baseline], Array]:
-    """The baselines from the start of the best candidate, and the nearest goal (nq,) [rad] that they go to."""
+def _table(incumbent: Incumbent, best: Candidate) -> tuple[list[Baseline], Candidate]:
+    """The baselines from the start of the best candidate to the nearest goal, and the candidate between these."""
     assert best.energy is not None
     prepared, problem = incumbent.prepared, incumbent.problem
     candidates = incumbent.candidates
@@ -125,7 +133,9 @@ def _table(incumbent: Incumbent, best: Candidate) -> tuple[list[Baseline], Array
     q_goals = np.array([each.q_goal for each in candidates])[beside]
     oracle = prepared.torques, prepared.potential, prepared.broken_on_the_way
     table = baselines(problem, best.q_start, q_goals, best.duration, best.energy, *oracle)
-    return table, nearest(problem, best.q_start, q_goals)
+    q_nearest = nearest(problem, best.q_start, q_goals)
+    at = (each for each in candidates if (each.q_start == best.q_start).all() and (each.q_goal == q_nearest).all())
+    return table, next(at)
 
 
 def accept_baseline(incumbent: Incumbent, candidate: Candidate, better: list[BaselineName]) -> None:
@@ -156,6 +166,9 @@ def _accept_certified(incumbent: Incumbent, candidate: Candidate, better: list[B
             energy = incumbent.prepared.energy(spline)
             if incumbent.allows(spline.duration) and incumbent.certified(candidate, spline, energy).valid:
                 incumbent.accept_if_better(
-                    candidate, SolveResult(SolveStatus.SOLVED, f"the {name} motion itself", spline=spline), energy
+                    candidate,
+                    SolveResult(SolveStatus.SOLVED, f"the {name} motion itself", spline=spline),
+                    energy,
+                    certified=True,
                 )
                 break

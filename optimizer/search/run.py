@@ -145,8 +145,9 @@ class Run:
             incumbent.tell_candidates()
             incumbent.tell_best()
         while (best := incumbent.best()) is not None:
-            best = start_beside(incumbent, best)
-            refine(incumbent, best)
+            if not best.refused:
+                best = start_beside(incumbent, best)
+                refine(incumbent, best)
             longest = self.solved_beside(replace(problem, duration_min=problem.duration_max)) if may_rest else None
             if longest is not None:
                 incumbent.accept_if_better(*longest)

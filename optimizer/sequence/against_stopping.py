@@ -11,6 +11,7 @@ from models.robot import Array
 from optimizer.energy.interval import Known
 from optimizer.problem.work_round import WorkRound
 from optimizer.sequence.layers import Layer
+from optimizer.sequence.moves import Wait
 from optimizer.sequence.passing_leg import PassingLeg
 from optimizer.sequence.round_baselines import compared
 from optimizer.sequence.round_search import RoundSearch
@@ -18,8 +19,6 @@ from optimizer.sequence.round_solution import Move, Needed, RoundBaseline, Round
 from optimizer.solution import Solution
 from optimizer.trajectories.joined import joined
 
-# length [s] and energy [J] of a wait
-Wait = tuple[float, float]
 # share of the deadline that the round with rests may take
 SHARE = 0.4
 # rad: joint positions of one node

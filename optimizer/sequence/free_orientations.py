@@ -38,8 +38,8 @@ from optimizer.problem.targets import PosesAround
 from optimizer.problem.work_round import WorkRound
 from optimizer.sequence.configurations_beside import beside
 from optimizer.sequence.known_motions import knowing, known_motions
+from optimizer.sequence.move_problem import LEAST_TIME
 from optimizer.sequence.round_baselines import compared_again
-from optimizer.sequence.round_search import LEAST_TIME
 from optimizer.sequence.round_solution import Move, RoundBaseline, RoundSolution
 from optimizer.sequence.successive_moves import successively_chosen
 
@@ -127,15 +127,21 @@ def _first(
     tried = {name: _evenly_from(turns, found_at[name]) for name, turns in all_around.items()}
     try:
         try:
-            return tried, _bounded(asked, tried, search, share * end.left)
+            whole = _bounded(asked, tried, search, share * end.left)
         except InvalidProblem:
             # the configurations are too many
-            only = {name: turns[:1] for name, turns in tried.items()}
-            return only, _bounded(asked, only, search, share * end.left)
+            tried = {name: turns[:1] for name, turns in tried.items()}
+            whole = _bounded(asked, tried, search, share * end.left)
     except DeadlineExceeded:
         if found is None:
             raise
         return all_around, found
+    if found is None or whole.needed.of(asked.objective) <= found.needed.of(asked.objective):
+        return tried, whole
+    # in so short a time, the full turns may have led to a worse round
+    better = _better(found, whole)
+    baselines = [compared_again(asked, each, better.needed) for each in whole.baselines]
+    return all_around, replace(better, baselines=baselines)
 
 
 def _bounded(asked: WorkRound, tried: Mapping[str, Sequence[Turns]], search: Search, time: float) -> RoundSolution:

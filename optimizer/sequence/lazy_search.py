@@ -8,7 +8,7 @@ and so on until every leg of the least chain is solved: then no chain has a boun
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -119,6 +119,13 @@ class LazySearch(ABC):
     def _least_solved(self) -> list[int]:
         """The least chain of pairs that are all solved; no nodes if there is none."""
         costs = [np.where(leg.is_solved, leg.cost, np.inf) for leg in self.legs]
+        return LeastChain(costs, self.closed).find()[1]
+
+    def least_through(self, pairs: Iterable[tuple[int, int, int]]) -> list[int]:
+        """The least chain of these pairs (leg, start node, goal node); no nodes if there is none."""
+        costs = [np.full(leg.cost.shape, np.inf) for leg in self.legs]
+        for k, s, g in pairs:
+            costs[k][s, g] = self.legs[k].cost[s, g]
         return LeastChain(costs, self.closed).find()[1]
 
     def _no_chain(self) -> JoulepathError:

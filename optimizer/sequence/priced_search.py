@@ -54,14 +54,12 @@ def priced_motion(
 class MoveOfALeg:
     """The move of a pair, nodes `s` and `g` of a leg, at several prices of time; it lasts `longest` [s] at most.
 
-    It begins with the motions `known`, and keeps those that it finds.
+    It begins with the motions `known`, to which it puts those that it finds.
     """
 
-    def __init__(
-        self, leg: Leg, s: int, g: int, longest: float, deadline: Deadline, known: Sequence[PricedMotion]
-    ) -> None:
+    def __init__(self, leg: Leg, s: int, g: int, longest: float, deadline: Deadline, known: list[PricedMotion]) -> None:
         self.leg, self.s, self.g, self.longest, self.deadline = leg, s, g, longest, deadline
-        self.known = list(known)
+        self.known = known
 
     def at(self, price: float) -> PricedMotion:
         """The motion of least objective + price · duration. Raises NoTrajectory, or DeadlineExceeded.

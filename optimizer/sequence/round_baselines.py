@@ -9,19 +9,17 @@ from operator import add
 
 import numpy as np
 
-from optimizer.deadline import Clock, DeadlinePassed, watch
+from optimizer.deadline import Clock
 from optimizer.energy.interval import Known, saving_interval
 from optimizer.exceptions import DeadlineExceeded, JoulepathError
 from optimizer.problem.free_order import is_given_order_allowed
 from optimizer.problem.work_round import WorkRound
 from optimizer.search.baselines import baselines, nearest, saving
+from optimizer.sequence.moves import moves_of
 from optimizer.sequence.rests import dwell_energies, rest_sensitivity
 from optimizer.sequence.round_search import RoundSearch
 from optimizer.sequence.round_solution import Needed, RoundBaseline, RoundBaselineName, RoundSolution
-from optimizer.sequence.time_sharing import duration_of
-from optimizer.sequence.timed_round import TimedSearch
 from optimizer.solution import Baseline, Sensitivity, Solution
-from optimizer.trajectories.spline import Spline, lasting
 
 
 def move_by_move(search: RoundSearch) -> list[int] | None:
@@ -58,59 +56,6 @@ def move_by_move(search: RoundSearch) -> list[int] | None:
     return nodes if all(each in search.solutions for each in search.pairs(nodes)) else None
 
 
-def same_factor(timing: TimedSearch, nodes: list[int], ours: Needed) -> RoundBaseline | None:
-    """The chain's moves of least energy, all of them slowed or sped up by one factor; None if some are not known.
-
-    Of least mechanical work no move has a duration of its own: the fastest moves are slowed.
-    """
-    search = timing.search
-    if search.asked.objective == "mechanical":
-        own = [each.spline for each in timing.fastest(nodes) or []]
-    else:
-        free = [search.solutions.get(each) for each in search.pairs(nodes)]
-        own = [each.trajectory.spline for each in free if each is not None]
-    if len(own) < len(search.legs):
-        return None
-    factor = timing.time / sum(spline.duration for spline in own)
-    return _in_time(timing, "same_factor", nodes, [lasting(spline, spline.duration * factor) for spline in own], ours)
-
-
-def fastest_then_wait(timing: TimedSearch, ours: Needed) -> RoundBaseline | None:
-    """The round that is nearly the fastest of all, in configurations of its own, as a planner of least time chooses
-    them; all the time that is left is waited out. None if it is not found.
-    """
-    found = timing.fastest_round()
-    if found is None or duration_of(found[1]) > timing.time:
-        return None
-    nodes, fast = found
-    return _in_time(timing, "fastest_then_wait", nodes, [each.spline for each in fast], ours)
-
-
-def _in_time(
-    timing: TimedSearch, name: RoundBaselineName, nodes: list[int], splines: list[Spline], ours: Needed
-) -> RoundBaseline | None:
-    """The baseline of a chain with given motions; the time that they leave is waited out where it draws least.
-
-    None if the time is up.
-    """
-    search = timing.search
-    pairs = list(zip(search.pairs(nodes), splines, strict=True))
-    waited = timing.time - sum(spline.duration for spline in splines)
-    at, wait = timing.cheapest_wait(nodes, waited)
-    prepared = [search.legs[k].prepared for (k, _, _), _ in pairs]
-    moving = [leg.energy(spline) for leg, spline in zip(prepared, splines, strict=True)]
-    total = sum(each.electrical.total for each in moving) + sum(dwells_of(search, nodes)) + wait
-    sensitivity = reduce(add, [leg.sensitivity(spline) for leg, spline in zip(prepared, splines, strict=True)])
-    known = Known(total, sensitivity + resting(search, nodes, at, waited), sum(each.duration for each in splines))
-    theirs = Needed(known, sum(each.mechanical.total for each in moving))
-    try:
-        with watch(search.end):
-            held = all(search.confirms(*pair, spline) for pair, spline in pairs)
-    except DeadlinePassed:
-        return None
-    return compared(search.asked, name, timing.time + timing.asked.dwelling, theirs, held, ours)
-
-
 def given_order(asked: WorkRound, left: float, ours: RoundSolution, clock: Clock) -> RoundBaseline | None:
     """The best round in the order in which the stops are given, found within the `left` [s] of the deadline.
 
@@ -127,7 +72,7 @@ def given_order(asked: WorkRound, left: float, ours: RoundSolution, clock: Clock
 
 
 def of_chain(search: RoundSearch, nodes: list[int], name: RoundBaselineName, ours: Needed) -> RoundBaseline | None:
-    """The baseline of a chain whose motions are known; `ours` is what it is compared with.
+    """The baseline of a chain whose motions are known, with its moves; `ours` is what it is compared with.
 
     None if it takes another time than is asked for.
     """
@@ -140,7 +85,8 @@ def of_chain(search: RoundSearch, nodes: list[int], name: RoundBaselineName, our
     sensitivity = reduce(add, [move.sensitivity for move in moves]) + resting(search, nodes)
     known = Known(energy, sensitivity, sum(move.duration for move in moves))
     theirs = Needed(known, sum(move.energy.mechanical.total for move in moves))
-    return compared(search.asked, name, duration, theirs, True, ours)
+    baseline = compared(search.asked, name, duration, theirs, True, ours)
+    return replace(baseline, moves=moves_of(search, nodes, moves, {}))
 
 
 def controller_default(search: RoundSearch, start: int, ours: Needed) -> RoundBaseline | None:

@@ -10,7 +10,6 @@ from itertools import accumulate, chain
 
 import numpy as np
 
-from models.robot import Array
 from optimizer.certificate import certify
 from optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
 from optimizer.exceptions import DeadlineExceeded, JoulepathError, NoTrajectory
@@ -27,14 +26,16 @@ from optimizer.sequence.known_motions import KnownMotion, known_motions
 from optimizer.sequence.layers import Layer
 from optimizer.sequence.lazy_search import SAME, SHARE_OF_A_LEG, LazySearch
 from optimizer.sequence.legs import Leg, check_size
+from optimizer.sequence.move_problem import problem_of
 from optimizer.sequence.passing_leg import LIKELY, PassingLeg, Route
 from optimizer.sequence.rests import dwell_costs
 from optimizer.sequence.ways import layers_of
 from optimizer.solution import CandidateStatus, Solution
 from optimizer.trajectories.spline import Spline
 
-# share of the deadline that the search leaves to the motions of its answer, and least time for one of these [s]
-RESERVED, LEAST_TIME = 0.3, 1e-3
+# shares of the deadline that the search leaves to the motions of its answer, and these to certify a simpler round that
+# needs less
+RESERVED, KEPT = 0.3, 0.08
 # routes through passes that are tried for a pair at most, and while none has a motion
 MOST_ROUTES, MOST_FAILED = 3, 10
 # stops beyond which the proof that no chain is better is worth less than its time: a pair that is not solved weighs so
@@ -100,24 +101,30 @@ class RoundSearch(LazySearch):
     def run(self) -> list[int]:
         """The nodes of the chain of least energy, whose motions are all in `solutions`.
 
-        Raises NoSequence, or DeadlineExceeded if the deadline passes before any chain is solved.
+        Once the time is up, of the chains whose motions are. Raises NoSequence, or DeadlineExceeded if there are none.
         """
         while True:
-            nodes = self.explore()
-            fresh = [each for each in self.pairs(nodes) if each not in self.solutions]
-            if not fresh:
-                return nodes
-            # what has no motion yet may take all the time that is left, the others a share of it in a long round
-            fresh.sort(key=lambda each: each in self._runs)
-            for done, each in enumerate(fresh):
-                shared = self._is_rough and each in self._runs
-                self.finish(*each, share=1 / (len(fresh) - done) if shared else 1.0)
+            try:
+                nodes = self.explore()
+                if not self._finish(nodes):
+                    return nodes
+            except DeadlineExceeded:
+                self.cut_short = True
+                if nodes := self.least_through(self.solutions):
+                    return nodes
+                raise
+
+    def _finish(self, nodes: list[int]) -> bool:
+        """Finish the moves of a chain; whether some were not in `solutions`. Raises DeadlineExceeded."""
+        # what has no motion yet may take all the time that is left, the others a share of it in a long round
+        fresh = sorted((each for each in self.pairs(nodes) if each not in self.solutions), key=self._runs.__contains__)
+        for done, each in enumerate(fresh):
+            shared = self._is_rough and each in self._runs
+            self.finish(*each, share=1 / (len(fresh) - done) if shared else 1.0)
+        return bool(fresh)
 
     def attempt(self, k: int, s: int, g: int) -> float | None:
-        """Objective [J] of a first motion of a pair, whose run is kept; inf if none is found in its share of the time.
-
-        None once the time is up.
-        """
+        """Objective [J] of a first motion of a pair, whose run is kept; inf if none is found, None if too late."""
         leg = self.legs[k]
         energy = self._attempt_routes(leg, k, s, g) if isinstance(leg, PassingLeg) else self._attempt(k, s, g)
         if energy is not None:
@@ -228,11 +235,14 @@ class RoundSearch(LazySearch):
         problem = self._problem_of(k, s, g, self.asked.deadline)
         return certify(problem, spline, leg.start.q[s], leg.goal.q[g], leg.prepared.energy(spline)).valid
 
-    def solve_in(self, k: int, s: int, g: int, duration: float) -> Solution:
-        """The certified motion of a pair in a given duration [s]. Raises the errors of `optimize`."""
-        problem = self._problem_of(k, s, g, self._end_of(k).left)
+    def solve_in(self, k: int, s: int, g: int, duration: float, begin: Sequence[Spline] = ()) -> Solution:
+        """The certified motion of a pair in a given duration [s], from known motions if there are any to `begin` with.
+
+        Raises the errors of `optimize`.
+        """
+        problem = self._problem_of(k, s, g, self._end_of(k, KEPT * self.asked.deadline).left)
         fixed = replace(problem, duration_min=duration, duration_max=duration)
-        own, known = self.solutions.get((k, s, g)), self._known(k, s, g)
+        own, known = self.solutions.get((k, s, g)), [*self._known(k, s, g), *begin]
         if own is not None and self.moves[k].tool_path is not None:
             # a path that is followed as fast as it can be is not followed so fast again without a guess
             known.append(own.trajectory.spline)
@@ -244,7 +254,8 @@ class RoundSearch(LazySearch):
 
         Raises DeadlineExceeded if no time is left.
         """
-        leg, before, end = self.legs[k], float(self.legs[k].cost[s, g]), self._end_of(k)
+        leg, before = self.legs[k], float(self.legs[k].cost[s, g])
+        end = self._end_of(k, 0.0 if self.asked.any_time else KEPT * self.asked.deadline)
         if share < 1:
             end = end.within(share * end.left)
         problem, known = self._problem_of(k, s, g, end.left), self._known(k, s, g)
@@ -287,11 +298,12 @@ class RoundSearch(LazySearch):
             self._known_motions.forget(key)
             return None
 
-    def _end_of(self, k: int) -> Deadline:
-        """The deadline of the motion of a leg. Raises DeadlineExceeded if no time is left."""
-        if self.end.passed:
+    def _end_of(self, k: int, kept: float = 0.0) -> Deadline:
+        """The deadline of the motion of a leg, with time [s] kept. Raises DeadlineExceeded if none is left."""
+        end = self.end.earlier_by(kept)
+        if end.passed:
             raise DeadlineExceeded([])
-        return self._shared(k, self.end) if isinstance(self.legs[k], PassingLeg) else self.end
+        return self._shared(k, end) if isinstance(self.legs[k], PassingLeg) else end
 
     def _shared(self, k: int, end: Deadline) -> Deadline:
         """The end of what a leg through passes may take of the time until `end`: it may take all that it gets.
@@ -319,6 +331,10 @@ class RoundSearch(LazySearch):
         if better:
             with suppress(DeadlineExceeded):
                 return self.solve_in(k, s, g, motion.duration)
+        return self.as_it_is(k, s, g, motion)
+
+    def as_it_is(self, k: int, s: int, g: int, motion: Spline) -> Solution:
+        """The solution that a motion of a pair is. Raises NoTrajectory if it is not certified, or DeadlineExceeded."""
         return self._run(k, self._problem_of(k, s, g, self.end.left)).as_it_is(motion)
 
     def _run(self, k: int, problem: Problem, known: Sequence[Spline] = ()) -> Run:
@@ -332,19 +348,3 @@ class RoundSearch(LazySearch):
         leg = self.legs[k]
         problem = problem_of(self.asked, self.moves[k], leg.start.q[s], leg.goal.q[g], time)
         return replace(problem, passes=leg.passes(s, g))
-
-
-def problem_of(asked: WorkRound, move: PlannedMove, q_start: Array, q_goal: Array, time: float) -> Problem:
-    """The problem of a move of a round between joint positions (nq,) [rad], with `time` [s] for it."""
-    return Problem(
-        arm=move.arm,
-        start=q_start,
-        goal=q_goal,
-        method=asked.method,
-        objective=asked.objective,
-        duration_max=None if asked.objective == "electrical" else asked.longest_move,
-        tool_path=move.tool_path,
-        windings=False,
-        sample_period=asked.sample_period,
-        deadline=max(time, LEAST_TIME),
-    )

@@ -21,9 +21,9 @@ from optimizer.problem.problem import Problem
 from optimizer.problem.stops import PlannedMove
 from optimizer.problem.work_round import WorkRound
 from optimizer.search.run import Run
+from optimizer.sequence.move_problem import LEAST_TIME, problem_of
 from optimizer.sequence.rests import rest_sensitivity
 from optimizer.sequence.round_baselines import compared
-from optimizer.sequence.round_search import LEAST_TIME, problem_of
 from optimizer.sequence.round_solution import Move, Needed, RoundBaseline, RoundBaselineName, RoundSolution, needed_by
 from optimizer.sequence.stored_charge import Demand, charges_of, drawn, flows
 from optimizer.solution import StorageUse
@@ -67,9 +67,8 @@ def with_storage(asked: WorkRound, search: Search, clock: Clock) -> RoundSolutio
         with suppress(DeadlineExceeded):
             rounds.append(search(_on(_ordered(asked, stored), Bus(), SECOND * end.left)))
     valued = [_valued(asked, each.moves) for each in rounds]
-    others = [each for one in rounds for each in one.baselines if each.moves]
-    greedy = [_valued(asked, each.moves) for each in others]
-    best = min([*valued, *greedy], key=lambda each: each.value)
+    others = [(each.name, _valued(asked, each.moves)) for one in rounds for each in one.baselines if each.moves]
+    best = min([*valued, *(each for _, each in others)], key=lambda each: each.value)
     best = _refined(asked, best, end.within(REFINED * end.left), clock)
     moves = _moves(asked, best, end, clock)
     needed = needed_by(moves)
@@ -84,7 +83,7 @@ def with_storage(asked: WorkRound, search: Search, clock: Clock) -> RoundSolutio
         storage=_use(asked, best),
     )
     theirs: list[tuple[RoundBaselineName, Valued]] = [("without_storage", each) for each in valued[1:]]
-    theirs += [("move_by_move", each) for each in greedy[:1]]
+    theirs += [(name, each) for name, each in others if name == "move_by_move"][:1]
     return replace(found, baselines=[_baseline(asked, *each, needed) for each in theirs])
 
 

@@ -7,10 +7,10 @@ the price that shares the time exactly, the least chain is the best round of all
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, partial
+from operator import attrgetter
 
 import numpy as np
 
@@ -27,6 +27,10 @@ from optimizer.sequence.time_sharing import PRICES, Shared, TimeSharing, duratio
 MOST_CHAINS = 5
 # relative: a chain is better only by more
 BETTER = 1e-4
+
+# leg, start node and goal node of a move
+Pair = tuple[int, int, int]
+_duration = attrgetter("duration")
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,8 @@ class TimedSearch:
         # moves after which it may wait
         self.places = [k for k, move in enumerate(self.asked.moves) if self.asked.may_wait_after(move)]
         self.sought = [set[int]() for _ in self.legs]
-        self._fastest: dict[tuple[int, int, int], PricedMotion | None] = {}
+        self._fastest: dict[Pair, PricedMotion | None] = {}
+        self._motions: dict[Pair, list[PricedMotion]] = {}
 
     def run(self, nodes: list[int] | None) -> Timed:
         """The best round found from that of a chain on, whose motions are known, or from the fastest one.
@@ -79,7 +84,7 @@ class TimedSearch:
                 self.exact &= not unsure
                 if chain == best.nodes:
                     return best
-                other = self._of(chain, [priced.motions.get(each) for each in self.search.pairs(chain)])
+                other = self._of(chain)
                 if other is None or other.energy > best.energy * (1 - BETTER):
                     # another chain is as good at this price, and worse in this time
                     break
@@ -89,10 +94,10 @@ class TimedSearch:
 
     def _of_the_own(self, nodes: list[int]) -> Timed | None:
         """A chain whose motions are known, with its time shared; as they are, if that is not done in time."""
-        known = [self.search.solutions[each] for each in self.search.pairs(nodes)]
-        own = [PricedMotion(each.trajectory.spline, each.energy.of(self.asked.objective)) for each in known]
+        if self.search.search_end.passed and (known := self.as_it_is(nodes)) is not None:
+            return known
         try:
-            found = self._of(nodes, own)
+            found = self._of(nodes)
         except DeadlineExceeded:
             found = None
         return self.as_it_is(nodes) if found is None else found
@@ -106,7 +111,7 @@ class TimedSearch:
             return None
         self.exact = False
         at, wait = self.cheapest_wait(nodes, waited)
-        price = -float(self._powers(at)[nodes[at + 1]])
+        price = -self.waiting_power(nodes, at)
         energy = needed + wait + self.search.dwells(nodes)
         return Timed(nodes, Shared(price, lengths, needed, waited), at, wait, energy)
 
@@ -122,7 +127,19 @@ class TimedSearch:
         chain = priced.explore()
         for sought, leg in zip(self.sought, priced.legs, strict=True):
             sought.update(leg.solved)
+        for each in self.search.pairs(chain):
+            found, known = priced.motions.get(each), self.in_hand(each)
+            if found is not None and all(found is not motion for motion in known):
+                known.append(found)
         return chain
+
+    def in_hand(self, pair: Pair) -> list[PricedMotion]:
+        """The motions of a pair that are known, of any duration; what is found later is put to them."""
+        if pair not in self._motions:
+            own = self.search.solutions.get(pair)
+            objective = self.asked.objective
+            self._motions[pair] = [] if own is None else [PricedMotion(own.trajectory.spline, own.energy.of(objective))]
+        return self._motions[pair]
 
     def _of_the_fastest(self) -> Timed:
         """The chain that is nearly the fastest, with its time shared. Raises RoundTooShort or NoTrajectory."""
@@ -140,7 +157,7 @@ class TimedSearch:
             if priced.cut_short:
                 raise DeadlineExceeded([])
             raise RoundTooShort(duration_of(fast) + self.asked.dwelling, self.asked.dwelling)
-        found = self._of(chain, [priced.motions.get(each) for each in self.search.pairs(chain)])
+        found = self._of(chain)
         if found is None:
             raise NoTrajectory([])
         return found
@@ -150,6 +167,9 @@ class TimedSearch:
 
         It is that by bounds; where one of its moves has no motion, as among obstacles, that of a search.
         """
+        if self.search.search_end.passed and "_fast_search" not in vars(self):
+            # its bounds alone take the time that rounds in hand need for their certificates
+            return None
         with suppress(DeadlineExceeded, NoSequence):
             for find in (self._fast_search.least, partial(self._explored, self._fast_search)):
                 nodes = find()
@@ -159,34 +179,39 @@ class TimedSearch:
         return None
 
     def fastest(self, nodes: list[int]) -> list[PricedMotion] | None:
-        """The moves of a chain as fast as they can be; None if some are not found."""
+        """The moves of a chain as fast as they can be, each no slower than any motion of it that is known.
+
+        None if some are not found.
+        """
         found = list[PricedMotion]()
         for each in self.search.pairs(nodes):
             if each not in self._fastest:
-                own = self.search.solutions.get(each)
-                known = [] if own is None else [own.trajectory.spline]
-                self._fastest[each] = fastest_motion(self.legs[each[0]], *each[1:], self.search.search_end, known)
+                self._fastest[each] = self._fastest_of(each)
             motion = self._fastest[each]
             if motion is None:
                 return None
             found.append(motion)
         return found
 
-    def _of(self, nodes: list[int], motions: Sequence[PricedMotion | None]) -> Timed | None:
-        """A chain with its time shared, from motions of its moves; None if no motions that fast are found."""
+    def _fastest_of(self, pair: Pair) -> PricedMotion | None:
+        """The motion of a pair of least duration."""
+        known = self.in_hand(pair)
+        splines = [each.spline for each in known]
+        found = fastest_motion(self.legs[pair[0]], *pair[1:], self.search.search_end, splines)
+        return min([*known, *([] if found is None else [found])], key=_duration, default=None)
+
+    def _of(self, nodes: list[int]) -> Timed | None:
+        """A chain with its time shared; None if no motions that fast are found."""
         fast = self.fastest(nodes)
         if fast is None or duration_of(fast) > self.time:
             return None
         beside = (self.longest, self.search.search_end)
         sharing = TimeSharing(
-            [
-                MoveOfALeg(self.legs[k], s, g, *beside, [] if motion is None else [motion])
-                for (k, s, g), motion in zip(self.search.pairs(nodes), motions, strict=True)
-            ]
+            [MoveOfALeg(self.legs[k], s, g, *beside, self.in_hand((k, s, g))) for k, s, g in self.search.pairs(nodes)]
         )
         try:
             if self._rests_count:
-                waiting = min(float(self._powers(k)[nodes[k + 1]]) for k in self.places)
+                waiting = min(self.waiting_power(nodes, k) for k in self.places)
                 shared = sharing.fill(self.time, waiting, fast)
             else:
                 shared = sharing.fill_for_work(self.time, fast)
@@ -215,6 +240,10 @@ class TimedSearch:
         hold = float(holding_powers(planned, leg.goal)[node])
         dwell = rest_energy(self.asked, planned, planned.dwell, hold)
         return rest_energy(self.asked, planned, planned.dwell + waited, hold) - dwell
+
+    def waiting_power(self, nodes: list[int], move: int) -> float:
+        """What every further second of a long wait after a move adds to the objective [W]."""
+        return float(self._powers(move)[nodes[move + 1]]) if self._rests_count else 0.0
 
     def _powers(self, move: int) -> Array:
         return long_wait_powers(self.asked, self.asked.moves[move], self.legs[move].goal)

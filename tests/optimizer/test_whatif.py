@@ -16,10 +16,14 @@ from optimizer.problem.scene import Obstacle, Scene, Sphere
 from optimizer.solution import Solution
 from optimizer.whatif import whatif
 from tests.optimizer.cells import at
+from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import PAYLOAD, changed, limits, problem, tcp_pose
+from tests.selection import long_but
 
 # quadrature of the same motion on another grid
 QUADRATURE = 1e-3
+# the same motion, its energy added up twice
+ROUNDING = 1e-9
 
 
 @pytest.fixture(scope="module")
@@ -84,3 +88,17 @@ def test_no_time_leaves_the_same_motion(asked: Problem, base: Solution) -> None:
     found = whatif(base, changed(asked, deadline=1e-6, link_mass_scale=0.5))
     assert found.reoptimised is None and isinstance(found.error, DeadlineExceeded)
     assert found.certificate.valid
+
+
+@pytest.mark.parametrize("readings", long_but([60, 300], range(60, 1200, 40)))
+def test_wherever_the_deadline_ends_it_the_same_motion_is_in_hand(
+    asked: Problem, base: Solution, readings: int
+) -> None:
+    """On an arm with a part, the base motion needs less than what time is left for, or there is nothing else."""
+    worse = replace(changed(asked, payload=PAYLOAD), method="uniform_scaling", deadline=float(readings))
+    found = whatif(base, worse, CountingClock())
+    assert found.certificate.valid
+    if found.reoptimised is None:
+        assert isinstance(found.error, DeadlineExceeded)
+    else:
+        assert found.reoptimised.energy.electrical.total <= found.same_motion.electrical.total * (1 + ROUNDING)

@@ -272,9 +272,11 @@ REFUSALS = {"no time": DeadlineExceeded([]), "no motion": NoTrajectory([])}
     ("where", "problem"),
     long_but([("sharing", "no time"), ("motions", "no motion")], product(["sharing", "motions"], REFUSALS)),
 )
-def test_time_that_cannot_be_shared_is_waited_out(where: str, problem: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Among obstacles, what shares the time may end by the deadline, or miss a motion: the round in its own time is
-    known by then."""
+def test_time_that_cannot_be_shared_leaves_simpler_rounds(
+    where: str, problem: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Among obstacles, what shares the time may end by the deadline, or miss a motion: the moves slowed alike, and the
+    fastest ones with a wait, are known by then."""
 
     def fails(*_: Any) -> Any:
         raise REFUSALS[problem]
@@ -283,14 +285,13 @@ def test_time_that_cannot_be_shared_is_waited_out(where: str, problem: str, monk
         monkeypatch.setattr(TimeSharing, "fill", fails)
     else:
         monkeypatch.setattr(RoundSearch, "solve_in", fails)
-    asked = in_time(ASKED, duration_of(LONGER))
-    found = optimize_round(asked)
-    # moves slowed alike may need less than a wait
-    assert all(move.solution.certificate.valid for move in found.moves) and found.joins < ROUNDING
-    assert 0 < found.lower_bound <= found.energy.electrical.total
-    assert found.status == "feasible"
-    assert found.duration == pytest.approx(asked.duration_max, rel=ROUNDING)
-    assert sum(move.wait for move in found.moves) == pytest.approx((LONGER - 1) * free().duration, rel=ROUNDING)
-    # what is shorter than the round's own time has no such answer
-    with pytest.raises(type(REFUSALS[problem])):
-        optimize_round(in_time(ASKED, duration_of(SHORTER)))
+    for factor, name in ((LONGER, "same_factor"), (SHORTER, "fastest_then_wait")):
+        asked = in_time(ASKED, duration_of(factor))
+        found = optimize_round(asked)
+        assert_true(asked, found)
+        assert found.status == "feasible"
+        assert found.duration == pytest.approx(asked.duration_max, rel=ROUNDING)
+        (taken,) = (each for each in found.baselines if each.name == name)
+        assert found.energy.electrical.total == pytest.approx(taken.electrical, rel=ROUNDING)
+        # slowed alike, they need less than a wait after them
+        assert (sum(move.wait for move in found.moves) > 0) == (factor == SHORTER)

@@ -1,0 +1,27 @@
+"""The problem of one move of a round."""
+
+from __future__ import annotations
+
+from models.robot import Array
+from optimizer.problem.problem import Problem
+from optimizer.problem.stops import PlannedMove
+from optimizer.problem.work_round import WorkRound
+
+# least time [s] for a motion
+LEAST_TIME = 1e-3
+
+
+def problem_of(asked: WorkRound, move: PlannedMove, q_start: Array, q_goal: Array, time: float) -> Problem:
+    """The problem of a move of a round between joint positions (nq,) [rad], with `time` [s] for it."""
+    return Problem(
+        arm=move.arm,
+        start=q_start,
+        goal=q_goal,
+        method=asked.method,
+        objective=asked.objective,
+        duration_max=None if asked.objective == "electrical" else asked.longest_move,
+        tool_path=move.tool_path,
+        windings=False,
+        sample_period=asked.sample_period,
+        deadline=max(time, LEAST_TIME),
+    )
