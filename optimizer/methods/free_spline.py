@@ -23,6 +23,7 @@ from optimizer.problem.problem import LEAST_DURATION
 from optimizer.solution import BaselineName
 from optimizer.trajectories import bspline, seven_segment
 from optimizer.trajectories.bspline import Basis
+from optimizer.trajectories.ramp_knots import RampKnots
 from optimizer.trajectories.ruckig_motion import time_optimal, time_optimal_positions
 from optimizer.trajectories.spline import Spline, sampled, spline_of
 
@@ -51,6 +52,8 @@ CORNERED_PROGRESS = 5e-2
 # energy, 0.01 % where clearances hold the motion
 FINE_PROGRESS = 2e-4
 
+RAMPS = RampKnots()
+
 
 class FreeSpline(SqpMethod):
     """Solves a candidate by splines with knots at the switches of jerk."""
@@ -71,10 +74,9 @@ class FreeSpline(SqpMethod):
         If time is short, or this finds no motion, then from the time-optimal motion with knots at its switches of jerk.
         If the result collides, or gets out of obstacles at the cost of much energy, from planned collision-free paths.
         """
-        shortest = float(seven_segment.shortest_duration(self.q_goal - self.q_start, self.coordinates.limits))
-        tried: list[SolveResult] = []
+        shortest, tried = self._shortest, list[SolveResult]()
         if not self.interval.minimum_time and self.t_max >= TIGHT * shortest:
-            space = bspline.uniform(COARSE)
+            space = self._space(COARSE)
             guess = Guess(space, self._smoothed(space), 0.0, rough=True, progress=self._progress)
             if self._is_refined_at_once:
                 tried, guess = self._coarse_and_refined(guess, TIGHT * shortest)
@@ -112,7 +114,7 @@ class FreeSpline(SqpMethod):
         late = self.deadline.left < MULTIPLE * (left - self.deadline.left)
         if late or self.prepared.surroundings.worst_violation(coarse.spline) is not None:
             return [replace(coarse, spline=None)], found
-        return [coarse, self.solve_from(*sampled(coarse.spline), fine=duration < tight)], found
+        return [coarse, self.refined(coarse.spline, fine=duration < tight)], found
 
     def _may_be_on_the_wrong_side(self, found: SolveResult) -> bool:
         """Whether a motion may have left obstacles on the wrong side."""
@@ -155,8 +157,7 @@ class FreeSpline(SqpMethod):
 
     def _polished(self, spline: Spline) -> SolveResult:
         """The end of a rough solve of more control points than `may_refine` takes."""
-        space, t = bspline.uniform(len(spline.control_points)), np.linspace(0.0, 1.0, SAMPLES)
-        points = space.fit(self.coordinates.from_joints(spline.curve(t * spline.duration)), t)
+        space, points = Basis.of(spline.knots / spline.duration), self.coordinates.from_joints(spline.control_points)
         return self.improve(Guess(space, points, spline.duration, collision_free=True, progress=self._progress))
 
     def along_path(self, q: Array, t: Array) -> SolveResult:
@@ -167,7 +168,7 @@ class FreeSpline(SqpMethod):
         """
         tried: list[SolveResult] = []
         for count in ALONG_PATH:
-            space = bspline.uniform(count)
+            space = self._space(count)
             points = space.fit(self.coordinates.from_joints(q), t)
             fitted = spline_of(space, self.coordinates.to_joints(points), 1.0).curve(t)
             if count < ALONG_PATH[-1] and self.prepared.surroundings.model.least_distance(fitted, 0.0) < -ALLOWED_CUT:
@@ -180,8 +181,21 @@ class FreeSpline(SqpMethod):
 
     @staticmethod
     def may_refine(found: Spline) -> bool:
-        """Whether the knots are evenly spaced: `solve_from` places more of them, at the switches of jerk."""
-        return len(found.control_points) == COARSE
+        """Whether the knots are those of a first solve: `refined` places more of them, at the switches of jerk."""
+        return len(found.control_points) == COARSE or _is_at_ramps(found)
+
+    def refined(self, spline: Spline, fine: bool) -> SolveResult:
+        """From a motion of a first solve, with knots REFINED at the switches of jerk, or EXACT if `fine`.
+
+        Where these are at the ramps already, the space contains the motion itself.
+        """
+        if not _is_at_ramps(spline):
+            return super().refined(spline, fine)
+        duration = spline.duration
+        knots = spline.knots / duration
+        space = RAMPS.refined(knots, self._switches(duration), EXACT if fine else REFINED)
+        points = bspline.refit(self.coordinates.from_joints(spline.control_points), knots, space.knots)
+        return self._refined(Guess(space, points, duration, nearly_feasible=True), sampled(spline)[0])
 
     def solve_from(self, q: Array, t: Array, fine: bool) -> SolveResult:
         """From samples q (k, nq) at times t (k,), with knots REFINED, or EXACT if `fine`."""
@@ -238,12 +252,36 @@ class FreeSpline(SqpMethod):
 
     def graded(self, duration: float, repeat: int) -> Basis:
         """A space with knots at the switches of the leading coordinate's jerk in a motion of `duration` [s]."""
+        if self._is_slow(duration):
+            return RAMPS.space(self._switches(duration), repeat, COARSE)
         return bspline.graded(self._switches(duration), repeat)
+
+    def _space(self, count: int) -> Basis:
+        """The space of a first solve: `count` control points over evenly spaced knots, or knots at the ramps of a slow
+        motion."""
+        duration = max(self._shortest, self.t_min)
+        return RAMPS.space(self._switches(duration), 1, count) if self._is_slow(duration) else bspline.uniform(count)
+
+    @property
+    def _shortest(self) -> float:
+        """Least duration [s] that the limits on rates allow."""
+        line = self.coordinates
+        return float(seven_segment.shortest_duration(line.goal - line.start, line.limits))
+
+    def _is_slow(self, duration: float) -> bool:
+        """Whether the ramps are so short, beside a `duration` [s], that the knots have to follow them.
+
+        Where the cost has corners, sharper motions have evenly spaced knots.
+        """
+        line, problem = self.coordinates, self.prepared.problem
+        plain = not has_corners(problem.objective, problem.arm)
+        return plain and RAMPS.is_slow(seven_segment.ramp(line.goal - line.start, line.limits), duration)
 
     def _switches(self, duration: float) -> Array:
         """The switches of the leading coordinate's jerk in a motion of `duration` [s], as fractions of it."""
         line = self.coordinates
-        return seven_segment.switches(line.goal - line.start, duration, line.limits)
+        closest = RAMPS.closest if self._is_slow(duration) else seven_segment.CLOSEST
+        return seven_segment.switches(line.goal - line.start, duration, line.limits, closest)
 
     def _smoothed(self, space: Basis) -> Array:
         """Control points (n, r) of the smoothed time-optimal motion: its positions at the Greville points.
@@ -254,3 +292,10 @@ class FreeSpline(SqpMethod):
         points = time_optimal_positions(line.limits, line.start, line.goal, bspline.greville(space.knots))
         points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = line.start, line.goal
         return points
+
+
+def _is_at_ramps(spline: Spline) -> bool:
+    """Whether a motion has the knots of a slow motion's first solve: single ones, at uneven distances."""
+    breaks = spline.knots[bspline.DEGREE : -bspline.DEGREE]
+    spans = np.diff(breaks)
+    return bool(spans.min() > 0 and spans.max() > 1.001 * spans.min())

@@ -178,18 +178,39 @@ def uniform(n: int) -> Basis:
     return Basis.of(clamped(np.linspace(0.0, 1.0, n - DEGREE + 1)))
 
 
-def graded(switches: Array, repeat: int, widest: float = 0.13) -> Basis:
+def graded(
+    switches: Array, repeat: int, widest: float = 0.13, growth: float = np.inf, next_to_end: float = NEXT_TO_END
+) -> Basis:
     """A space with knots of multiplicity `repeat` at the switches (k,), and further knots at most `widest` apart.
 
     At a knot of multiplicity two the slope of the third derivative may jump, at multiplicity three the third derivative
-    itself, as jerk does between its limits.
+    itself, as jerk does between its limits. No span between two switches is wider than `growth` times the one before or
+    after it. A switch is left out if it is no farther than `next_to_end` from an end of [0, 1].
     """
-    edges = np.concatenate([[0.0], _inner(switches), [1.0]])
+    edges = np.concatenate([[0.0], _inner(switches, next_to_end), [1.0]])
+    spans = np.concatenate([[np.inf], np.diff(edges), [np.inf]])
     breaks = [0.0]
-    for a, b in pairwise(edges):
-        breaks += np.linspace(a, b, math.ceil((b - a) / widest) + 1)[1:-1].tolist()
+    for k, (a, b) in enumerate(pairwise(edges)):
+        breaks += _between(a, b, spans[k], spans[k + 2], widest, growth)
         breaks += [b] * (repeat if b < 1.0 else 1)
     return Basis.of(clamped(np.array(breaks)))
+
+
+def _between(a: float, b: float, before: float, after: float, widest: float, growth: float) -> list[float]:
+    """Breakpoints between a and b, whose spans grow from those `before` and `after` them to `widest`."""
+    lower, upper = [a], [b]
+    while True:
+        up, down = min(growth * before, widest), min(growth * after, widest)
+        step, left = min(up, down), upper[-1] - lower[-1]
+        if step == widest or left <= 2 * step:
+            middle = np.linspace(lower[-1], upper[-1], math.ceil(left / step) + 1)[1:-1].tolist()
+            return [*lower[1:], *middle, *upper[:0:-1]]
+        if up <= down:
+            lower.append(lower[-1] + up)
+            before = up
+        else:
+            upper.append(upper[-1] - down)
+            after = down
 
 
 def moved(knots: Array, switches: Array, repeat: int) -> Array | None:
@@ -205,6 +226,6 @@ def moved(knots: Array, switches: Array, repeat: int) -> Array | None:
     return np.repeat(np.interp(breaks, old, new), counts)
 
 
-def _inner(switches: Array) -> Array:
+def _inner(switches: Array, next_to_end: float = NEXT_TO_END) -> Array:
     """The switches that are not at either end."""
-    return switches[(switches > NEXT_TO_END) & (switches < 1 - NEXT_TO_END)]
+    return switches[(switches > next_to_end) & (switches < 1 - next_to_end)]
