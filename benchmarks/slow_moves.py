@@ -14,6 +14,7 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
@@ -65,14 +66,18 @@ def slow_problem(seed: int, index: int) -> tuple[SlowKind, Problem]:
     return kind, Problem(arm=arm, start=task.q_start, goal=task.q_goal, deadline=AMPLE)
 
 
-def variants(problem: Problem, spline: Spline) -> Iterator[tuple[str, float]]:
-    """Energies [J] of the same move, each with its name, found in other ways from the answer's motion."""
+def other_searches(problem: Problem, duration: float) -> Iterator[tuple[str, float]]:
+    """Energies [J] of the same move, each with its name, at durations near that of the answer and by another method."""
     for factor in NEAR:
-        fixed = spline.duration * factor
+        longest = duration * factor
         with suppress(JoulepathError):
-            yield f"{factor:g} T", _energy(replace(problem, duration_min=fixed, duration_max=fixed))
+            yield f"{factor:g} T", _energy(replace(problem, duration_min=longest, duration_max=longest))
     with suppress(JoulepathError):
         yield "lagrange", _energy(replace(problem, method="lagrange"))
+
+
+def more_points(problem: Problem, spline: Spline) -> Iterator[tuple[str, float]]:
+    """Energies [J] of the same move, each with its name, from the answer's motion in larger spaces."""
     prepared = PreparedProblem.of(problem)
     solver = FreeSpline(prepared, *spline.control_points[[0, -1]], NEVER)
     yield "evenly", prepared.cost_of(solver.solve_evenly(*sampled(spline), MORE * FEW, PROGRESS).spline)
@@ -88,7 +93,7 @@ def _finer(solver: FreeSpline, spline: Spline) -> SolveResult:
     duration = spline.duration
     own: Array = spline.knots / duration
     breaks = np.unique(own)
-    between = [np.linspace(a, b, MORE + 1)[1:-1] for a, b in zip(breaks[:-1], breaks[1:], strict=True)]
+    between = [np.linspace(a, b, MORE + 1)[1:-1] for a, b in pairwise(breaks)]
     space = Basis.of(np.sort(np.concatenate([own, *between])))
     points = bspline.refit(spline.control_points, own, space.knots)
     return solver.improve(Guess(space, points, duration, nearly_feasible=True, progress=PROGRESS))
@@ -102,7 +107,8 @@ def compare(seed: int, count: int, json: Path | None) -> int:
         began = time.process_time()
         answer = optimize(problem)
         spent = time.process_time() - began
-        energy, others = answer.energy.electrical.total, dict(variants(problem, answer.trajectory.spline))
+        energy, spline = answer.energy.electrical.total, answer.trajectory.spline
+        others = dict(other_searches(problem, spline.duration)) | dict(more_points(problem, spline))
         best = min(others, key=lambda name: others[name])
         row = {
             "index": index,

@@ -8,12 +8,12 @@ are this project's.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
 from models.robot import Array
-from optimizer.collision.path_planner import SAMPLES
 from optimizer.energy.plant import has_corners
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.methods.planned_paths import FROM_PLANNED_PATH
@@ -74,12 +74,12 @@ class FreeSpline(SqpMethod):
         If time is short, or this finds no motion, then from the time-optimal motion with knots at its switches of jerk.
         If the result collides, or gets out of obstacles at the cost of much energy, from planned collision-free paths.
         """
-        shortest, tried = self._shortest, list[SolveResult]()
-        if not self.interval.minimum_time and self.t_max >= TIGHT * shortest:
+        tried: list[SolveResult] = []
+        if not self.interval.minimum_time and not self._is_tight():
             space = self._space(COARSE)
             guess = Guess(space, self._smoothed(space), 0.0, rough=True, progress=self._progress)
             if self._is_refined_at_once:
-                tried, guess = self._coarse_and_refined(guess, TIGHT * shortest)
+                tried, guess = self._coarse_and_refined(guess, TIGHT * self._shortest)
             if not tried or tried[-1].spline is None:
                 tried.append(self.improve(guess))
         if not tried or (tried[-1].status is SolveStatus.FAILED and tried[-1].collision is None):
@@ -252,9 +252,8 @@ class FreeSpline(SqpMethod):
 
     def graded(self, duration: float, repeat: int) -> Basis:
         """A space with knots at the switches of the leading coordinate's jerk in a motion of `duration` [s]."""
-        if self._is_slow(duration):
-            return RAMPS.space(self._switches(duration), repeat, COARSE)
-        return bspline.graded(self._switches(duration), repeat)
+        switches = self._switches(duration)
+        return RAMPS.space(switches, repeat, COARSE) if self._is_slow(duration) else bspline.graded(switches, repeat)
 
     def _space(self, count: int) -> Basis:
         """The space of a first solve: `count` control points over evenly spaced knots, or knots at the ramps of a slow
@@ -262,26 +261,42 @@ class FreeSpline(SqpMethod):
         duration = max(self._shortest, self.t_min)
         return RAMPS.space(self._switches(duration), 1, count) if self._is_slow(duration) else bspline.uniform(count)
 
-    @property
+    @cached_property
     def _shortest(self) -> float:
         """Least duration [s] that the limits on rates allow."""
         line = self.coordinates
         return float(seven_segment.shortest_duration(line.goal - line.start, line.limits))
+
+    @cached_property
+    def _ramp(self) -> float:
+        """Time [s] in which the leading coordinate gets to its greatest speed in the fastest motion."""
+        return seven_segment.ramp(self._way, self.coordinates.limits)
+
+    @property
+    def _way(self) -> Array:
+        """The displacement (r,) by which ramps are measured: where there is none, the motion may go away and back."""
+        way = self.coordinates.goal - self.coordinates.start
+        return way if way.any() else np.full_like(way, RAMPS.least_way)
 
     def _is_slow(self, duration: float) -> bool:
         """Whether the ramps are so short, beside a `duration` [s], that the knots have to follow them.
 
         Where the cost has corners, sharper motions have evenly spaced knots.
         """
-        line, problem = self.coordinates, self.prepared.problem
-        plain = not has_corners(problem.objective, problem.arm)
-        return plain and RAMPS.is_slow(seven_segment.ramp(line.goal - line.start, line.limits), duration)
+        problem = self.prepared.problem
+        return RAMPS.is_slow(self._ramp, duration) and not has_corners(problem.objective, problem.arm)
+
+    def _is_tight(self) -> bool:
+        """Whether all durations are too near the shortest for the knots of a first solve."""
+        slow = self._is_slow(self._shortest)
+        return self.t_max < (self._shortest + self._ramp if slow else TIGHT * self._shortest)
 
     def _switches(self, duration: float) -> Array:
         """The switches of the leading coordinate's jerk in a motion of `duration` [s], as fractions of it."""
         line = self.coordinates
-        closest = RAMPS.closest if self._is_slow(duration) else seven_segment.CLOSEST
-        return seven_segment.switches(line.goal - line.start, duration, line.limits, closest)
+        if self._is_slow(duration):
+            return seven_segment.switches(self._way, duration, line.limits, RAMPS.closest)
+        return seven_segment.switches(line.goal - line.start, duration, line.limits)
 
     def _smoothed(self, space: Basis) -> Array:
         """Control points (n, r) of the smoothed time-optimal motion: its positions at the Greville points.

@@ -42,7 +42,7 @@ def _jerk_limited(speed: float, distance: float, jerk: float) -> float:
 
 
 def ramp(displacement: Array, limits: Limits) -> float:
-    """Time [s] in which the leading joint gets to its greatest speed in the fastest motion over a displacement (nq,)."""
+    """Time [s] in which the leading joint gets to its greatest speed in the fastest motion over a displacement."""
     shortest = float(shortest_duration(displacement, limits))
     early = switches(displacement, shortest, limits, closest=0.0)
     return shortest * float(early[early <= 0.5].max(initial=0.0))
