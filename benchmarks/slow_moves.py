@@ -47,7 +47,7 @@ MOST_EXCESS = 3e-3
 # durations that are tried, in multiples of the answer's
 NEAR = (0.9, 0.97, 0.99, 0.997, 1.003, 1.01, 1.03, 1.1)
 # multiple of the control points, those of a first solve, and the relative decrease that ends the solve
-MORE, FEW, PROGRESS = 4, 13, 1e-6
+MORE, FEW, PROGRESS = 4, 13, 1e-5
 # so long that no search ends early [s]
 AMPLE = 600.0
 
