@@ -1,8 +1,8 @@
 """`bspline`: one quintic B-spline per joint; control points and duration are optimised together.
 
 C. Hansen, J. Öltjen, D. Meike, T. Ortmaier, "Enhanced approach for energy-efficient trajectory generation of industrial
-robots", IEEE CASE 2012: B-splines optimised by an SQP. Knots repeated at the switches of jerk, and the initial guesses,
-are this project's.
+robots", IEEE CASE 2012: B-splines optimised by an SQP. Knots repeated at the switches of jerk, knots at the ramps of slow
+motions, and the initial guesses are this project's.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class FreeSpline(SqpMethod):
     evenly_spaced: ClassVar[bool] = True
 
     def solve(self) -> SolveResult:
-        """From the smoothed time-optimal motion on evenly spaced knots.
+        """From the smoothed time-optimal motion, on evenly spaced knots or on those at the ramps of a slow motion.
 
         If time is short, or this finds no motion, then from the time-optimal motion with knots at its switches of jerk.
         If the result collides, or gets out of obstacles at the cost of much energy, from planned collision-free paths.
@@ -230,7 +230,8 @@ class FreeSpline(SqpMethod):
     def _solve_in(self, space: Basis, q: Array, t: Array, progress: float = PROGRESS) -> SolveResult:
         """From samples q (k, nq) at times t (k,), in a spline space."""
         duration = float(t[-1])
-        points = bspline.smooth_fit(self.coordinates.from_joints(q), t / duration, space.knots)
+        fit = bspline.smoothed if self._is_slow(duration) else bspline.smooth_fit
+        points = fit(self.coordinates.from_joints(q), t / duration, space.knots)
         return self._refined(Guess(space, points, duration, progress=progress), q)
 
     def _refined(self, guess: Guess, q: Array) -> SolveResult:

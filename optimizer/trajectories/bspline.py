@@ -85,6 +85,18 @@ def smooth_fit(samples: Array, at: Array, knots: Array) -> Array:
     return points
 
 
+def smoothed(samples: Array, at: Array, knots: Array) -> Array:
+    """Control points (n, r) that are the values, at the Greville points, of the cubic spline through samples (k, r) of
+    a motion at (k,) in [0, 1]; at rest at both ends.
+
+    Such a curve varies less than the motion (Schoenberg), whatever the knots: it hardly exceeds the motion's rates.
+    """
+    _, apart = np.unique(at, return_index=True)
+    points = np.asarray(make_interp_spline(at[apart], samples[apart], k=3)(greville(knots)))
+    points[:REST_POINTS], points[-REST_POINTS:] = samples[0], samples[-1]
+    return points
+
+
 def refit(points: Array, knots: Array, onto: Array) -> Array:
     """Control points (n, r) over the knots `onto` that interpolate the spline of `points` (m, r) over `knots`.
 
