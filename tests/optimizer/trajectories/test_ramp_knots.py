@@ -49,7 +49,7 @@ def test_a_refined_space_holds_every_motion_of_the_first(repeat: int) -> None:
     at = switches(20.1)
     first = RAMPS.space(at, 1, COUNT)
     # the motion that was found may last a little longer
-    finer = RAMPS.refined(first.knots, at * 0.99, repeat)
+    finer = RAMPS.refined(first.knots, np.where(at < 0.5, 0.99 * at, 1 - 0.99 * (1 - at)), repeat)
     points = np.random.default_rng(0).uniform(-1, 1, (first.n, 2))
     again = bspline.refit(points, first.knots, finer.knots)
     x = np.linspace(0, 1, 4001)
