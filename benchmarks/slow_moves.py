@@ -80,7 +80,9 @@ def more_points(problem: Problem, spline: Spline) -> Iterator[tuple[str, float]]
     """Energies [J] of the same move, each with its name, from the answer's motion in larger spaces."""
     prepared = PreparedProblem.of(problem)
     solver = FreeSpline(prepared, *spline.control_points[[0, -1]], NEVER)
-    yield "evenly", prepared.cost_of(solver.solve_evenly(*sampled(spline), MORE * FEW, PROGRESS).spline)
+    q, t = sampled(spline)
+    points = bspline.smoothed(q, t / spline.duration, bspline.uniform(MORE * FEW).knots)
+    yield "evenly", prepared.cost_of(solver.solve_points(points, spline.duration, PROGRESS).spline)
     yield "finer", prepared.cost_of(_finer(solver, spline).spline)
 
 

@@ -219,8 +219,9 @@ class FreeSpline(SqpMethod):
         return self._refined(Guess(Basis.of(knots), points, duration, nearly_feasible=True), sampled(spline)[0])
 
     def solve_evenly(self, q: Array, t: Array, count: int, progress: float) -> SolveResult:
-        """From samples q (k, nq) at times t (k,), with `count` control points over evenly spaced knots."""
-        return self._solve_in(bspline.uniform(count), q, t, progress)
+        """From samples q (k, nq) at times t (k,), with `count` control points over evenly spaced knots, and more of both
+        at the ramps of a slow motion."""
+        return self._solve_in(self._space(count, float(t[-1])), q, t, progress)
 
     def solve_points(self, points: Array, duration: float, progress: float) -> SolveResult:
         """From control points (n, nq) [rad] over evenly spaced knots of a motion of `duration` [s]."""
@@ -256,10 +257,10 @@ class FreeSpline(SqpMethod):
         switches = self._switches(duration)
         return RAMPS.space(switches, repeat, COARSE) if self._is_slow(duration) else bspline.graded(switches, repeat)
 
-    def _space(self, count: int) -> Basis:
-        """The space of a first solve: `count` control points over evenly spaced knots, or knots at the ramps of a slow
-        motion."""
-        duration = max(self._shortest, self.t_min)
+    def _space(self, count: int, duration: float | None = None) -> Basis:
+        """The space of a first solve: `count` control points over evenly spaced knots, and more of both at the ramps of
+        a slow motion of `duration` [s]; None: the least that is allowed."""
+        duration = max(self._shortest, self.t_min) if duration is None else duration
         return RAMPS.space(self._switches(duration), 1, count) if self._is_slow(duration) else bspline.uniform(count)
 
     @cached_property
@@ -282,10 +283,9 @@ class FreeSpline(SqpMethod):
     def _is_slow(self, duration: float) -> bool:
         """Whether the ramps are so short, beside a `duration` [s], that the knots have to follow them.
 
-        Where the cost has corners, sharper motions have evenly spaced knots.
+        Mechanical work needs no time: its motions last as long as they may, and pushes lie anywhere in between.
         """
-        problem = self.prepared.problem
-        return RAMPS.is_slow(self._ramp, duration) and not has_corners(problem.objective, problem.arm)
+        return self.prepared.problem.objective != "mechanical" and RAMPS.is_slow(self._ramp, duration)
 
     def _is_tight(self) -> bool:
         """Whether all durations are too near the shortest for the knots of a first solve."""
@@ -311,7 +311,7 @@ class FreeSpline(SqpMethod):
 
 
 def _is_at_ramps(spline: Spline) -> bool:
-    """Whether a motion has the knots of a slow motion's first solve: single ones, at uneven distances."""
-    breaks = spline.knots[bspline.DEGREE : -bspline.DEGREE]
-    spans = np.diff(breaks)
-    return bool(spans.min() > 0 and spans.max() > 1.001 * spans.min())
+    """Whether a motion has the knots of a slow motion's first solve: single ones, at uneven distances, some of them
+    farther apart than those of a refinement."""
+    spans = np.diff(spline.knots[bspline.DEGREE : -bspline.DEGREE]) / spline.duration
+    return bool(spans.max() > max(RAMPS.refined_widest, 1.001 * spans.min()) and spans.min() > 0)

@@ -121,7 +121,8 @@ class Method(ABC):
         return self.solve_from(*sampled(spline), fine)
 
     def solve_evenly(self, q: Array, t: Array, count: int, progress: float) -> SolveResult:
-        """Solve from samples q (k, nq) [rad] at times t (k,) [s] with `count` control points, evenly spaced in time.
+        """Solve from samples q (k, nq) [rad] at times t (k,) [s] with `count` control points, evenly spaced in time, and
+        more of them at the ramps of a slow motion.
 
         The solve ends when a step promises less than the relative decrease `progress`.
         """

@@ -15,6 +15,7 @@ from models.robot import Array
 from optimizer.energy import kernel
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.optimize import optimize
+from optimizer.problem.bus import Bus
 from optimizer.problem.cycle import Cycle
 from optimizer.problem.problem import Problem
 from optimizer.solution import Solution
@@ -110,6 +111,14 @@ def test_other_robots_ramp_as_fast_as_they_can(name: str) -> None:
 def test_a_payload_is_moved_slowly() -> None:
     found = optimize(problem(START, GOAL, payload=PAYLOAD, limits=limits(v_max=0.1)))
     assert energy(found) < 449.3 * (1 + MOST_EXCESS)
+
+
+@pytest.mark.parametrize("bus", [Bus("isolated"), Bus("storage", efficiency=0.9, capacity=50.0, power=500.0)])
+def test_other_buses_ramp_as_fast(bus: Bus) -> None:
+    """On an isolated bus power has a corner of its own for each joint, and finer motions are solved one by one."""
+    task = slow(0.1, bus=bus)
+    found = optimize(task)
+    assert found.duration < shortest(task) * (1 + RAMPS)
 
 
 def test_a_cycle_that_leaves_no_time_to_wait() -> None:

@@ -236,7 +236,7 @@ def test_a_slow_motion_has_its_first_knots_at_the_ramps_and_is_refined_from_itse
 
 @pytest.mark.parametrize("given", [{}, {"objective": "mechanical", "duration_max": 15.0}, {"limits": ROBOT.limits}])
 def test_other_first_knots_are_evenly_spaced(given: dict[str, object]) -> None:
-    """At the robot's own limits of speed; and where power has corners, which are followed on evenly spaced knots."""
+    """At the robot's own limits of speed; and of least work, for which no time is too long."""
     own = slowly(0.1, **given)
     even = bool(np.ptp(np.diff(np.unique(spline(own.solve()).knots))) < 1e-9)
     assert even is bool(given)
