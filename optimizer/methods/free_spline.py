@@ -1,7 +1,7 @@
 """`bspline`: one quintic B-spline per joint; control points and duration are optimised together.
 
 C. Hansen, J. Öltjen, D. Meike, T. Ortmaier, "Enhanced approach for energy-efficient trajectory generation of industrial
-robots", IEEE CASE 2012: B-splines optimised by an SQP. Knots repeated at the switches of jerk, knots at the ramps of slow
+robots", IEEE CASE 2012: B-splines optimised by an SQP. Knots repeated at the switches of jerk, those at the ramps of slow
 motions, and the initial guesses are this project's.
 """
 
@@ -219,8 +219,10 @@ class FreeSpline(SqpMethod):
         return self._refined(Guess(Basis.of(knots), points, duration, nearly_feasible=True), sampled(spline)[0])
 
     def solve_evenly(self, q: Array, t: Array, count: int, progress: float) -> SolveResult:
-        """From samples q (k, nq) at times t (k,), with `count` control points over evenly spaced knots, and more of both
-        at the ramps of a slow motion."""
+        """From samples q (k, nq) at times t (k,), with `count` control points over evenly spaced knots.
+
+        A slow motion has more of both at its ramps.
+        """
         return self._solve_in(self._space(count, float(t[-1])), q, t, progress)
 
     def solve_points(self, points: Array, duration: float, progress: float) -> SolveResult:
