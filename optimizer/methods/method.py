@@ -123,7 +123,8 @@ class Method(ABC):
     def solve_evenly(self, q: Array, t: Array, count: int, progress: float) -> SolveResult:
         """Solve from samples q (k, nq) [rad] at times t (k,) [s] with `count` control points, evenly spaced in time.
 
-        A slow motion has more of them at its ramps. The solve ends when a step promises less than the relative decrease `progress`.
+        A slow motion has more of them at its ramps. The solve ends when a step promises less than the relative decrease
+        `progress`.
         """
         return SolveResult(SolveStatus.FAILED, "the method has no evenly spaced control points")
 
