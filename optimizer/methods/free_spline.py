@@ -1,7 +1,7 @@
 """`bspline`: one quintic B-spline per joint; control points and duration are optimised together.
 
 C. Hansen, J. Öltjen, D. Meike, T. Ortmaier, "Enhanced approach for energy-efficient trajectory generation of industrial
-robots", IEEE CASE 2012: B-splines optimised by an SQP. Knots repeated at the switches of jerk, those at the ramps of slow
+robots", IEEE CASE 2012: B-splines optimised by an SQP. Knots repeated at the switches of jerk, knots at ramps of slow
 motions, and the initial guesses are this project's.
 """
 
