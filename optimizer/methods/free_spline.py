@@ -71,24 +71,33 @@ class FreeSpline(SqpMethod):
     def solve(self) -> SolveResult:
         """From the smoothed time-optimal motion, on evenly spaced knots or on those at the ramps of a slow motion.
 
-        If time is short, or this finds no motion, then from the time-optimal motion with knots at its switches of jerk.
+        If these find no motion, then on evenly spaced ones. If time is short, or this finds no motion either, then from
+        the time-optimal motion with knots at its switches of jerk.
         If the result collides, or gets out of obstacles at the cost of much energy, from planned collision-free paths.
         """
         tried: list[SolveResult] = []
         if not self.interval.minimum_time and not self._is_tight():
-            space = self._space(COARSE)
-            guess = Guess(space, self._smoothed(space), 0.0, rough=True, progress=self._progress)
-            if self._is_refined_at_once:
-                tried, guess = self._coarse_and_refined(guess, TIGHT * self._shortest)
-            if not tried or tried[-1].spline is None:
-                tried.append(self.improve(guess))
-        if not tried or (tried[-1].status is SolveStatus.FAILED and tried[-1].collision is None):
+            for space in dict.fromkeys([self._space(COARSE), bspline.uniform(COARSE)]):
+                tried += self._from_smoothed(space)
+                if not _is_lost(tried):
+                    break
+        if _is_lost(tried):
             tried.append(self.improve(self.time_optimal_guess()))
         if tried[-1].status is SolveStatus.FAILED and tried[-1].collision is not None:
             tried.append(self.from_planned_paths(tried[-1]))
         elif self._may_be_on_the_wrong_side(tried[-1]):
             return self._compared_with_planned_paths(with_effort(tried[-1], tried))
         return with_effort(tried[-1], tried)
+
+    def _from_smoothed(self, space: Basis) -> list[SolveResult]:
+        """The attempts from the smoothed time-optimal motion in a space; the last one counts."""
+        guess, tried = (
+            Guess(space, self._smoothed(space), 0.0, rough=True, progress=self._progress),
+            list[SolveResult](),
+        )
+        if self._is_refined_at_once:
+            tried, guess = self._coarse_and_refined(guess, TIGHT * self._shortest)
+        return tried if tried and tried[-1].spline is not None else [*tried, self.improve(guess)]
 
     @property
     def _is_refined_at_once(self) -> bool:
@@ -287,7 +296,19 @@ class FreeSpline(SqpMethod):
 
         Mechanical work needs no time: its motions last as long as they may, and pushes lie anywhere in between.
         """
+        if self._is_held_back:
+            return False
         return self.prepared.problem.objective != "mechanical" and RAMPS.is_slow(self._ramp, duration)
+
+    @cached_property
+    def _is_held_back(self) -> bool:
+        """Whether path constraints hold back the time-optimal motion: the SQP hardly finds motions of short spans then."""
+        path, line = self.prepared.path, self.coordinates
+        if path is None:
+            return False
+        fastest = time_optimal(line.limits, line.start, line.goal)
+        ratios = path.ratios(line.to_joints(fastest.q), fastest.v @ line.directions.T)
+        return bool(ratios.max() > RAMPS.most_held_back)
 
     def _is_tight(self) -> bool:
         """Whether all durations are too near the shortest for the knots of a first solve."""
@@ -310,6 +331,11 @@ class FreeSpline(SqpMethod):
         points = time_optimal_positions(line.limits, line.start, line.goal, bspline.greville(space.knots))
         points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = line.start, line.goal
         return points
+
+
+def _is_lost(tried: list[SolveResult]) -> bool:
+    """Whether no motion was found, and not because of a collision."""
+    return not tried or (tried[-1].status is SolveStatus.FAILED and tried[-1].collision is None)
 
 
 def _is_at_ramps(spline: Spline) -> bool:

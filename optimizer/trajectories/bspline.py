@@ -27,6 +27,8 @@ LEAST_PER_SPAN = 4
 GRID_POINTS = 512
 # points at which path constraints are bounded; an excess between them is found afterwards and repaired
 PATH_POINTS = 96
+# points of a short span, its ends included, among evenly spaced ones that may miss it
+SPAN_POINTS = 6
 # weight of the third derivative by τ beside the positions in a smooth fit
 THIRD = 3e-3
 # a switch nearer to an end of [0, 1] is none
@@ -45,6 +47,16 @@ def basis_matrix(knots: Array, points: Array, derivative: int = 0) -> Array:
     n = len(knots) - DEGREE - 1
     # its checks take longer than the values
     return np.ascontiguousarray(BSpline.construct_fast(knots, np.eye(n), DEGREE)(points, derivative))
+
+
+def in_all_spans(knots: Array, count: int) -> Array:
+    """Points from 0 to the last knot, ascending: `count` evenly spaced ones, and SPAN_POINTS in every span that is
+    shorter than the distance between these."""
+    points, breaks = np.linspace(0.0, knots[-1], count), np.unique(knots)
+    short = np.flatnonzero(np.diff(breaks) < points[1])
+    if not len(short):
+        return points
+    return np.unique(np.append(points, np.linspace(breaks[short], breaks[short + 1], SPAN_POINTS)))
 
 
 def greville(knots: Array) -> Array:
@@ -147,8 +159,8 @@ class Basis:
 
     @cached_property
     def at_path(self) -> Array:
-        """Basis functions and their first derivative (2, PATH_POINTS, n) at the path points inside (0, 1)."""
-        points = np.linspace(0.0, 1.0, PATH_POINTS + 2)[1:-1]
+        """Basis functions and their first derivative (2, M, n) at M ≥ PATH_POINTS path points inside (0, 1)."""
+        points = in_all_spans(self.knots, PATH_POINTS + 2)[1:-1]
         return np.stack([self.matrix(points, d) for d in range(2)])
 
     def matrix(self, points: Array, derivative: int = 0) -> Array:

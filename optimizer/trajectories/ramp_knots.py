@@ -38,6 +38,9 @@ class RampKnots:
 
     `least_way` [rad]: the displacement whose ramps count where start and goal are the same. In a long duration such a
     motion goes to where holding costs less, and back: that needs some tenths of a second.
+
+    `most_held_back` [1]: the greatest ratio of a path constraint, in the time-optimal motion, of which a motion is slow.
+    Above it, the constraint will be active, as it is with a TCP that is slower than the joints.
     """
 
     slow_below: float = 0.05
@@ -46,6 +49,7 @@ class RampKnots:
     finest: float = 1e-4
     closest: float = 2e-5
     least_way: float = 0.02
+    most_held_back: float = 0.9
 
     def is_slow(self, ramp: float, duration: float) -> bool:
         """Whether a motion of `duration` [s] is slow, whose ramps last `ramp` [s] at the limits."""

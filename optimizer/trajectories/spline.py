@@ -18,7 +18,7 @@ LONGEST_PANEL, LEAST_PANELS, MOST_PANELS = 0.2, 64, 2000
 # samples per knot span at which the peaks of speed, acceleration and jerk are searched
 RATE_POINTS = 33
 # samples of a motion that another is fitted to
-FIT_SAMPLES, SPAN_SAMPLES = 201, 6
+FIT_SAMPLES = 201
 
 
 @dataclass(frozen=True)
@@ -53,14 +53,8 @@ def sample(spline: Spline, t: Array) -> tuple[Array, Array, Array]:
 
 
 def sampled(spline: Spline) -> tuple[Array, Array]:
-    """Samples q (k, nq) [rad] at times t (k,) [s], to fit another spline to: FIT_SAMPLES equally spaced ones, and
-    SPAN_SAMPLES in every knot span that is shorter than the distance between these."""
-    t = np.linspace(0.0, spline.duration, FIT_SAMPLES)
-    breaks = np.unique(spline.knots)
-    short = np.flatnonzero(np.diff(breaks) < t[1])
-    if len(short):
-        within = np.linspace(breaks[short], breaks[short + 1], SPAN_SAMPLES)
-        t = np.unique(np.append(t, within))
+    """At least FIT_SAMPLES samples q (k, nq) [rad] at times t (k,) [s] in all knot spans, to fit another spline to."""
+    t = bspline.in_all_spans(spline.knots, FIT_SAMPLES)
     return np.asarray(spline.curve(t)), t
 
 
