@@ -302,7 +302,7 @@ class FreeSpline(SqpMethod):
 
     @cached_property
     def _is_held_back(self) -> bool:
-        """Whether path constraints hold back the time-optimal motion: the SQP hardly finds motions of short spans then."""
+        """Whether path constraints hold back the time-optimal motion: then the SQP hardly finds any of short spans."""
         path, line = self.prepared.path, self.coordinates
         if path is None:
             return False
