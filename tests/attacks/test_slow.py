@@ -133,3 +133,15 @@ def test_a_longest_duration_beyond_the_answers_changes_little(index: int) -> Non
     found = optimize(task)
     again = optimize(replace(task, duration_max=1.02 * found.duration))
     assert energy(again) == pytest.approx(energy(found), rel=MOST_EXCESS)
+
+
+@pytest.mark.parametrize(("index", "speed"), [(2, 0.25), (4, 0.08), (5, 0.25)])
+def test_a_slow_tcp_is_within_its_limit_in_short_spans(index: int, speed: float) -> None:
+    """Evenly spaced path points missed short knot spans: no motion was confirmed, or one of half again the energy."""
+    _, task = slow_problem(0, index)
+    task = replace(task, arm=replace(task.arm, tcp_speed=speed))
+    found = optimize(task)
+    assert found.certificate.worst_ratio["tcp_speed"] <= 1 + 1e-6
+    # at a lower limit of speed there are no faster motions, so none that needs less time and less energy was missed
+    lower = optimize(replace(task, arm=replace(task.arm, tcp_speed=0.9 * speed)))
+    assert energy(found) < energy(lower) * (1 + MOST_EXCESS)
