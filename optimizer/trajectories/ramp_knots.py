@@ -39,8 +39,8 @@ class RampKnots:
     `least_way` [rad]: the displacement whose ramps count where start and goal are the same. In a long duration such a
     motion goes to where holding costs less, and back: that needs some tenths of a second.
 
-    `most_held_back` [1]: the greatest ratio of a path constraint in the time-optimal motion of a slow one. Above it, that
-    will be active, as it is with a TCP that is slower than the joints.
+    `most_held_back` [1]: the greatest ratio of a path constraint in the time-optimal motion of a slow one. Above it, such
+    a constraint will be active, as that of a TCP that is slower than the joints.
     """
 
     slow_below: float = 0.05
