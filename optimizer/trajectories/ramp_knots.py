@@ -25,8 +25,8 @@ class RampKnots:
     evenly spaced knots cost 0.3 % of the energy of a UR5e, at 0.02 1 %; at the limits of speed of most arms it is
     above 0.1, where they cost next to nothing.
 
-    `growth` [1]: the greatest ratio of neighbouring spans. With 3, a refinement gains some 0.3 %; with 2, it gains as
-    much, and the first solve takes longer.
+    `growth` [1]: the greatest ratio of neighbouring spans. With 3, a first solve is 0.3 % above its refinement; with 2, it
+    takes longer, and its refinement is no better.
 
     `refined_widest` [1]: the width of the widest span of a refinement. In motions of a minute, twice the width costs up
     to 0.8 % of the energy, in which other joints start and stop far from the ends; half of it gains 0.1 % at most.
@@ -39,8 +39,8 @@ class RampKnots:
     `least_way` [rad]: the displacement whose ramps count where start and goal are the same. In a long duration such a
     motion goes to where holding costs less, and back: that needs some tenths of a second.
 
-    `most_held_back` [1]: the greatest ratio of a path constraint in the time-optimal motion of a slow one. Above it, such
-    a constraint will be active, as that of a TCP that is slower than the joints.
+    `most_held_back` [1]: the greatest ratio of a path constraint in the time-optimal motion of a slow one. Above it,
+    such a constraint will be active, as that of a TCP that is slower than the joints.
     """
 
     slow_below: float = 0.05
