@@ -2,10 +2,12 @@
 
     python -m benchmarks.energies --count 200 --json build/energies.json
     python -m benchmarks.energies --count 200 --compare build/energies.json
+    python -m benchmarks.energies --kind slow --count 200
 
 Five kinds of tasks take turns: joint to joint, joint to pose, the mechanical objective, a payload, and the cells of
 `benchmarks.cells`. The library solves each of them. `--compare` exits with 1 if the task, the outcome or the energy of
-an index differs from the stored run. Energies may differ by RELATIVE.
+an index differs from the stored run. Energies may differ by RELATIVE. `--kind slow` solves slow moves instead, and
+compares them with variants of themselves: see `benchmarks.slow_moves`.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ import orjson
 
 from benchmarks.cells import cell_task
 from benchmarks.command import on_one_core, parser, write_json
+from benchmarks.slow_moves import compare
 from benchmarks.tasks import collision_free, flange
 from models.registry import load_robot
 from models.robot import Array
@@ -137,10 +140,13 @@ def main() -> int:
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, default=200, help="tasks (%(default)s)")
     arguments.add_argument("--compare", type=Path, help="a stored run to compare with")
+    arguments.add_argument("--kind", choices=("ordinary", "slow"), default="ordinary", help="moves (%(default)s)")
     given = arguments.parse_args()
     on_one_core()
     compile_kernel(load_robot("ur5e"))
     warm_up("ur5e")
+    if given.kind == "slow":
+        return compare(given.seed, given.count, given.json)
     rows = []
     for index in range(given.count):
         rows.append(row := solve(given.seed, index))

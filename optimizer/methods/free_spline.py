@@ -1,19 +1,19 @@
 """`bspline`: one quintic B-spline per joint; control points and duration are optimised together.
 
 C. Hansen, J. Öltjen, D. Meike, T. Ortmaier, "Enhanced approach for energy-efficient trajectory generation of industrial
-robots", IEEE CASE 2012: B-splines optimised by an SQP. Knots repeated at the switches of jerk, and the initial guesses,
-are this project's.
+robots", IEEE CASE 2012: B-splines optimised by an SQP. Knots repeated at the switches of jerk, knots at ramps of slow
+motions, and the initial guesses are this project's.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
 from models.robot import Array
-from optimizer.collision.path_planner import SAMPLES
 from optimizer.energy.plant import has_corners
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.methods.planned_paths import FROM_PLANNED_PATH
@@ -23,6 +23,7 @@ from optimizer.problem.problem import LEAST_DURATION
 from optimizer.solution import BaselineName
 from optimizer.trajectories import bspline, seven_segment
 from optimizer.trajectories.bspline import Basis
+from optimizer.trajectories.ramp_knots import RampKnots
 from optimizer.trajectories.ruckig_motion import time_optimal, time_optimal_positions
 from optimizer.trajectories.spline import Spline, sampled, spline_of
 
@@ -51,6 +52,8 @@ CORNERED_PROGRESS = 5e-2
 # energy, 0.01 % where clearances hold the motion
 FINE_PROGRESS = 2e-4
 
+RAMPS = RampKnots()
+
 
 class FreeSpline(SqpMethod):
     """Solves a candidate by splines with knots at the switches of jerk."""
@@ -66,27 +69,35 @@ class FreeSpline(SqpMethod):
     evenly_spaced: ClassVar[bool] = True
 
     def solve(self) -> SolveResult:
-        """From the smoothed time-optimal motion on evenly spaced knots.
+        """From the smoothed time-optimal motion, on evenly spaced knots or on those at the ramps of a slow motion.
 
-        If time is short, or this finds no motion, then from the time-optimal motion with knots at its switches of jerk.
+        If these find no motion, then on evenly spaced ones. If time is short, or this finds no motion either, then from
+        the time-optimal motion with knots at its switches of jerk.
         If the result collides, or gets out of obstacles at the cost of much energy, from planned collision-free paths.
         """
-        shortest = float(seven_segment.shortest_duration(self.q_goal - self.q_start, self.coordinates.limits))
         tried: list[SolveResult] = []
-        if not self.interval.minimum_time and self.t_max >= TIGHT * shortest:
-            space = bspline.uniform(COARSE)
-            guess = Guess(space, self._smoothed(space), 0.0, rough=True, progress=self._progress)
-            if self._is_refined_at_once:
-                tried, guess = self._coarse_and_refined(guess, TIGHT * shortest)
-            if not tried or tried[-1].spline is None:
-                tried.append(self.improve(guess))
-        if not tried or (tried[-1].status is SolveStatus.FAILED and tried[-1].collision is None):
+        if not self.interval.minimum_time and not self._is_tight():
+            for space in dict.fromkeys([self._space(COARSE), bspline.uniform(COARSE)]):
+                tried += self._from_smoothed(space)
+                if not _is_lost(tried):
+                    break
+        if _is_lost(tried):
             tried.append(self.improve(self.time_optimal_guess()))
         if tried[-1].status is SolveStatus.FAILED and tried[-1].collision is not None:
             tried.append(self.from_planned_paths(tried[-1]))
         elif self._may_be_on_the_wrong_side(tried[-1]):
             return self._compared_with_planned_paths(with_effort(tried[-1], tried))
         return with_effort(tried[-1], tried)
+
+    def _from_smoothed(self, space: Basis) -> list[SolveResult]:
+        """The attempts from the smoothed time-optimal motion in a space; the last one counts."""
+        guess, tried = (
+            Guess(space, self._smoothed(space), 0.0, rough=True, progress=self._progress),
+            list[SolveResult](),
+        )
+        if self._is_refined_at_once:
+            tried, guess = self._coarse_and_refined(guess, TIGHT * self._shortest)
+        return tried if tried and tried[-1].spline is not None else [*tried, self.improve(guess)]
 
     @property
     def _is_refined_at_once(self) -> bool:
@@ -112,7 +123,7 @@ class FreeSpline(SqpMethod):
         late = self.deadline.left < MULTIPLE * (left - self.deadline.left)
         if late or self.prepared.surroundings.worst_violation(coarse.spline) is not None:
             return [replace(coarse, spline=None)], found
-        return [coarse, self.solve_from(*sampled(coarse.spline), fine=duration < tight)], found
+        return [coarse, self.refined(coarse.spline, fine=duration < tight)], found
 
     def _may_be_on_the_wrong_side(self, found: SolveResult) -> bool:
         """Whether a motion may have left obstacles on the wrong side."""
@@ -151,8 +162,7 @@ class FreeSpline(SqpMethod):
 
     def _polished(self, spline: Spline) -> SolveResult:
         """The end of a rough solve of more control points than `may_refine` takes."""
-        space, t = bspline.uniform(len(spline.control_points)), np.linspace(0.0, 1.0, SAMPLES)
-        points = space.fit(self.coordinates.from_joints(spline.curve(t * spline.duration)), t)
+        space, points = Basis.of(spline.knots / spline.duration), self.coordinates.from_joints(spline.control_points)
         return self.improve(Guess(space, points, spline.duration, collision_free=True, progress=self._progress))
 
     def along_path(self, q: Array, t: Array) -> SolveResult:
@@ -163,7 +173,7 @@ class FreeSpline(SqpMethod):
         """
         tried: list[SolveResult] = []
         for count in ALONG_PATH:
-            space = bspline.uniform(count)
+            space = self._space(count)
             points = space.fit(self.coordinates.from_joints(q), t)
             fitted = spline_of(space, self.coordinates.to_joints(points), 1.0).curve(t)
             if count < ALONG_PATH[-1] and self.prepared.surroundings.model.least_distance(fitted, 0.0) < -ALLOWED_CUT:
@@ -176,8 +186,21 @@ class FreeSpline(SqpMethod):
 
     @staticmethod
     def may_refine(found: Spline) -> bool:
-        """Whether the knots are evenly spaced: `solve_from` places more of them, at the switches of jerk."""
-        return len(found.control_points) == COARSE
+        """Whether the knots are those of a first solve: `refined` places more of them, at the switches of jerk."""
+        return len(found.control_points) == COARSE or _is_at_ramps(found)
+
+    def refined(self, spline: Spline, fine: bool) -> SolveResult:
+        """From a motion of a first solve, with knots REFINED at the switches of jerk, or EXACT if `fine`.
+
+        Where these are at the ramps already, the space contains the motion itself.
+        """
+        if not _is_at_ramps(spline):
+            return super().refined(spline, fine)
+        duration = spline.duration
+        knots = spline.knots / duration
+        space = RAMPS.refined(knots, self._switches(duration), EXACT if fine else REFINED)
+        points = bspline.refit(self.coordinates.from_joints(spline.control_points), knots, space.knots)
+        return self._refined(Guess(space, points, duration, nearly_feasible=True), sampled(spline)[0])
 
     def solve_from(self, q: Array, t: Array, fine: bool) -> SolveResult:
         """From samples q (k, nq) at times t (k,), with knots REFINED, or EXACT if `fine`."""
@@ -201,8 +224,11 @@ class FreeSpline(SqpMethod):
         return self._refined(Guess(Basis.of(knots), points, duration, nearly_feasible=True), sampled(spline)[0])
 
     def solve_evenly(self, q: Array, t: Array, count: int, progress: float) -> SolveResult:
-        """From samples q (k, nq) at times t (k,), with `count` control points over evenly spaced knots."""
-        return self._solve_in(bspline.uniform(count), q, t, progress)
+        """From samples q (k, nq) at times t (k,), with `count` control points over evenly spaced knots.
+
+        A slow motion has more of both at its ramps.
+        """
+        return self._solve_in(self._space(count, float(t[-1])), q, t, progress)
 
     def solve_points(self, points: Array, duration: float, progress: float) -> SolveResult:
         """From control points (n, nq) [rad] over evenly spaced knots of a motion of `duration` [s]."""
@@ -212,7 +238,8 @@ class FreeSpline(SqpMethod):
     def _solve_in(self, space: Basis, q: Array, t: Array, progress: float = PROGRESS) -> SolveResult:
         """From samples q (k, nq) at times t (k,), in a spline space."""
         duration = float(t[-1])
-        points = bspline.smooth_fit(self.coordinates.from_joints(q), t / duration, space.knots)
+        fit = bspline.smoothed if self._is_slow(duration) else bspline.smooth_fit
+        points = fit(self.coordinates.from_joints(q), t / duration, space.knots)
         return self._refined(Guess(space, points, duration, progress=progress), q)
 
     def _refined(self, guess: Guess, q: Array) -> SolveResult:
@@ -234,11 +261,61 @@ class FreeSpline(SqpMethod):
 
     def graded(self, duration: float, repeat: int) -> Basis:
         """A space with knots at the switches of the leading coordinate's jerk in a motion of `duration` [s]."""
-        return bspline.graded(self._switches(duration), repeat)
+        switches = self._switches(duration)
+        return RAMPS.space(switches, repeat, COARSE) if self._is_slow(duration) else bspline.graded(switches, repeat)
+
+    def _space(self, count: int, duration: float | None = None) -> Basis:
+        """The space of a first solve: `count` control points over evenly spaced knots, and more of both at the ramps of
+        a slow motion of `duration` [s]; None: the least that is allowed."""
+        duration = max(self._shortest, self.t_min) if duration is None else duration
+        return RAMPS.space(self._switches(duration), 1, count) if self._is_slow(duration) else bspline.uniform(count)
+
+    @cached_property
+    def _shortest(self) -> float:
+        """Least duration [s] that the limits on rates allow."""
+        line = self.coordinates
+        return float(seven_segment.shortest_duration(line.goal - line.start, line.limits))
+
+    @cached_property
+    def _ramp(self) -> float:
+        """Time [s] in which the leading coordinate gets to its greatest speed in the fastest motion."""
+        return seven_segment.ramp(self._way, self.coordinates.limits)
+
+    @property
+    def _way(self) -> Array:
+        """The displacement (r,) by which ramps are measured: where there is none, the motion may go away and back."""
+        way = self.coordinates.goal - self.coordinates.start
+        return way if way.any() else np.full_like(way, RAMPS.least_way)
+
+    def _is_slow(self, duration: float) -> bool:
+        """Whether the ramps are so short, beside a `duration` [s], that the knots have to follow them.
+
+        Mechanical work needs no time: its motions last as long as they may, and pushes lie anywhere in between.
+        """
+        if self._is_held_back:
+            return False
+        return self.prepared.problem.objective != "mechanical" and RAMPS.is_slow(self._ramp, duration)
+
+    @cached_property
+    def _is_held_back(self) -> bool:
+        """Whether path constraints hold back the time-optimal motion: then the SQP hardly finds any of short spans."""
+        path, line = self.prepared.path, self.coordinates
+        if path is None:
+            return False
+        fastest = time_optimal(line.limits, line.start, line.goal)
+        ratios = path.ratios(line.to_joints(fastest.q), fastest.v @ line.directions.T)
+        return bool(ratios.max() > RAMPS.most_held_back)
+
+    def _is_tight(self) -> bool:
+        """Whether all durations are too near the shortest for the knots of a first solve."""
+        slow = self._is_slow(self._shortest)
+        return self.t_max < (self._shortest + self._ramp if slow else TIGHT * self._shortest)
 
     def _switches(self, duration: float) -> Array:
         """The switches of the leading coordinate's jerk in a motion of `duration` [s], as fractions of it."""
         line = self.coordinates
+        if self._is_slow(duration):
+            return seven_segment.switches(self._way, duration, line.limits, RAMPS.closest)
         return seven_segment.switches(line.goal - line.start, duration, line.limits)
 
     def _smoothed(self, space: Basis) -> Array:
@@ -250,3 +327,15 @@ class FreeSpline(SqpMethod):
         points = time_optimal_positions(line.limits, line.start, line.goal, bspline.greville(space.knots))
         points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = line.start, line.goal
         return points
+
+
+def _is_lost(tried: list[SolveResult]) -> bool:
+    """Whether no motion was found, and not because of a collision."""
+    return not tried or (tried[-1].status is SolveStatus.FAILED and tried[-1].collision is None)
+
+
+def _is_at_ramps(spline: Spline) -> bool:
+    """Whether a motion has the knots of a slow motion's first solve: single ones, at uneven distances, some of them
+    farther apart than those of a refinement."""
+    spans = np.diff(spline.knots[bspline.DEGREE : -bspline.DEGREE]) / spline.duration
+    return bool(spans.max() > max(RAMPS.refined_widest, 1.001 * spans.min()) and spans.min() > 0)

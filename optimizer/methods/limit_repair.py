@@ -19,6 +19,7 @@ from optimizer.nlp.clearance_constraint import CLEARANCE, RESERVE, SCALE
 from optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.solution import Clearance
+from optimizer.trajectories.bspline import in_all_spans
 from optimizer.trajectories.quadrature import grid
 from optimizer.trajectories.spline import Spline, peak_rates, retimed, sample, time_scale
 
@@ -137,7 +138,7 @@ def path_excess(
     checked = path if collision is not None else prepared.path
     ratio = np.zeros(len(path.names))
     if checked is not None:
-        q, v, _ = sample(spline, np.linspace(0.0, spline.duration, PATH_SAMPLES))
+        q, v, _ = sample(spline, in_all_spans(spline.knots, PATH_SAMPLES))
         ratio[: len(checked.names)] = checked.ratios(q, v).max(axis=0)
     excess = ratio - 1
     return np.where(excess > -REPAIR_MARGIN / 4, PATH_REPAIR * np.maximum(excess, 0.0) + REPAIR_MARGIN, 0.0)

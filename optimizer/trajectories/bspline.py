@@ -27,6 +27,8 @@ LEAST_PER_SPAN = 4
 GRID_POINTS = 512
 # points at which path constraints are bounded; an excess between them is found afterwards and repaired
 PATH_POINTS = 96
+# points of a short span, its ends included, among evenly spaced ones that may miss it
+SPAN_POINTS = 6
 # weight of the third derivative by τ beside the positions in a smooth fit
 THIRD = 3e-3
 # a switch nearer to an end of [0, 1] is none
@@ -45,6 +47,16 @@ def basis_matrix(knots: Array, points: Array, derivative: int = 0) -> Array:
     n = len(knots) - DEGREE - 1
     # its checks take longer than the values
     return np.ascontiguousarray(BSpline.construct_fast(knots, np.eye(n), DEGREE)(points, derivative))
+
+
+def in_all_spans(knots: Array, count: int) -> Array:
+    """Points from 0 to the last knot, ascending: `count` evenly spaced ones, and SPAN_POINTS in every span that is
+    shorter than the distance between these."""
+    points, breaks = np.linspace(0.0, knots[-1], count), np.unique(knots)
+    short = np.flatnonzero(np.diff(breaks) < points[1])
+    if not len(short):
+        return points
+    return np.unique(np.append(points, np.linspace(breaks[short], breaks[short + 1], SPAN_POINTS)))
 
 
 def greville(knots: Array) -> Array:
@@ -82,6 +94,18 @@ def smooth_fit(samples: Array, at: Array, knots: Array) -> Array:
     wanted = np.concatenate([samples, THIRD * motion(nodes, 3)]) - matrix @ points
     inner = slice(REST_POINTS, len(points) - REST_POINTS)
     points[inner] = np.linalg.lstsq(matrix[:, inner], wanted, rcond=None)[0]
+    return points
+
+
+def smoothed(samples: Array, at: Array, knots: Array) -> Array:
+    """Control points (n, r) that are the values, at the Greville points, of the cubic spline through samples (k, r) of
+    a motion at (k,) in [0, 1]; at rest at both ends.
+
+    Such a curve varies less than the motion (Schoenberg), whatever the knots: it hardly exceeds the motion's rates.
+    """
+    _, apart = np.unique(at, return_index=True)
+    points = np.asarray(make_interp_spline(at[apart], samples[apart], k=3)(greville(knots)))
+    points[:REST_POINTS], points[-REST_POINTS:] = samples[0], samples[-1]
     return points
 
 
@@ -135,8 +159,8 @@ class Basis:
 
     @cached_property
     def at_path(self) -> Array:
-        """Basis functions and their first derivative (2, PATH_POINTS, n) at the path points inside (0, 1)."""
-        points = np.linspace(0.0, 1.0, PATH_POINTS + 2)[1:-1]
+        """Basis functions and their first derivative (2, M, n) at M ≥ PATH_POINTS path points inside (0, 1)."""
+        points = in_all_spans(self.knots, PATH_POINTS + 2)[1:-1]
         return np.stack([self.matrix(points, d) for d in range(2)])
 
     def matrix(self, points: Array, derivative: int = 0) -> Array:
@@ -178,18 +202,39 @@ def uniform(n: int) -> Basis:
     return Basis.of(clamped(np.linspace(0.0, 1.0, n - DEGREE + 1)))
 
 
-def graded(switches: Array, repeat: int, widest: float = 0.13) -> Basis:
+def graded(
+    switches: Array, repeat: int, widest: float = 0.13, growth: float = np.inf, next_to_end: float = NEXT_TO_END
+) -> Basis:
     """A space with knots of multiplicity `repeat` at the switches (k,), and further knots at most `widest` apart.
 
     At a knot of multiplicity two the slope of the third derivative may jump, at multiplicity three the third derivative
-    itself, as jerk does between its limits.
+    itself, as jerk does between its limits. No span between two switches is wider than `growth` times the one before or
+    after it. A switch is left out if it is no farther than `next_to_end` from an end of [0, 1].
     """
-    edges = np.concatenate([[0.0], _inner(switches), [1.0]])
+    edges = np.concatenate([[0.0], _inner(switches, next_to_end), [1.0]])
+    spans = np.concatenate([[np.inf], np.diff(edges), [np.inf]])
     breaks = [0.0]
-    for a, b in pairwise(edges):
-        breaks += np.linspace(a, b, math.ceil((b - a) / widest) + 1)[1:-1].tolist()
+    for k, (a, b) in enumerate(pairwise(edges)):
+        breaks += _between(a, b, spans[k], spans[k + 2], widest, growth)
         breaks += [b] * (repeat if b < 1.0 else 1)
     return Basis.of(clamped(np.array(breaks)))
+
+
+def _between(a: float, b: float, before: float, after: float, widest: float, growth: float) -> list[float]:
+    """Breakpoints between a and b, whose spans grow from those `before` and `after` them to `widest`."""
+    lower, upper = [a], [b]
+    while True:
+        up, down = min(growth * before, widest), min(growth * after, widest)
+        step, left = min(up, down), upper[-1] - lower[-1]
+        if step == widest or left <= 2 * step:
+            middle = np.linspace(lower[-1], upper[-1], math.ceil(left / step) + 1)[1:-1].tolist()
+            return [*lower[1:], *middle, *upper[:0:-1]]
+        if up <= down:
+            lower.append(lower[-1] + up)
+            before = up
+        else:
+            upper.append(upper[-1] - down)
+            after = down
 
 
 def moved(knots: Array, switches: Array, repeat: int) -> Array | None:
@@ -205,6 +250,6 @@ def moved(knots: Array, switches: Array, repeat: int) -> Array | None:
     return np.repeat(np.interp(breaks, old, new), counts)
 
 
-def _inner(switches: Array) -> Array:
+def _inner(switches: Array, next_to_end: float = NEXT_TO_END) -> Array:
     """The switches that are not at either end."""
-    return switches[(switches > NEXT_TO_END) & (switches < 1 - NEXT_TO_END)]
+    return switches[(switches > next_to_end) & (switches < 1 - next_to_end)]

@@ -41,11 +41,18 @@ def _jerk_limited(speed: float, distance: float, jerk: float) -> float:
     return float(distance / speed + 2 * np.sqrt(speed / jerk))
 
 
-def switches(displacement: Array, duration: float, limits: Limits) -> Array:
+def ramp(displacement: Array, limits: Limits) -> float:
+    """Time [s] in which the leading joint gets to its greatest speed in the fastest motion over a displacement."""
+    shortest = float(shortest_duration(displacement, limits))
+    early = switches(displacement, shortest, limits, closest=0.0)
+    return shortest * float(early[early <= 0.5].max(initial=0.0))
+
+
+def switches(displacement: Array, duration: float, limits: Limits, closest: float = CLOSEST) -> Array:
     """Switches of the leading joint's jerk as fractions of `duration` [s], ascending, for a displacement (nq,) [rad].
 
     The leading joint has the longest profile. In a longer duration it cruises at a lower speed; a shorter duration
-    counts as its own.
+    counts as its own. Switches closer than the fraction `closest` of the duration count as one.
     """
     distance = np.abs(displacement)
     own = _durations(distance, limits)
@@ -67,4 +74,4 @@ def switches(displacement: Array, duration: float, limits: Limits) -> Array:
     else:
         early = np.array([a / j, speed / a, speed / a + a / j]) / duration
     both = np.unique(np.concatenate([early, 1 - early]))
-    return np.asarray(both[np.append(True, np.diff(both) > CLOSEST)])
+    return np.asarray(both[np.append(True, np.diff(both) > closest)])

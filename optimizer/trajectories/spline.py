@@ -53,8 +53,8 @@ def sample(spline: Spline, t: Array) -> tuple[Array, Array, Array]:
 
 
 def sampled(spline: Spline) -> tuple[Array, Array]:
-    """FIT_SAMPLES samples q (k, nq) [rad] at equally spaced times t (k,) [s], to fit another spline to."""
-    t = np.linspace(0.0, spline.duration, FIT_SAMPLES)
+    """At least FIT_SAMPLES samples q (k, nq) [rad] at times t (k,) [s] in all knot spans, to fit another spline to."""
+    t = bspline.in_all_spans(spline.knots, FIT_SAMPLES)
     return np.asarray(spline.curve(t)), t
 
 

@@ -18,7 +18,7 @@ from optimizer.methods.free_spline import TIGHT, FreeSpline
 from optimizer.methods.method import Method, SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import Problem
-from optimizer.trajectories.seven_segment import shortest_duration
+from optimizer.trajectories.seven_segment import ramp, shortest_duration
 from optimizer.trajectories.spline import Spline, sampled
 from tests.optimizer.moves import (
     GOAL,
@@ -212,3 +212,31 @@ def test_a_coarse_motion_that_collides_is_no_guess() -> None:
     assert expected.unhindered is not None
     assert found.unhindered == pytest.approx(expected.unhindered)
     assert FreeSpline.may_refine(spline(found))
+
+
+def slowly(speed: float, **given: object) -> FreeSpline:
+    """The solver of a move whose joints are limited to a speed [rad/s]."""
+    own = solver(START, GOAL, **{"limits": limits(v_max=speed)} | given)
+    assert isinstance(own, FreeSpline)
+    return own
+
+
+def test_a_slow_motion_has_its_first_knots_at_the_ramps_and_is_refined_from_itself() -> None:
+    own = slowly(0.1)
+    coarse = own.solve()
+    motion, cost = spline(coarse), own.prepared.cost_of
+    breaks = np.unique(motion.knots) / motion.duration
+    shortest_span = breaks[1] * motion.duration
+    assert shortest_span < ramp(GOAL - START, own.coordinates.limits) and own.may_refine(motion)
+    finer = own.refined(motion, fine=True)
+    assert not own.may_refine(spline(finer))
+    assert cost(spline(finer)) < cost(motion)
+    assert_held(own.prepared.problem, spline(finer))
+
+
+@pytest.mark.parametrize("given", [{}, {"objective": "mechanical", "duration_max": 15.0}, {"limits": ROBOT.limits}])
+def test_other_first_knots_are_evenly_spaced(given: dict[str, object]) -> None:
+    """At the robot's own limits of speed; and of least work, for which no time is too long."""
+    own = slowly(0.1, **given)
+    even = bool(np.ptp(np.diff(np.unique(spline(own.solve()).knots))) < 1e-9)
+    assert even is bool(given)

@@ -1,0 +1,147 @@
+"""Slow moves need no more than other durations, other methods and more control points find."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks.slow_moves import MOST_EXCESS, NEAR, compare, other_searches, slow_problem
+from models.registry import load_robot
+from models.robot import Array
+from optimizer.energy import kernel
+from optimizer.energy.kernel_cache import compile_kernel
+from optimizer.optimize import optimize
+from optimizer.problem.bus import Bus
+from optimizer.problem.cycle import Cycle
+from optimizer.problem.problem import Problem
+from optimizer.solution import Solution
+from optimizer.trajectories.seven_segment import shortest_duration
+from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, fixed, limits, problem
+
+# a move of which joint 6 is limited to so many rad/s, and the least energies [J] that are known of it. These and those
+# below are from spaces of four times the answer's control points (`benchmarks.slow_moves.more_points`)
+SLOW_START = np.array([0.5, -0.3, 0.4, -1.2, -1.1, 0.0])
+SLOW_GOAL = np.array([-0.5, -0.3, -0.4, -1.2, -1.1, 2.0])
+LEAST_KNOWN = {0.3: 331.8, 0.1: 823.9, 0.05: 1562.8, 0.02: 3783.0}
+# share of the shortest duration that is left for ramps slower than the limits of jerk allow
+RAMPS = 5e-3
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _compiled() -> Iterator[None]:
+    """Many motions of the default robot take a while without it. The few of another one take less than its compiler."""
+    compile_kernel(load_robot("ur5e"))
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(kernel, "compiler", lambda: None)
+        yield
+
+
+def slow(speed: float, **given: Any) -> Problem:
+    """The move with joint 6 limited to a speed [rad/s]."""
+    v_max = ROBOT.limits.v_max.copy()
+    v_max[5] = speed
+    return problem(SLOW_START, SLOW_GOAL, limits=limits(v_max=v_max), **given)
+
+
+def energy(solution: Solution) -> float:
+    return solution.energy.electrical.total
+
+
+def shortest(task: Problem) -> float:
+    assert isinstance(task.start, np.ndarray) and isinstance(task.goal, np.ndarray)
+    return float(shortest_duration(task.goal - task.start, task.arm.active_limits))
+
+
+@pytest.mark.parametrize("speed", LEAST_KNOWN)
+def test_a_slow_joint_ramps_as_fast_as_it_can(speed: float) -> None:
+    """Evenly spaced knots need 2 to 21 % more: their ramps take seconds."""
+    found = optimize(slow(speed))
+    assert energy(found) < LEAST_KNOWN[speed] * (1 + MOST_EXCESS)
+    assert found.status == "optimal" and found.certificate.valid
+
+
+@pytest.mark.parametrize("index", range(3))
+def test_no_duration_near_the_answers_needs_less(index: int) -> None:
+    """One move of each kind: all joints slow, one joint slow, a tenth of all limits of speed."""
+    _, task = slow_problem(0, index)
+    found = optimize(task)
+    others = dict(other_searches(task, found.duration))
+    assert {f"{factor:g} T" for factor in NEAR if factor > 1} < set(others)
+    assert energy(found) < min(others.values()) * (1 + MOST_EXCESS)
+
+
+@pytest.mark.long
+def test_the_excess_of_slow_moves_is_small() -> None:
+    assert compare(seed=1, count=30, json=None) == 0
+
+
+@pytest.mark.parametrize("ratio", [1.0005, 1.003, 1.02, 1.1])
+def test_a_duration_next_to_the_shortest_is_kept(ratio: float) -> None:
+    """Half a thousandth of 40 s is less than a ramp."""
+    task = slow(0.05)
+    longest = ratio * shortest(task)
+    found = optimize(replace(task, duration_max=longest))
+    assert found.duration <= longest * (1 + 1e-9)
+    assert energy(found) < LEAST_KNOWN[0.05] * (1 + MOST_EXCESS)
+
+
+@pytest.mark.parametrize(
+    ("goal", "duration", "least"), [(GOAL, 60.0, 2260.1), (START, 20.0, 768.3), (START + 1e-3, 20.0, 768.4)]
+)
+def test_much_more_time_than_a_move_needs_is_used(goal: Array, duration: float, least: float) -> None:
+    """It goes to where holding costs less, and on in time, even if it only comes back."""
+    assert energy(optimize(problem(START, goal, **fixed(duration)))) < least * (1 + MOST_EXCESS)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur20"])
+def test_other_robots_ramp_as_fast_as_they_can(name: str) -> None:
+    robot = load_robot(name)
+    lower, upper = np.maximum(robot.limits.q_min, -2.0), np.minimum(robot.limits.q_max, 2.0)
+    start, goal = np.random.default_rng(0).uniform(lower, upper, (2, robot.nq))
+    task = problem(start, goal, robot=robot, limits=replace(robot.limits, v_max=np.full(robot.nq, 0.25)))
+    found = optimize(task)
+    assert found.status == "optimal"
+    assert found.duration < shortest(task) * (1 + RAMPS)
+
+
+def test_a_payload_is_moved_slowly() -> None:
+    found = optimize(problem(START, GOAL, payload=PAYLOAD, limits=limits(v_max=0.1)))
+    assert energy(found) < 449.3 * (1 + MOST_EXCESS)
+
+
+@pytest.mark.parametrize("bus", [Bus("isolated"), Bus("storage", efficiency=0.9, capacity=50.0, power=500.0)])
+def test_other_buses_ramp_as_fast(bus: Bus) -> None:
+    """On an isolated bus power has a corner of its own for each joint, and finer motions are solved one by one."""
+    task = slow(0.1, bus=bus)
+    found = optimize(task)
+    assert found.duration < shortest(task) * (1 + RAMPS)
+
+
+def test_a_cycle_that_leaves_no_time_to_wait() -> None:
+    task = slow(0.1)
+    found = optimize(replace(task, cycle=Cycle(time=1.0005 * shortest(task))))
+    assert energy(found) < LEAST_KNOWN[0.1] * (1 + MOST_EXCESS)
+
+
+@pytest.mark.parametrize("index", [0, 2])
+def test_a_longest_duration_beyond_the_answers_changes_little(index: int) -> None:
+    _, task = slow_problem(2, index)
+    found = optimize(task)
+    again = optimize(replace(task, duration_max=1.02 * found.duration))
+    assert energy(again) == pytest.approx(energy(found), rel=MOST_EXCESS)
+
+
+@pytest.mark.parametrize(("index", "speed"), [(2, 0.25), (4, 0.08), (5, 0.25)])
+def test_a_slow_tcp_is_within_its_limit_in_short_spans(index: int, speed: float) -> None:
+    """Evenly spaced path points missed short knot spans: no motion was confirmed, or one of half again the energy."""
+    _, task = slow_problem(0, index)
+    task = replace(task, arm=replace(task.arm, tcp_speed=speed))
+    found = optimize(task)
+    assert found.certificate.worst_ratio["tcp_speed"] <= 1 + 1e-6
+    # at a lower limit of speed there are no faster motions, so none that needs less time and less energy was missed
+    lower = optimize(replace(task, arm=replace(task.arm, tcp_speed=0.9 * speed)))
+    assert energy(found) < energy(lower) * (1 + MOST_EXCESS)
