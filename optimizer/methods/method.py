@@ -15,7 +15,7 @@ from optimizer.deadline import Deadline
 from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.solution import BaselineName, Clearance
-from optimizer.trajectories.spline import Spline
+from optimizer.trajectories.spline import Spline, sampled
 
 DEADLINE_PASSED = "the deadline passed"
 CONVERGED = "converged"
@@ -113,8 +113,17 @@ class Method(ABC):
 
     @staticmethod
     def may_refine(found: Spline) -> bool:
-        """Whether `solve_from` may improve the motion that `solve` found."""
+        """Whether `refined` may improve the motion that `solve` found."""
         return False
+
+    @staticmethod
+    def may_grade(found: Spline) -> bool:
+        """Whether `solve_from` in its finer space may improve a motion that was `refined`."""
+        return False
+
+    def refined(self, spline: Spline, fine: bool) -> SolveResult:
+        """Solve from a motion that `may_refine`, in a finer space; `fine` as of `solve_from`."""
+        return self.solve_from(*sampled(spline), fine)
 
     def solve_evenly(self, q: Array, t: Array, count: int, progress: float) -> SolveResult:
         """Solve from samples q (k, nq) [rad] at times t (k,) [s] with `count` control points, evenly spaced in time.

@@ -8,7 +8,7 @@ from models.robot import Array
 from optimizer.deadline import DeadlinePassed, watch
 from optimizer.methods.free_spline import TIGHT
 from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.search.attempts import solve_from
+from optimizer.search.attempts import improve, solve_from
 from optimizer.search.baselines import baselines, guesses, nearest
 from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.incumbent import SLACK, Incumbent
@@ -39,9 +39,11 @@ def refine(incumbent: Incumbent, candidate: Candidate) -> None:
         if tight and slides(incumbent.prepared, candidate):
             grade(incumbent, candidate)
         else:
-            solve_from(incumbent, candidate, sampled(coarse), fine=tight)
+            improve(incumbent, candidate, lambda solver: solver.refined(coarse, fine=tight))
         if tight and candidate.spline is coarse and not incumbent.deadline.passed:
-            solve_from(incumbent, candidate, sampled(coarse), fine=False)
+            improve(incumbent, candidate, lambda solver: solver.refined(coarse, fine=False))
+    if method.may_grade(candidate.spline) and not deadline.passed:
+        solve_from(incumbent, candidate, sampled(candidate.spline), fine=True)
     if not method.guess_baselines:
         return
     if incumbent.uses_storage:
