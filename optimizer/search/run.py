@@ -24,6 +24,7 @@ from optimizer.search.candidates import Candidate, Reason, bound, pairs
 from optimizer.search.ends import ends
 from optimizer.search.fastest import find_fastest
 from optimizer.search.free_goal_bound import family_bound_of
+from optimizer.search.freed_duration import start_from_free_duration
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.least_work import explore_least_work
 from optimizer.search.missed_branches import all_known, bound_of_others
@@ -144,6 +145,8 @@ class Run:
         while (best := incumbent.best()) is not None:
             best = start_beside(incumbent, best)
             refine(incumbent, best)
+            if not self.known:
+                start_from_free_duration(incumbent, best)
             best = incumbent.best() or best
             table = compare_with_baselines(incumbent, best)
             best = incumbent.best() or best
