@@ -55,7 +55,7 @@ class Candidate:
 
     `shortest` [s] is a proven least duration. `holdable`: both ends are feasible. A candidate that is `deferred` is
     not solved yet, because similar candidates have a smaller lower bound. `sampled`: an end is one of infinitely
-    many configurations that reach its target.
+    many configurations that reach its target. `refined`: the motion is not only a first one, which the method refines.
     """
 
     start: EndConfiguration
@@ -71,6 +71,7 @@ class Candidate:
     attempt: SolveResult | None = field(default=None, repr=False)
     holdable: bool = True
     deferred: bool = False
+    refined: bool = False
     sampled: bool = field(init=False)
 
     def __post_init__(self) -> None:
@@ -111,6 +112,7 @@ class Candidate:
             self.start.target,
             self.goal.target,
             self.attempt is not None or self.status is CandidateStatus.FAILED,
+            None if self.energy is None else self.refined,
         )
 
 

@@ -33,6 +33,7 @@ SLOWER = (1.0, 1 + 1e-5)
 def refine(incumbent: Incumbent, candidate: Candidate) -> None:
     """Improve the motion of a solved candidate, as far as the method and the deadline allow."""
     method, problem, deadline = incumbent.method, incumbent.problem, incumbent.deadline
+    candidate.refined = True
     sharpen(incumbent, candidate)
     if method.may_refine(candidate.spline) and not deadline.passed:
         coarse, tight = candidate.spline, is_tight(incumbent, candidate)
