@@ -201,7 +201,7 @@ class FreeSpline(SqpMethod):
 
     @staticmethod
     def may_grade(found: Spline) -> bool:
-        """Whether the knots are REFINED: a solve with EXACT ones, at the switches of the motion found, may need less."""
+        """Whether the knots are REFINED: a solve with EXACT ones, at the switches of this motion, may need less."""
         inner = found.knots[bspline.DEGREE + 1 : -bspline.DEGREE - 1]
         return len(inner) > 0 and int(np.unique(inner, return_counts=True)[1].max()) == REFINED
 

@@ -36,7 +36,8 @@ MOST_TIME_SCALE = 1 + 5e-4
 # a motion is checked at the quadrature points alone if its torques there, of rigid bodies and of friction with any
 # sign, stay below this ratio of the limits
 FAR_BELOW = 0.8
-# samples at which path constraints of a motion that collides are checked, and the multiple of an excess by which they are tightened
+# samples at which path constraints of a motion that collides are checked, and the multiple of an excess by which they
+# are tightened
 PATH_SAMPLES, PATH_REPAIR = 401, 1.5
 
 
