@@ -46,8 +46,8 @@ CHECKING = 0.15
 # among obstacles, a solve ends early if it comes to no less than this multiple of the best energy known: an SQP that
 # still changes sides seldom gets this far below what it promises
 NOT_MUCH_BETTER = 1.05
-# on an isolated bus the smoothed corners cost a few percent, and following a motion to sharp ones saves as much: a solve
-# ends early only if it comes to no less than this multiple of the best energy known
+# on an isolated bus the smoothed corners cost a few percent, and following a motion to sharp ones saves as much: a
+# solve ends early only if it comes to no less than this multiple of the best energy known
 MUCH_COSTLIER = 1.15
 # a planned path is not optimised if the motion along it needs more than this multiple of the best energy known: that
 # seldom falls by so much

@@ -56,6 +56,7 @@ class Candidate:
     `shortest` [s] is a proven least duration. `holdable`: both ends are feasible. A candidate that is `deferred` is
     not solved yet, because similar candidates have a smaller lower bound. `sampled`: an end is one of infinitely
     many configurations that reach its target. `refined`: the motion is not only a first one, which the method refines.
+    `tightened`: it was solved again, within tighter limits, since the certificate rejected its motion.
     """
 
     start: EndConfiguration
@@ -72,6 +73,7 @@ class Candidate:
     holdable: bool = True
     deferred: bool = False
     refined: bool = False
+    tightened: bool = False
     sampled: bool = field(init=False)
 
     def __post_init__(self) -> None:

@@ -35,6 +35,7 @@ from optimizer.search.path_ends import bound_beside, path_candidates
 from optimizer.search.raised_bounds import raise_bounds
 from optimizer.search.refinement import baselines_of, compare_with_baselines, refine
 from optimizer.search.sampled_ends import activate_deferred, between
+from optimizer.search.second_attempt import reject
 from optimizer.search.seeds import activate_seeds
 from optimizer.search.sliding import slides
 from optimizer.solution import (
@@ -145,8 +146,7 @@ class Run:
         while (best := incumbent.best()) is not None:
             best = start_beside(incumbent, best)
             refine(incumbent, best)
-            if not self.known:
-                start_from_free_duration(incumbent, best)
+            start_from_free_duration(incumbent, best, self.known)
             best = incumbent.best() or best
             table = compare_with_baselines(incumbent, best)
             best = incumbent.best() or best
@@ -155,7 +155,7 @@ class Run:
             answer = self.answer(best, table)
             if answer is not None:
                 return answer
-            incumbent.reject(best)
+            reject(incumbent, best)
             self.explore()
         if any(candidate.status is CandidateStatus.UNVISITED for candidate in incumbent.candidates):
             raise self.too_late()
