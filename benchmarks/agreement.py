@@ -5,8 +5,8 @@
 
 Every random request is answered by `/optimize` with a free duration, with the duration of that answer and with
 durations around it, by `/pareto`, by `/compare`, and by `/cycle` as an open round of one stop. All are the same
-problem, or a more constrained one. For each endpoint the relative difference of its energy from the free answer's is reported;
-for a fixed duration around the free one, only what it needs less. The requests of the worst differences are printed.
+problem, or a more constrained one. Reported are the relative differences of the energies from that of the free answer;
+of durations around it, what they need less. The requests of the worst differences are printed.
 """
 
 from __future__ import annotations
