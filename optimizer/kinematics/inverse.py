@@ -46,7 +46,7 @@ ACCURACY = 1e-9
 # members of a self-motion that stand for it; of many self-motions, so many times those of one in all, and of each at
 # least so many
 MEMBERS, MOST_IN_ALL, LEAST_OF_EACH = 8, 4, 2
-# from so many members of each on, they stand for the whole curve: none is far from the next
+# where so many members are asked for, they stand for the whole curve: none is far from the next
 WHOLE = 16
 # members among which one within the limits is sought, if no other is
 MANY = 128
@@ -202,7 +202,7 @@ class ClosedFormInverseKinematics:
             each = max(LEAST_OF_EACH, min(members, MOST_IN_ALL * members // len(motions)))
             parameters = [spread(motion, each) for motion in motions]
             configurations = _members(motions, parameters)
-            if each >= WHOLE:
+            if members >= WHOLE:
                 found = zip(motions, parameters, configurations, strict=True)
                 configurations = [without_gaps(motion, u, q) for motion, u, q in found]
             for motion, of_motion in zip(motions, configurations, strict=True):
