@@ -6,7 +6,6 @@ duration is a motion of its own duration, too: asked for with this duration, it 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from optimizer.deadline import DeadlinePassed, watch
@@ -16,20 +15,20 @@ from optimizer.search.attempts import solve, solve_from
 from optimizer.search.candidates import Candidate
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.refinement import refine
-from optimizer.trajectories.spline import Spline, lasting, sampled
+from optimizer.trajectories.spline import lasting, sampled
 
 # greatest ratio of the two durations, and of the two energies, at which the free motion may lead to a better one
 NEAR, PROMISING = 1.15, 1.01
 RETIMED = "the motion of least energy of any duration, retimed"
 
 
-def start_from_free_duration(incumbent: Incumbent, best: Candidate, known: Sequence[Spline]) -> None:
+def start_from_free_duration(incumbent: Incumbent, best: Candidate) -> None:
     """Improve a solved candidate of a fixed duration from its own motion of any duration, if that lasts about as long.
 
-    Its own solves come from motions of the fixed duration alone. Where motions are `known`, they are a start already.
+    Its own solves come from motions of the fixed duration alone.
     """
     duration = incumbent.problem.duration_max
-    if duration is None or known or not _applies(incumbent):
+    if duration is None or not _applies(incumbent):
         return
     free = replace(incumbent.problem, duration_min=None, duration_max=None)
     other = Incumbent(incumbent.prepared.sharing(free), incumbent.end, longest=incumbent.longest)

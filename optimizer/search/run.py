@@ -146,7 +146,7 @@ class Run:
         while (best := incumbent.best()) is not None:
             best = start_beside(incumbent, best)
             refine(incumbent, best)
-            start_from_free_duration(incumbent, best, self.known)
+            start_from_free_duration(incumbent, best)
             best = incumbent.best() or best
             table = compare_with_baselines(incumbent, best)
             best = incumbent.best() or best
