@@ -17,6 +17,7 @@ from optimizer.progress import Improved, Tell, forward, nobody, only_improved
 from optimizer.sequence.against_stopping import SHARE, Rested, as_passed, start_from, stopping_baselines
 from optimizer.sequence.divided_paths import with_divided_paths
 from optimizer.sequence.free_orientations import with_free_orientations
+from optimizer.sequence.last_posture import with_last_posture
 from optimizer.sequence.move_problem import LEAST_TIME
 from optimizer.sequence.moves import moves_of
 from optimizer.sequence.order_search import OrderSearch
@@ -53,7 +54,9 @@ def optimize_round(asked: WorkRound, clock: Clock = time.perf_counter, tell: Tel
     with one_thread():
         began, tell = clock(), forward(tell)
         asked = _divided(asked, clock)
+        end = Deadline.after(asked.deadline, clock)
         found = with_free_orientations(asked, lambda other: _valued(other, clock, tell), clock)
+        found = with_last_posture(asked, found, end, clock)
         _tell_found(tell, found)
         return replace(found, wall_time=clock() - began)
 

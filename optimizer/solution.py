@@ -184,6 +184,7 @@ class CandidateReport(NamedTuple):
     """A start and goal pair: its status and reason, its proven bound and the energy found [J], of the objective.
 
     `start_target` and `goal_target` are indices as in `Branch.target`. `tried`: a motion was computed, found or not.
+    `refined`: its energy is not that of a first, coarse motion; None if it has none.
     An answer has thousands of them: a frozen dataclass takes four times as long to make.
     """
 
@@ -199,6 +200,7 @@ class CandidateReport(NamedTuple):
     start_target: int = 0
     goal_target: int = 0
     tried: bool = False
+    refined: bool | None = None
 
 
 BaselineName = Literal["trapezoid", "quintic", "ruckig", "ruckig_slowed", "controller_default"]

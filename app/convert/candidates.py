@@ -43,4 +43,4 @@ def most_telling(candidates: Sequence[CandidateReport]) -> list[CandidateReport]
 def candidate_fields(candidate: CandidateReport) -> dict[str, Any]:
     """One entry of `candidates`."""
     ends = ("start", "start_target", "goal", "goal_target", "q_start", "q_goal")
-    return fields(candidate, *ends, "status", "reason", "lower_bound", "energy", "duration")
+    return fields(candidate, *ends, "status", "reason", "lower_bound", "energy", "duration", "refined")

@@ -142,6 +142,13 @@ class Candidate(Response):
     )
     energy: float | None = described("Energy of the motion found, of the objective; null if not solved.", "J", 180.5)
     duration: float | None = described("Duration of the motion found; null if not solved.", "s", 1.9)
+    refined: bool | None = described(
+        "Whether the motion was optimised to the end. If not, its energy is that of a first, coarse motion: asked for "
+        "alone, this pair may need a few percent less. Null if not solved.",
+        None,
+        False,
+        default=None,
+    )
 
 
 class CandidateCounts(Response):

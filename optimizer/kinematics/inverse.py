@@ -34,7 +34,7 @@ from optimizer.kinematics.multi_start import MultiStart
 from optimizer.kinematics.reach import REACH, at_the_edge, out_of_reach
 from optimizer.kinematics.redundant_arm import RedundantArm
 from optimizer.kinematics.redundant_curve import RedundantCurve
-from optimizer.kinematics.self_motion import SelfMotion, is_point, spread
+from optimizer.kinematics.self_motion import SelfMotion, is_point, spread, without_gaps
 from optimizer.kinematics.tcp import flange_pose
 from optimizer.kinematics.traced_arm import TracedArm
 from optimizer.kinematics.traced_curve import TracedCurve
@@ -46,6 +46,8 @@ ACCURACY = 1e-9
 # members of a self-motion that stand for it; of many self-motions, so many times those of one in all, and of each at
 # least so many
 MEMBERS, MOST_IN_ALL, LEAST_OF_EACH = 8, 4, 2
+# where so many members are asked for, they stand for the whole curve: none is far from the next
+WHOLE = 16
 # members among which one within the limits is sought, if no other is
 MANY = 128
 
@@ -198,7 +200,11 @@ class ClosedFormInverseKinematics:
         motions = self._form.self_motions(T, limits)
         if motions:
             each = max(LEAST_OF_EACH, min(members, MOST_IN_ALL * members // len(motions)))
-            configurations = _members(motions, [spread(motion, each) for motion in motions])
+            parameters = [spread(motion, each) for motion in motions]
+            configurations = _members(motions, parameters)
+            if members >= WHOLE:
+                found = zip(motions, parameters, configurations, strict=True)
+                configurations = [without_gaps(motion, u, q) for motion, u, q in found]
             for motion, of_motion in zip(motions, configurations, strict=True):
                 labels += [motion.label] * len(of_motion)
                 curves += [None if is_point(motion) else motion] * len(of_motion)

@@ -20,6 +20,9 @@ from optimizer.problem.branches import BranchLabel, Label
 ROUNDING = 1e-10
 # an arc shorter than this is one configuration, up to rounding [rad]
 POINT = 1e-4
+# distance of a joint between two members of a curve that leaves room for others [rad], and halvings of the way between
+# them
+FAR_APART, HALVINGS = 0.5, 6
 
 
 class SelfMotion(Protocol):
@@ -81,6 +84,25 @@ def spread(motion: SelfMotion, count: int) -> Array:
         if not closed:
             found.append(upper)
     return np.array(found)
+
+
+def without_gaps(motion: SelfMotion, parameters: Array, q: Array) -> Array:
+    """The members q (n, nq) [rad] of a self-motion at parameters (n,), in the order of its arcs, with members between
+    neighbours on an arc that are FAR_APART.
+
+    Next to a singularity the arm moves far while the parameter hardly does.
+    """
+    lower = np.sort([arc[0] for arc in motion.arcs])
+    for _ in range(HALVINGS):
+        arc = np.searchsorted(lower, parameters, "right")
+        apart = np.abs(wrapped(np.diff(q, axis=0))).max(axis=1) > FAR_APART
+        gaps = np.flatnonzero(apart & (np.diff(arc) == 0) & (np.diff(parameters) > 0))
+        if not len(gaps):
+            break
+        between = (parameters[gaps] + parameters[gaps + 1]) / 2
+        q = np.insert(q, gaps + 1, motion.at(between), axis=0)
+        parameters = np.insert(parameters, gaps + 1, between)
+    return q
 
 
 @dataclass(frozen=True, eq=False)

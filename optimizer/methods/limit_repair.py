@@ -38,7 +38,8 @@ MOST_TIME_SCALE = 1 + 5e-4
 # a motion is checked at the quadrature points alone if its torques there, of rigid bodies and of friction with any
 # sign, stay below this ratio of the limits
 FAR_BELOW = 0.8
-# samples at which path constraints are checked, and the multiple of an excess by which they are tightened
+# samples at which path constraints of a motion that collides are checked, and the multiple of an excess by which they
+# are tightened
 PATH_SAMPLES, PATH_REPAIR = 401, 1.5
 
 
@@ -138,7 +139,9 @@ def path_excess(
     checked = path if collision is not None else prepared.path
     ratio = np.zeros(len(path.names))
     if checked is not None:
-        q, v, _ = sample(spline, in_all_spans(spline.knots, PATH_SAMPLES))
+        # what collides is solved again; any other motion is checked where the certificate checks it
+        instants = grid(spline.duration) if collision is None else in_all_spans(spline.knots, PATH_SAMPLES)
+        q, v, _ = sample(spline, instants)
         ratio[: len(checked.names)] = checked.ratios(q, v).max(axis=0)
     excess = ratio - 1
     return np.where(excess > -REPAIR_MARGIN / 4, PATH_REPAIR * np.maximum(excess, 0.0) + REPAIR_MARGIN, 0.0)

@@ -127,6 +127,11 @@ class Method(ABC):
         """Whether `refined` may improve the motion that `solve` found."""
         return False
 
+    @staticmethod
+    def may_grade(found: Spline) -> bool:
+        """Whether `solve_from` in its finer space may improve a motion that was `refined`."""
+        return False
+
     def refined(self, spline: Spline, fine: bool) -> SolveResult:
         """Solve from a motion that `may_refine`, in a finer space; `fine` as of `solve_from`."""
         return self.solve_from(*sampled(spline), fine)

@@ -46,6 +46,9 @@ CHECKING = 0.15
 # among obstacles, a solve ends early if it comes to no less than this multiple of the best energy known: an SQP that
 # still changes sides seldom gets this far below what it promises
 NOT_MUCH_BETTER = 1.05
+# on an isolated bus the smoothed corners cost a few percent, and following a motion to sharp ones saves as much: a
+# solve ends early only if it comes to no less than this multiple of the best energy known
+MUCH_COSTLIER = 1.15
 # a planned path is not optimised if the motion along it needs more than this multiple of the best energy known: that
 # seldom falls by so much
 FAR_COSTLIER = 2.5
@@ -174,9 +177,11 @@ class SqpMethod(Method):
 
         Through passes, promises are not kept; around obstacles not quite.
         """
-        smoothed = has_corners(self.prepared.problem.objective, self.prepared.arm)
-        if len(self.passes) or smoothed or self.interval.minimum_time:
+        objective = self.prepared.problem.objective
+        if len(self.passes) or objective == "mechanical" or self.interval.minimum_time:
             return np.inf
+        if has_corners(objective, self.prepared.arm):
+            return above(self.best_known, MUCH_COSTLIER)
         return above(self.best_known, NOT_MUCH_BETTER) if len(stage.pairs) else self.best_known
 
     def _is_far_costlier(self, guess: Guess, stage: _Stage) -> bool:

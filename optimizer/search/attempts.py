@@ -114,6 +114,7 @@ def settled(incumbent: Incumbent, candidate: Candidate, result: SolveResult, mes
     candidate.attempt = result
     candidate.settle(CandidateStatus.SOLVED, Reason.METHOD, message)
     candidate.energy = incumbent.prepared.cost_of(result.spline)
+    candidate.refined = not incumbent.method.may_refine(result.spline)
     return candidate
 
 

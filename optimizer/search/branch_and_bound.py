@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from optimizer.deadline import Deadline
+from optimizer.methods import method_of
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.search.candidates import Candidate, Reason
@@ -50,6 +51,7 @@ def explore(
         candidate.settle(CandidateStatus(result.status.value), Reason.METHOD, result.reason)
         if result.spline is not None:
             candidate.energy = prepared.cost_of(result.spline)
+            candidate.refined = not method_of(prepared.problem).may_refine(result.spline)
             if best is None or best.energy is None or candidate.energy < best.energy:
                 best = candidate
         ended(candidate)

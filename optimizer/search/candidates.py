@@ -56,7 +56,8 @@ class Candidate:
 
     `shortest` [s] is a proven least duration. `holdable`: both ends are feasible. A candidate that is `deferred` is
     not solved yet, because similar candidates have a smaller lower bound. `sampled`: an end is one of infinitely
-    many configurations that reach its target.
+    many configurations that reach its target. `refined`: the motion is not only a first one, which the method refines.
+    `tightened`: it was solved again, within tighter limits, since the certificate rejected its motion.
     """
 
     start: EndConfiguration
@@ -74,6 +75,8 @@ class Candidate:
     deferred: bool = False
     earlier: Candidate | None = field(default=None, repr=False)
     refused: bool = False
+    refined: bool = False
+    tightened: bool = False
     sampled: bool = field(init=False)
 
     def __post_init__(self) -> None:
@@ -131,6 +134,7 @@ class Candidate:
             self.start.target,
             self.goal.target,
             self.attempt is not None or self.status is CandidateStatus.FAILED,
+            None if self.energy is None else self.refined,
         )
 
 

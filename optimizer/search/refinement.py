@@ -37,6 +37,7 @@ NOT_CONFIRMED = "the certificate did not confirm it, or not before the deadline"
 def refine(incumbent: Incumbent, candidate: Candidate) -> None:
     """Improve the motion of a solved candidate, as far as the method and the deadline allow."""
     method, problem, deadline = incumbent.method, incumbent.problem, incumbent.deadline
+    candidate.refined = True
     sharpen(incumbent, candidate)
     if method.may_refine(candidate.spline) and not deadline.passed:
         coarse, tight = candidate.spline, is_tight(incumbent, candidate)
@@ -46,6 +47,8 @@ def refine(incumbent: Incumbent, candidate: Candidate) -> None:
             improve(incumbent, candidate, lambda solver: solver.refined(coarse, fine=tight))
         if tight and candidate.spline is coarse and not incumbent.deadline.passed:
             improve(incumbent, candidate, lambda solver: solver.refined(coarse, fine=False))
+    if method.may_grade(candidate.spline) and not deadline.passed:
+        solve_from(incumbent, candidate, sampled(candidate.spline), fine=True)
     if not method.guess_baselines:
         return
     if incumbent.uses_storage:

@@ -25,6 +25,7 @@ from optimizer.search.claims import may_be_optimal
 from optimizer.search.ends import ends
 from optimizer.search.fastest import explore_or_find_fastest, find_fastest
 from optimizer.search.free_goal_bound import family_bound_of
+from optimizer.search.freed_duration import start_from_free_duration
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.least_work import explore_least_work
 from optimizer.search.missed_branches import all_known, bound_of_others
@@ -36,6 +37,7 @@ from optimizer.search.raised_bounds import raise_bounds
 from optimizer.search.refinement import baselines_of, compare_with_baselines, refine
 from optimizer.search.refusals import no_trajectory
 from optimizer.search.sampled_ends import activate_deferred, between
+from optimizer.search.second_attempt import reject
 from optimizer.search.seeds import activate_seeds
 from optimizer.search.sliding import slides
 from optimizer.solution import (
@@ -148,6 +150,7 @@ class Run:
             if not best.refused:
                 best = start_beside(incumbent, best)
                 refine(incumbent, best)
+                start_from_free_duration(incumbent, best)
             longest = self.solved_beside(replace(problem, duration_min=problem.duration_max)) if may_rest else None
             if longest is not None:
                 incumbent.accept_if_better(*longest)
@@ -159,7 +162,7 @@ class Run:
             answer = self.answer(best, table)
             if answer is not None:
                 return answer
-            incumbent.reject(best)
+            reject(incumbent, best)
             self.explore()
         if any(each.reason is Reason.NOT_CONFIRMED for each in incumbent.candidates):
             find_fastest(incumbent, self.known, improve=False)

@@ -49,7 +49,7 @@ function row(candidate) {
   const [goal, start] = [candidate.goal, candidate.start].map((text) => text.replaceAll("/", "/\u200b")); // may break there
   const name = [goal, start === goal ? null : el("small", {}, ` from ${start}`)];
   const button = best || embedded() ? "" : el("button", { type: "button", onclick: () => beside(candidate).catch(problem) }, "compute");
-  return { title: candidate.reason, class: best ? "best" : candidate.status, cells: [box, name, best ? "this motion" : candidate.status, candidate.lower_bound, candidate.energy, candidate.duration, button] };
+  return { title: candidate.reason, class: best ? "best" : candidate.status, cells: [box, name, best ? "this motion" : candidate.refined === false ? "solved roughly" : candidate.status, candidate.lower_bound, candidate.energy, candidate.duration, button] };
 }
 
 /** Computes one branch, and lets its arm move beside the answer's. Throws Problem. */

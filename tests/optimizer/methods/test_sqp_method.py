@@ -177,7 +177,7 @@ def test_a_sole_candidate_is_refined_at_once() -> None:
     assert_held(at_once.prepared.problem, found)
     tight = coarse.duration < TIGHT * shortest_duration(GOAL - START, ROBOT.limits)
     cost = at_once.prepared.cost_of
-    assert cost(found) == pytest.approx(cost(spline(twice.solve_from(*sampled(coarse), fine=bool(tight)))), rel=1e-3)
+    assert cost(found) == pytest.approx(cost(spline(twice.refined(coarse, fine=bool(tight)))), rel=1e-3)
 
 
 @pytest.mark.parametrize("why", ["refining fails", "another candidate", "little time"])
@@ -186,7 +186,7 @@ def test_else_the_coarse_motion_is_checked(why: str, monkeypatch: pytest.MonkeyP
     own.is_sole = why != "another candidate"
     if why == "refining fails":
         failed = SolveResult(SolveStatus.FAILED, "for a test", 5, 1)
-        monkeypatch.setattr(FreeSpline, "solve_from", lambda *_, **__: failed)
+        monkeypatch.setattr(FreeSpline, "refined", lambda *_, **__: failed)
     result = own.solve()
     assert FreeSpline.may_refine(spline(result))
     assert result.solves == (3 if why == "refining fails" else 1)

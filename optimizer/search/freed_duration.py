@@ -1,0 +1,69 @@
+"""A fixed duration: the motion of least energy of any duration, retimed, as another start.
+
+A motion has several local optima, and solves of nearby durations may end in others. What `optimize` answers without a
+duration is a motion of its own duration, too: asked for with this duration, it is found again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from optimizer.deadline import DeadlinePassed, watch
+from optimizer.methods.free_spline import FreeSpline
+from optimizer.methods.method import SolveResult, SolveStatus
+from optimizer.search.attempts import solve, solve_from
+from optimizer.search.candidates import Candidate
+from optimizer.search.incumbent import Incumbent
+from optimizer.search.refinement import refine
+from optimizer.trajectories.spline import lasting, sampled
+
+# greatest ratio of the two durations, and of the two energies, at which the free motion may lead to a better one
+NEAR, PROMISING = 1.15, 1.01
+RETIMED = "the motion of least energy of any duration, retimed"
+
+
+def start_from_free_duration(incumbent: Incumbent, best: Candidate) -> None:
+    """Improve a solved candidate of a fixed duration from its own motion of any duration, if that lasts about as long.
+
+    Its own solves come from motions of the fixed duration alone.
+    """
+    duration = incumbent.problem.duration_max
+    if duration is None or not _applies(incumbent):
+        return
+    free = replace(incumbent.problem, duration_min=None, duration_max=None)
+    other = Incumbent(incumbent.prepared.sharing(free), incumbent.end, longest=incumbent.longest)
+    twin = Candidate(best.start, best.goal, best.q_start, best.q_goal)
+    other.candidates = [twin]
+    result = solve(other, twin)
+    if result.spline is not None and duration / NEAR < result.spline.duration < duration * NEAR:
+        other.accept_if_better(twin, result, other.prepared.energy(result.spline))
+        refine(other, twin)
+        _take(incumbent, best, twin, duration)
+    incumbent.iterations += other.iterations
+    incumbent.solves += other.solves
+
+
+def _applies(incumbent: Incumbent) -> bool:
+    """Whether the duration is fixed, and a motion of any duration has a duration of its own."""
+    problem = incumbent.problem
+    fixed = problem.duration_min == problem.duration_max and not incumbent.deadline.passed
+    plain = problem.objective == "electrical" and problem.cycle is None and not incumbent.uses_storage
+    return fixed and plain and incumbent.method is FreeSpline
+
+
+def _take(incumbent: Incumbent, best: Candidate, twin: Candidate, duration: float) -> None:
+    """Accept the motion of `twin`, retimed to `duration` [s], and what is solved from it, if it needs less energy."""
+    assert twin.attempt is not None and best.energy is not None
+    motion = lasting(twin.spline, duration)
+    try:
+        with watch(incumbent.deadline):
+            energy = incumbent.prepared.energy(motion)
+            valid = incumbent.certified(twin, motion, energy).valid
+    except DeadlinePassed:
+        return
+    before = best.energy
+    if valid:
+        found = SolveResult(SolveStatus.SOLVED, RETIMED, spline=motion, stationarity=twin.attempt.stationarity)
+        incumbent.accept_if_better(best, found, energy, twin)
+    if motion is not twin.spline and energy.of(incumbent.problem.objective) < PROMISING * before:
+        solve_from(incumbent, best, sampled(motion), fine=True)

@@ -1,0 +1,85 @@
+"""What follows when the certificate rejects a motion: the candidate is solved once more, within tighter limits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from optimizer.deadline import DeadlinePassed, watch
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.arm import Arm
+from optimizer.search.attempts import solve
+from optimizer.search.candidates import Candidate, Reason
+from optimizer.search.incumbent import Incumbent
+from optimizer.search.refinement import refine
+from optimizer.solution import CandidateStatus
+
+# limits become tighter by what the motion exceeded them by, and by this share
+BEYOND = 2e-3
+WITHIN_TIGHTER = "converged within tighter limits, after the certificate did not confirm the first motion"
+
+
+def reject(incumbent: Incumbent, candidate: Candidate) -> None:
+    """Drop a motion that the certificate did not confirm.
+
+    If it exceeded a limit, the candidate is solved again within limits that are tighter by the excess, once. What the
+    certificate confirms of that becomes its motion.
+    """
+    tighter = None if candidate.tightened else _tightened(incumbent, candidate)
+    incumbent.reject(candidate)
+    if tighter is None or incumbent.deadline.passed:
+        return
+    candidate.tightened = True
+    other = Incumbent(PreparedProblem.of(replace(incumbent.problem, arm=tighter)), incumbent.end)
+    twin = Candidate(candidate.start, candidate.goal, candidate.q_start, candidate.q_goal)
+    other.candidates = [twin]
+    result = solve(other, twin)
+    if result.spline is not None:
+        other.accept_if_better(twin, result, other.prepared.energy(result.spline))
+        refine(other, twin)
+        _take(incumbent, candidate, twin)
+    incumbent.iterations += other.iterations
+    incumbent.solves += other.solves
+
+
+def _tightened(incumbent: Incumbent, candidate: Candidate) -> Arm | None:
+    """The arm with tighter limits; None if the motion of the candidate exceeds none of them, or follows a path."""
+    problem, arm, spline = incumbent.problem, incumbent.problem.arm, candidate.spline
+    if problem.tool_path is not None or problem.passes:
+        return None
+    try:
+        with watch(incumbent.deadline):
+            worst = incumbent.certified(candidate, spline, incumbent.prepared.energy(spline)).worst_ratio
+    except DeadlinePassed:
+        return None
+    share = {name: 1 / (ratio * (1 + BEYOND)) if ratio > 1 else 1.0 for name, ratio in worst.items()}
+    if all(each == 1.0 for name, each in share.items() if name != "position"):
+        return None
+    limits, cone = arm.active_limits, arm.tool_cone
+    return replace(
+        arm,
+        limits=replace(
+            limits,
+            v_max=limits.v_max * share["velocity"],
+            a_max=limits.a_max * share["acceleration"],
+            j_max=limits.j_max * share["jerk"],
+            tau_max=limits.tau_max * share["torque"],
+        ),
+        tcp_speed=None if arm.tcp_speed is None else arm.tcp_speed * share["tcp_speed"],
+        elbow_speed=None if arm.elbow_speed is None else arm.elbow_speed * share["elbow_speed"],
+        tool_cone=None if cone is None else replace(cone, half_angle=cone.half_angle * share["tool_cone"]),
+    )
+
+
+def _take(incumbent: Incumbent, candidate: Candidate, twin: Candidate) -> None:
+    """Give the candidate the motion of `twin` if the certificate confirms it for the limits that were asked for."""
+    spline = twin.spline
+    try:
+        with watch(incumbent.deadline):
+            energy = incumbent.prepared.energy(spline)
+            valid = incumbent.certified(twin, spline, energy).valid
+    except DeadlinePassed:
+        return
+    if valid:
+        candidate.move(twin)
+        candidate.attempt, candidate.energy = twin.attempt, energy.of(incumbent.problem.objective)
+        candidate.settle(CandidateStatus.SOLVED, Reason.METHOD, WITHIN_TIGHTER)

@@ -1,0 +1,129 @@
+"""The same motion, asked for in different ways: with and without a duration, as a front, by a pose or its joint
+positions, with all branches or one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import orjson
+import pytest
+
+from app.convert.request import to_problem
+from app.schemas.request import OptimizeRequest
+from benchmarks.agreement import request
+from benchmarks.tasks import as_pose, flange
+from models.registry import load_robot
+from optimizer.exceptions import NoTrajectory
+from optimizer.methods import sqp_method
+from optimizer.optimize import optimize
+from optimizer.pareto import pareto
+from optimizer.search.second_attempt import WITHIN_TIGHTER
+from optimizer.solution import Solution
+
+Json = dict[str, Any]
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+# relative: what solves of the same motion may differ by
+AGREED = 1e-3
+# s: nothing here is to end by the deadline on a loaded machine
+DEADLINE = 120.0
+
+ISOLATED: Json = {
+    "start": {"q": [1.391, -1.57, -0.179, -1.57, 1, 0]},
+    "goal": {"q": [-1.967, -0.028, 0.503, 0, 1, 0]},
+    "payload": {"mass": 4.5, "com": [-0.075, -0.093, -0.03]},
+    "bus": {"mode": "isolated"},
+    "collisions": False,
+}
+LIFT: Json = {
+    "start": {"q": [1.27, -1.343, -1.54, -1.797, -0.339, -1.678]},
+    "goal": {"q": [1.75, -1.621, -1.878, -2.295, -0.426, -3.045]},
+    "payload": {"mass": 3, "com": [0, 0, 0.1]},
+    "collisions": False,
+}
+SLOW_TOOL: Json = {
+    "start": {"q": [1.386, -2.806, 1.791, -1.512, -0.177, -0.054]},
+    "goal": {"q": [-2.052, -2.357, -1.561, -0.231, -2.324, 0.231]},
+    "tcp": {"position": [-0.136, 0.036, -0.11], "rpy": [0.998, 0.2, -0.771]},
+    "limits": {"tcp_speed": 0.127, "elbow_speed": 0.251},
+    "collisions": False,
+}
+NEAR_A_STRETCHED_SHOULDER = [0.57244, 0.00264, -2.87612, -1.45547, -0.40888, 2.9146, 0.92274]
+REDUNDANT: Json = {
+    "robot": "fr3",
+    "start": {"q": [1.78826, -1.00437, -2.16259, -1.98522, -0.02407, 2.11598, 1.34053]},
+    "payload": {"mass": 1.5, "com": [0.02, 0, 0.06]},
+    "collisions": False,
+}
+
+
+def solved(body: Json, **fields: Any) -> Solution:
+    return optimize(to_problem(OptimizeRequest.model_validate(body | fields), DEADLINE))
+
+
+def energy(solution: Solution) -> float:
+    return solution.energy.electrical.total
+
+
+@pytest.mark.long
+def test_on_an_isolated_bus_no_fixed_duration_needs_less_than_a_free_one() -> None:
+    free = solved(ISOLATED)
+    assert energy(free) < 148.47  # J: the motion of 1.8677 s that was found before
+    for duration in (1.8677, free.duration):
+        assert energy(solved(ISOLATED, duration=duration)) > (1 - AGREED) * energy(free)
+
+
+@pytest.mark.parametrize("index", [5, 13, 21], ids=["tight limits", "payload", "plain"])
+def test_its_own_duration_as_a_fixed_one_gives_the_same_energy(index: int) -> None:
+    _, body = request(0, index)
+    free = solved(body)
+    assert energy(solved(body, duration=free.duration)) == pytest.approx(energy(free), rel=AGREED)
+
+
+def test_a_front_ends_with_the_answer_of_optimize() -> None:
+    least = energy(solved(LIFT))
+    front = pareto(to_problem(OptimizeRequest.model_validate(LIFT), DEADLINE), 4)
+    assert (1 - AGREED) * least <= energy(front.points[-1]) <= least
+    # J: that of the fastest motion, which a free duration was kept from coming near to
+    assert least < 29.63
+
+
+def test_short_peaks_of_the_tools_speed_are_no_refusal() -> None:
+    found = solved(SLOW_TOOL)
+    assert found.certificate.valid
+    assert energy(found) < (1 + AGREED) * energy(solved(SLOW_TOOL, method="lagrange"))
+
+
+def test_a_motion_that_the_certificate_rejects_is_solved_again_within_tighter_limits(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(sqp_method, "path_excess", lambda *_: np.zeros(2))
+    found = solved(SLOW_TOOL)
+    assert [each.reason for each in found.candidates] == [WITHIN_TIGHTER]
+    assert found.certificate.valid and found.certificate.worst_ratio["tcp_speed"] <= 1
+
+
+def test_a_second_rejection_ends_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sqp_method, "path_excess", lambda *_: np.zeros(2))
+    monkeypatch.setattr("optimizer.search.second_attempt.BEYOND", -0.02)
+    with pytest.raises(NoTrajectory):
+        solved(SLOW_TOOL)
+
+
+def test_a_pose_needs_no_more_than_a_posture_that_reaches_it() -> None:
+    pose = as_pose(flange(load_robot("fr3"), np.array(NEAR_A_STRETCHED_SHOULDER)))
+    to_posture = solved(REDUNDANT, goal={"q": NEAR_A_STRETCHED_SHOULDER})
+    assert energy(solved(REDUNDANT, goal={"pose": pose})) < (1 + AGREED) * energy(to_posture)
+
+
+def test_a_candidate_that_is_not_refined_says_so() -> None:
+    body = orjson.loads((EXAMPLES / "optimize" / "bin_to_shelf.json").read_bytes())
+    labels = {"shoulder": "right", "elbow": "up", "wrist": "flip"}
+    every, alone = solved(body | {"branch": None}), solved(body | {"branch": labels})
+    listed = {each.goal: each for each in every.candidates if each.energy is not None}
+    assert listed[every.goal.label].refined
+    other = listed[alone.goal.label]
+    assert other.energy is not None and other.energy > (1 + AGREED) * energy(alone) and other.refined is False
+    assert all(each.refined is None for each in every.candidates if each.energy is None)

@@ -1,0 +1,50 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.tasks import flange
+from models.registry import load_robot
+from models.robot import Array
+from optimizer.kinematics.angles import wrapped
+from optimizer.kinematics.inverse import required_inverse_kinematics
+from optimizer.kinematics.self_motion import FAR_APART, SelfMotion, spread, without_gaps
+
+# one turn of the first joint while the second stays within 0.003 rad of the stretched shoulder
+NEAR_SINGULAR = [0.57244, 0.00264, -2.87612, -1.45547, -0.40888, 2.9146, 0.92274]
+COUNT = 24
+
+
+class Corner:
+    """A curve whose joints stand still but for a step of 3 rad within a thousandth of the parameter."""
+
+    label, free, arcs = None, (0,), [(0.0, 1.0)]
+
+    def at(self, parameter: Array) -> Array:
+        return np.clip((parameter - 0.5) * 1e3, 0.0, 1.0)[:, None] * 3.0
+
+
+def test_members_follow_a_redundant_arm_past_a_singularity() -> None:
+    robot = load_robot("fr3")
+    T = flange(robot, np.array(NEAR_SINGULAR))
+    ends = required_inverse_kinematics(robot, "goal").solve(T, members=COUNT)
+    nearest = min(float(np.abs(wrapped(each.q - NEAR_SINGULAR)).max()) for each in ends)
+    assert nearest < FAR_APART
+
+
+def test_evenly_spread_members_are_left_as_they_are() -> None:
+    robot = load_robot("fr3")
+    T = flange(robot, np.array([0.3, -0.8, 0.4, -1.9, 0.5, 1.7, 0.2]))
+    for motion in required_inverse_kinematics(robot, "goal")._form.self_motions(T, robot.limits):  # type: ignore[attr-defined]
+        u = spread(motion, COUNT)
+        q = motion.at(u)
+        if np.abs(wrapped(np.diff(q, axis=0))).max() < FAR_APART:
+            np.testing.assert_array_equal(without_gaps(motion, u, q), q)
+
+
+def test_a_jump_ends_after_some_halvings_and_members_keep_their_order() -> None:
+    motion: SelfMotion = Corner()  # type: ignore[assignment]
+    u = np.linspace(0.0, 1.0, 9)
+    filled = without_gaps(motion, u, motion.at(u))[:, 0]
+    assert len(u) < len(filled) < 3 * len(u)
+    assert filled == pytest.approx(np.sort(filled))
