@@ -9,7 +9,7 @@ from optimizer.exceptions import InvalidTable
 from optimizer.identification.logs.columns import Columns, Group
 from optimizer.identification.logs.head import number
 
-_IN_NAME = re.compile(r"(.*\S)\s*[\[(]([^\[\]()]*[^\[\]()0-9\s][^\[\]()]*)[\])]")
+_DIGITS = frozenset("0123456789")
 _BEGINS = re.compile(r"[-+]?[.,]?[0-9]")  # of what is rather a number, or several
 _ANGLES: tuple[Group, ...] = ("q", "v", "a", "commanded")
 
@@ -30,11 +30,18 @@ _OTHER_UNITS: tuple[tuple[tuple[Group, ...], re.Pattern[str], re.Pattern[str], s
 
 def parted(names: Sequence[str]) -> tuple[list[str], list[str]]:
     """Names of columns without the units behind them, in brackets, and these units; empty where there are none."""
-    found = [_IN_NAME.fullmatch(name) for name in names]
-    return (
-        [name if match is None else match[1] for name, match in zip(names, found, strict=True)],
-        ["" if match is None else match[2] for match in found],
-    )
+    found = [_parted(name) for name in names]
+    return [bare for bare, _ in found], [unit for _, unit in found]
+
+
+def _parted(name: str) -> tuple[str, str]:
+    """A name without the unit in brackets behind it, and the unit; a number there is that of a joint."""
+    begin = max(name.rfind("["), name.rfind("("))
+    bare, unit = name[: max(begin, 0)].rstrip(), name[begin + 1 : -1]
+    is_unit = bare and name.endswith((")", "]")) and not {*unit} & {*")]"}
+    if is_unit and any(each not in _DIGITS and not each.isspace() for each in unit):
+        return bare, unit
+    return name, ""
 
 
 def is_line_of_units(cells: Sequence[str]) -> bool:
