@@ -13,7 +13,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pinocchio as pin
 
-from models.own_arm.description import Description, InvalidArm
+from models.own_arm.description import LONGEST_NAME, Description, InvalidArm
 from models.own_arm.robot_xml import number, numbers, robot_element
 from models.robot import Array
 from models.uploads.limits import Checkpoint, unwatched
@@ -164,7 +164,7 @@ def _check_chain(moving: list[Element]) -> None:
     if not 1 <= len(moving) <= MOST_JOINTS:
         _refuse("tip", f"Between base and tip {len(moving)} joints move: from 1 to {MOST_JOINTS} are possible.")
     for joint in moving:
-        name, kind = _name(joint), joint.get("type")
+        name, kind = _name(joint), str(joint.get("type"))[:LONGEST_NAME]
         if kind not in TURNING:
             _refuse("urdf", f"Joint {name!r} is {kind}: only revolute joints can move. Give its position in `locked`.")
         if joint.find("mimic") is not None:
@@ -291,8 +291,8 @@ def _limit(joint: Element, part: str) -> float:
 def _end(joint: Element, side: str) -> str:
     end = joint.find(side)
     link = None if end is None else end.get("link")
-    if not link:
-        _refuse("urdf", f"Joint {_name(joint)!r} has no <{side}> link.")
+    if not link or len(link) > LONGEST_NAME:
+        _refuse("urdf", f"Joint {_name(joint)!r} has no <{side}> link of up to {LONGEST_NAME} characters.")
     return link
 
 

@@ -1,0 +1,422 @@
+"""Uploads that claim shapes of no size, and uploads made to hold or to end a worker."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import io
+import json
+import struct
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from starlette.testclient import TestClient
+
+from app.convert.arm import to_arm
+from app.convert.mesh_file import mesh_from_file
+from app.convert.request import to_problem
+from app.schemas import errors as problems
+from app.schemas.arm import ArmRequest
+from app.schemas.examples.own_arm import ARM, URDF
+from app.schemas.identifications import IdentifyRequest
+from app.schemas.ik import IKRequest
+from app.schemas.logs import LogSettings
+from app.schemas.own_arm import OwnArm
+from app.schemas.request import OptimizeRequest
+from app.tasks.evaluate import EvaluateTask
+from app.tasks.identify import IdentifyTask
+from app.tasks.ik import IKTask
+from app.tasks.own_robot import OwnRobotTask
+from app.tasks.read_log import ReadLogTask
+from models.from_figures import robot_of
+from models.own_arm.description import Collision, InvalidArm
+from models.own_arm.figures import own_figures
+from models.own_arm.upright import turn_onto
+from models.registry import load_robot
+from models.uploads.limits import LIMITS
+from optimizer.deadline import Deadline, DeadlinePassed, watch
+from optimizer.exceptions import DeadlineExceeded, InvalidProblem
+from optimizer.problem.scene import Mesh
+from tests.app.routes.test_problems import refused
+from tests.identification_logs import csv_of, recorded, truth_of
+from tests.models.own_arm.arms import PLAIN
+from tests.optimizer.clocks import CountingClock
+
+CORNERS = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+LATE = 20.0
+"""Deadline [s] by a clock that moves by 1 s whenever it is read: it passes while a file of some pieces is read."""
+MORE_READINGS = 12
+"""Readings of the clock after the deadline: one that ends the reading, and those of whoever asks for the time left."""
+SHAPE = '<cylinder radius="0.05" length="0.3"/>'
+BLOCK = np.array([[x, y, z] for x in (0, 180) for y in (0, 60) for z in (0, 40)], dtype=float)  # mm
+
+
+def obj(points: Any) -> bytes:
+    """An OBJ with these corners, and a face for each three of them."""
+    lines = [f"v {x} {y} {z}" for x, y, z in np.asarray(points).tolist()]
+    return "\n".join([*lines, *(f"f {k} {k + 1} {k + 2}" for k in range(1, len(lines) - 1))]).encode()
+
+
+def arm(**changes: Any) -> Any:
+    fields = {name: getattr(PLAIN, name) for name in PLAIN.__dataclass_fields__}
+    return type(PLAIN)(**{**fields, **changes})
+
+
+def meshed(scale: str) -> str:
+    return URDF.replace(SHAPE, f'<mesh filename="link.obj" {scale}/>')
+
+
+@pytest.mark.parametrize(
+    ("shape", "words"),
+    [
+        ('<cylinder radius="-0.2" length="0.3"/>', "<cylinder>, whose `radius` .* not -0.2"),
+        ('<cylinder radius="0.05" length="0"/>', "<cylinder>, whose `length`"),
+        ('<cylinder radius="0.05" length="-0.3"/>', "<cylinder>, whose `length`"),
+        ('<capsule radius="0" length="0.3"/>', "<capsule>, whose `radius`"),
+        ('<sphere radius="0"/>', "<sphere>, whose `radius`"),
+        ('<sphere radius="1e-9"/>', "<sphere>, whose `radius`"),
+        ('<sphere radius="1e9"/>', "<sphere>, whose `radius`"),
+        ('<sphere radius="nan"/>', "`radius` that is no finite number"),
+        ('<sphere radius="inf"/>', "`radius` that is no finite number"),
+        ('<box size="0.1 0 0.1"/>', "<box>, whose `size`"),
+        ('<box size="0.1 -0.1 0.1"/>', "<box>, whose `size`"),
+    ],
+)
+def test_a_shape_of_no_size_makes_no_robot(shape: str, words: str) -> None:
+    with pytest.raises(InvalidArm, match=f"A <collision> of link 'upper_arm' has a {words}" if "<" in words else words):
+        own_figures("mine", arm(urdf=URDF.replace(SHAPE, shape)))
+
+
+@pytest.mark.parametrize(
+    ("scale", "points", "words"),
+    [
+        ('scale="0 0 0"', BLOCK, "press the mesh flat"),
+        ('scale="0.001 0.001 0"', BLOCK, "press the mesh flat"),
+        ('scale="0.001 0.001 1e-9"', BLOCK, "press the mesh flat"),
+        ('scale="1e-9 1e-9 1e-9"', BLOCK, "extend over 0.0001 m"),
+        ('scale="1e-308 1e-308 1e-308"', BLOCK, "extend over 0.0001 m"),
+        ('scale="nan 1 1"', BLOCK, "finite numbers"),
+        ('scale="1e308 1e308 1e308"', BLOCK, "extend over 0.0001 m"),
+        ("", np.full((6, 3), 0.2), "extend over 0.0001 m"),
+        ("", np.outer(np.arange(6.0), [0.1, 0.1, 0.0]), "on one line"),
+    ],
+)
+def test_a_mesh_of_no_size_makes_no_robot(scale: str, points: Any, words: str) -> None:
+    with pytest.raises(InvalidArm, match=f"link 'upper_arm' .*{words}"), np.errstate(over="ignore", invalid="ignore"):
+        own_figures("mine", arm(urdf=meshed(scale), meshes={"link.obj": obj(points)}))
+
+
+def test_a_mirrored_mesh_and_a_flat_one_keep_their_size() -> None:
+    """A negative scale mirrors, as on left and right hands; a sheet of metal is a surface with an area."""
+    for scale, points in (("0.001 -0.001 0.001", BLOCK), ("0.001 0.001 0.001", BLOCK * [1, 1, 0])):
+        files = {"link.obj": obj(points)}
+        figures, _ = own_figures("mine", arm(urdf=meshed(f'scale="{scale}"'), meshes=files))
+        (row,) = figures["collision"]["upper_arm"]["value"]
+        # in the frame of the figures, whose z axis is the joint's y axis
+        placed = (points * np.array([float(each) for each in scale.split()]) + [0, 0, 0.2]) @ turn_onto(np.eye(3)[1])
+        begin, along = np.array(row[:3]), np.array(row[3:6]) - row[:3]
+        share = np.clip((placed - begin) @ along / max(along @ along, 1e-30), 0, 1)
+        assert np.linalg.norm(placed - begin - share[:, None] * along, axis=1).max() <= row[6] + 1e-9  # rounding
+
+
+@pytest.mark.parametrize(
+    "collision",
+    [
+        Collision(radius=1e-9),
+        Collision(radius=float("nan")),
+        Collision({"forearm": ((0.0, 0.0, 0.0, 0.0, 0.0, 0.3, 1e-9),)}),
+        Collision({"forearm": ((0.0, 0.0, 0.0, 0.0, 0.0, 0.3, -0.1),)}),
+    ],
+)
+def test_a_users_capsule_has_a_size(collision: Collision) -> None:
+    with pytest.raises(InvalidArm, match=r"between 0\.0001 and 1 m"):
+        own_figures("mine", arm(collision=collision))
+
+
+def test_an_arm_whose_joints_are_in_one_place_needs_a_radius() -> None:
+    """The radius by the rule is a share of its length, which is zero."""
+    urdf = URDF
+    for part in ("0 0 0.4", "0 0 0.3", "0 0 0.2"):
+        urdf = urdf.replace(f'<origin xyz="{part}"/>', "")
+    with pytest.raises(InvalidArm, match=r"between 0\.0001 and 1 m") as found:
+        own_figures("mine", arm(urdf=urdf))
+    assert found.value.field == "collision.radius"
+
+
+def test_a_stored_robot_with_a_shape_of_no_size_is_refused() -> None:
+    figures, _ = own_figures("mine", PLAIN)
+    figures["collision"]["upper_arm"]["value"][0][6] = -0.2
+    with pytest.raises(ValueError, match="'upper_arm' must be between"):
+        robot_of("mine", figures)
+
+
+@pytest.mark.parametrize(
+    ("field", "shape"),
+    [
+        ("vertices", {"shape": "mesh", "vertices": (1e-6 * np.eye(4, 3)).tolist()}),
+        ("data", {"shape": "mesh_file", "format": "obj", "data": base64.b64encode(obj(np.eye(4, 3))).decode(),
+                  "scale": 1e-6}),
+    ],
+)  # fmt: skip
+def test_an_obstacle_of_no_size_is_refused(field: str, shape: dict[str, Any]) -> None:
+    request = ArmRequest.model_validate({"robot": "ur5e", "scene": {"obstacles": [{"name": "box", **shape}]}})
+    with pytest.raises(InvalidProblem, match=r"extend over 0\.0001 m or more") as found:
+        to_arm(request)
+    assert found.value.field == f"scene.obstacles.0.{field}"
+
+
+def test_a_hull_of_a_tenth_of_a_millimetre_is_a_body() -> None:
+    assert len(Mesh(1.01e-4 * np.eye(4, 3)).vertices) == 4
+
+
+# a document, or a file, of a size that counts; what becomes of it
+DOCUMENTS: dict[str, tuple[Callable[[int], str], str]] = {
+    "open comments": (lambda n: "<robot>" + "<!--" * n, "not XML"),
+    "comments": (lambda n: URDF.replace("</robot>", "<!---->" * n + "</robot>"), "more than 200000 elements"),
+    "attributes": (lambda n: URDF.replace("<robot", "<robot " + " ".join(f'a{k}=""' for k in range(n)), 1),
+                   "more than 200 attributes"),
+    "levels": (lambda n: URDF.replace("</robot>", "<a>" * n + "</a>" * n + "</robot>"), "more than 100 levels"),
+    "unclosed levels": (lambda n: URDF.replace("</robot>", "<a>" * n), "more than 100 levels"),
+    "elements": (lambda n: URDF.replace("</robot>", "<a/>" * n + "</robot>"), "more than"),
+    "instructions": (lambda n: URDF.replace("</robot>", "<?a?>" * n + "</robot>"), "more than 200000 elements"),
+    "entities": (lambda n: "<!DOCTYPE r [<!ENTITY a '" + "a" * n + "'>]><robot>" + "&a;" * n + "</robot>",
+                 "document type"),
+    "shapes": (lambda n: URDF.replace(SHAPE, SHAPE + "</geometry></collision><collision><geometry>" + SHAPE, 1)
+               .replace('<link name="tool"/>', '<link name="tool">' + f"<collision><geometry>{SHAPE}</geometry>"
+                        "</collision>" * min(n, 2000) + "</link>"), "more than 1000 shapes"),
+    "words": (lambda n: URDF.replace('"0 0 0.2"', '"' + "0 " * n + '"', 1), "not 3 finite numbers"),
+    "names": (lambda n: URDF.replace('link="upper_arm"', f'link="{"a" * n}"'), "no <child> link"),
+    "zeros": (lambda n: "\0" * n, "not XML"),
+    "surrogates": (lambda n: "<robot>" + "\ud800" * n, "not XML"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_a_urdf_that_holds_too_much_is_refused_at_once(name: str) -> None:
+    """Each took seconds to minutes, or the worker, by the time that a request's body may hold as much."""
+    make, words = DOCUMENTS[name]
+    with pytest.raises(InvalidArm, match=words) as found:
+        own_figures("mine", arm(urdf=make(300_000)))
+    assert found.value.field == "urdf" and len(str(found.value)) < 500
+
+
+def test_what_is_below_the_limits_is_read() -> None:
+    many = " ".join(f'a{k}=""' for k in range(LIMITS.xml_attributes - 1))
+    deep = LIMITS.xml_depth - 1
+    text = URDF.replace("<robot", f"<robot {many}", 1)
+    text = text.replace("</robot>", "<a>" * deep + "</a>" * deep + "<!---->" * 1000 + "</robot>")
+    assert own_figures("mine", arm(urdf=text)) == own_figures("mine", PLAIN)
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda text: "\ufeff" + text,
+        lambda text: '<?xml version="1.0" encoding="UTF-16"?>' + text,
+        lambda text: text.replace("\n", "\r\n"),
+        lambda text: text.replace("</robot>", '<!-- <xacro:a b="${c}"/> <!DOCTYPE d> --></robot>'),
+        lambda text: text.replace("<robot", '<robot xmlns="http://www.ros.org" xmlns:xacro="http://ros.org/xacro"', 1),
+        lambda text: text.replace("</robot>", '<gz:plugin gz:a="1"><b/></gz:plugin></robot>'),
+        lambda text: text.replace("</robot>", "<gazebo><![CDATA[ a < b ]]></gazebo></robot>"),
+        lambda text: text.replace("</robot>", '<gazebo a="&lt;&#65;">&amp;&gt;</gazebo><?php a?></robot>'),
+    ],
+)
+def test_what_public_urdfs_contain_is_no_fault(made: Callable[[str], str]) -> None:
+    assert own_figures("mine", arm(urdf=made(URDF))) == own_figures("mine", PLAIN)
+
+
+def glb(document: dict[str, Any], data: bytes) -> bytes:
+    head = json.dumps(document).encode()
+    parts = [(0x4E4F534A, head + b" " * (-len(head) % 4)), (0x004E4942, data + b"\0" * (-len(data) % 4))]
+    content = b"".join(struct.pack("<II", len(part), kind) + part for kind, part in parts)
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(content)) + content
+
+
+def one_triangle(primitives: int, nodes: list[dict[str, Any]]) -> bytes:
+    data = np.eye(3, dtype="<f4").tobytes() + np.arange(3, dtype="<u4").tobytes()
+    return glb(
+        {
+            "asset": {"version": "2.0"},
+            "buffers": [{"byteLength": 48}],
+            "bufferViews": [
+                {"buffer": 0, "byteOffset": 0, "byteLength": 36},
+                {"buffer": 0, "byteOffset": 36, "byteLength": 12},
+            ],
+            "accessors": [
+                {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+                {"bufferView": 1, "componentType": 5125, "count": 3, "type": "SCALAR"},
+            ],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}] * primitives}],
+            "nodes": nodes,
+            "scenes": [{"nodes": [0]}],
+            "scene": 0,
+        },
+        data,
+    )
+
+
+def mesh(kind: Any, content: bytes) -> Any:
+    return mesh_from_file(kind, base64.b64encode(content).decode(), 1.0)
+
+
+GROUPS = CORNERS + b"".join(b"g a%d\nusemtl m%d\nf 1 2 3\n" % (k, k) for k in range(40_000))
+SOLIDS = b"solid\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendsolid\n" * 40_000
+
+
+@pytest.mark.parametrize(("kind", "content"), [("obj", GROUPS), ("stl", SOLIDS)])
+def test_groups_materials_and_solids_cost_nothing(kind: Any, content: bytes) -> None:
+    """All of their triangles count. It took time as the square of their number, minutes for these."""
+    assert len(mesh(kind, content).corners) == 40_000
+
+
+@pytest.mark.parametrize(
+    ("primitives", "nodes"),
+    [
+        (1, [{"mesh": 0, "children": [k + 1]} for k in range(999)] + [{"mesh": 0}]),
+        (1, [{"mesh": 0, "children": [1]}, {"mesh": 0, "children": [0]}]),
+        (40_000, [{"mesh": 0}]),
+        (200, [{"mesh": 0}] * 200),
+    ],
+)
+def test_a_glb_of_many_copies_is_refused(primitives: int, nodes: list[dict[str, Any]]) -> None:
+    with pytest.raises(InvalidProblem, match="no plain glb file"):
+        mesh("glb", one_triangle(primitives, nodes))
+
+
+def test_a_plain_glb_is_read() -> None:
+    nodes = [{"children": [1]}, {"children": [2], "mesh": 0}, {"mesh": 0, "translation": [0, 0, 1]}]
+    assert len(mesh("glb", one_triangle(2, nodes)).corners) == 4
+
+
+def test_corners_that_count_back_are_those_above_the_face() -> None:
+    """Of the whole file, the last three would be the second triangle's, twice."""
+    content = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 0 0 5\nv 1 0 5\nv 0 1 5\nf -3/1/1 -2//2 -1\n"
+    heights = mesh("obj", content).corners[:, :, 2]
+    assert sorted(heights.max(axis=1)) == [0.0, 5.0] and sorted(heights.min(axis=1)) == [0.0, 5.0]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        CORNERS + b"f 0 1 2\n",
+        CORNERS + b"f 1 2 4\n",
+        CORNERS + b"f -4 2 3\n",
+        CORNERS + b"f 1 2 3" + b"9" * 100_000,
+        CORNERS + b"f" + b" 1 2 3" * 300_000,
+        CORNERS + b"f 1 2 3\n" * 100_001,
+        CORNERS.replace(b"v 1 0 0", b"v 1 0"),
+        CORNERS.replace(b"v 1 0 0", b"v 1 0 nan") + b"f 1 2 3\n",
+        CORNERS.decode().encode("utf-16"),
+        b"\0" * 1000,
+        b"",
+    ],
+)
+def test_an_obj_that_is_none_or_too_large_is_refused(content: bytes) -> None:
+    with pytest.raises(InvalidProblem) as found:
+        mesh("obj", content)
+    assert found.value.field == "data"
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> CountingClock:
+    """The clock of all deadlines, which moves by itself whenever it is read."""
+    clock = CountingClock()
+    monkeypatch.setattr(Deadline, "after", lambda seconds, _=None: Deadline(clock() + seconds, clock))
+    return clock
+
+
+def zipped(files: dict[str, bytes]) -> str:
+    target = io.BytesIO()
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return base64.b64encode(target.getvalue()).decode()
+
+
+@pytest.fixture(scope="module")
+def log_file() -> bytes:
+    robot = load_robot("ur5e")
+    return csv_of(recorded(robot, truth_of(robot), moves=2))
+
+
+def late_tasks(log: bytes, folder: Path) -> Iterator[tuple[str, Any]]:
+    """Tasks of all endpoints that take an upload."""
+    path = folder / "upload.csv"
+    path.write_bytes(log)
+    many = CORNERS + b"v 0 0 1\n" + b"f 1 2 3\nf 2 3 4\n" * (30 * LIMITS.mesh_lines)
+    remarks = base64.b64encode(b"#\n" * (30 * LIMITS.mesh_lines) + obj(np.eye(4, 3))).decode()
+    scene = {"obstacles": [{"name": "bin", "shape": "mesh_file", "format": "obj", "data": remarks}]}
+    with_mesh = OwnArm.model_validate({**ARM, "urdf": meshed(""), "meshes": zipped({"link.obj": many})})
+    yield "a mesh of a robot", OwnRobotTask("mine", with_mesh, "id")
+    text = OwnArm.model_validate({**ARM, "urdf": URDF.replace("</robot>", " " * (30 * LIMITS.xml_piece) + "</robot>")})
+    yield "a URDF", OwnRobotTask("mine", text, "id")
+    yield "a log", ReadLogTask(str(path), LogSettings(robot="ur5e"), 1 << 30, "id")
+    motion = folder / "motion.csv"
+    motion.write_text("q1,q2,q3,q4,q5,q6\n" + "0,0,0,0,0,0\n" * 200)
+    yield "a motion", EvaluateTask(str(motion), "csv", {"time_per_segment": "1"}, "json", "id", LATE)
+    request = IdentifyRequest.model_validate({"logs": ["1" * 8 + "-" + "-".join(["1" * 4] * 3) + "-" + "1" * 12]})
+    settings = LogSettings(robot="ur5e").model_dump(mode="json")
+    yield "an identification", IdentifyTask(request, ((settings, gzip.compress(log)),), "id")
+    pose = {"position": [0.4, 0.1, 0.3], "rpy": [0, 0, 0]}
+    yield "a scene of /ik", IKTask(IKRequest.model_validate({"pose": pose, "scene": scene}), "id")
+    move = {"start": {"q": [0.0] * 6}, "goal": {"q": [1.0] * 6}, "scene": scene}
+    asked = OptimizeRequest.model_validate(move)
+    yield "a scene", type("Task", (), {"run": staticmethod(lambda deadline: to_problem(asked, deadline))})
+
+
+def test_what_is_read_ends_at_its_deadline(clock: CountingClock, log_file: bytes, tmp_path: Path) -> None:
+    """With the typed error, and at once; whatever ran it goes on."""
+    for name, task in late_tasks(log_file, tmp_path):
+        began = clock.now
+        with pytest.raises(DeadlineExceeded):
+            task.run(LATE)
+        assert clock.now - began < LATE + MORE_READINGS, name
+
+
+@pytest.mark.parametrize("content", [gzip.compress(b"") * 10_000, gzip.compress(b"t,q1\n" + b"#\n" * 100_000)])
+def test_gzip_that_yields_nothing_ends_at_the_deadline(content: bytes) -> None:
+    from optimizer.identification.logs.reading import read_log
+
+    with pytest.raises(DeadlinePassed), watch(Deadline(LATE, CountingClock())):
+        read_log(content, load_robot("ur5e"))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"urdf": "<robot>" + "<!--" * 500_000},
+        {"urdf": URDF.replace("<robot", "<robot " + " ".join(f'a{k}="1"' for k in range(100_000)), 1)},
+        {"urdf": URDF.replace("</robot>", "<a>" * 400_000 + "</a>" * 400_000 + "</robot>")},
+        {"urdf": URDF.replace(SHAPE, '<cylinder radius="-0.2" length="0.3"/>')},
+        {"urdf": meshed('scale="1e-9 1e-9 1e-9"'), "meshes": zipped({"link.obj": obj(BLOCK)})},
+        {"urdf": meshed(""), "meshes": zipped({"link.obj": GROUPS})},
+        {"meshes": zipped({"a.stl": b"\0" * (LIMITS.mesh_bytes + 1)})},
+    ],
+)
+def test_the_worker_answers_and_lives_on(client: TestClient, change: dict[str, Any]) -> None:
+    """The last but one has three corners only, in 40,000 groups."""
+    workers = sorted(client.app.state.engine.worker_pids)  # type: ignore[attr-defined]
+    errors = refused(client.post("/robots", json={"name": "attack", **ARM, **change}), problems.Validation)["errors"]
+    assert errors[0]["loc"] in (["body", "urdf"], ["body", "meshes"])
+    assert sorted(client.app.state.engine.worker_pids) == workers  # type: ignore[attr-defined]
+
+
+def test_a_scene_of_40000_groups_is_an_obstacle(client: TestClient) -> None:
+    pose = {"position": [0.6, 0.6, 0.0], "rpy": [0, 0, 0]}
+    bin_ = {"name": "bin", "shape": "mesh_file", "format": "obj", "data": base64.b64encode(GROUPS).decode()}
+    move = {"start": {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]}, "goal": {"q": [1.0, -1.2, 1.8, -2.0, -1.3, 0.5]}}
+    answer = client.post("/optimize", json={**move, "scene": {"obstacles": [{**bin_, "pose": pose}]}})
+    assert answer.status_code == 200 and answer.json()["certificate"]["clearance"]["min_clearance"] > 0
+
+
+def test_a_body_that_unpacks_to_more_than_the_limit_is_refused(client: TestClient) -> None:
+    """Before and after unpacking: 70 kB of gzip make 70 MB of JSON."""
+    content = b'{"urdf": "' + b" " * 70_000_000 + b'"}'
+    headers = {"Content-Type": "application/json"}
+    packed = client.post("/robots", content=gzip.compress(content), headers={**headers, "Content-Encoding": "gzip"})
+    refused(packed, problems.BodyTooLarge)
+    refused(client.post("/robots", content=content, headers=headers), problems.BodyTooLarge)
