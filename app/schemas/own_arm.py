@@ -10,6 +10,8 @@ from pydantic import Field
 from app.schemas.common import NO_CONTROLS, PLAIN, Request, described
 from app.schemas.examples.own_arm import URDF
 from app.schemas.lengths import NAME_LENGTH, ROBOT_LENGTH
+from models.own_arm.description import WIDEST
+from models.shape_sizes import SIZES
 
 Positive = Annotated[float, Field(ge=1e-6, le=1e6)]
 NotNegative = Annotated[float, Field(ge=0, le=1e6)]
@@ -59,7 +61,7 @@ class OwnCollision(Request):
         default=None,
         max_length=200,
     )
-    radius: Annotated[float, Field(gt=0, lt=1)] | None = described(
+    radius: Annotated[float, Field(ge=SIZES.smallest, le=WIDEST)] | None = described(
         "Radius of the capsules from joint to joint. Null: 4.5 % of the arm's length.", "m", 0.05, default=None
     )
     never_meet: Annotated[list[Pair], Field(max_length=200)] | None = described(

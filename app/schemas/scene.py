@@ -19,6 +19,7 @@ from app.schemas.common import (
     frame_of,
 )
 from app.schemas.examples.values import BOX, MESH_FILE, TOOL, at
+from models.shape_sizes import SIZES
 from optimizer.problem.arm import MOST_PARTS
 from optimizer.problem.clouds import MOST_ALONG_EDGE, MOST_POINTS, MOST_VOXELS
 from optimizer.problem.names import LONGEST_NAME
@@ -31,7 +32,7 @@ BASE64 = r"^[A-Za-z0-9+/]*={0,2}$"
 # most cells of a grid in bits, and most bytes of a mesh file, and the lengths of their base64
 MOST_CELLS, MOST_FILE_BYTES = 1 << 23, 1 << 22
 MOST_BITS_TEXT, MOST_FILE_TEXT = 4 * -(-MOST_CELLS // 8 // 3) + 4, 4 * -(-MOST_FILE_BYTES // 3)
-Size = Annotated[float, Field(ge=1e-4, le=100)]
+Size = Annotated[float, Field(ge=SIZES.smallest, le=SIZES.largest)]
 
 
 class _Shape(Request):

@@ -12,6 +12,8 @@ from models.uploads.limits import Checkpoint, unwatched
 
 # m: places of the ends are rounded to this, the radius up to it
 DIGIT = 1e-5
+# most points of which a hull is computed at a time, about a second if all are its corners
+HULL = 100_000
 # of the search for the ends: steps, and the change of an end [m] at which it stops
 STEPS, CONVERGED = 1500, 1e-5
 
@@ -21,7 +23,7 @@ def capsule_around(points: Array, checkpoint: Checkpoint = unwatched) -> tuple[A
 
     Its volume is least as far as a direct search from each principal axis finds. The radius is exact.
     """
-    points = _outermost(points)
+    points = _outermost(points, checkpoint)
     centre = points.mean(axis=0)
     found = []
     for direction in np.linalg.svd(points - centre, full_matrices=False)[2]:
@@ -38,10 +40,14 @@ def capsule_around(points: Array, checkpoint: Checkpoint = unwatched) -> tuple[A
     return axis, float(np.ceil(_reach(axis, points) / DIGIT) * DIGIT)
 
 
-def _outermost(points: Array) -> Array:
-    """The corners of the hull, or all points if they are flat."""
+def _outermost(points: Array, checkpoint: Checkpoint) -> Array:
+    """The corners of the hull, or all points if they are flat. Of very many points some more: those of parts' hulls."""
+    parts = np.array_split(points, -(-len(points) // HULL))
+    if len(parts) > 1:
+        points = np.concatenate([_outermost(part, checkpoint) for part in parts])
+    checkpoint()
     try:
-        return np.asarray(points[ConvexHull(points).vertices])
+        return np.asarray(points[ConvexHull(points).vertices]) if len(points) <= HULL else points
     except (QhullError, ValueError):
         return points
 

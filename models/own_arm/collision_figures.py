@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from models.own_arm import rules
-from models.own_arm.description import LONGEST_NAME, Description, InvalidArm
+from models.own_arm.description import LONGEST_NAME, WIDEST, Description, InvalidArm
 from models.own_arm.figure import assumed, stated
-from models.own_arm.link_shapes import WIDEST, LinkShapes, Rows, check_near
+from models.own_arm.link_shapes import LinkShapes, Rows, check_near
 from models.own_arm.meeting_pairs import pairs_that_meet
 from models.own_arm.srdf import disabled_pairs
 from models.own_arm.upright import UprightChain

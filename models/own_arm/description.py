@@ -14,6 +14,8 @@ Letter = Literal["A", "B", "C", "T"]
 # x, y, z of both ends of the axis in the link's frame, then the radius [m]
 CapsuleRow = tuple[float, float, float, float, float, float, float]
 
+# greatest radius of a capsule that a user gives [m]
+WIDEST = 1.0
 # characters of a name or a path in a file that a message repeats at most
 LONGEST_NAME = 200
 

@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from models.own_arm.capsule_around import capsule_around
-from models.own_arm.description import CapsuleRow, Description, InvalidArm
+from models.own_arm.description import WIDEST, CapsuleRow, Description, InvalidArm
 from models.own_arm.mesh_files import corners
 from models.own_arm.robot_xml import numbers
 from models.own_arm.upright import UprightChain
@@ -26,8 +26,6 @@ from models.uploads.limits import LIMITS, Checkpoint
 
 # largest mesh of a link, and farthest place of a shape from its joint [m]: files in millimetres need a scale
 LARGEST, FARTHEST = 5.0, 50.0
-# greatest radius of a user's capsule [m]
-WIDEST = 1.0
 
 Rows = list[list[float]]
 """Of each capsule the ends of its axis and the radius, as in a robot's figures [m]."""

@@ -17,6 +17,9 @@ def unwatched() -> None:
 class UploadLimits:
     """Greatest numbers of what a file may hold. Each is an order of magnitude or more above published files."""
 
+    xml_bytes: int = 8 << 20
+    """Bytes of one document; published arms have up to 0.5 MB. The attributes of one element are all read before they
+    can be counted, so many of them in 1.5 s."""
     xml_depth: int = 100
     """Elements inside one another; a URDF needs 5, and what simulators add to it some 10 more. Libraries that copy and
     write the tree call themselves once for each level, and run out of stack at about 1,000."""
@@ -26,8 +29,8 @@ class UploadLimits:
     xml_nodes: int = 200_000
     """Elements, comments and processing instructions of one document; published arms have up to 3,000. The tree of so
     many takes some 50 MB."""
-    xml_piece: int = 1 << 22
-    """Bytes that are parsed between two checkpoints, about 0.1 s. Of what follows a fault, the parser still scans the
+    xml_piece: int = 1 << 18
+    """Bytes that are parsed between two checkpoints, in some 10 ms. Of what follows a fault, the parser still scans the
     rest of the piece; a token that is longer than a piece is scanned again with each."""
     shapes: int = 1000
     """Collision shapes and capsules of one arm. Each pair of shapes is compared in 300 configurations."""

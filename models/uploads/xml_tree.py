@@ -18,6 +18,8 @@ def xml_tree(text: str, checkpoint: Checkpoint = unwatched) -> Element:
     counted = _Counted()
     try:
         data = text.encode()
+        if len(data) > LIMITS.xml_bytes:
+            raise UnreadableFile(f"has more than {LIMITS.xml_bytes >> 20} MiB.")
         for begin in range(0, len(data), LIMITS.xml_piece):
             checkpoint()
             counted.parser.Parse(data[begin : begin + LIMITS.xml_piece], False)

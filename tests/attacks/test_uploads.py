@@ -190,6 +190,7 @@ DOCUMENTS: dict[str, tuple[Callable[[int], str], str]] = {
                         "</collision>" * min(n, 2000) + "</link>"), "more than 1000 shapes"),
     "words": (lambda n: URDF.replace('"0 0 0.2"', '"' + "0 " * n + '"', 1), "not 3 finite numbers"),
     "names": (lambda n: URDF.replace('link="upper_arm"', f'link="{"a" * n}"'), "no <child> link"),
+    "spaces": (lambda n: URDF.replace("<robot", "<robot" + " " * LIMITS.xml_bytes), "more than 8 MiB"),
     "zeros": (lambda n: "\0" * n, "not XML"),
     "surrogates": (lambda n: "<robot>" + "\ud800" * n, "not XML"),
 }  # fmt: skip
