@@ -1,4 +1,4 @@
-"""Uploads that claim shapes of no size, and uploads made to hold or to end a worker."""
+"""Uploads made to hold or to end a worker."""
 
 from __future__ import annotations
 
@@ -16,11 +16,9 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.convert.arm import to_arm
 from app.convert.mesh_file import mesh_from_file
 from app.convert.request import to_problem
 from app.schemas import errors as problems
-from app.schemas.arm import ArmRequest
 from app.schemas.examples.own_arm import ARM, URDF
 from app.schemas.identifications import IdentifyRequest
 from app.schemas.ik import IKRequest
@@ -32,18 +30,15 @@ from app.tasks.identify import IdentifyTask
 from app.tasks.ik import IKTask
 from app.tasks.own_robot import OwnRobotTask
 from app.tasks.read_log import ReadLogTask
-from models.from_figures import robot_of
-from models.own_arm.description import Collision, InvalidArm
+from models.own_arm.description import InvalidArm
 from models.own_arm.figures import own_figures
-from models.own_arm.upright import turn_onto
 from models.registry import load_robot
 from models.uploads.limits import LIMITS
 from optimizer.deadline import Deadline, DeadlinePassed, watch
 from optimizer.exceptions import DeadlineExceeded, InvalidProblem
-from optimizer.problem.scene import Mesh
 from tests.app.routes.test_problems import refused
 from tests.identification_logs import csv_of, recorded, truth_of
-from tests.models.own_arm.arms import PLAIN
+from tests.models.own_arm.arms import BLOCK, PLAIN, SHAPE, changed, meshed, obj
 from tests.optimizer.clocks import CountingClock
 
 CORNERS = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n"
@@ -51,128 +46,6 @@ LATE = 20.0
 """Deadline [s] by a clock that moves by 1 s whenever it is read: it passes while a file of some pieces is read."""
 MORE_READINGS = 12
 """Readings of the clock after the deadline: one that ends the reading, and those of whoever asks for the time left."""
-SHAPE = '<cylinder radius="0.05" length="0.3"/>'
-BLOCK = np.array([[x, y, z] for x in (0, 180) for y in (0, 60) for z in (0, 40)], dtype=float)  # mm
-
-
-def obj(points: Any) -> bytes:
-    """An OBJ with these corners, and a face for each three of them."""
-    lines = [f"v {x} {y} {z}" for x, y, z in np.asarray(points).tolist()]
-    return "\n".join([*lines, *(f"f {k} {k + 1} {k + 2}" for k in range(1, len(lines) - 1))]).encode()
-
-
-def arm(**changes: Any) -> Any:
-    fields = {name: getattr(PLAIN, name) for name in PLAIN.__dataclass_fields__}
-    return type(PLAIN)(**{**fields, **changes})
-
-
-def meshed(scale: str) -> str:
-    return URDF.replace(SHAPE, f'<mesh filename="link.obj" {scale}/>')
-
-
-@pytest.mark.parametrize(
-    ("shape", "words"),
-    [
-        ('<cylinder radius="-0.2" length="0.3"/>', "<cylinder>, whose `radius` .* not -0.2"),
-        ('<cylinder radius="0.05" length="0"/>', "<cylinder>, whose `length`"),
-        ('<cylinder radius="0.05" length="-0.3"/>', "<cylinder>, whose `length`"),
-        ('<capsule radius="0" length="0.3"/>', "<capsule>, whose `radius`"),
-        ('<sphere radius="0"/>', "<sphere>, whose `radius`"),
-        ('<sphere radius="1e-9"/>', "<sphere>, whose `radius`"),
-        ('<sphere radius="1e9"/>', "<sphere>, whose `radius`"),
-        ('<sphere radius="nan"/>', "`radius` that is no finite number"),
-        ('<sphere radius="inf"/>', "`radius` that is no finite number"),
-        ('<box size="0.1 0 0.1"/>', "<box>, whose `size`"),
-        ('<box size="0.1 -0.1 0.1"/>', "<box>, whose `size`"),
-    ],
-)
-def test_a_shape_of_no_size_makes_no_robot(shape: str, words: str) -> None:
-    with pytest.raises(InvalidArm, match=f"A <collision> of link 'upper_arm' has a {words}" if "<" in words else words):
-        own_figures("mine", arm(urdf=URDF.replace(SHAPE, shape)))
-
-
-@pytest.mark.parametrize(
-    ("scale", "points", "words"),
-    [
-        ('scale="0 0 0"', BLOCK, "press the mesh flat"),
-        ('scale="0.001 0.001 0"', BLOCK, "press the mesh flat"),
-        ('scale="0.001 0.001 1e-9"', BLOCK, "press the mesh flat"),
-        ('scale="1e-9 1e-9 1e-9"', BLOCK, "extend over 0.0001 m"),
-        ('scale="1e-308 1e-308 1e-308"', BLOCK, "extend over 0.0001 m"),
-        ('scale="nan 1 1"', BLOCK, "finite numbers"),
-        ('scale="1e308 1e308 1e308"', BLOCK, "extend over 0.0001 m"),
-        ("", np.full((6, 3), 0.2), "extend over 0.0001 m"),
-        ("", np.outer(np.arange(6.0), [0.1, 0.1, 0.0]), "on one line"),
-    ],
-)
-def test_a_mesh_of_no_size_makes_no_robot(scale: str, points: Any, words: str) -> None:
-    with pytest.raises(InvalidArm, match=f"link 'upper_arm' .*{words}"), np.errstate(over="ignore", invalid="ignore"):
-        own_figures("mine", arm(urdf=meshed(scale), meshes={"link.obj": obj(points)}))
-
-
-def test_a_mirrored_mesh_and_a_flat_one_keep_their_size() -> None:
-    """A negative scale mirrors, as on left and right hands; a sheet of metal is a surface with an area."""
-    for scale, points in (("0.001 -0.001 0.001", BLOCK), ("0.001 0.001 0.001", BLOCK * [1, 1, 0])):
-        files = {"link.obj": obj(points)}
-        figures, _ = own_figures("mine", arm(urdf=meshed(f'scale="{scale}"'), meshes=files))
-        (row,) = figures["collision"]["upper_arm"]["value"]
-        # in the frame of the figures, whose z axis is the joint's y axis
-        placed = (points * np.array([float(each) for each in scale.split()]) + [0, 0, 0.2]) @ turn_onto(np.eye(3)[1])
-        begin, along = np.array(row[:3]), np.array(row[3:6]) - row[:3]
-        share = np.clip((placed - begin) @ along / max(along @ along, 1e-30), 0, 1)
-        assert np.linalg.norm(placed - begin - share[:, None] * along, axis=1).max() <= row[6] + 1e-9  # rounding
-
-
-@pytest.mark.parametrize(
-    "collision",
-    [
-        Collision(radius=1e-9),
-        Collision(radius=float("nan")),
-        Collision({"forearm": ((0.0, 0.0, 0.0, 0.0, 0.0, 0.3, 1e-9),)}),
-        Collision({"forearm": ((0.0, 0.0, 0.0, 0.0, 0.0, 0.3, -0.1),)}),
-    ],
-)
-def test_a_users_capsule_has_a_size(collision: Collision) -> None:
-    with pytest.raises(InvalidArm, match=r"between 0\.0001 and 1 m"):
-        own_figures("mine", arm(collision=collision))
-
-
-def test_an_arm_whose_joints_are_in_one_place_needs_a_radius() -> None:
-    """The radius by the rule is a share of its length, which is zero."""
-    urdf = URDF
-    for part in ("0 0 0.4", "0 0 0.3", "0 0 0.2"):
-        urdf = urdf.replace(f'<origin xyz="{part}"/>', "")
-    with pytest.raises(InvalidArm, match=r"between 0\.0001 and 1 m") as found:
-        own_figures("mine", arm(urdf=urdf))
-    assert found.value.field == "collision.radius"
-
-
-def test_a_stored_robot_with_a_shape_of_no_size_is_refused() -> None:
-    figures, _ = own_figures("mine", PLAIN)
-    figures["collision"]["upper_arm"]["value"][0][6] = -0.2
-    with pytest.raises(ValueError, match="'upper_arm' must be between"):
-        robot_of("mine", figures)
-
-
-@pytest.mark.parametrize(
-    ("field", "shape"),
-    [
-        ("vertices", {"shape": "mesh", "vertices": (1e-6 * np.eye(4, 3)).tolist()}),
-        ("data", {"shape": "mesh_file", "format": "obj", "data": base64.b64encode(obj(np.eye(4, 3))).decode(),
-                  "scale": 1e-6}),
-    ],
-)  # fmt: skip
-def test_an_obstacle_of_no_size_is_refused(field: str, shape: dict[str, Any]) -> None:
-    request = ArmRequest.model_validate({"robot": "ur5e", "scene": {"obstacles": [{"name": "box", **shape}]}})
-    with pytest.raises(InvalidProblem, match=r"extend over 0\.0001 m or more") as found:
-        to_arm(request)
-    assert found.value.field == f"scene.obstacles.0.{field}"
-
-
-def test_a_hull_of_a_tenth_of_a_millimetre_is_a_body() -> None:
-    assert len(Mesh(1.01e-4 * np.eye(4, 3)).vertices) == 4
-
-
 # a document, or a file, of a size that counts; what becomes of it
 DOCUMENTS: dict[str, tuple[Callable[[int], str], str]] = {
     "open comments": (lambda n: "<robot>" + "<!--" * n, "not XML"),
@@ -201,7 +74,7 @@ def test_a_urdf_that_holds_too_much_is_refused_at_once(name: str) -> None:
     """Each took seconds to minutes, or the worker, by the time that a request's body may hold as much."""
     make, words = DOCUMENTS[name]
     with pytest.raises(InvalidArm, match=words) as found:
-        own_figures("mine", arm(urdf=make(300_000)))
+        own_figures("mine", changed(urdf=make(300_000)))
     assert found.value.field == "urdf" and len(str(found.value)) < 500
 
 
@@ -210,7 +83,7 @@ def test_what_is_below_the_limits_is_read() -> None:
     deep = LIMITS.xml_depth - 1
     text = URDF.replace("<robot", f"<robot {many}", 1)
     text = text.replace("</robot>", "<a>" * deep + "</a>" * deep + "<!---->" * 1000 + "</robot>")
-    assert own_figures("mine", arm(urdf=text)) == own_figures("mine", PLAIN)
+    assert own_figures("mine", changed(urdf=text)) == own_figures("mine", PLAIN)
 
 
 @pytest.mark.parametrize(
@@ -227,7 +100,7 @@ def test_what_is_below_the_limits_is_read() -> None:
     ],
 )
 def test_what_public_urdfs_contain_is_no_fault(made: Callable[[str], str]) -> None:
-    assert own_figures("mine", arm(urdf=made(URDF))) == own_figures("mine", PLAIN)
+    assert own_figures("mine", changed(urdf=made(URDF))) == own_figures("mine", PLAIN)
 
 
 def glb(document: dict[str, Any], data: bytes) -> bytes:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -85,3 +87,27 @@ def refused(field: str, words: str, description: Description) -> None:
     with pytest.raises(InvalidArm, match=words) as found:
         own_figures("mine", description)
     assert found.value.field == field
+
+
+SHAPE = '<cylinder radius="0.05" length="0.3"/>'
+"""The collision shape of the plain arm."""
+
+
+BLOCK = np.array([[x, y, z] for x in (0, 180) for y in (0, 60) for z in (0, 40)], dtype=float)
+"""Corners of a block [mm]."""
+
+
+def obj(points: Any) -> bytes:
+    """An OBJ with these corners (n, 3), and a face for each three of them that follow one another."""
+    lines = [f"v {x} {y} {z}" for x, y, z in np.asarray(points).tolist()]
+    return "\n".join([*lines, *(f"f {k} {k + 1} {k + 2}" for k in range(1, len(lines) - 1))]).encode()
+
+
+def changed(**changes: Any) -> Description:
+    """The plain arm with other fields."""
+    return dataclasses.replace(PLAIN, **changes)
+
+
+def meshed(scale: str) -> str:
+    """The URDF of the plain arm, with a mesh as its shape."""
+    return URDF.replace(SHAPE, f'<mesh filename="link.obj" {scale}/>')
