@@ -203,8 +203,7 @@ def _merged(
             joint.set("type", "revolute")
             limit.attrib.update({"lower": repr(-CONTINUOUS), "upper": repr(CONTINUOUS)})
     for link in bare.findall("link"):
-        for shape in (*link.findall("visual"), *link.findall("collision")):
-            link.remove(shape)
+        link[:] = [each for each in link if each.tag not in ("visual", "collision")]
     names = {_name(joint): k for k, joint in enumerate(moving, start=1)}
     given = {f"joint {k}": _name(joint) for k, joint in enumerate(bare.findall("joint"))}
     for unique, joint in zip(given, bare.findall("joint"), strict=True):
