@@ -11,12 +11,15 @@ import pinocchio as pin
 from models.own_arm.link_shapes import Rows
 from models.own_arm.upright import UprightChain, turn_onto
 from models.own_arm.urdf_chain import Chain
+from models.robot import Array
 from models.uploads.limits import Checkpoint
 
 # random configurations over which pairs are looked at, and the share of them from which on two links cannot be apart.
 # Joints have the ranges that links leave them: a pair that meets this often with a guessed capsule says that it is too
 # thick there
 SAMPLES, ALWAYS, OFTEN = 300, 0.95, 0.3
+# m: what rounding may take from a ball around a capsule
+ROUNDING = 1e-9
 
 
 def pairs_that_meet(
@@ -27,6 +30,7 @@ def pairs_that_meet(
     pairs = [(a, b) for a, b in combinations(range(chain.nq + 1), 2) if a + 1 < b]
     meets = np.zeros(len(pairs))
     shapes = [[(coal.Capsule(row[6], _length(row)), _middle(row)) for row in rows] for rows in capsules]
+    balls = [_balls(rows) for rows in capsules]
     request = coal.CollisionRequest()
     for q in np.random.default_rng(0).uniform(chain.q_min, chain.q_max, (SAMPLES, chain.nq)):
         frames = [pin.SE3.Identity()]
@@ -34,12 +38,28 @@ def pairs_that_meet(
             frames.append(frames[-1] * placement * pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, angle), np.zeros(3)))
         for k, pair in enumerate(pairs):
             checkpoint()
-            first, second = ([(shape, _pose(frames[i] * at)) for shape, at in shapes[i]] for i in pair)
+            (T_a, first, around_a), (T_b, second, around_b) = ((frames[i], shapes[i], balls[i]) for i in pair)
             meets[k] += any(
-                coal.collide(a, T_a, b, T_b, request, coal.CollisionResult()) for a, T_a in first for b, T_b in second
-            )
+                coal.collide(
+                    first[i][0], _pose(T_a * first[i][1]), second[j][0], _pose(T_b * second[j][1]),
+                    request, coal.CollisionResult(),
+                )
+                for i, j in _close(T_a, around_a, T_b, around_b)
+            )  # fmt: skip
     share = [OFTEN if guessed[a] or guessed[b] else ALWAYS for a, b in pairs]
     return [list(pair) for pair, count, least in zip(pairs, meets, share, strict=True) if count >= least * SAMPLES]
+
+
+def _balls(rows: Rows) -> Array:
+    """Centre and radius (n, 4) [m] of the ball around each capsule."""
+    return np.array([[*((np.array(row[:3]) + row[3:6]) / 2), row[6] + _length(row) / 2 + ROUNDING] for row in rows])
+
+
+def _close(T_a: pin.SE3, first: Array, T_b: pin.SE3, second: Array) -> list[list[int]]:
+    """Which of balls (n, 4) and (m, 4) [m], in their frames, overlap: indices of each pair."""
+    a, b = (balls[:, :3] @ T.rotation.T + T.translation for T, balls in ((T_a, first), (T_b, second)))
+    apart = np.linalg.norm(a[:, None] - b[None], axis=2) - first[:, None, 3] - second[None, :, 3]
+    return np.argwhere(apart <= 0).tolist()
 
 
 def _length(row: list[float]) -> float:
