@@ -15,7 +15,7 @@ def unwatched() -> None:
 
 @dataclass(frozen=True)
 class UploadLimits:
-    """Greatest numbers of what a file may hold. Each is an order of magnitude or more above published files."""
+    """Greatest numbers of what a file may hold: each is several times that of any published file that was looked at."""
 
     xml_bytes: int = 8 << 20
     """Bytes of one document; published arms have up to 0.5 MB. The attributes of one element are all read before they
