@@ -72,7 +72,7 @@ def to_evaluate_response(request_id: str, asked: ArmRequest, result: Evaluation)
         ],
         "collides": None if nearest is None else nearest.distance < 0,
         "nearest": None if nearest is None else fields(nearest, *SampledClearance.model_fields),
-        "warnings": sampled_warnings(result.close_pass),
+        "warnings": sampled_warnings(result),
         "samples": None if samples is None else fields(samples, *Samples.__dataclass_fields__),
     }
 
