@@ -69,7 +69,7 @@ def answered(task: Task, deadline: float, request_id: str) -> bytes:
 
     try:
         result = _run(task, deadline)
-        return (result if result.kept_as is None else result.without_path()).document
+        return (result if result.kept_as is None else result.not_kept()).document
     except (JoulepathError, ServiceError) as error:
         raise refused(error, request_id) from None
 

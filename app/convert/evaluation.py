@@ -58,7 +58,8 @@ def to_evaluate_response(request_id: str, asked: ArmRequest, result: Evaluation)
     """The answer of `POST /evaluate`, for the motion of the arm asked about."""
     samples, nearest = result.samples, result.nearest
     return {
-        "id": request_id,
+        "request": request_id,
+        "id": None,
         "robot": asked.robot,
         "arm": arm_fields(asked),
         "duration": result.total.duration,

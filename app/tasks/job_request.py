@@ -73,6 +73,7 @@ class JobRequestTask:
             result = CycleTask(cycle, self.request_id, motions=self.motions).run(deadline)
         else:
             result = _RUN[self.kind](body, self.request_id, deadline)
+        result = result if result.kept_as is not None else result.kept()
         answer = orjson.loads(result.document)
         figures = figures_of(answer)
         # here and not in the service, which has more to do; nobody waits, so that size counts more than time

@@ -62,7 +62,8 @@ class _Work:
     def result_of(self, robot: str, objective: str | None, base: Any, changes: list[Any]) -> TaskResult:
         """The answer."""
         content = {
-            "id": self.request_id,
+            "request": self.request_id,
+            "id": None,
             "robot": robot,
             "objective": objective,
             "base": base,

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from tests.app.job_clients import ended
 from tests.app.live import ROOT
 from tests.app.requests import HOME, NEAR, PATIENT
 
@@ -36,15 +37,8 @@ def free_about(end: dict[str, Any], axis: list[float] | None) -> dict[str, Any]:
     return {"pose": {**end["pose"], "orientation": {**orientation, "free_about": axis}}}
 
 
-@pytest.mark.parametrize(
-    "free",
-    [
-        ("start",),
-        pytest.param(("start", "goal"), marks=pytest.mark.long),
-        pytest.param(("goal",), marks=pytest.mark.long),
-    ],
-    ids="+".join,
-)
+@pytest.mark.long
+@pytest.mark.parametrize("free", [("start",), ("start", "goal"), ("goal",)], ids="+".join)
 def test_a_seam_with_free_ends_is_answered(client: TestClient, free: tuple[str, ...]) -> None:
     """Where the tool is beside the last axis, a nozzle turned about it is another place for the wrist."""
     asked = example("optimize/seam_any_turn")
@@ -141,3 +135,70 @@ def test_a_payload_without_mass_needs_no_centre(client: TestClient) -> None:
     arm = {"payload": {"mass": 0}}
     changed = client.post("/whatif", json={"optimize": asked, "changes": [{"name": "empty", "arm": arm}], **PATIENT})
     assert changed.status_code == 200, changed.text
+
+
+def kept_answers(client: TestClient) -> list[dict[str, Any]]:
+    """One answer of each path whose answers, or whose parts, are kept: the answers that are."""
+    asked = {"start": {"q": HOME}, "goal": {"q": NEAR}, **PATIENT}
+    motion = {"configurations": [HOME, NEAR], "time_per_segment": 1.5, "sample_period": 0.02}
+    optimized = client.post("/optimize", json=asked).json()
+    a_round = client.post("/cycle", json={"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], **PATIENT}).json()
+    front = client.post("/pareto", json=asked | {"points": 2}).json()
+    empty = {"name": "empty", "arm": {"payload": None}}
+    changed = client.post("/whatif", json={"evaluate": motion, "changes": [empty], **PATIENT}).json()
+    sent = client.post("/jobs", json={"requests": [{"optimize": asked}, {"evaluate": motion}]})
+    job = ended(client, sent.headers["location"])
+    study = client.post("/studies", json={"name": "ids", "threshold": 1.0}).headers["location"]
+    step = client.post(f"{study}/iterations", json={"evaluate": motion}).json()
+    paths = [
+        *(leg["answer"] for leg in a_round["legs"] if leg["answer"]),
+        *(point["answer"] for point in front["points"]),
+        changed["base"]["answer"],
+        *(each["answer"] for each in job["requests"]),
+        f"/answers/{step['answer']}",
+    ]
+    return [optimized, a_round, *(client.get(path).json()["answer"] for path in paths)]
+
+
+def test_the_id_in_an_answer_is_that_of_the_kept_answer(client: TestClient) -> None:
+    for answer in kept_answers(client):
+        stored = client.get(f"/answers/{answer['id']}")
+        assert stored.status_code == 200, stored.text
+        assert stored.json()["id"] == answer["id"] and stored.json()["answer"] == answer
+        exported = client.post("/export/csv", json={"answer": answer["id"]})
+        assert exported.status_code == 200, exported.text
+        assert answer.get("answer", f"/answers/{answer['id']}") == f"/answers/{answer['id']}"
+
+
+@pytest.mark.parametrize("fields", [{}, {"method": "time_scaling"}], ids=["bspline", "time_scaling"])
+def test_an_equal_request_has_its_own_request_and_the_same_id(client: TestClient, fields: dict[str, Any]) -> None:
+    asked = {"start": {"q": HOME}, "goal": {"q": NEAR}, "gravity": [0.0, 0.0, -9.8123], **PATIENT, **fields}
+    headers = [{"Cache-Control": "max-age=0", "X-Request-ID": name} for name in ("mine", "mine.again")]
+    first, again = (client.post("/optimize", json=asked, headers=each) for each in headers)
+    assert again.headers["joulepath-cache"] == "hit"
+    assert [each.json()["request"] for each in (first, again)] == ["mine", "mine.again"]
+    assert [each.headers["x-request-id"] for each in (first, again)] == ["mine", "mine.again"]
+    assert first.json()["id"] == again.json()["id"] not in ("mine", "mine.again")
+    assert client.get(f"/answers/{again.json()['id']}").json()["answer"]["request"] == "mine", "it was computed for it"
+
+
+def test_an_id_of_the_caller_is_no_id_of_an_answer(client: TestClient) -> None:
+    """Even one that has the form of an answer's, of which another is kept."""
+    asked = {"start": {"q": HOME}, "goal": {"q": NEAR}, **PATIENT}
+    first = client.post("/optimize", json=asked).json()
+    second = client.post("/optimize", json=asked, headers={"X-Request-ID": first["id"]}).json()
+    assert second["request"] == first["id"] != second["id"]
+    assert client.get(second["answer"]).json()["answer"] == second
+
+
+@pytest.mark.parametrize("path", ["evaluate", "compare", "ik"])
+def test_an_answer_that_is_not_kept_has_no_id(client: TestClient, path: str) -> None:
+    bodies: dict[str, dict[str, Any]] = {
+        "evaluate": {"configurations": [HOME, NEAR], "time_per_segment": 1.5},
+        "compare": {"start": {"q": HOME}, "goal": {"q": NEAR}, "methods": ["bspline"], "answers": True, **PATIENT},
+        "ik": {"pose": {"position": [0.4, -0.2, 0.35], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
+    }
+    answer = client.post(f"/{path}", json=bodies[path], headers={"X-Request-ID": "mine"}).json()
+    assert answer["request"] == "mine" and answer["id"] is None
+    for row in answer.get("methods", []):
+        assert row["answer"]["request"] == "mine" and row["answer"]["id"] is row["answer"]["answer"] is None
