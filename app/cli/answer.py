@@ -75,13 +75,15 @@ def answered(task: Task, deadline: float, request_id: str) -> bytes:
 
 
 def _run(task: Task, deadline: float) -> TaskResult:
-    """The result of a task, with the robot and the figures that it takes from the database."""
-    from app.cli.store import with_figures, with_own_robot
-    from app.exceptions import UnknownFigures
+    """The result of a task, with the log, the robot and the figures that it takes from the database."""
+    from app.cli.store import with_figures, with_log, with_own_robot
+    from app.exceptions import UnknownFigures, UnknownLog
     from optimizer.exceptions import UnknownRobot
 
     try:
         return task.run(deadline)
+    except UnknownLog as error:
+        return _run(with_log(task, error.id), deadline)
     except UnknownFigures as error:
         task = with_figures(task, error.id)
     except UnknownRobot as error:

@@ -83,7 +83,8 @@ def _check_header(columns: list[str], nq: int) -> None:
     for k, (name, right) in enumerate(zip(columns, expected, strict=False), 1):
         if name != right:
             raise InvalidTable(f"Column {k} of the header is not `{right}`: its columns must be {wanted}", 1, right)
-    raise InvalidTable(f"The header has {len(columns)} columns: they must be {wanted}", 1)
+    last = columns[-1]
+    raise InvalidTable(f"The header has {len(columns)} columns, up to `{last}`: they must be {wanted}", 1, last)
 
 
 def _blocks(file: BufferedReader, columns: list[str], separator: str) -> Iterator[Array]:

@@ -105,8 +105,7 @@ def _identified(answer: dict[str, Any]) -> FoundFigures:
 
 def _evaluate(body: bytes, request_id: str, deadline: float) -> TaskResult:
     request = EvaluateRequest.model_validate_json(body)
-    evaluation = evaluated(request, Deadline.after(deadline))
-    return TaskResult.of_json(to_evaluate_response(request_id, request, evaluation))
+    return TaskResult.of_json(to_evaluate_response(request_id, evaluated(request, Deadline.after(deadline))))
 
 
 _RUN: dict[str, Callable[[bytes, str, float], TaskResult]] = {

@@ -124,7 +124,7 @@ class _Evaluator:
         self._limits = LimitMonitor(arm)
         self._clearance = ClearanceMonitor(arm) if arm.collisions else None
         self._sampler = None if period is None else Sampler(self._plant, period)
-        self._segment_count = motion.segments if isinstance(motion, Waypoints) else 1
+        self._segment_count = motion.segments
         self._intervals: dict[int, IntervalEnergy] = {}
         self._speed_jumps = 0
         self._spread = arm_spread(arm)

@@ -52,7 +52,8 @@ class LogOptions:
 
     `payload`: what the arm carried; None: what the log says, else nothing. `gravity` (3,) [m/s²] in the base frame.
     `columns` names the columns where their names are not known: see `mapped`. `units` are those of the joints,
-    `current_units` those of currents. `effort` says what the efforts are; `auto` finds it out. `most_bytes` is the
+    `current_units` those of currents. `effort` says what the efforts are; `auto` finds it out, and with None they are
+    not read. `most_bytes` is the
     greatest size of the file after unpacking.
     """
 
@@ -61,7 +62,7 @@ class LogOptions:
     columns: Mapping[str, str | Sequence[str]] | None = None
     units: Literal["rad", "deg"] = "rad"
     current_units: Literal["A", "mA"] = "A"
-    effort: EffortMeaning | Literal["auto"] = "auto"
+    effort: EffortMeaning | Literal["auto"] | None = "auto"
     name: str | None = None
     tags: tuple[str, ...] = ()
     most_bytes: int = MOST_BYTES
@@ -116,7 +117,7 @@ def read(source: Path | bytes, robot: Robot, options: LogOptions) -> Reading:
     logged = {group: channels.take(group) for group in ("v", "a", "commanded", "temperature")}
     v, a = speeds_of(q, logged["v"], logged["a"], columns, grid.rate, remarks)
     motion = Motion(robot, payload, gravity, q, v, a, grid.rate)
-    named = next((group for group in _EFFORTS if group in channels.values), None)
+    named = None if options.effort is None else next((group for group in _EFFORTS if group in channels.values), None)
     effort, found = None, None
     if named is not None:
         effort, found = _efforts(channels, named, motion, options, remarks)
@@ -151,7 +152,7 @@ def _efforts(
 
     Raises EffortNotUsable."""
     effort = channels.take(named)
-    assert effort is not None
+    assert effort is not None and options.effort is not None
     check_measured(effort)
     remarks += held_warning("effort", effort, motion.v, motion.rate)
     effort = _in_time("effort comes", effort, lag_of(motion, effort), channels.grid.time, remarks)
