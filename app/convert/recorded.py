@@ -16,10 +16,10 @@ from app.exceptions import UnknownLog
 from app.schemas.arm import Payload
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
 from app.schemas.logs import LogSettings
-from optimizer.exceptions import InvalidProblem
-from optimizer.identification.errors import EffortNotUsable
+from optimizer.exceptions import InvalidProblem, InvalidTable
 from optimizer.identification.logs.log import Log
-from optimizer.identification.logs.reading import LogOptions, Reading, read
+from optimizer.identification.logs.log_errors import EffortNotUsable
+from optimizer.identification.logs.reading import LogOptions, Reading, check_header, read
 from optimizer.problem import arm as library
 
 S = TypeVar("S", bound=EvaluateSettings)
@@ -67,10 +67,11 @@ def as_logged(asked: EvaluateRequest) -> EvaluateRequest:
     return asked if asked.log is None else told_by(reading_of(asked.log).log, asked)
 
 
-def read_csv(file: Path, asked: EvaluateCsvSettings) -> Reading:
-    """The log in a CSV file. Efforts that are not usable are not read: the energy needs none, and a remark says so.
+def read_csv(file: Path, asked: EvaluateCsvSettings, otherwise: InvalidTable) -> Reading:
+    """The log in a CSV file, whose header is wrong for a motion because of `otherwise`. Efforts that are not usable are
+    not read: the energy needs none, and a remark says so.
 
-    Raises InvalidTable, LogTooLarge or InvalidProblem.
+    Raises LogTooLarge, InvalidProblem, or InvalidTable: `otherwise` where the header has a motion's columns, or none.
     """
     options = LogOptions(
         payload=to_payload(asked.payload) if "payload" in asked.model_fields_set else None,
@@ -81,6 +82,10 @@ def read_csv(file: Path, asked: EvaluateCsvSettings) -> Reading:
         effort=asked.effort,
     )
     robot = robot_named(asked.robot)
+    try:
+        check_header(file, robot, options)
+    except InvalidTable as error:
+        raise otherwise if otherwise.column is not None or error.column is None else error from None
     try:
         return read(file, robot, options)
     except EffortNotUsable as error:

@@ -52,6 +52,7 @@ MOST_ITERATIONS = 2**31 - 1
             *MOTION_PROBLEMS,
             problems.PathInfeasible,
             problems.InvalidTable,
+            problems.UnknownLog,
             problems.KeyReused,
             problems.UnknownStudy,
             problems.NotOwner,

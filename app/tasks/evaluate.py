@@ -70,14 +70,8 @@ class EvaluateTask:
             raise InvalidRequest([{"loc": location(error, "query"), "msg": str(error)}]) from None
 
     def _evaluate_log(self, settings: EvaluateCsvSettings, end: Deadline, error: InvalidTable) -> Evaluated:
-        """The evaluation of a file whose header is not that of a motion, but of a log.
-
-        Raises `error` if it is neither, and has a motion's columns.
-        """
-        try:
-            reading = read_csv(Path(self.file), settings)
-        except InvalidTable as other:
-            raise error if other.row == 1 and error.column is not None else other from None
+        """The evaluation of a file whose header is that of a log, and not that of a motion, as `error` says."""
+        reading = read_csv(Path(self.file), settings, error)
         if settings.model_fields_set & {"time_per_segment", "interpolation"}:
             raise own_times()
         return evaluated_log(told_by(reading.log, settings), reading, end)

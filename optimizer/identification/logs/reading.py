@@ -97,6 +97,12 @@ def read_log(source: Path | bytes, robot: Robot, **options: Any) -> Log:
     return read(source, robot, LogOptions(**options)).log
 
 
+def check_header(source: Path | bytes, robot: Robot, options: LogOptions) -> None:
+    """Raises InvalidTable unless the file begins as a log does: with names of columns that are known or mapped."""
+    with Source(source, options.most_bytes) as file:
+        _named(head_of(file, robot.joint_names).names, robot, options)
+
+
 def read(source: Path | bytes, robot: Robot, options: LogOptions) -> Reading:
     """The log in a CSV file, which may be gzip, and what was seen in it.
 
@@ -175,11 +181,16 @@ def _power(channels: _Channels, motion: Motion, remarks: list[str]) -> Array | N
 
 def _columns(names: Sequence[str], first: Sequence[str], robot: Robot, options: LogOptions) -> Columns:
     """The columns that are read, by the header and the cells of the `first` row."""
+    columns = _named(names, robot, options)
+    return columns if options.columns is not None else in_order_of_joints(columns, first, robot.joint_names)
+
+
+def _named(names: Sequence[str], robot: Robot, options: LogOptions) -> Columns:
+    """The columns that are read, by the header. Raises InvalidTable or InvalidProblem."""
     if options.columns is not None:
         return mapped(names, options.columns, robot.nq)
     bare, _ = parted(names)
-    columns = by_joint_name(bare, robot.joint_names) or recognised(bare, robot.nq)
-    return in_order_of_joints(columns, first, robot.joint_names)
+    return by_joint_name(bare, robot.joint_names) or recognised(bare, robot.nq)
 
 
 def _begun(rows: Rows, robot: Robot, options: LogOptions, scales: Mapping[Group, float], remarks: list[str]) -> Columns:

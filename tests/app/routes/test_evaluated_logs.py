@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import json
 from collections.abc import Iterator
 from typing import Any
 
@@ -28,6 +29,8 @@ PAYLOAD = {"mass": CARRIED.mass, "com": CARRIED.com.tolist()}
 SAMPLED = 2e-3
 # relative: of the unit's drives against the robot's own figures, which differ by some ten per cent
 OWN_FIGURES = 0.25
+# s: a move begins and ends slowly, and counts once its speed is above the noise
+EDGES = 0.15
 ABSENT = "7b5f3a52-3a26-4a3e-8f0e-3c1d0e6f5a11"
 
 
@@ -86,10 +89,10 @@ def test_the_measured_energy_of_each_move_stands_beside_the_models(client: TestC
     assert answer["arm"]["payload"]["mass"] == CARRIED.mass, "as the log says"
     assert answer["segment_count"] == len(answer["segments"]) == len(recording.moves), "moves and rests"
     for segment, move in zip(answer["segments"], recording.moves, strict=True):
-        rows = slice(move.start, min(move.end, len(recording.time) - 1) + 1)
-        drawn = np.trapezoid(recording.power[rows], recording.time[rows])
-        assert segment["start"] == pytest.approx(recording.time[move.start], abs=0.05)
-        assert segment["measured"]["electrical"] == pytest.approx(drawn, rel=0.1), "edges are found to some rows"
+        assert segment["start"] == pytest.approx(recording.time[move.start], abs=EDGES)
+        first, last = np.searchsorted(recording.time, [segment["start"] - 1e-6, segment["end"] - 1e-6])
+        drawn = np.trapezoid(recording.power[first : last + 1], recording.time[first : last + 1])
+        assert segment["measured"]["electrical"] == pytest.approx(drawn, rel=SAMPLED)
         ours = segment["energy"]["electrical"]["total"]
         assert segment["measured"]["by_efforts"] == pytest.approx(ours, rel=OWN_FIGURES)
     whole = np.trapezoid(recording.power, recording.time)
@@ -101,7 +104,7 @@ def test_the_measured_energy_of_each_move_stands_beside_the_models(client: TestC
 def test_the_efforts_of_the_robots_own_figures_make_the_models_energy(client: TestClient, recording: Recording) -> None:
     """Torques that the model itself needs: what the motors are measured to take is what it says."""
     model = evaluated(
-        client, csv_of(recording, without="aiP"), payload=json(PAYLOAD), sample_period=f"{1 / recording.rate}"
+        client, csv_of(recording, without="aiP"), payload=json.dumps(PAYLOAD), sample_period=f"{1 / recording.rate}"
     )
     rows = len(recording.time)
     torque = np.array(model["samples"]["tau_motor"])[:rows]
@@ -110,25 +113,19 @@ def test_the_efforts_of_the_robots_own_figures_make_the_models_energy(client: Te
         np.column_stack([recording.time, recording.q, recording.v, torque]),
         ",",
     )
-    again = evaluated(client, body, payload=json(PAYLOAD), effort="torque")
+    again = evaluated(client, body, payload=json.dumps(PAYLOAD), effort="torque")
     assert again["total"]["measured"]["electrical"] is None, "no power was logged"
     ours = model["total"]["energy"]["electrical"]["total"]
     assert again["total"]["measured"]["by_efforts"] == pytest.approx(ours, rel=5 * SAMPLED)
-
-
-def json(value: Any) -> str:
-    import orjson
-
-    return orjson.dumps(value).decode()
 
 
 @pytest.mark.parametrize("write", [rtde, jointstate, csv_of], ids=["rtde", "joint names", "own, with power"])
 def test_whatever_is_a_log_is_a_motion(client: TestClient, recording: Recording, write: Any) -> None:
     """The same motion, whatever the columns: within what their digits and derivatives leave."""
     plain = csv_of(recording, without="iP")
-    expected = evaluated(client, plain, payload=json(PAYLOAD))["total"]["energy"]["electrical"]["total"]
+    expected = evaluated(client, plain, payload=json.dumps(PAYLOAD))["total"]["energy"]["electrical"]["total"]
     for body in (write(recording), gzip.compress(write(recording))):
-        found = evaluated(client, body, payload=json(PAYLOAD))
+        found = evaluated(client, body, payload=json.dumps(PAYLOAD))
         assert found["total"]["energy"]["electrical"]["total"] == pytest.approx(expected, rel=0.02)
         assert found["duration"] == pytest.approx(recording.time[-1], rel=1e-6)
 
@@ -149,20 +146,21 @@ def test_a_stored_log_brings_its_arm(client: TestClient, recording: Recording, s
     by_file = evaluated(client, rtde(recording))
     assert answer.json()["total"] == by_file["total"] and answer.json()["arm"] == by_file["arm"]
     other = client.post("/evaluate", json={"log": stored, "payload": None}).json()
-    assert other["total"]["energy"] != by_file["total"]["energy"] and "payload" not in (other["arm"] or {})
+    assert other["total"]["energy"] != by_file["total"]["energy"] and not (other["arm"] or {}).get("payload")
 
 
 def test_a_stored_log_in_other_requests(client: TestClient, stored: str) -> None:
     alone = client.post("/evaluate", json={"log": stored}).json()["total"]["energy"]["electrical"]["total"]
     sent = client.post("/jobs", json={"requests": [{"evaluate": {"log": stored}}]})
-    assert ended(client, sent.headers["location"])["requests"][0]["energy"] == alone
+    (done,) = ended(client, sent.headers["location"])["requests"]
+    assert done["energy"] == alone, done["problem"]
     study = client.post("/studies", json={"name": "log", "threshold": 1.0}).headers["location"]
     assert client.post(f"{study}/iterations", json={"evaluate": {"log": stored}}).json()["energy"] == alone
     empty = {"name": "empty", "arm": {"payload": None}}
     changed = client.post("/whatif", json={"evaluate": {"log": stored}, "changes": [empty]})
     assert changed.status_code == 200, changed.text
-    assert changed.json()["base"]["electrical"] == alone
-    assert changed.json()["changes"][0]["same_motion"]["electrical"]["total"] < alone, "without what it carried"
+    assert changed.json()["base"]["electrical"]["total"] == alone
+    assert changed.json()["changes"][0]["same_motion"]["electrical"]["total"]["value"] < alone, "without what it carried"
 
 
 @pytest.mark.parametrize(
