@@ -160,7 +160,8 @@ def test_a_stored_log_in_other_requests(client: TestClient, stored: str) -> None
     changed = client.post("/whatif", json={"evaluate": {"log": stored}, "changes": [empty]})
     assert changed.status_code == 200, changed.text
     assert changed.json()["base"]["electrical"]["total"] == alone
-    assert changed.json()["changes"][0]["same_motion"]["electrical"]["total"]["value"] < alone, "without what it carried"
+    (row,) = changed.json()["changes"]
+    assert row["same_motion"]["electrical"]["total"]["value"] < alone, "without what it carried"
 
 
 @pytest.mark.parametrize(
