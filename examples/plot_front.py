@@ -1,6 +1,6 @@
 """Draws a front: energy over duration, a colour per pair of arm configurations.
 
-    python -m examples.plot_front examples/pareto/branch_switch.json --output front.png
+    .venv/bin/python -m examples.plot_front examples/pareto/branch_switch.json --output front.png
 
 asks the service and draws its answer. Needs matplotlib.
 """

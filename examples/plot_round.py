@@ -1,6 +1,6 @@
 """Draws a round: power over time, with its moves and dwells.
 
-    python -m examples.plot_round examples/cycle/pick_and_place.json --output round.png
+    .venv/bin/python -m examples.plot_round examples/cycle/pick_and_place.json --output round.png
 
 asks the service and draws its answer. Needs matplotlib.
 """

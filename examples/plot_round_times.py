@@ -1,6 +1,6 @@
 """Draws the energy of a round over its time: one request for each of some times, and its baselines.
 
-    python -m examples.plot_round_times examples/cycle/pick_and_place.json --output round_times.png
+    .venv/bin/python -m examples.plot_round_times examples/cycle/pick_and_place.json --output round_times.png
 
 asks the service once without a time, then for each of `--ratios` of the duration of that answer, and draws the answers.
 Needs matplotlib.

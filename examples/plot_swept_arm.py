@@ -1,6 +1,6 @@
 """Draws where an arm passes: its capsules at some instants of the motion, the scene, and the path of the TCP.
 
-    python -m examples.plot_swept_arm examples/optimize/bin_to_shelf.json docs/bin_to_shelf.png
+    .venv/bin/python -m examples.plot_swept_arm examples/optimize/bin_to_shelf.json docs/bin_to_shelf.png
 
 Solves the request with the library, from the repository's folder. Needs matplotlib.
 """

@@ -89,13 +89,22 @@ class PreparedProblem(Plant):
         """Least duration [s] that the tool path leaves to a motion; zero without one."""
         return 0.0 if self.course is None else least_time(self.arm, self.course)
 
-    @property
-    def freed(self) -> Problem:
+    def freed(self, start: Target | None = None, goal: Target | None = None) -> Problem:
         """The problem without its tool path, of motions that last as long as those along it: their bounds hold for
-        these."""
+        these.
+
+        It is between `start` and `goal`, or the problem's own ends. Only along a path may a start leave its
+        orientation free: such a problem needs another start.
+        """
         problem, least = self.problem, self.least_time
         shortest = min(max(problem.duration_min or 0.0, least), problem.duration_max or np.inf)
-        return replace(problem, tool_path=None, duration_min=shortest if shortest > 0 else problem.duration_min)
+        return replace(
+            problem,
+            tool_path=None,
+            duration_min=shortest if shortest > 0 else problem.duration_min,
+            start=problem.start if start is None else start,
+            goal=problem.goal if goal is None else goal,
+        )
 
     @cached_property
     def traces(self) -> dict[bytes, Trace]:

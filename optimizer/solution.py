@@ -324,7 +324,8 @@ class Solution:
 
     Not `complete`: the inverse kinematics of the arm may have missed configurations at the start or goal. Then `status`
     is `feasible`, and the lower bound covers the motions between those that may be missing.
-    `sensitivity` is that of the electrical energy.
+    `sensitivity` is that of the electrical energy. `unmodelled` are contacts of bodies that stand in for a tool or a
+    payload without a shape, see `collision.stand_ins`.
     """
 
     status: Literal["optimal", "feasible"]
@@ -339,6 +340,7 @@ class Solution:
     candidates: list[CandidateReport]
     unreachable: list[UnreachableTarget]
     certificate: Certificate
+    unmodelled: list[Clearance]
     solver: SolverReport
     complete: bool
 

@@ -13,6 +13,7 @@ from optimizer.collision.bodies import Indices
 from optimizer.collision.clearance_proof import is_proven_clear, proven_clearance
 from optimizer.collision.model import ClosestPair, CollisionModel, collision_model
 from optimizer.collision.path_planner import USUAL, Effort, PlannedPaths, PlanningEnd, plan_paths
+from optimizer.collision.stand_ins import StandIns
 from optimizer.collision.state_validity import ValidityCheckers
 from optimizer.deadline import Deadline
 from optimizer.kinematics.forward import joint_placements
@@ -43,6 +44,16 @@ class Surroundings:
     def model(self) -> CollisionModel:
         """Bodies, checked pairs and distances."""
         return collision_model(self.arm)
+
+    @cached_property
+    def _stand_ins(self) -> StandIns | None:
+        return StandIns.of(self.arm)
+
+    def unmodelled_contacts(self, spline: Spline) -> list[Clearance]:
+        """What would touch in a motion, by samples, if stand-ins took the place of a tool and payload without shape."""
+        if self._stand_ins is None:
+            return []
+        return self._stand_ins.contacts(np.linspace(0.0, spline.duration, CONTACT_SAMPLES), self._samples(spline))
 
     def worst_violation(self, spline: Spline) -> Clearance | None:
         """Clearance of a motion whose margins are violated or not proven: distance, pair and time.

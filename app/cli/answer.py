@@ -70,19 +70,21 @@ def answered(task: Task, deadline: float, request_id: str) -> bytes:
 
     try:
         result = _run(task, deadline)
-        return (result if result.kept_as is None else result.without_path()).document
+        return (result if result.kept_as is None else result.not_kept()).document
     except (JoulepathError, ServiceError) as error:
         raise refused(error, request_id) from None
 
 
 def _run(task: Task, deadline: float) -> TaskResult:
-    """The result of a task, with the robot and the figures that it takes from the database."""
-    from app.cli.store import with_figures, with_own_robot
-    from app.exceptions import UnknownFigures
+    """The result of a task, with the log, the robot and the figures that it takes from the database."""
+    from app.cli.store import with_figures, with_log, with_own_robot
+    from app.exceptions import UnknownFigures, UnknownLog
     from optimizer.exceptions import UnknownRobot
 
     try:
         return task.run(deadline)
+    except UnknownLog as error:
+        return _run(with_log(task, error.id), deadline)
     except UnknownFigures as error:
         task = with_figures(task, error.id)
     except UnknownRobot as error:

@@ -51,8 +51,8 @@ def evaluate(
 ) -> None:
     """Computes the energy of a given motion, and the limits that it violates.
 
-    FILE is the JSON of `POST /evaluate`, a CSV with one column per joint and optionally a column t, or - for standard
-    input. Options win over the fields of `--settings`.
+    FILE is the JSON of `POST /evaluate`, a CSV with one column per joint and optionally a column t, a log as
+    `POST /logs` takes it, or - for standard input. Options win over the fields of `--settings`.
     """
     kind = given or ("csv" if file.lower().endswith(".csv") else "json")
     query = {name: value for name, value in options.items() if value is not None}

@@ -28,6 +28,13 @@ def with_figures(task: Task, id: str) -> Task:
     return WithFigures(task, in_store(lambda store: identified(store, id)))
 
 
+def with_log(task: Task, id: str) -> Task:
+    """The task, with a stored log. Raises UnknownLog or StoreUnavailable."""
+    from app.tasks.arm_engine import WithLog, given_log
+
+    return WithLog(task, in_store(lambda store: given_log(store, id)))
+
+
 def robot_named(name: str) -> Robot:
     """The robot of this name: one that comes with the library, or one in the database.
 

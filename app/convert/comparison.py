@@ -46,7 +46,8 @@ def to_compare_response(
             row["answer"] = answers.get(method)
         rows.append({**row, "method": method, "problem": failed.get(method)})
     return {
-        "id": request_id,
+        "request": request_id,
+        "id": None,
         "robot": request.robot,
         "objective": request.objective,
         "lower_bound": bound,

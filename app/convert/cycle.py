@@ -132,7 +132,8 @@ def to_cycle_response(
     energy = found.energy
     electrical = energy.electrical
     return {
-        "id": request_id,
+        "request": request_id,
+        "id": None,
         **fields(request, "robot", "method", "objective"),
         **fields(found, "order", "duration", "status", "price_of_time"),
         "energy": {

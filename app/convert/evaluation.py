@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import reduce
 from io import StringIO
 from typing import Any
 
@@ -11,25 +14,54 @@ import numpy as np
 from app.convert.arm_fields import arm_fields
 from app.convert.fields import fields
 from app.convert.motion_csv import MotionCsv
+from app.convert.recorded import reading_of
 from app.convert.solution import energy_fields
 from app.convert.warnings import sampled_warnings
-from app.schemas.arm import ArmRequest
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings, SampledClearance
 from optimizer.csv_table import FIRST_ROW
 from optimizer.exceptions import InvalidProblem
+from optimizer.identification.logs.recorded import Measured, motion_of
 from optimizer.replay.evaluate import Evaluation
 from optimizer.replay.interval_energy import IntervalEnergy
 from optimizer.replay.recording import Log, Waypoints, in_blocks
 from optimizer.replay.sampler import Samples
 
 
+@dataclass(frozen=True)
+class Evaluated:
+    """The evaluation of a motion of the arm that was `asked` about. Of a log, what was `measured` in each segment, and
+    the remarks on it."""
+
+    asked: EvaluateSettings
+    result: Evaluation
+    measured: Sequence[Measured] = ()
+    remarks: Sequence[str] = ()
+
+    def of_segment(self, k: int) -> Measured | None:
+        """What was measured in a segment."""
+        return self.measured[k] if self.measured else None
+
+    @property
+    def of_all(self) -> Measured | None:
+        """What was measured in the whole motion."""
+        return reduce(Measured.joined, self.measured) if self.measured else None
+
+
+def own_times() -> InvalidProblem:
+    """The error for times that are given beside a log."""
+    message = "A CSV file with a column of times has its own times: leave out time_per_segment and interpolation."
+    return InvalidProblem("time_per_segment", message)
+
+
 def to_motion(request: EvaluateRequest) -> Waypoints | Log:
-    """The motion in a JSON request. Raises InvalidProblem."""
+    """The motion in a JSON request. Raises InvalidProblem, and UnknownLog for a log that it did not bring."""
+    if request.log is not None:
+        return motion_of(reading_of(request.log).log)
     if request.trajectory is not None:
         given = request.trajectory
         v, a = (None if rows is None else np.array(rows) for rows in (given.v, given.a))
         return Log(in_blocks(np.array(given.t), np.array(given.q), v, a))
-    assert request.configurations is not None  # the schema requires one of the two
+    assert request.configurations is not None  # the schema requires one of them
     q = request.configurations
     if any(len(row) != len(q[0]) for row in q):
         raise InvalidProblem("configurations", "Every row of configurations must have one number per joint.")
@@ -41,10 +73,7 @@ def to_csv_motion(settings: EvaluateCsvSettings, table: MotionCsv) -> Waypoints 
     if not table.has_time:
         return _to_waypoints(settings, table.configurations(), FIRST_ROW)
     if settings.model_fields_set & {"time_per_segment", "interpolation"}:
-        raise InvalidProblem(
-            "time_per_segment",
-            "A CSV file with a column t has its own times: leave out time_per_segment and interpolation.",
-        )
+        raise own_times()
     return Log(table.log(), FIRST_ROW)
 
 
@@ -54,16 +83,18 @@ def _to_waypoints(settings: EvaluateSettings, q: Any, first_row: int) -> Waypoin
     return Waypoints(q, np.array(settings.time_per_segment), settings.interpolation, first_row)
 
 
-def to_evaluate_response(request_id: str, asked: ArmRequest, result: Evaluation) -> dict[str, Any]:
+def to_evaluate_response(request_id: str, found: Evaluated) -> dict[str, Any]:
     """The answer of `POST /evaluate`, for the motion of the arm asked about."""
+    asked, result = found.asked, found.result
     samples, nearest = result.samples, result.nearest
     return {
-        "id": request_id,
+        "request": request_id,
+        "id": None,
         "robot": asked.robot,
         "arm": arm_fields(asked),
         "duration": result.total.duration,
-        "total": _interval_fields(result.total),
-        "segments": [_interval_fields(segment) for segment in result.segments],
+        "total": _interval_fields(result.total, found.of_all),
+        "segments": [_interval_fields(each, found.of_segment(k)) for k, each in enumerate(result.segments)],
         **fields(result, "segment_count", "speed_jumps"),
         "within_limits": all(report.held for report in result.limits),
         "limits": [
@@ -72,26 +103,27 @@ def to_evaluate_response(request_id: str, asked: ArmRequest, result: Evaluation)
         ],
         "collides": None if nearest is None else nearest.distance < 0,
         "nearest": None if nearest is None else fields(nearest, *SampledClearance.model_fields),
-        "warnings": sampled_warnings(result.close_pass),
+        "warnings": [*found.remarks, *sampled_warnings(result)],
         "samples": None if samples is None else fields(samples, *Samples.__dataclass_fields__),
     }
 
 
-def _interval_fields(interval: IntervalEnergy) -> dict[str, Any]:
+def _interval_fields(interval: IntervalEnergy, known: Measured | None) -> dict[str, Any]:
     return {
         **fields(interval, "start", "end"),
         "energy": energy_fields(interval.energy),
         **fields(interval, "mean_mechanical_power", "kinetic_start", "kinetic_end", "balance_error"),
+        "measured": None if known is None else vars(known),
     }
 
 
-def to_csv_table(result: Evaluation) -> str:
+def to_csv_table(found: Evaluated) -> str:
     """The answer as CSV: one line per segment, and a last line `total`. Columns have the names of the JSON fields."""
-    text = StringIO()
-    rows = [(str(k), segment) for k, segment in enumerate(result.segments, 1)] + [("total", result.total)]
+    text, result = StringIO(), found.result
+    rows = [(str(k + 1), each, found.of_segment(k)) for k, each in enumerate(result.segments)]
     writer = None
-    for name, interval in rows:
-        row = {"segment": name, **dict(_flat("", _interval_fields(interval)))}
+    for name, interval, known in [*rows, ("total", result.total, found.of_all)]:
+        row = {"segment": name, **dict(_flat("", _interval_fields(interval, known)))}
         # only the whole motion has one
         row = {key: value for key, value in row.items() if not key.startswith("electrical.interval")}
         if writer is None:

@@ -43,7 +43,8 @@ def to_excitation_problem(request: ExcitationRequest, deadline: float) -> Excita
 def to_excitation_response(request: ExcitationRequest, request_id: str, found: Excitation) -> dict[str, Any]:
     """The answer of `POST /excitation`."""
     return {
-        "id": request_id,
+        "request": request_id,
+        "id": None,
         "robot": request.robot,
         "arm": arm_fields(request),
         "coefficients": fields(found, "period", "centre", "a", "b"),

@@ -24,7 +24,8 @@ def to_ik_response(
 ) -> dict[str, Any]:
     """The answer of `POST /ik`."""
     return {
-        "id": request_id,
+        "request": request_id,
+        "id": None,
         "robot": request.robot,
         "solutions": [
             {

@@ -74,7 +74,7 @@ def _check_header(columns: list[str], nq: int) -> None:
     if columns in (q, ["t", *q], ["t", *q, *v], ["t", *q, *v, *a]):
         return
     wanted = f"t,q1,…,q{nq}, then v1,…,v{nq} and a1,…,a{nq} if they were logged, or q1,…,q{nq} alone"
-    wanted += ". Separate columns by commas, semicolons or tabs."
+    wanted += ", or those of a log as POST /logs takes it. Separate columns by commas, semicolons or tabs."
     if all(_NUMBER.match(name) for name in columns):
         raise InvalidTable(f"The first line has numbers: put a header with the names of the columns first, {wanted}", 1)
     if not any(_COLUMN.fullmatch(name) for name in columns):
@@ -83,7 +83,8 @@ def _check_header(columns: list[str], nq: int) -> None:
     for k, (name, right) in enumerate(zip(columns, expected, strict=False), 1):
         if name != right:
             raise InvalidTable(f"Column {k} of the header is not `{right}`: its columns must be {wanted}", 1, right)
-    raise InvalidTable(f"The header has {len(columns)} columns: they must be {wanted}", 1)
+    last = columns[-1]
+    raise InvalidTable(f"The header has {len(columns)} columns, up to `{last}`: they must be {wanted}", 1, last)
 
 
 def _blocks(file: BufferedReader, columns: list[str], separator: str) -> Iterator[Array]:

@@ -42,10 +42,11 @@ def to_optimize_response(
 ) -> dict[str, Any]:
     """The answer of `POST /optimize`: numbers, strings, lists, dicts, and arrays in C order.
 
-    `arm` is that of `arm_fields`. Its last field, `answer`, is None: who keeps the answer sets it.
+    `arm` is that of `arm_fields`. Its `id` and its last field, `answer`, are None: who keeps the answer sets them.
     """
     return {
-        "id": request_id,
+        "request": request_id,
+        "id": None,
         "robot": request.robot,
         "arm": arm,
         "method": request.method,

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from optimizer.collision.close_pass import CLOSE
-from optimizer.replay.nearest_contact import LeastClearance
+from optimizer.collision.stand_ins import StandInSettings
+from optimizer.problem.arm import PAYLOAD, TOOL
+from optimizer.replay.evaluate import Evaluation
 from optimizer.simulation.outcome import Outcome
 from optimizer.simulation.planned import PlannedMotion
 from optimizer.simulation.replay import Replay
 from optimizer.simulation.shapes import unsimulated
-from optimizer.solution import Solution
+from optimizer.solution import Clearance, Solution
 
 ADVICE = "Make sure that the arm and its cell are known as accurately, or ask for a margin."
 
@@ -23,6 +25,12 @@ DIVIDED = (
     "{} is where the path is divided, at {:.1%} of its length: no arm configuration follows it whole. `status` and "
     "`lower_bound` are for this division."
 )
+STAND_INS = {
+    TOOL: f"a rod of {1e3 * StandInSettings.tool_radius:g} mm radius from the flange to the TCP",
+    PAYLOAD: f"a ball of its mass at {StandInSettings.payload_density:g} kg/m³ about its centre of mass",
+}
+"""What stands in for a body of the arm that has no shape."""
+SHAPES = {TOOL: "tool.capsules", PAYLOAD: "payload.shape"}
 NO_DEFAULT_MOTION = "No default motion of the robot's controller is known: `controller_default` is left out."
 
 
@@ -35,12 +43,14 @@ def certified_warnings(solution: Solution) -> list[str]:
     if close_pass is not None:
         proven = f"proven: at least {_mm(max(close_pass.min_clearance, 0.0))} mm"
         found.append(_close(close_pass.pair, close_pass.sampled, close_pass.time, f" ({proven})"))
-    return found
+    return found + [_unmodelled(contact) for contact in solution.unmodelled]
 
 
-def sampled_warnings(close_pass: LeastClearance | None) -> list[str]:
+def sampled_warnings(result: Evaluation) -> list[str]:
     """The warnings of a motion whose distances were sampled."""
-    return [] if close_pass is None else [_close(close_pass.pair, close_pass.distance, close_pass.time, "")]
+    close = result.close_pass
+    found = [] if close is None else [_close(close.pair, close.distance, close.time, "")]
+    return found + [_unmodelled(contact) for contact in result.unmodelled]
 
 
 def replay_warnings(planned: PlannedMotion, found: Replay) -> list[str]:
@@ -79,6 +89,15 @@ def _close(pair: tuple[str, str], distance: float, time: float, proven: str) -> 
     # the proven distance may be below CLOSE, and the sampled one a little above it
     how = f"{_mm(distance)} mm apart" if distance > 0 else f"overlapping by {_mm(-distance)} mm"
     return f"Closer than {CLOSE * 1e3:g} mm: {first} and {second} are {how} at {time:.3f} s{proven}. {ADVICE}"
+
+
+def _unmodelled(contact: Clearance) -> str:
+    obstacle, carried = contact.pair
+    return (
+        f"The {carried} has no shape, and nothing keeps it out of the obstacles: {STAND_INS[carried]} would be "
+        f"{-1e3 * contact.sampled:.0f} mm deep in {obstacle} at {contact.time:.3f} s. Give its shape in "
+        f"`{SHAPES[carried]}`."
+    )
 
 
 def _mm(distance: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import uuid
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -9,7 +10,8 @@ from typing import Any
 
 import orjson
 
-_ID = b'{"id":"'
+_HEAD = re.compile(rb'\{"request":"([^"]*)","id":(?:null|"([^"]*)")')
+"""The first fields of an answer: the id of its request, and its own. No id has a quotation mark."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +47,8 @@ class TaskResult:
     """A document and its media type. A task that fails raises an exception instead.
 
     `stored` are complete answers that belong into the database before the document is sent: it refers to them.
-    `kept_as` is the id under which the document itself is to be kept; its last field, `answer`, has the path. `figures`
-    are what lists show of it.
+    `kept_as` is the id under which the document itself is to be kept: its field `id`, the second one, has it, and the
+    path is in the last one, `answer`, if there is one. `figures` are what lists show of it.
     `is_optimal`: no more time would make it better. `age` [s] is that of a document that was computed before. `motions`
     are those that it used or found of a cell, by their keys: later rounds may have them in common.
     """
@@ -69,33 +71,40 @@ class TaskResult:
     def of_kept_json(
         cls, content: Mapping[str, Any], figures: AnswerFigures, stored: tuple[StoredAnswer, ...] = ()
     ) -> TaskResult:
-        """A JSON document that is to be kept, with its path as the last field, `answer`."""
-        kept = StoredAnswer(str(uuid.uuid4()), b"")
-        document = json_document({**content, "answer": kept.path})
+        """A JSON document that is to be kept. Its fields `request` and `id` come first, `answer` comes last."""
         is_optimal = figures.status == "optimal"
-        return cls(document, "application/json", stored, kept.id, figures, is_optimal)
+        return cls(json_document(content), "application/json", stored, None, figures, is_optimal).kept()
 
-    def without_path(self) -> TaskResult:
-        """The same document, which was not kept: its field `answer` is null."""
-        assert self.kept_as is not None
-        end = _last_field(self.kept_as)
-        assert self.document.endswith(end)
-        return replace(self, document=self.document[: -len(end)] + b',"answer":null}', kept_as=None)
+    def kept(self) -> TaskResult:
+        """The same document, to be kept under an id of its own."""
+        return self._under(str(uuid.uuid4()))
 
-    def with_id(self, request_id: str) -> TaskResult:
-        """The same document for another request: its first field, `id`, is that of the request."""
-        assert self.document.startswith(_ID)
-        # no id has a quotation mark
-        rest = self.document[self.document.index(b'"', len(_ID)) :]
-        return replace(self, document=_ID + request_id.encode() + rest)
+    def not_kept(self) -> TaskResult:
+        """The same document, which is not kept: its fields `id` and `answer` are null."""
+        return self._under(None)
+
+    def for_request(self, request_id: str) -> TaskResult:
+        """The same document as the answer to another request: its field `request` is the id of that."""
+        head = _HEAD.match(self.document)
+        assert head is not None
+        start, end = head.span(1)
+        return replace(self, document=self.document[:start] + request_id.encode() + self.document[end:])
 
     def copied(self, request_id: str) -> TaskResult:
         """The same document for another request, to be kept as another answer."""
-        own = self.with_id(request_id)
-        if self.kept_as is None or not own.document.endswith(end := _last_field(self.kept_as)):
-            return replace(own, kept_as=str(uuid.uuid4()))
-        new = str(uuid.uuid4())
-        return replace(own, document=own.document[: -len(end)] + _last_field(new), kept_as=new)
+        return self.for_request(request_id).kept()
+
+    def _under(self, answer_id: str | None) -> TaskResult:
+        head = _HEAD.match(self.document)
+        if head is None:
+            # identifications have a resource of their own
+            return replace(self, kept_as=answer_id)
+        own = b"null" if answer_id is None else b'"%s"' % answer_id.encode()
+        first, rest = b'{"request":"%s","id":%s' % (head[1], own), self.document[head.end() :]
+        last = _last_field(None if head[2] is None else head[2].decode())
+        if rest.endswith(last):
+            rest = rest[: -len(last)] + _last_field(answer_id)
+        return replace(self, document=first + rest, kept_as=answer_id)
 
     @classmethod
     def of_csv(cls, table: str, stored: tuple[StoredAnswer, ...] = ()) -> TaskResult:
@@ -103,8 +112,8 @@ class TaskResult:
         return cls(table.encode(), "text/csv", stored)
 
 
-def _last_field(answer_id: str) -> bytes:
-    return b',"answer":"%s"}' % StoredAnswer(answer_id, b"").path.encode()
+def _last_field(answer_id: str | None) -> bytes:
+    return b',"answer":null}' if answer_id is None else b',"answer":"%s"}' % StoredAnswer(answer_id, b"").path.encode()
 
 
 def json_document(content: Mapping[str, Any]) -> bytes:

@@ -97,9 +97,13 @@ class TooManyRobots(ServiceError):
 
 
 class UnknownLog(ServiceError):
-    """No log has that id."""
+    """No log has the `id` that the request names."""
 
     MESSAGE = "No log has this id: GET /logs lists all logs."
+
+    def __init__(self, id: str = "") -> None:
+        super().__init__()
+        self.id = id
 
 
 class UnknownIdentification(ServiceError):

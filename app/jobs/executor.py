@@ -13,7 +13,7 @@ from app.engine.pool import Engine
 from app.engine.result import TaskResult
 from app.engine.task import Task
 from app.engine.work import Ended, Take, Work, result_of
-from app.exceptions import Preempted, ServiceError, UnknownFigures
+from app.exceptions import Preempted, ServiceError, UnknownFigures, UnknownLog
 from app.schemas.identifications import IdentifyRequest
 from app.store import logs
 from app.store.store import Store
@@ -76,7 +76,7 @@ async def _run(run: Callable[[Take], Awaitable[None]], store: Store, take: Take)
     waiting: list[Work] = []
 
     def ended(work: Work, how: Ended) -> None:
-        if isinstance(how, UnknownRobot | UnknownFigures):
+        if isinstance(how, UnknownRobot | UnknownFigures | UnknownLog):
             waiting.append(work)
         else:
             work.ended(how)

@@ -64,7 +64,9 @@ def _kind_of(file: IO[bytes]) -> _Kind:
         **problem_responses(
             *WORKER_PROBLEMS,
             problems.UnknownFigures,
+            problems.UnknownLog,
             problems.InvalidTable,
+            problems.LogTooLarge,
             problems.UnsupportedMediaType,
             problems.KeyReused,
         ),
@@ -79,8 +81,9 @@ async def evaluate(
     later: ServiceLater,
 ) -> Response:
     """The energy of a given motion, per segment and in total, and the limits that it violates. The motion is a list of
-    configurations with the times between them, or a log. It is sent as JSON, or as CSV with the settings as query
-    parameters. `Accept: text/csv` returns the table of energies as CSV."""
+    configurations with the times between them, a trajectory, or a log of the arm, whose measured energies stand beside
+    the model's. It is sent as JSON, or as CSV with the settings as query parameters: any file that `POST /logs` reads.
+    `Accept: text/csv` returns the table of energies as CSV."""
     declared = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     kind = _KINDS.get(declared)
     if kind is None and declared not in _ANY:

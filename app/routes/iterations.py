@@ -23,7 +23,7 @@ from app.schemas import errors as problems
 from app.schemas.studies import IterationBody, IterationDetail
 from app.store import studies
 from app.store.cache import Answered, Asked
-from app.store.tables import Study, new_id
+from app.store.tables import Study
 from app.studies.answers import detail
 from app.tasks.answer_cache import AnswerCache
 from app.tasks.answer_figures import figures_of
@@ -52,6 +52,7 @@ MOST_ITERATIONS = 2**31 - 1
             *MOTION_PROBLEMS,
             problems.PathInfeasible,
             problems.InvalidTable,
+            problems.UnknownLog,
             problems.KeyReused,
             problems.UnknownStudy,
             problems.NotOwner,
@@ -144,9 +145,11 @@ async def show(
 
 def _iteration(step: StudyStep, result: TaskResult, asked: Asked | None = None) -> studies.Step:
     """The iteration with this answer, which answers what was `asked`, too."""
+    result = result if result.kept_as is not None else result.kept()
+    assert result.kept_as is not None
     answer = orjson.loads(result.document)
     energy = answer["energy"] if step.kind == "optimize" else answer["total"]["energy"]
-    stored = StoredAnswer(result.kept_as or new_id(), result.document, figures_of(answer))
+    stored = StoredAnswer(result.kept_as, result.document, figures_of(answer))
     return studies.Step(
         step.kind,
         step.sent,

@@ -30,6 +30,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
             *MOTION_PROBLEMS,
             problems.PathInfeasible,
             problems.InvalidTable,
+            problems.UnknownLog,
             problems.StoreUnavailable,
             problems.KeyReused,
         ),

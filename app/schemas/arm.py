@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from math import pi
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
+from pydantic_core import InitErrorDetails
 
 from app.schemas.common import FiguresId, Frame, Request, Vector3, described, frame_of
 from app.schemas.examples.figures import FIGURES_ID
@@ -44,7 +45,12 @@ class Payload(Request):
     """A body that is fixed to the flange."""
 
     mass: float = described("Mass.", "kg", 2.0, ge=0, le=1e3)
-    com: Vector3 = described("Centre of mass in the flange frame.", "m", [0.0, 0.0, 0.05])
+    com: Vector3 = described(
+        "Centre of mass in the flange frame. Required unless `mass` is 0.",
+        "m",
+        [0.0, 0.0, 0.05],
+        default=[0.0, 0.0, 0.0],
+    )
     inertia: list[float] | None = described(
         "Inertia about the centre of mass, in the axes of the flange frame: [ixx, ixy, ixz, iyy, iyz, izz]. Null: a "
         "point mass.",
@@ -61,6 +67,13 @@ class Payload(Request):
         default=None,
     )
     touches: LinkNames | None = touched_links("payload")
+
+    @model_validator(mode="after")
+    def _has_a_centre(self) -> Self:
+        if self.mass > 0 and "com" not in self.model_fields_set:
+            missing = InitErrorDetails(type="missing", loc=("com",), input=self.model_dump(exclude_unset=True))
+            raise ValidationError.from_exception_data("Payload", [missing])
+        return self
 
 
 # with a smaller limit, a motion would exceed the largest duration

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from app.schemas.examples.values import REQUEST_ID
+from app.schemas.examples.values import ANSWER_ID, REQUEST_ID
 from app.schemas.lengths import ROBOT_LENGTH
 from optimizer.problem.names import is_plain
 from optimizer.problem.pose import QUATERNION_TOLERANCE
@@ -90,7 +90,13 @@ class Response(BaseModel):
 class Answer(Response):
     """The fields of every answer about a robot."""
 
-    id: str = described("Id of the request, as in the header `X-Request-ID`.", None, REQUEST_ID)
+    request: str = described("Id of the request, as in the header `X-Request-ID`.", None, REQUEST_ID)
+    id: str | None = described(
+        "Id of this answer: `GET /answers/{id}` returns it again, and exports and replays take it. Null if it is not "
+        "kept.",
+        None,
+        ANSWER_ID,
+    )
     robot: str = described("Name of the robot.", None, "ur5e")
 
 

@@ -10,8 +10,11 @@ from pydantic_core import PydanticCustomError
 from app.schemas.arm import ArmRequest, one_or_each
 from app.schemas.common import JointPositions, MotionAnswer, Request, Response, described, part
 from app.schemas.energy import MotionEnergy
+from app.schemas.examples.values import LOG_ID
 from app.schemas.examples.values import PAPER_HOME as _HOME
 from app.schemas.examples.values import PAPER_POSE as _THERE
+from app.schemas.lengths import ID_LENGTH
+from app.schemas.log_file import LogFile
 from app.schemas.request import Seconds
 from app.schemas.response import BODIES, WARNINGS, SampledMotion
 from optimizer.problem.problem import LONGEST_DURATION
@@ -108,7 +111,7 @@ class EvaluateSettings(ArmRequest):
 
 
 class EvaluateRequest(EvaluateSettings):
-    """A given motion, as exactly one of `configurations` and `trajectory`."""
+    """A given motion, as exactly one of `configurations`, `trajectory` and `log`."""
 
     configurations: Rows | None = described(
         "Joint positions, passed in this order.", "rad", [_HOME, _THERE, _HOME], default=None
@@ -119,26 +122,45 @@ class EvaluateRequest(EvaluateSettings):
         {"t": [0.0, 1.5, 3.0], "q": [_HOME, _THERE, _HOME]},
         default=None,
     )
+    log: Annotated[str, Field(max_length=ID_LENGTH)] | None = described(
+        "Id of a stored log, from `POST /logs`: the motion that the arm has made. `robot`, `payload` and `gravity` are "
+        "those of the log where they are left out.",
+        None,
+        LOG_ID,
+        default=None,
+    )
 
     @model_validator(mode="after")
     def _one_motion(self) -> Self:
-        if (self.configurations is None) == (self.trajectory is None):
-            raise PydanticCustomError("exactly_one", "Give exactly one of `configurations` and `trajectory`")
+        motions = {"configurations", "trajectory", "log"}
+        if sum(getattr(self, name) is not None for name in motions) != 1:
+            raise PydanticCustomError("exactly_one", "Give exactly one of `configurations`, `trajectory` and `log`")
         if self.configurations is not None and self.time_per_segment is None:
             raise PydanticCustomError("times", "`configurations` require `time_per_segment`")
         given = self.model_fields_set & {"time_per_segment", "interpolation"}
-        if self.trajectory is not None and given:
+        if self.configurations is None and given:
             raise PydanticCustomError(
-                "contradiction", "A `trajectory` has its own times: leave out `time_per_segment` and `interpolation`"
+                "contradiction",
+                "A `trajectory` and a `log` have their own times: leave out `time_per_segment` and `interpolation`",
             )
         return self
 
 
-class EvaluateCsvSettings(EvaluateSettings):
+class EvaluateCsvSettings(EvaluateSettings, LogFile):
     """The query parameters of a CSV body."""
 
-    units: Literal["rad", "deg"] = described(
-        "Angular unit of all joint columns: positions, velocities and accelerations.", None, "deg", default="rad"
+
+class MeasuredEnergy(Response):
+    """Electrical energy by what was measured during this part of a log."""
+
+    electrical: float | None = described(
+        "Integral of the logged power of the arm's bus. Null if the log has none.", "J", 61.2
+    )
+    by_efforts: float | None = described(
+        "Integral of the power that the motors take by their logged currents or torques, with the losses of the "
+        "robot's drives and its idle power. Null if the log has none.",
+        "J",
+        59.8,
     )
 
 
@@ -156,6 +178,7 @@ class IntervalEnergy(Response):
         "1",
         1e-9,
     )
+    measured: MeasuredEnergy | None = part("What was measured meanwhile; null without a log of power or efforts.")
 
 
 class LimitCheck(Response):
@@ -201,7 +224,8 @@ class EvaluateResponse(MotionAnswer):
     duration: float = described("Duration of the motion.", "s", 3.0)
     total: IntervalEnergy = part("The whole motion.")
     segments: list[IntervalEnergy] = part(
-        "Segments between configurations; a trajectory is one segment. Empty if there are more than 10,000."
+        "Segments between configurations. A trajectory is one segment, and a log has one for each move and each rest. "
+        "Empty if there are more than 10,000."
     )
     segment_count: int = described("Number of segments.", "1", 2)
     speed_jumps: int = described(
@@ -217,5 +241,5 @@ class EvaluateResponse(MotionAnswer):
         "Whether a clearance is negative at a sample; null if `collisions` is false.", None, False
     )
     nearest: SampledClearance | None = part("Smallest clearance at sample points; null if `collisions` is false.")
-    warnings: list[str] = described(WARNINGS, None, [])
+    warnings: list[str] = described(WARNINGS + " Of a log, also what `POST /logs` says of it.", None, [])
     samples: SampledMotion | None = part("Samples of the motion; null without `sample_period`.")

@@ -3,39 +3,21 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
 from app.schemas.arm import Payload
-from app.schemas.common import NO_CONTROLS, PLAIN, Request, Response, RobotName, Vector3, described, part
+from app.schemas.common import NO_CONTROLS, PLAIN, Response, RobotName, Vector3, described, part
 from app.schemas.examples.values import CREATED, LOG_ID
-from app.schemas.lengths import NAME_LENGTH
+from app.schemas.log_file import EffortMeaning, LogFile
 from app.schemas.queries import Query, after_of, limit_of, next_of
 from app.schemas.studies import Name
 
-EffortMeaning = Literal["current", "torque", "external"]
-_Column = Annotated[str, Field(min_length=1, max_length=NAME_LENGTH, pattern=NO_CONTROLS)]
-_Columns = Annotated[list[_Column], Field(min_length=1, max_length=16)]
 Tag = Annotated[str, Field(min_length=1, max_length=32, pattern=NO_CONTROLS), PLAIN]
 
 
-class LogColumns(Request):
-    """Names of the columns of a log, as in its header; of joints one each, from base to flange. Null: none."""
-
-    time: _Column = described("Times [s].", None, "time_s")
-    nanoseconds: _Column | None = described("Nanoseconds beside times in whole seconds.", None, "nsecs", default=None)
-    q: _Columns = described("Joint positions.", None, ["axis_1", "axis_2"])
-    v: _Columns | None = described("Joint velocities.", None, ["speed_1", "speed_2"], default=None)
-    a: _Columns | None = described("Joint accelerations.", None, ["acc_1", "acc_2"], default=None)
-    current: _Columns | None = described("Motor currents.", None, ["amps_1", "amps_2"], default=None)
-    torque: _Columns | None = described("Motor torques at the joints.", None, ["nm_1", "nm_2"], default=None)
-    effort: _Columns | None = described("Efforts of unknown meaning.", None, ["eff_1", "eff_2"], default=None)
-    temperature: _Columns | None = described("Temperatures of the joints [°C].", None, ["t_1", "t_2"], default=None)
-    power: _Column | None = described("Power drawn from the bus of the arm [W].", None, "watts", default=None)
-
-
-class LogSettings(Request):
+class LogSettings(LogFile):
     """The query parameters of a log."""
 
     robot: RobotName = described("Name of the robot, from `GET /robots`.", None, "ur5e", default="ur5e")
@@ -49,23 +31,6 @@ class LogSettings(Request):
     )
     gravity: Vector3 = described(
         "Acceleration of gravity in the base frame.", "m/s²", [0.0, 0.0, -9.81], default=[0.0, 0.0, -9.81]
-    )
-    columns: LogColumns | None = described(
-        "Which columns hold what, where their names are not known.",
-        None,
-        {"time": "t", "q": ["q1", "q2", "q3", "q4", "q5", "q6"]},
-        default=None,
-    )
-    units: Literal["rad", "deg"] = described(
-        "Angular unit of positions, velocities and accelerations.", None, "rad", default="rad"
-    )
-    current_units: Literal["A", "mA"] = described("Unit of currents.", None, "A", default="A")
-    effort: Literal["auto", "current", "torque", "external"] = described(
-        "What the efforts are: motor currents, motor torques at the joints, or torques from outside, without gravity. "
-        "`auto` finds it out.",
-        None,
-        "auto",
-        default="auto",
     )
 
 

@@ -27,7 +27,8 @@ GAP = "1 - lower_bound / energy of the objective; 0 if this energy is not positi
 WARNINGS = (
     "Remarks on the motion, in words; empty if there are none. If two bodies come closer than "
     f"{CLOSE * 1e3:g} mm, one names them, their distance without margins, and the time. Others say that arm "
-    "configurations may have been missed, or that a baseline is left out."
+    "configurations may have been missed, that a baseline is left out, or what a tool or payload without a shape would "
+    "touch."
 )
 OBJECTIVE = "Energy that was minimised: electrical energy drawn from the supply, or mechanical work."
 

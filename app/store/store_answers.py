@@ -42,7 +42,7 @@ async def store_answers(
 async def keep_answer(
     store: Store, settings: Settings, kind: str, result: TaskResult, owner: str | None, asked: Asked | None = None
 ) -> TaskResult:
-    """The result, once it is stored as `result.kept_as`. If it cannot be, the result without a path of its own.
+    """The result, once it is stored as `result.kept_as`. If it cannot be, the result without an id of its own.
 
     It then answers what was `asked`, too.
     """
@@ -56,7 +56,7 @@ async def keep_answer(
     try:
         await _put(store, settings, kind, [kept], owner, settings.answers_max_bytes, remember)
     except (StoreUnavailable, _TooLarge):
-        return result.without_path()
+        return result.not_kept()
     return replace(result, kept_as=None)
 
 

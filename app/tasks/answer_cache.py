@@ -59,7 +59,7 @@ class AnswerCache:
         if asked is None or self.by_passed or is_heard:
             return await compute(deadline)
         result, is_anothers = await self.in_flight.result(asked, compute)
-        return replace(result, age=0).with_id(request_id) if is_anothers else result
+        return replace(result, age=0).for_request(request_id) if is_anothers else result
 
     async def motions(self, cell: str | None) -> dict[str, bytes]:
         """Motions that rounds in this cell may have in common, by their keys; none for a round whose cell is not known.
@@ -77,7 +77,7 @@ class AnswerCache:
     async def find(self, asked: Asked | None, request_id: str) -> TaskResult | None:
         """A stored answer as that to the request with this id; None if there is none."""
         found = await self._find(asked)
-        return None if found is None else found.with_id(request_id)
+        return None if found is None else found.for_request(request_id)
 
     async def copy(self, asked: Asked | None, request_id: str) -> TaskResult | None:
         """The same, to be kept as another answer."""

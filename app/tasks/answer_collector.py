@@ -20,14 +20,15 @@ class AnswerCollector:
         self._answers: list[StoredAnswer] = []
 
     def add(self, content: dict[str, Any]) -> str:
-        """Adds an answer and returns its path, which also goes into its field `answer` if it has one.
+        """Adds an answer and returns its path. Its fields `id` and `answer`, those that it has, are set.
 
         Raises InvalidRequest above MOST_BYTES.
         """
         answer_id = str(uuid.uuid4())
         path = StoredAnswer(answer_id, b"").path
-        own = {"answer": path} if "answer" in content else {}
-        answer = StoredAnswer(answer_id, json_document({**content, **own}), figures_of(content))
+        own = {"id": answer_id, "answer": path}
+        own_of = {name: value for name, value in own.items() if name in content}
+        answer = StoredAnswer(answer_id, json_document({**content, **own_of}), figures_of(content))
         self._answers.append(answer)
         if sum(len(each.body) for each in self._answers) > MOST_BYTES:
             message = "The answers are too large together: use a longer `sample_period`, or ask for fewer"

@@ -9,10 +9,11 @@ from typing import Any, Protocol
 
 from app.convert.identified import Identified, identified_as
 from app.convert.own_robots import own_robot_named, own_robot_of
+from app.convert.recorded import GivenLog, log_given
 from app.engine.result import TaskResult
 from app.engine.task import Task
-from app.exceptions import UnknownFigures
-from app.store import figures, robots
+from app.exceptions import UnknownFigures, UnknownLog
+from app.store import figures, logs, robots
 from app.store.store import Store
 from models.registry import load_robot, robot_names
 from models.robot import Robot
@@ -66,6 +67,24 @@ class WithFigures:
 
 
 @dataclass(frozen=True)
+class WithLog:
+    """A task, and the stored log that it names."""
+
+    task: Task
+    log: GivenLog
+
+    @property
+    def request_id(self) -> str:
+        """Id of the request."""
+        return self.task.request_id
+
+    def run(self, deadline: float) -> TaskResult:
+        """The task's result."""
+        with log_given(self.log):
+            return self.task.run(deadline)
+
+
+@dataclass(frozen=True)
 class ArmEngine:
     """Runs tasks about robots that come with the service and about those in the database, with their own figures or
     with identified ones."""
@@ -76,13 +95,14 @@ class ArmEngine:
     async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
         """The task's result; `tell` gets what it finds.
 
-        Raises UnknownRobot, UnknownFigures, and what the engine raises; StoreUnavailable only for figures, and for a
-        robot that does not come with the service.
+        Raises UnknownRobot, UnknownFigures, UnknownLog, and what the engine raises; StoreUnavailable only for figures,
+        a log, and a robot that does not come with the service.
         """
+        log: str | None = None
         request = getattr(task, "request", None)
         name, used = getattr(request, "robot", None), getattr(request, "figures", None)
         while True:
-            equipped = await self._equipped(task, name, used)
+            equipped = await self._equipped(task, name, used, log)
             try:
                 return await self.engine.run(equipped, deadline, tell)
             # only the worker reads the body of an upload, and the names in it
@@ -94,9 +114,18 @@ class ArmEngine:
                 if error.id == used:
                     raise
                 used = error.id
+            except UnknownLog as error:
+                if error.id == log:
+                    raise
+                log = error.id
 
-    async def _equipped(self, task: Task, name: str | None, used: str | None) -> Task:
-        """The task with what it needs of the database. Raises UnknownRobot, UnknownFigures, StoreUnavailable."""
+    async def _equipped(self, task: Task, name: str | None, used: str | None, log: str | None) -> Task:
+        """The task with what it needs of the database.
+
+        Raises UnknownRobot, UnknownFigures, UnknownLog or StoreUnavailable.
+        """
+        if log is not None:
+            task = WithLog(task, await given_log(self.store, log))
         if used is not None:
             task = WithFigures(task, await identified(self.store, used))
         if name is not None and name not in robot_names():
@@ -129,6 +158,12 @@ async def identified(store: Store, id: str) -> Identified:
     """The identified figures of this id. Raises UnknownFigures or StoreUnavailable."""
     row = await store.read(partial(figures.get, id=id))
     return Identified(row.id, row.robot, row.content)
+
+
+async def given_log(store: Store, id: str) -> GivenLog:
+    """The stored log of this id. Raises UnknownLog or StoreUnavailable."""
+    row = await store.read(partial(logs.get, log_id=id))
+    return GivenLog(id, row.settings, row.body)
 
 
 async def own_figures(store: Store, name: str) -> dict[str, Any]:

@@ -10,11 +10,12 @@ from typing import Literal, TypeVar
 from pydantic import ValidationError
 
 from app.convert.arm import to_arm
-from app.convert.evaluation import to_csv_motion, to_csv_table, to_evaluate_response, to_motion
+from app.convert.evaluation import Evaluated, own_times, to_csv_motion, to_csv_table, to_evaluate_response, to_motion
 from app.convert.fields import location
 from app.convert.json_text import parsed_json
 from app.convert.motion_csv import MotionCsv
 from app.convert.query import query_values
+from app.convert.recorded import as_logged, read_csv, reading_of, told_by
 from app.convert.until import until
 from app.engine.result import TaskResult
 from app.exceptions import InvalidRequest
@@ -22,7 +23,9 @@ from app.http.problem_details import invalid_request
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
 from optimizer.deadline import Deadline
 from optimizer.exceptions import InvalidProblem, InvalidTable, OutsideLimits
-from optimizer.replay.evaluate import Evaluation, evaluate
+from optimizer.identification.logs.reading import Reading
+from optimizer.identification.logs.recorded import measured, motion_of
+from optimizer.replay.evaluate import evaluate
 
 M = TypeVar("M", EvaluateRequest, EvaluateCsvSettings)
 
@@ -45,31 +48,41 @@ class EvaluateTask:
         """The answer of `POST /evaluate`, within about `deadline` seconds. Raises InvalidRequest."""
         # when the request began to wait for a worker
         began = Deadline.after(deadline - self.longest)
-        asked, result = self._evaluate_csv(began) if self.kind == "csv" else self._evaluate_json(began)
+        found = self._evaluate_csv(began) if self.kind == "csv" else self._evaluate_json(began)
         if self.wanted == "csv":
-            return TaskResult.of_csv(to_csv_table(result))
-        return TaskResult.of_json(to_evaluate_response(self.request_id, asked, result))
+            return TaskResult.of_csv(to_csv_table(found))
+        return TaskResult.of_json(to_evaluate_response(self.request_id, found))
 
-    def _evaluate_csv(self, began: Deadline) -> tuple[EvaluateSettings, Evaluation]:
+    def _evaluate_csv(self, began: Deadline) -> Evaluated:
         settings = csv_settings(self.query)
         end = self._end(settings, began, "query")
         try:
             with Path(self.file).open("rb") as file:
                 with until(end):
                     arm = to_arm(settings)
-                    motion = to_csv_motion(settings, MotionCsv.of(file, arm.robot.nq, settings.units))
-                result = evaluate(arm, motion, settings.sample_period, end.left)
+                    try:
+                        table = MotionCsv.of(file, arm.robot.nq, settings.units)
+                    except InvalidTable as error:
+                        return self._evaluate_log(settings, end, error)
+                    motion = to_csv_motion(settings, table)
+                return Evaluated(settings, evaluate(arm, motion, settings.sample_period, end.left))
         except InvalidProblem as error:
             if isinstance(error, InvalidTable | OutsideLimits):
                 raise  # about the motion
             raise InvalidRequest([{"loc": location(error, "query"), "msg": str(error)}]) from None
-        return settings, result
 
-    def _evaluate_json(self, began: Deadline) -> tuple[EvaluateSettings, Evaluation]:
+    def _evaluate_log(self, settings: EvaluateCsvSettings, end: Deadline, error: InvalidTable) -> Evaluated:
+        """The evaluation of a file whose header is that of a log, and not that of a motion, as `error` says."""
+        reading = read_csv(Path(self.file), settings, error)
+        if settings.model_fields_set & {"time_per_segment", "interpolation"}:
+            raise own_times()
+        return evaluated_log(told_by(reading.log, settings), reading, end)
+
+    def _evaluate_json(self, began: Deadline) -> Evaluated:
         body = Path(self.file).read_bytes()
         content = parsed_json(body)
         request = _validated(lambda: EvaluateRequest.model_validate(content), "body")
-        return request, evaluated(request, self._end(request, began, "body"))
+        return evaluated(request, self._end(request, began, "body"))
 
     def _end(self, asked: EvaluateSettings, began: Deadline, where: str) -> Deadline:
         """Raises InvalidRequest, with the part `where` of the request, if it asks for more than it may."""
@@ -79,11 +92,23 @@ class EvaluateTask:
         return began.earlier_by(-(asked.deadline or self.longest))
 
 
-def evaluated(request: EvaluateRequest, end: Deadline) -> Evaluation:
-    """The evaluation of the motion in a request, until about `end`."""
+def evaluated(request: EvaluateRequest, end: Deadline) -> Evaluated:
+    """The evaluation of the motion in a request, until about `end`. Raises UnknownLog."""
+    if request.log is not None:
+        with until(end):
+            reading = reading_of(request.log)
+        return evaluated_log(as_logged(request), reading, end)
     with until(end):
         arm, motion = to_arm(request), to_motion(request)
-    return evaluate(arm, motion, request.sample_period, end.left)
+    return Evaluated(request, evaluate(arm, motion, request.sample_period, end.left))
+
+
+def evaluated_log(asked: EvaluateSettings, reading: Reading, end: Deadline) -> Evaluated:
+    """The evaluation of the motion of a log, until about `end`, and what was measured."""
+    with until(end):
+        arm = to_arm(asked)
+    result = evaluate(arm, motion_of(reading.log), asked.sample_period, end.left)
+    return Evaluated(asked, result, measured(reading.log, arm), reading.report.warnings)
 
 
 def csv_settings(query: dict[str, str]) -> EvaluateCsvSettings:

@@ -39,7 +39,8 @@ class IKPathTask:
         names = ("q", "position_error", "rotation_error", "smallest_singular_value", "reached", "written", "reason")
         return TaskResult.of_json(
             {
-                "id": self.request_id,
+                "request": self.request_id,
+                "id": None,
                 "robot": request.robot,
                 "trajectory": {"t": [t for t, _ in written], "q": [q for _, q in written]},
                 "points": [{"t": t, **fields(point, *names)} for t, point in zip(request.t, found, strict=True)],

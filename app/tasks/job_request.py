@@ -73,6 +73,7 @@ class JobRequestTask:
             result = CycleTask(cycle, self.request_id, motions=self.motions).run(deadline)
         else:
             result = _RUN[self.kind](body, self.request_id, deadline)
+        result = result if result.kept_as is not None else result.kept()
         answer = orjson.loads(result.document)
         figures = figures_of(answer)
         # here and not in the service, which has more to do; nobody waits, so that size counts more than time
@@ -104,8 +105,7 @@ def _identified(answer: dict[str, Any]) -> FoundFigures:
 
 def _evaluate(body: bytes, request_id: str, deadline: float) -> TaskResult:
     request = EvaluateRequest.model_validate_json(body)
-    evaluation = evaluated(request, Deadline.after(deadline))
-    return TaskResult.of_json(to_evaluate_response(request_id, request, evaluation))
+    return TaskResult.of_json(to_evaluate_response(request_id, evaluated(request, Deadline.after(deadline))))
 
 
 _RUN: dict[str, Callable[[bytes, str, float], TaskResult]] = {

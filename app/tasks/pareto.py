@@ -39,7 +39,8 @@ class ParetoTask:
 
     def _content(self, front: Front, points: list[dict[str, Any]]) -> dict[str, Any]:
         return {
-            "id": self.request_id,
+            "request": self.request_id,
+            "id": None,
             **fields(self.request, "robot", "method", "objective"),
             **fields(front, "status", "shortest"),
             "points": points,

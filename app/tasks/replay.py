@@ -55,7 +55,8 @@ class ReplayTask(WithKeptAnswers):
         warnings = list[str]()
         motions = [self._replayed(leg, motion, end, warnings) for leg, motion in planned]
         content = {
-            "id": self.request_id,
+            "request": self.request_id,
+            "id": None,
             "robot": planned[0][1].arm.robot.name,
             "simulator": simulator,
             "motions": motions,

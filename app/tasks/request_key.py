@@ -14,6 +14,8 @@ from app.schemas.cycle import CycleRequest
 from app.schemas.whatif import WhatifRequest
 from app.store.cache import Meaning
 
+_FORM = 2
+"""Form of the answers: requests are not answered by one of another form."""
 _CELL = set(ArmRequest.model_fields) - {"payload"}
 
 
@@ -21,7 +23,7 @@ def meaning_of(kind: str, body: Any) -> Meaning:
     """What a validated request to the endpoint `kind` means: the order of fields, defaults that are spelled out, and
     its deadline do not matter."""
     assert isinstance(body, BaseModel)
-    content = [__version__, kind, body.model_dump(mode="json", exclude={"deadline"})]
+    content = [__version__, _FORM, kind, body.model_dump(mode="json", exclude={"deadline"})]
     base = (body.optimize or body.evaluate) if isinstance(body, WhatifRequest) else body
     meaning: Meaning = {"version": __version__, "digest": _hash(content), "robot": base.robot}  # type: ignore[union-attr]
     if isinstance(body, CycleRequest):

@@ -9,7 +9,8 @@ from typing import Any, TypeVar
 
 from app.convert.arm import to_arm
 from app.convert.arm_fields import arm_fields
-from app.convert.evaluation import to_evaluate_response, to_motion
+from app.convert.evaluation import Evaluated, to_evaluate_response, to_motion
+from app.convert.recorded import as_logged
 from app.convert.request import to_problem
 from app.convert.solution import certificate_fields, to_optimize_response
 from app.convert.until import time_left, until
@@ -64,7 +65,8 @@ class _Work:
     def result_of(self, robot: str, objective: str | None, base: Any, changes: list[Any]) -> TaskResult:
         """The answer."""
         content = {
-            "id": self.request_id,
+            "request": self.request_id,
+            "id": None,
             "robot": robot,
             "objective": objective,
             "base": base,
@@ -150,14 +152,15 @@ class _Evaluated(_Work):
 
     def result(self) -> TaskResult:
         """The answer. Raises the error of the base, and InvalidProblem for an invalid change."""
-        asked = self.request.evaluate
-        assert asked is not None
+        assert self.request.evaluate is not None
+        given = self.request.evaluate
         with until(self.deadline):
+            asked = _located(lambda: as_logged(given), "evaluate")
             arm = _located(lambda: to_arm(asked), "evaluate")
             arms = [self._arm(asked, k) for k in range(len(self.request.changes))]
         base = _located(lambda: self._evaluate(arm, asked), "evaluate")
         content = {
-            "answer": self.collector.add(to_evaluate_response(self.request_id, asked, base)),
+            "answer": self.collector.add(to_evaluate_response(self.request_id, Evaluated(asked, base))),
             "status": None,
             "holds": _holds(base),
             **of_base(base.total.energy, base.total.duration),
@@ -184,7 +187,9 @@ class _Evaluated(_Work):
         same = {
             "holds": _holds(found),
             "certificate": None,
-            "answer": self.collector.add(to_evaluate_response(self.request_id, _changed(asked, change), found)),
+            "answer": self.collector.add(
+                to_evaluate_response(self.request_id, Evaluated(_changed(asked, change), found))
+            ),
             **differences(content, found.total.energy, found.total.duration),
         }
         return self.row(change, same_motion=same)

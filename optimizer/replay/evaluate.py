@@ -30,7 +30,7 @@ from optimizer.replay.nearest_contact import ClearanceMonitor, LeastClearance
 from optimizer.replay.piecewise_motion import Indices, PiecewiseMotion, piecewise_motion
 from optimizer.replay.recording import BLOCK, Log, Waypoints
 from optimizer.replay.sampler import Sampler, Samples
-from optimizer.solution import Energy, Sensitivity
+from optimizer.solution import Clearance, Energy, Sensitivity
 from optimizer.trajectories.quadrature import lobatto_panels
 
 # quadrature panels: their greatest length [s], unless a polynomial piece would have more than MOST_PANELS of them
@@ -46,7 +46,8 @@ class Evaluation:
     """Energy and limits of a given motion. `segments` is empty if `segment_count` exceeds MOST_SEGMENTS.
 
     `speed_jumps` counts the velocity steps inside the motion. `nearest` has the margins subtracted; it is None if
-    collisions are not checked. `close_pass` has none subtracted; it is None unless it is below 2 mm.
+    collisions are not checked. `close_pass` has none subtracted; it is None unless it is below 2 mm. `unmodelled` is
+    that of a `Solution`.
     """
 
     total: IntervalEnergy
@@ -57,6 +58,7 @@ class Evaluation:
     samples: Samples | None
     nearest: LeastClearance | None
     close_pass: LeastClearance | None
+    unmodelled: list[Clearance]
 
 
 @one_thread()
@@ -122,7 +124,7 @@ class _Evaluator:
         self._limits = LimitMonitor(arm)
         self._clearance = ClearanceMonitor(arm) if arm.collisions else None
         self._sampler = None if period is None else Sampler(self._plant, period)
-        self._segment_count = motion.segments if isinstance(motion, Waypoints) else 1
+        self._segment_count = motion.segments
         self._intervals: dict[int, IntervalEnergy] = {}
         self._speed_jumps = 0
         self._spread = arm_spread(arm)
@@ -161,6 +163,7 @@ class _Evaluator:
             samples=None if self._sampler is None else self._sampler.finish(self._last, self._charge),
             nearest=None if self._clearance is None else self._clearance.nearest,
             close_pass=None if self._clearance is None else self._clearance.close_pass,
+            unmodelled=[] if self._clearance is None else self._clearance.unmodelled,
         )
 
     def _total(self, segments: list[IntervalEnergy]) -> IntervalEnergy:

@@ -10,9 +10,11 @@ import numpy as np
 from models.robot import Array
 from optimizer.collision.close_pass import CLOSE, model_without_margins
 from optimizer.collision.model import ClosestPair, CollisionModel, collision_model
+from optimizer.collision.stand_ins import StandIns
 from optimizer.deadline import checkpoint
 from optimizer.problem.arm import Arm
 from optimizer.replay.piecewise_motion import PiecewiseMotion
+from optimizer.solution import Clearance
 
 # greatest time between samples [s], unless a block would have more than MOST_INTERVALS of them
 PERIOD, MOST_INTERVALS = 0.01, 16384
@@ -39,13 +41,16 @@ class ClearanceMonitor:
     """Updates the least clearance of a motion, block after block.
 
     `nearest` has the margins subtracted; None if no pair is checked. `close_pass` is the least distance without
-    margins; None unless it is below CLOSE at a sample.
+    margins; None unless it is below CLOSE at a sample. `unmodelled` are the deepest contacts of the bodies that stand
+    in for a tool and a payload without a shape.
     """
 
     def __init__(self, arm: Arm) -> None:
         self._arm = arm
         self._beyond_margins = _LeastSampled(collision_model(arm))
         self._spacing = 0.0
+        self._stand_ins = StandIns.of(arm)
+        self._contacts = dict[str, Clearance]()
 
     @cached_property
     def _without_margins(self) -> _LeastSampled:
@@ -59,6 +64,15 @@ class ClearanceMonitor:
         q = motion.at_times(t)[0]
         if self._beyond_margins.add(t, q) < CLOSE:
             self._without_margins.add(t, q)
+        for contact in () if self._stand_ins is None else self._stand_ins.contacts(t, q):
+            known = self._contacts.get(contact.pair[1])
+            if known is None or contact.sampled < known.sampled:
+                self._contacts[contact.pair[1]] = contact
+
+    @property
+    def unmodelled(self) -> list[Clearance]:
+        """The deepest contact of each stand-in over all blocks."""
+        return list(self._contacts.values())
 
     @property
     def nearest(self) -> LeastClearance | None:

@@ -134,21 +134,23 @@ def _log(arm: Arm, log: Log) -> Iterator[PiecewiseMotion]:
         rows = block if rows is None else _joined(rows, block)
         if len(rows.t) - begin > BLOCK + OVERLAP:
             end = len(rows.t) - 1 - OVERLAP
-            yield _between(rows, begin, end)
+            yield _between(log, rows, begin, end)
             keep = max(end - OVERLAP, 0)
             rows, begin = _from(rows, keep), end - keep
     assert rows is not None  # logs of fewer than two rows are refused
-    yield _between(rows, begin, len(rows.t) - 1)
+    yield _between(log, rows, begin, len(rows.t) - 1)
 
 
-def _between(rows: LogBlock, begin: int, end: int) -> PiecewiseMotion:
-    """The pieces from row `begin` to row `end` of the splines through all `rows`."""
+def _between(log: Log, rows: LogBlock, begin: int, end: int) -> PiecewiseMotion:
+    """The pieces from row `begin` to row `end` of the splines through all `rows` of a log."""
     q = CubicSpline(rows.t, rows.q)
     v = q.derivative() if rows.v is None else CubicSpline(rows.t, rows.v)
     a = v.derivative() if rows.a is None else CubicSpline(rows.t, rows.a)
     inside = (slice(None), slice(begin, end))
     curves = (curve.c[inside] for curve in (q, v, a, a.derivative()))
-    return PiecewiseMotion(rows.t[begin : end + 1], np.zeros(end - begin, dtype=np.int64), *curves)
+    # by their middles: an edge is the time of a row but for rounding
+    segment = np.searchsorted(log.edges, (rows.t[begin:end] + rows.t[begin + 1 : end + 1]) / 2, side="right")
+    return PiecewiseMotion(rows.t[begin : end + 1], segment, *curves)
 
 
 def _joined(first: LogBlock, second: LogBlock) -> LogBlock:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -91,11 +91,18 @@ class LogBlock:
 class Log:
     """A logged trajectory as a stream of blocks, which is read once. All blocks have the same columns.
 
-    Errors count rows from `first_row`.
+    Errors count rows from `first_row`. Segments after the first one begin at `edges` [s], which increase, after the
+    first row.
     """
 
     blocks: Iterable[LogBlock]
     first_row: int = 0
+    edges: Sequence[float] = ()
+
+    @property
+    def segments(self) -> int:
+        """Number of segments."""
+        return len(self.edges) + 1
 
     def checked(self, arm: Arm) -> Iterator[LogBlock]:
         """The blocks, with times since the first row.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -84,11 +83,11 @@ def bound_beside(prepared: PreparedProblem, followed: Sequence[Candidate], deadl
     """
     start, goal = prepared.problem.start, prepared.problem.goal
     if isinstance(start, ConeOrientedPose) and isinstance(goal, ConeOrientedPose):
-        known = replace(prepared.freed, start=followed[0].q_start)
+        known = prepared.freed(start=followed[0].q_start)
         return bound_between(PreparedProblem.of(known), start, goal, deadline, enough)
     if isinstance(start, ConeOrientedPose):
-        return _bound_to_free(backwards(prepared.freed, goal, start), followed[0].start, deadline, enough)
-    problem = prepared.freed
+        return _bound_to_free(backwards(prepared.freed(goal, start), goal, start), followed[0].start, deadline, enough)
+    problem = prepared.freed()
     if isinstance(goal, ConeOrientedPose):
         return _bound_to_free(problem, followed[0].goal, deadline, enough)
     free = PreparedProblem.of(problem)

@@ -295,6 +295,7 @@ class Run:
                     return None
                 trajectory = prepared.trajectory(spline, self.problem.sample_period)
                 sensitivity = prepared.sensitivity(spline)
+                unmodelled = prepared.surroundings.unmodelled_contacts(spline)
         except DeadlinePassed:
             raise self.too_late() from None
         objective = energy.of(self.problem.objective)
@@ -319,6 +320,7 @@ class Run:
             candidates=[each.report() for each in incumbent.candidates],
             unreachable=self.unreachable,
             certificate=certificate,
+            unmodelled=unmodelled,
             solver=SolverReport(
                 wall_time=self.clock() - self.began,
                 iterations=incumbent.iterations,

@@ -77,7 +77,7 @@ class FreeEndsChain:
     def __init__(self, asked: WorkRound, legs: Sequence[Leg], covered: Mapping[int, CoveredLayer]) -> None:
         self.asked, self.legs, self.covered = asked, legs, covered
         self.layers = [legs[0].start, *(leg.goal for leg in legs)]
-        self.bounds = [LeastBound(PreparedProblem.of(leg.prepared.freed)) for leg in legs]
+        self.bounds = [LeastBound(PreparedProblem.of(leg.prepared.freed())) for leg in legs]
         self.quick = dict[int, SingleJointBound]()
         self.costs = [self._costs(k) for k in range(len(legs))]
         # of the pairs of two layers of cells: which of them have the bound of their displacement

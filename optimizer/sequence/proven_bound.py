@@ -77,7 +77,7 @@ def _of_unknown(leg: Leg, enough: float, deadline: Deadline) -> float:
 def _of_turned(leg: Leg, enough: float, deadline: Deadline) -> float:
     """Bound [J] on the motions of a leg of which an end is in any configuration of a pose that is turned about an
     axis."""
-    problem, start, goal = leg.prepared.freed, leg.start, leg.goal
+    problem, start, goal = leg.prepared.freed(), leg.start, leg.goal
     if start.around is not None and goal.around is not None:
         return bound_between(PreparedProblem.of(problem), start.around, goal.around, deadline, enough)
     if goal.around is not None:

@@ -22,7 +22,7 @@ from optimizer.problem.tool_path import ToolPath
 from optimizer.search.candidates import bound, pairs
 from optimizer.search.ends import ends_of
 from optimizer.search.free_ends_bound import bound_between
-from optimizer.search.path_ends import path_candidates
+from optimizer.search.path_ends import bound_beside, path_candidates
 from optimizer.search.run import Run
 from optimizer.solution import Solution
 from tests.optimizer.moves import AMPLE, tcp_pose
@@ -129,6 +129,16 @@ def test_a_path_is_followed_from_angles_all_around() -> None:
     found = path_candidates(PreparedProblem.of(along(goal, start=free(start), path=ToolPath(about=Z))))
     labels = {each.start.label for each in found}
     assert len(found) >= 8 * len(labels) and all(each.deferred for each in found)
+
+
+@pytest.mark.parametrize("both", [False, True], ids=["start", "both"])
+def test_the_bound_beside_is_that_of_a_problem_without_the_path(both: bool) -> None:
+    """Without the path, no problem has a free start: the bound needs another one."""
+    start, goal = ends_turned(0)
+    asked = along(free(goal) if both else goal, start=free(start), path=ToolPath(about=Z))
+    prepared = PreparedProblem.of(asked)
+    beside = bound_beside(prepared, path_candidates(prepared), NEVER, enough=1.0)
+    assert 1.0 <= beside < np.inf
 
 
 @pytest.mark.parametrize(("start", "path"), WRONG)

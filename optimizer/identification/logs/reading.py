@@ -52,7 +52,8 @@ class LogOptions:
 
     `payload`: what the arm carried; None: what the log says, else nothing. `gravity` (3,) [m/s²] in the base frame.
     `columns` names the columns where their names are not known: see `mapped`. `units` are those of the joints,
-    `current_units` those of currents. `effort` says what the efforts are; `auto` finds it out. `most_bytes` is the
+    `current_units` those of currents. `effort` says what the efforts are; `auto` finds it out, and with None they are
+    not read. `most_bytes` is the
     greatest size of the file after unpacking.
     """
 
@@ -61,7 +62,7 @@ class LogOptions:
     columns: Mapping[str, str | Sequence[str]] | None = None
     units: Literal["rad", "deg"] = "rad"
     current_units: Literal["A", "mA"] = "A"
-    effort: EffortMeaning | Literal["auto"] = "auto"
+    effort: EffortMeaning | Literal["auto"] | None = "auto"
     name: str | None = None
     tags: tuple[str, ...] = ()
     most_bytes: int = MOST_BYTES
@@ -96,6 +97,12 @@ def read_log(source: Path | bytes, robot: Robot, **options: Any) -> Log:
     return read(source, robot, LogOptions(**options)).log
 
 
+def check_header(source: Path | bytes, robot: Robot, options: LogOptions) -> None:
+    """Raises InvalidTable unless the file begins as a log does: with names of columns that are known or mapped."""
+    with Source(source, options.most_bytes) as file:
+        _named(head_of(file, robot.joint_names).names, robot, options)
+
+
 def read(source: Path | bytes, robot: Robot, options: LogOptions) -> Reading:
     """The log in a CSV file, which may be gzip, and what was seen in it.
 
@@ -116,7 +123,7 @@ def read(source: Path | bytes, robot: Robot, options: LogOptions) -> Reading:
     logged = {group: channels.take(group) for group in ("v", "a", "commanded", "temperature")}
     v, a = speeds_of(q, logged["v"], logged["a"], columns, grid.rate, remarks)
     motion = Motion(robot, payload, gravity, q, v, a, grid.rate)
-    named = next((group for group in _EFFORTS if group in channels.values), None)
+    named = None if options.effort is None else next((group for group in _EFFORTS if group in channels.values), None)
     effort, found = None, None
     if named is not None:
         effort, found = _efforts(channels, named, motion, options, remarks)
@@ -151,7 +158,7 @@ def _efforts(
 
     Raises EffortNotUsable."""
     effort = channels.take(named)
-    assert effort is not None
+    assert effort is not None and options.effort is not None
     check_measured(effort)
     remarks += held_warning("effort", effort, motion.v, motion.rate)
     effort = _in_time("effort comes", effort, lag_of(motion, effort), channels.grid.time, remarks)
@@ -174,11 +181,16 @@ def _power(channels: _Channels, motion: Motion, remarks: list[str]) -> Array | N
 
 def _columns(names: Sequence[str], first: Sequence[str], robot: Robot, options: LogOptions) -> Columns:
     """The columns that are read, by the header and the cells of the `first` row."""
+    columns = _named(names, robot, options)
+    return columns if options.columns is not None else in_order_of_joints(columns, first, robot.joint_names)
+
+
+def _named(names: Sequence[str], robot: Robot, options: LogOptions) -> Columns:
+    """The columns that are read, by the header. Raises InvalidTable or InvalidProblem."""
     if options.columns is not None:
         return mapped(names, options.columns, robot.nq)
     bare, _ = parted(names)
-    columns = by_joint_name(bare, robot.joint_names) or recognised(bare, robot.nq)
-    return in_order_of_joints(columns, first, robot.joint_names)
+    return by_joint_name(bare, robot.joint_names) or recognised(bare, robot.nq)
 
 
 def _begun(rows: Rows, robot: Robot, options: LogOptions, scales: Mapping[Group, float], remarks: list[str]) -> Columns:

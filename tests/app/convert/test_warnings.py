@@ -13,7 +13,8 @@ from app.convert.warnings import MISSED, NO_DEFAULT_MOTION, certified_warnings
 def solution(complete: bool, names: list[str]) -> Any:
     """As much of a solution as the warnings read."""
     baselines = [SimpleNamespace(name=name) for name in names]
-    return SimpleNamespace(complete=complete, baselines=baselines, certificate=SimpleNamespace(close_pass=None))
+    certificate = SimpleNamespace(close_pass=None)
+    return SimpleNamespace(complete=complete, baselines=baselines, certificate=certificate, unmodelled=[])
 
 
 @pytest.mark.parametrize(

@@ -73,7 +73,7 @@ def test_the_answer_is_that_of_a_request_without_progress(one: Server) -> None:
         "q_goal": answer["branch"]["goal"]["q"],
     }
     plain = one.post("/optimize", move(**SHORT)).json()
-    for name in ("id", "answer", "solver"):
+    for name in ("request", "id", "answer", "solver"):
         del plain[name]
     assert plain == {name: answer[name] for name in plain}
     assert one.get(answer["answer"]).json()["answer"] == answer, "it is kept"

@@ -26,7 +26,9 @@ from tests.app.jobs.test_dispatcher import BODY, Service, is_done, requests, unt
 
 def computed(task: JobRequestTask, status: str = "optimal") -> TaskResult:
     figures = AnswerFigures("ur5e", 5.0, 1.0, status)
-    result = TaskResult.of_kept_json({"id": task.request_id, "by": task.request_id}, figures)
+    result = TaskResult.of_kept_json(
+        {"request": task.request_id, "id": None, "by": task.request_id, "answer": None}, figures
+    )
     document = packed(result.document)
     return JobResult(
         document, result.media_type, (), result.kept_as, figures, result.is_optimal, wall_time=0.1, parts="optimize"
@@ -71,7 +73,8 @@ def test_one_is_computed_and_the_others_get_its_answer(tmp_path: Path) -> None:
         found = await requests(store, first)
         assert {each.state for each in found} == {"done"} and {each.energy for each in found} == {5.0}
         for number in (*range(20), 21):
-            own = {"id": f"{first}.{number}", "by": f"{first}.0", "answer": f"/answers/{found[number].answer_id}"}
+            kept = found[number].answer_id
+            own = {"request": f"{first}.{number}", "id": kept, "by": f"{first}.0", "answer": f"/answers/{kept}"}
             assert await document(service, first, number) == own
         await done(service, asks(), asks("b"))
         assert len(service.work.begun) == 2, "those of another job are known, too"
@@ -161,7 +164,7 @@ def test_a_job_that_is_deleted_takes_its_answers_with_it(tmp_path: Path) -> None
         first, _ = await done(service, asks())
         second, _ = await done(service, asks())
         await service.jobs.delete(first, OPERATOR)
-        assert (await document(service, second, 0))["id"] == f"{second}.0", "it has a copy"
+        assert (await document(service, second, 0))["request"] == f"{second}.0", "it has a copy"
         await done(service, asks())
         assert service.work.begun == [0, 0]
         await service.dispatcher.stop()

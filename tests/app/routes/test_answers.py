@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any
 
+import orjson
 import pytest
 from starlette.testclient import TestClient
 
@@ -103,20 +104,24 @@ def test_the_path_is_never_looked_for_in_the_callers_texts(client: TestClient) -
 
 
 def test_a_result_that_is_not_kept_says_so() -> None:
-    result = TaskResult.of_kept_json({"name": '","answer":"x"}', "q": [1.5]}, AnswerFigures())
+    name = '","id":null,"answer":"x"}'
+    result = TaskResult.of_kept_json({"request": "r", "id": None, "name": name, "answer": None}, AnswerFigures())
+    assert result.document.startswith(f'{{"request":"r","id":"{result.kept_as}","name":'.encode())
     assert result.document.endswith(f'"answer":"/answers/{result.kept_as}"}}'.encode())
-    without = result.without_path()
-    assert without.document == b'{"name":"\\",\\"answer\\":\\"x\\"}","q":[1.5],"answer":null}'
+    without = result.not_kept()
+    assert orjson.loads(without.document) == {"request": "r", "id": None, "name": name, "answer": None}
     assert without.kept_as is None
 
 
 @pytest.mark.parametrize(("most", "kept"), [(0, False), (100, False), (1 << 20, True)])
 def test_an_answer_larger_than_all_that_may_be_kept_is_not(tmp_path: Any, most: int, kept: bool) -> None:
-    result = TaskResult.of_kept_json({"q": list(range(1000))}, AnswerFigures())
+    content = {"request": "r", "id": None, "q": list(range(1000)), "answer": None}
+    result = TaskResult.of_kept_json(content, AnswerFigures())
 
     async def test(store: Store) -> None:
         answered = await keep_answer(store, Settings(answers_max_bytes=most), "optimize", result, None)
-        assert answered.document.endswith(b'"answer":null}') != kept
+        said = orjson.loads(answered.document)
+        assert (said["id"] is not None, said["answer"] is not None) == (kept, kept)
 
     with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
 

@@ -55,8 +55,9 @@ def test_an_equal_request_has_the_same_answer(client: TestClient) -> None:
     assert not is_hit(first)
     again = sent(client, body, **KNOWN | {"X-Request-ID": "another-one"})
     assert is_hit(again) and 0 <= int(again.headers["age"]) < 1000
-    assert again.json()["id"] == "another-one"
-    assert again.content == first.content.replace(first.json()["id"].encode(), b"another-one", 1)
+    assert again.json()["request"] == "another-one"
+    assert again.content == first.content.replace(first.json()["request"].encode(), b"another-one", 1)
+    assert again.json()["id"] == first.json()["id"], "the same answer"
     spelled_out = {"windings": True, "payload": load(0.123), "goal": {"q": NEAR}, "start": {"q": HOME}}
     assert is_hit(sent(client, spelled_out | {"method": "time_scaling", "robot": "ur5e", "deadline": 17}, **KNOWN))
     assert not is_hit(sent(client, body | {"payload": load(0.124)}, **KNOWN))
@@ -91,7 +92,7 @@ def test_a_body_that_a_worker_reads_is_computed(client: TestClient) -> None:
 
 
 def result(number: int, status: str) -> TaskResult:
-    content = {"id": "first", "status": status, "number": number}
+    content = {"request": "first", "id": None, "status": status, "number": number, "answer": None}
     return TaskResult.of_kept_json(content, figures_of(content))
 
 
@@ -190,7 +191,7 @@ def job(client: TestClient, requests: list[Any], headers: dict[str, str]) -> lis
 
 
 def without_paths(answer: dict[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in answer.items() if name not in ("id", "answer")}
+    return {name: value for name, value in answer.items() if name not in ("request", "id", "answer")}
 
 
 def test_jobs_have_what_was_answered_and_answer_what_comes(client: TestClient) -> None:
@@ -235,5 +236,6 @@ def test_equal_requests_at_the_same_time_are_computed_once(client: TestClient) -
     with ThreadPoolExecutor(4) as pool:
         answers = list(pool.map(lambda _: sent(client, body, **KNOWN), range(4)))
     assert sum(map(is_hit, answers)) == 3
-    assert len({answer.json()["id"] for answer in answers}) == 4
+    assert len({answer.json()["request"] for answer in answers}) == 4
+    assert len({answer.json()["id"] for answer in answers}) == 1
     assert len({orjson.dumps(without_paths(answer.json())) for answer in answers}) == 1

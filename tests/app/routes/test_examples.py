@@ -9,6 +9,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.schemas.examples import BODY_EXAMPLES, JSON
+from tests.app.job_clients import ended, sent
 from tests.app.live import ROOT
 from tests.app.requests import PATIENT
 from tests.selection import long_but
@@ -47,6 +48,20 @@ def test_file_is_answered(name: str, client: TestClient) -> None:
     path, body = name.rpartition("/")[0], json.loads(FILES[name].read_text())
     answer = client.post(f"/{path}", json=PATIENT | body if path in WITH_DEADLINE else body)
     assert answer.is_success, answer.text
+
+
+def test_a_slow_example_names_its_own_deadline() -> None:
+    """What a user sends as it is must be answered within the default deadline, or else bring a longer one."""
+    assert all("deadline" in json.loads(FILES[name].read_text()) for name in SLOW)
+
+
+def test_the_job_example_runs_to_its_end(client: TestClient) -> None:
+    """One of its requests shows what becomes of a motion that is asked to be too short."""
+    asked = json.loads(FILES["jobs/moves"].read_text())
+    job = ended(client, sent(client, asked.pop("requests"), **asked))
+    assert job["state"] == "done"
+    problems = [(each["problem"] or {}).get("type") for each in job["requests"]]
+    assert problems == [None, None, "/problems/duration-too-short", None]
 
 
 def test_paper_requests_are_up_to_date() -> None:

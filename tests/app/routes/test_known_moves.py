@@ -34,7 +34,7 @@ def solves(client: TestClient, answer: Any) -> list[int]:
 
 def without_times(answer: Any) -> Any:
     legs = [{name: value for name, value in leg.items() if name != "answer"} for leg in answer["legs"]]
-    dropped = ("id", "answer", "search")
+    dropped = ("request", "id", "answer", "search")
     return {name: value for name, value in answer.items() if name not in dropped} | {"legs": legs}
 
 

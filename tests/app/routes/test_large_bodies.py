@@ -54,7 +54,9 @@ def sent(client: TestClient, path: str, body: bytes) -> tuple[int, Any]:
     """Status and content of the answer, without what differs from one request to the next."""
     answer = client.post(path, content=body, headers={"content-type": "application/json"})
     content = answer.json()
-    return answer.status_code, {name: value for name, value in content.items() if name not in ("id", "instance")}
+    return answer.status_code, {
+        name: value for name, value in content.items() if name not in ("request", "id", "instance")
+    }
 
 
 def padded(body: bytes) -> bytes:

@@ -32,7 +32,7 @@ def asked_and_answered(request: pytest.FixtureRequest, client: TestClient) -> tu
     # strict, nothing missing, nothing more: the schema is the answer's
     OptimizeResponse.model_validate_json(answer.content)
     content: dict[str, Any] = answer.json()
-    assert content["id"] == request.param
+    assert content["request"] == request.param and content["answer"] == f"/answers/{content['id']}"
     return asked, content
 
 

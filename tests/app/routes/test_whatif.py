@@ -161,7 +161,8 @@ def test_is_the_difference_of_two_evaluations(client: TestClient, evaluated: dic
             row["reoptimised"] is row["reoptimisation"] is row["problem"] is row["same_motion"]["certificate"] is None
         )
         full = kept(client, row["same_motion"]["answer"], "evaluate")
-        assert {**full, "id": ""} == {**alone, "id": ""}
+        assert alone["id"] is None and row["same_motion"]["answer"] == f"/answers/{full['id']}"
+        assert {**full, "request": "", "id": ""} == {**alone, "request": "", "id": ""}
 
 
 NOTHING: list[dict[str, Any]] = [
@@ -289,9 +290,9 @@ def test_texts_of_the_caller_come_back_as_they_are(client: TestClient, text: str
         headers={"X-Request-ID": "kept-0"},
     ).json()
     (row,) = answer["changes"]
-    assert (answer["id"], row["name"]) == ("kept-0", text)
+    assert (answer["request"], answer["id"], row["name"]) == ("kept-0", None, text)
     assert text in row["problem"]["pair"] and text in row["problem"]["detail"]
-    assert kept(client, answer["base"]["answer"], "optimize")["id"] == "kept-0"
+    assert kept(client, answer["base"]["answer"], "optimize")["request"] == "kept-0"
 
 
 def test_refuses_a_base_that_cannot_be(client: TestClient) -> None:

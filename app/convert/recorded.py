@@ -1,0 +1,110 @@
+"""Logs that are evaluated: they come along with the task, from the database, or are the body of a request."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeVar
+
+from app.convert.arm import robot_named, to_payload
+from app.convert.logs import to_log_options
+from app.exceptions import UnknownLog
+from app.schemas.arm import Payload
+from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
+from app.schemas.logs import LogSettings
+from optimizer.exceptions import InvalidProblem, InvalidTable
+from optimizer.identification.logs.log import Log
+from optimizer.identification.logs.log_errors import EffortNotUsable
+from optimizer.identification.logs.reading import LogOptions, Reading, check_header, read
+from optimizer.problem import arm as library
+
+S = TypeVar("S", bound=EvaluateSettings)
+
+
+@dataclass(frozen=True)
+class GivenLog:
+    """A stored log by its id: the settings with which it is read, and its packed file."""
+
+    id: str
+    settings: dict[str, Any]
+    body: bytes
+
+    @cached_property
+    def reading(self) -> Reading:
+        """The log. Raises UnknownRobot if its robot is gone."""
+        settings = LogSettings.model_validate(self.settings)
+        # its size was checked when it was added
+        return read(self.body, robot_named(settings.robot), to_log_options(settings, LogOptions.most_bytes))
+
+
+_LOG: ContextVar[GivenLog | None] = ContextVar("stored log", default=None)
+
+
+@contextmanager
+def log_given(log: GivenLog) -> Iterator[None]:
+    """Within the context, and its thread, requests may name this log."""
+    before = _LOG.set(log)
+    try:
+        yield
+    finally:
+        _LOG.reset(before)
+
+
+def reading_of(id: str) -> Reading:
+    """The stored log of this id. Raises UnknownLog if the request did not bring it."""
+    log = _LOG.get()
+    if log is None or log.id != id:
+        raise UnknownLog(id)
+    return log.reading
+
+
+def as_logged(asked: EvaluateRequest) -> EvaluateRequest:
+    """The request, with what its log says of the arm. Raises UnknownLog or InvalidProblem."""
+    return asked if asked.log is None else told_by(reading_of(asked.log).log, asked)
+
+
+def read_csv(file: Path, asked: EvaluateCsvSettings, otherwise: InvalidTable) -> Reading:
+    """The log in a CSV file, whose header is wrong for a motion because of `otherwise`. Efforts that are not usable are
+    not read: the energy needs none, and a remark says so.
+
+    Raises LogTooLarge, InvalidProblem, or InvalidTable: `otherwise` where the header has a motion's columns, or none.
+    """
+    options = LogOptions(
+        payload=to_payload(asked.payload) if "payload" in asked.model_fields_set else None,
+        gravity=asked.gravity,
+        columns=None if asked.columns is None else asked.columns.model_dump(exclude_none=True),
+        units=asked.units,
+        current_units=asked.current_units,
+        effort=asked.effort,
+    )
+    robot = robot_named(asked.robot)
+    try:
+        check_header(file, robot, options)
+    except InvalidTable as error:
+        raise otherwise if otherwise.column is not None or error.column is None else error from None
+    try:
+        return read(file, robot, options)
+    except EffortNotUsable as error:
+        reading = read(file, robot, replace(options, effort=None))
+        return replace(reading, report=replace(reading.report, warnings=(*reading.report.warnings, str(error))))
+
+
+def told_by(log: Log, asked: S) -> S:
+    """The request, with robot, payload and gravity of the log where it leaves them out. Raises InvalidProblem."""
+    given = asked.model_fields_set
+    if "robot" in given and asked.robot != log.robot:
+        raise InvalidProblem("robot", f"The log is of the robot {log.robot}: leave robot out.")
+    own = {"robot": log.robot, "payload": _payload(log.payload), "gravity": log.gravity.tolist()}
+    return asked.model_copy(update={name: value for name, value in own.items() if name not in given})
+
+
+def _payload(payload: library.Payload) -> Payload | None:
+    if payload.mass == 0:
+        return None
+    inertia = payload.inertia
+    rows = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+    return Payload(mass=payload.mass, com=payload.com.tolist(), inertia=[float(inertia[at]) for at in rows])

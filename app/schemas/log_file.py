@@ -1,0 +1,51 @@
+"""How a file of a log is read: which columns hold what, in which units."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from app.schemas.common import NO_CONTROLS, Request, described
+from app.schemas.lengths import NAME_LENGTH
+
+EffortMeaning = Literal["current", "torque", "external"]
+_Column = Annotated[str, Field(min_length=1, max_length=NAME_LENGTH, pattern=NO_CONTROLS)]
+_Columns = Annotated[list[_Column], Field(min_length=1, max_length=16)]
+
+
+class LogColumns(Request):
+    """Names of the columns of a log, as in its header; of joints one each, from base to flange. Null: none."""
+
+    time: _Column = described("Times [s].", None, "time_s")
+    nanoseconds: _Column | None = described("Nanoseconds beside times in whole seconds.", None, "nsecs", default=None)
+    q: _Columns = described("Joint positions.", None, ["axis_1", "axis_2"])
+    v: _Columns | None = described("Joint velocities.", None, ["speed_1", "speed_2"], default=None)
+    a: _Columns | None = described("Joint accelerations.", None, ["acc_1", "acc_2"], default=None)
+    current: _Columns | None = described("Motor currents.", None, ["amps_1", "amps_2"], default=None)
+    torque: _Columns | None = described("Motor torques at the joints.", None, ["nm_1", "nm_2"], default=None)
+    effort: _Columns | None = described("Efforts of unknown meaning.", None, ["eff_1", "eff_2"], default=None)
+    temperature: _Columns | None = described("Temperatures of the joints [°C].", None, ["t_1", "t_2"], default=None)
+    power: _Column | None = described("Power drawn from the bus of the arm [W].", None, "watts", default=None)
+
+
+class LogFile(Request):
+    """What a file of a log does not say."""
+
+    columns: LogColumns | None = described(
+        "Which columns hold what, where their names are not known.",
+        None,
+        {"time": "t", "q": ["q1", "q2", "q3", "q4", "q5", "q6"]},
+        default=None,
+    )
+    units: Literal["rad", "deg"] = described(
+        "Angular unit of positions, velocities and accelerations.", None, "rad", default="rad"
+    )
+    current_units: Literal["A", "mA"] = described("Unit of currents.", None, "A", default="A")
+    effort: Literal["auto", "current", "torque", "external"] = described(
+        "What the efforts are: motor currents, motor torques at the joints, or torques from outside, without gravity. "
+        "`auto` finds it out.",
+        None,
+        "auto",
+        default="auto",
+    )

@@ -1,0 +1,73 @@
+"""The programs in `examples` run with the commands that their own first lines and the documentation name."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.app.live import ANSWER, ROOT, Server
+
+EXAMPLES = ROOT / "examples"
+PNG = b"\x89PNG"
+# several requests, or one that takes long: the rounds in many times are cut to one
+SLOW = {"plot_round", "plot_round_times", "plot_front", "plot_swept_arm", "plot_replay"}
+# by its name: the request, and the further arguments
+ASKING = {
+    "plot_answer": ("optimize/paper_pose_1", ()),
+    "plot_front": ("pareto/lift", ()),
+    "plot_round": ("cycle/pick_and_place", ()),
+    "plot_round_times": ("cycle/pick_and_place", ("--ratios", "1.2")),
+}
+COMPUTING = {
+    "plot_replay": ("{}",),
+    "plot_swept_arm": ("examples/optimize/bin_to_shelf.json", "{}"),
+}
+TESTED_ELSEWHERE = {"make_paper_requests", "study_loop"}
+PICTURES = [pytest.param(name, marks=pytest.mark.long) if name in SLOW else name for name in sorted(ASKING | COMPUTING)]
+
+
+def run(*command: str) -> str:
+    """What a program prints that ends without an error."""
+    done = subprocess.run([sys.executable, *command], cwd=ROOT, capture_output=True, text=True, timeout=5 * ANSWER)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_every_program_has_a_test() -> None:
+    programs = {each.stem for each in EXAMPLES.iterdir() if each.suffix in (".py", ".sh")}
+    assert programs == {*ASKING, *COMPUTING, *TESTED_ELSEWHERE, "first_saving"}
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_program_draws_a_picture(name: str, server: Server, tmp_path: Path) -> None:
+    picture = tmp_path / "picture.png"
+    if name in COMPUTING:
+        arguments = [each.format(picture) for each in COMPUTING[name]]
+    else:
+        request, more = ASKING[name]
+        file = f"examples/{request}.json"
+        arguments = [file, *more, "--service", server.url, "--output", str(picture)]
+    run("-m", f"examples.{name}", *arguments)
+    assert picture.read_bytes().startswith(PNG)
+
+
+def test_only_programs_without_imports_from_the_repository_are_run_as_files() -> None:
+    """Run as a file, a program finds no room of the repository: the command must be `python -m examples.NAME`."""
+    pages = [*(ROOT / "docs").glob("*.md"), ROOT / "README.md", *EXAMPLES.glob("*.py")]
+    named = {name for page in pages for name in re.findall(r"python3? examples/(\w+)\.py", page.read_text())}
+    assert named
+    room = re.compile(r"^from (app|examples|models|optimizer)\b", re.MULTILINE)
+    assert [name for name in named if room.search((EXAMPLES / f"{name}.py").read_text())] == []
+
+
+def test_first_saving_prints_what_can_be_saved(server: Server) -> None:
+    asked = "examples/optimize/pick_to_place.json"
+    told = run("examples/first_saving.py", asked, server.url)
+    answer = server.post("/optimize", json.loads((ROOT / asked).read_text())).json()
+    assert f"{answer['energy']['electrical']['total']:.0f} J in {answer['duration']:.2f} s" in told
+    assert "controller_default" in told and "% saved" in told
