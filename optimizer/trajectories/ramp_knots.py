@@ -25,8 +25,8 @@ class RampKnots:
     evenly spaced knots cost 0.3 % of the energy of a UR5e, at 0.02 1 %; at the limits of speed of most arms it is
     above 0.1, where they cost next to nothing.
 
-    `growth` [1]: the greatest ratio of neighbouring spans. With 3, a first solve is 0.3 % above its refinement; with 2, it
-    takes longer, and its refinement is no better.
+    `growth` [1]: the greatest ratio of neighbouring spans. With 3, a first solve is 0.3 % above its refinement; with 2,
+    it takes longer, and its refinement is no better.
 
     `refined_widest` [1]: the width of the widest span of a refinement. In motions of a minute, twice the width costs up
     to 0.8 % of the energy, in which other joints start and stop far from the ends; half of it gains 0.1 % at most.
