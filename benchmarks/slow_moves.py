@@ -16,7 +16,7 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -79,7 +79,7 @@ def other_searches(problem: Problem, duration: float) -> Iterator[tuple[str, flo
 def more_points(problem: Problem, spline: Spline) -> Iterator[tuple[str, float]]:
     """Energies [J] of the same move, each with its name, from the answer's motion in larger spaces."""
     prepared = PreparedProblem.of(problem)
-    solver = FreeSpline(prepared, *spline.control_points[[0, -1]], NEVER)
+    solver = FreeSpline(prepared, spline.control_points[0], spline.control_points[-1], NEVER)
     q, t = sampled(spline)
     points = bspline.smoothed(q, t / spline.duration, bspline.uniform(MORE * FEW).knots)
     yield "evenly", prepared.cost_of(solver.solve_points(points, spline.duration, PROGRESS).spline)
@@ -112,7 +112,7 @@ def compare(seed: int, count: int, json: Path | None) -> int:
         energy, spline = answer.energy.electrical.total, answer.trajectory.spline
         others = dict(other_searches(problem, spline.duration)) | dict(more_points(problem, spline))
         best = min(others, key=lambda name: others[name])
-        row = {
+        row: dict[str, Any] = {
             "index": index,
             "kind": kind,
             "energy": energy,

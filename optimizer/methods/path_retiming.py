@@ -91,7 +91,7 @@ class PathRetiming:
         self.space = space or bspline.uniform(min(len(path.control_points) + MORE_POINTS, MOST_POINTS))
         self.scaling = scaling or bspline.uniform(SCALING_POINTS)
         at = np.linspace(0.0, 1.0, FITTED * self.space.n)
-        self._instants = self.scaling.matrix(at)
+        self._instants, self._at_path = self.scaling.matrix(at), self.scaling.matrix(self.space.path_points)
         inner, self._ends = self.space.free, np.zeros((self.space.n, 2))
         self._ends[: self.space.resting, 0], self._ends[-self.space.resting :, 1] = 1.0, 1.0
         matrix = self.space.matrix(at)
@@ -171,7 +171,7 @@ class PathRetiming:
         """
         if self.least_speed is None:
             return np.zeros(0), np.zeros((0, len(x)))
-        basis = self.scaling.at_path[0]
+        basis = self._at_path
         aim, slope = self.least_speed.aimed_at(self._at(basis, x))
         found = self.least_speed.linearised(*z)
         by_x = (found.by_q @ Z[0] + found.by_v @ Z[1])[:, 0]

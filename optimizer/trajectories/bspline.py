@@ -28,7 +28,7 @@ GRID_POINTS = 512
 # points at which path constraints are bounded; an excess between them is found afterwards and repaired
 PATH_POINTS = 96
 # points of a short span, its ends included, among evenly spaced ones that may miss it
-SPAN_POINTS = 6
+SPAN_POINTS, SHORT = 6, 0.25
 # weight of the third derivative by τ beside the positions in a smooth fit
 THIRD = 3e-3
 # a switch nearer to an end of [0, 1] is none
@@ -51,9 +51,10 @@ def basis_matrix(knots: Array, points: Array, derivative: int = 0) -> Array:
 
 def in_all_spans(knots: Array, count: int) -> Array:
     """Points from 0 to the last knot, ascending: `count` evenly spaced ones, and SPAN_POINTS in every span that is
-    shorter than the distance between these."""
+    shorter than the distance between these and than the share SHORT of the widest one."""
     points, breaks = np.linspace(0.0, knots[-1], count), np.unique(knots)
-    short = np.flatnonzero(np.diff(breaks) < points[1])
+    spans = np.diff(breaks)
+    short = np.flatnonzero(spans < min(points[1], SHORT * spans.max()))
     if not len(short):
         return points
     return np.unique(np.append(points, np.linspace(breaks[short], breaks[short + 1], SPAN_POINTS)))
@@ -160,8 +161,12 @@ class Basis:
     @cached_property
     def at_path(self) -> Array:
         """Basis functions and their first derivative (2, M, n) at M ≥ PATH_POINTS path points inside (0, 1)."""
-        points = in_all_spans(self.knots, PATH_POINTS + 2)[1:-1]
-        return np.stack([self.matrix(points, d) for d in range(2)])
+        return np.stack([self.matrix(self.path_points, d) for d in range(2)])
+
+    @cached_property
+    def path_points(self) -> Array:
+        """The path points (M,), ascending."""
+        return in_all_spans(self.knots, PATH_POINTS + 2)[1:-1]
 
     def matrix(self, points: Array, derivative: int = 0) -> Array:
         """Values (k, n) of the basis functions' derivative at `points` (k,) in [0, 1]."""
