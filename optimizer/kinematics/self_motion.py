@@ -22,7 +22,7 @@ ROUNDING = 1e-10
 POINT = 1e-4
 # distance of a joint between two members of a curve that leaves room for others [rad], and halvings of the way between
 # them
-FAR_APART, HALVINGS = 0.5, 6
+FAR_APART, OUTLYING, HALVINGS = 0.5, 3.0, 6
 
 
 class SelfMotion(Protocol):
@@ -88,14 +88,16 @@ def spread(motion: SelfMotion, count: int) -> Array:
 
 def without_gaps(motion: SelfMotion, parameters: Array, q: Array) -> Array:
     """The members q (n, nq) [rad] of a self-motion at parameters (n,), in the order of its arcs, with members between
-    neighbours on an arc that are FAR_APART.
+    neighbours on an arc that are FAR_APART, and OUTLYING times as far as most are.
 
     Next to a singularity the arm moves far while the parameter hardly does.
     """
     lower = np.sort([arc[0] for arc in motion.arcs])
+    apart = np.abs(wrapped(np.diff(q, axis=0))).max(axis=1)
+    far = max(FAR_APART, OUTLYING * float(np.median(apart))) if len(apart) else np.inf
     for _ in range(HALVINGS):
         arc = np.searchsorted(lower, parameters, "right")
-        apart = np.abs(wrapped(np.diff(q, axis=0))).max(axis=1) > FAR_APART
+        apart = np.abs(wrapped(np.diff(q, axis=0))).max(axis=1) > far
         gaps = np.flatnonzero(apart & (np.diff(arc) == 0) & (np.diff(parameters) > 0))
         if not len(gaps):
             break
