@@ -70,8 +70,9 @@ def test_what_is_killed_loses_and_doubles_nothing(tmp_path: Path) -> None:
     with ExitStack() as stack:
         dask = stack.enter_context(scheduler(tmp_path, port))
         logs = [tmp_path / f"machine-{k}.log" for k in range(2)]
+        patient = {"JOULEPATH_STOP_GRACE": str(GRACE)}
         started = [
-            stack.enter_context(process(log, "app.cli", "cluster-worker", address, JOULEPATH_WORKERS="1"))
+            stack.enter_context(process(log, "app.cli", "cluster-worker", address, JOULEPATH_WORKERS="1", **patient))
             for log in logs
         ]
         shared = {"database_url": f"sqlite:///{tmp_path}/joulepath.db", "cluster": address, "workers": 1}
@@ -94,8 +95,11 @@ def test_what_is_killed_loses_and_doubles_nothing(tmp_path: Path) -> None:
         used = processor_time(worker)
         until(lambda: processor_time(worker) > used + AT_WORK)
         services[0].post(f"{path}/cancel", None)
-        until(lambda: not alive(worker))
         assert ended(over(services[0]), path)["state"] == "cancelled"
+        # the search would take longer than anybody waits here
+        path = sent(over(services[0]), [evaluation()])
+        assert ended(over(services[0]), path)["counts"]["done"] == 1
+        assert computing(logs[1]) == [worker], "it has ended the search by itself"
 
         dask.close()
         until(lambda: machines(services[0]) == [])
