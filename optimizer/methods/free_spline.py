@@ -191,7 +191,7 @@ class FreeSpline(SqpMethod):
     @staticmethod
     def may_refine(found: Spline) -> bool:
         """Whether the knots are those of a first solve: `refined` places more of them, at the switches of jerk."""
-        return len(found.control_points) == COARSE or _is_at_ramps(found)
+        return len(found.control_points) == COARSE or RAMPS.are_in(found)
 
     def refined(self, spline: Spline, fine: bool) -> SolveResult:
         """From a motion of a first solve, with knots REFINED at the switches of jerk.
@@ -200,7 +200,7 @@ class FreeSpline(SqpMethod):
         already, they stay there, and the space contains the motion itself.
         """
         duration = spline.duration
-        if _is_at_ramps(spline):
+        if RAMPS.are_in(spline):
             knots = spline.knots / duration
             space = RAMPS.refined(knots, self._switches(duration), EXACT if fine else REFINED)
             points = bspline.refit(self.coordinates.from_joints(spline.control_points), knots, space.knots)
@@ -348,10 +348,3 @@ class FreeSpline(SqpMethod):
 def _is_lost(tried: list[SolveResult]) -> bool:
     """Whether no motion was found, and not because of a collision."""
     return not tried or (tried[-1].status is SolveStatus.FAILED and tried[-1].collision is None)
-
-
-def _is_at_ramps(spline: Spline) -> bool:
-    """Whether a motion has the knots of a slow motion's first solve: single ones, at uneven distances, some of them
-    farther apart than those of a refinement."""
-    spans = np.diff(spline.knots[bspline.DEGREE : -bspline.DEGREE]) / spline.duration
-    return bool(spans.max() > max(RAMPS.refined_widest, 1.001 * spans.min()) and spans.min() > 0)

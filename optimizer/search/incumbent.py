@@ -17,7 +17,7 @@ from optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, 
 from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.reserve import reserve
 from optimizer.solution import CandidateStatus, Certificate, Energy
-from optimizer.trajectories.spline import Spline
+from optimizer.trajectories.spline import Spline, lasting
 
 # a baseline counts as better only beyond this share, the error of the quadratures that are compared
 SLACK = 1e-6
@@ -135,7 +135,18 @@ class Incumbent:
         if best is not None and best.energy is not None:
             self.tell(Improved(best.energy, best.duration, self.proven, best.q_goal))
 
+    @property
+    def _durations(self) -> tuple[float, float]:
+        """The least and the greatest duration [s] that the problem allows."""
+        return self.problem.duration_min or LEAST_DURATION, self.problem.duration_max or np.inf
+
     def allows(self, duration: float) -> bool:
         """Whether the problem allows a duration [s]; a baseline between equal ends has the duration 0."""
-        least, most = self.problem.duration_min or LEAST_DURATION, self.problem.duration_max or np.inf
+        least, most = self._durations
         return bool(least * (1 - SLACK) <= duration <= most * (1 + SLACK))
+
+    def allowed(self, spline: Spline) -> Spline | None:
+        """The motion, with a duration that rounding takes out of bounds brought back; None if it is not allowed."""
+        return (
+            lasting(spline, float(np.clip(spline.duration, *self._durations))) if self.allows(spline.duration) else None
+        )

@@ -165,9 +165,11 @@ def _accept_certified(incumbent: Incumbent, candidate: Candidate, better: list[B
     }
     for name in better:
         scale = max(least_time_scale(motions[name], limits.rates), 1.0)
-        for spline in (retimed(motions[name], slower * scale) for slower in SLOWER):
+        for spline in (incumbent.allowed(retimed(motions[name], slower * scale)) for slower in SLOWER):
+            if spline is None:
+                continue
             energy = incumbent.prepared.energy(spline)
-            if incumbent.allows(spline.duration) and incumbent.certified(candidate, spline, energy).valid:
+            if incumbent.certified(candidate, spline, energy).valid:
                 incumbent.accept_if_better(
                     candidate,
                     SolveResult(SolveStatus.SOLVED, f"the {name} motion itself", spline=spline),

@@ -24,18 +24,17 @@ from optimizer.search.candidates import Candidate, Reason, bound, pairs
 from optimizer.search.claims import may_be_optimal
 from optimizer.search.ends import ends
 from optimizer.search.fastest import explore_or_find_fastest, find_fastest
-from optimizer.search.free_goal_bound import family_bound_of
 from optimizer.search.freed_duration import start_from_free_duration
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.least_work import explore_least_work
-from optimizer.search.missed_branches import all_known, bound_of_others
+from optimizer.search.missed_branches import all_known
 from optimizer.search.near_goals import activate_near_goals
 from optimizer.search.other_starts import start_beside
 from optimizer.search.outer_turns import explore_families
-from optimizer.search.path_ends import bound_beside, path_candidates
-from optimizer.search.raised_bounds import raise_bounds
+from optimizer.search.path_ends import path_candidates
 from optimizer.search.refinement import baselines_of, compare_with_baselines, refine
 from optimizer.search.refusals import no_trajectory
+from optimizer.search.ruled_out import ruled_out
 from optimizer.search.sampled_ends import activate_deferred, between
 from optimizer.search.second_attempt import reject
 from optimizer.search.seeds import activate_seeds
@@ -299,7 +298,7 @@ class Run:
         except DeadlinePassed:
             raise self.too_late() from None
         objective = energy.of(self.problem.objective)
-        least, done = self._ruled_out(objective)
+        least, done = ruled_out(incumbent, objective)
         is_proven = not incumbent.cut_short and may_be_optimal(self.problem.objective, objective, least)
         assert best.attempt is not None
         incumbent.tell(Improved(objective, spline.duration, least, best.q_goal))
@@ -328,26 +327,3 @@ class Run:
                 stationarity=best.attempt.stationarity,
             ),
         )
-
-    def _ruled_out(self, objective: float) -> tuple[float, bool]:
-        """What no motion goes below [J], and whether every candidate that was not solved needs at least `objective`."""
-        incumbent = self.incumbent
-        prepared, candidates = incumbent.prepared, incumbent.candidates
-        raise_bounds(prepared, candidates, objective, incumbent.deadline)
-        open_ = [each for each in candidates if each.status in (CandidateStatus.UNVISITED, CandidateStatus.FAILED)]
-        for candidate in open_:
-            if candidate.lower_bound >= objective:
-                candidate.settle(CandidateStatus.PRUNED, Reason.BOUND)
-        # of a target that infinitely many configurations reach, only samples are solved: it is done only if a bound
-        # rules all of it out
-        family, beside = bound_of_others(prepared, candidates, incumbent.deadline, objective), np.inf
-        if self.problem.tool_path is None:
-            family = min(family, family_bound_of(prepared, candidates, incumbent.deadline, objective))
-        else:
-            beside = bound_beside(prepared, candidates, incumbent.deadline, objective)
-            family = min(family, beside) if any(each.sampled for each in candidates) else family
-        # an end that is infeasible for the search may still be one of other motions
-        unsought = min((each.lower_bound for each in candidates if not each.holdable), default=np.inf)
-        done = all(each.status is CandidateStatus.PRUNED for each in open_) and min(family, unsought) >= objective
-        least = min([family, beside, *(each.lower_bound for each in candidates if not each.sampled)])
-        return least, done and all_known(self.problem)

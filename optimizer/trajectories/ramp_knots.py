@@ -15,6 +15,7 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.trajectories.bspline import DEGREE, Basis, clamped, graded
+from optimizer.trajectories.spline import Spline
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,12 @@ class RampKnots:
     def is_slow(self, ramp: float, duration: float) -> bool:
         """Whether a motion of `duration` [s] is slow, whose ramps last `ramp` [s] at the limits."""
         return ramp < self.slow_below * duration
+
+    def are_in(self, spline: Spline) -> bool:
+        """Whether a motion has the knots of a slow motion's first solve: single ones, at uneven distances, some of them
+        farther apart than those of a refinement."""
+        spans = np.diff(spline.knots[DEGREE:-DEGREE]) / spline.duration
+        return bool(spans.max() > max(self.refined_widest, 1.001 * spans.min()) and spans.min() > 0)
 
     def space(self, switches: Array, repeat: int, count: int) -> Basis:
         """A space with knots of multiplicity `repeat` at the switches (k,) in [0, 1]; its widest spans are as wide as
