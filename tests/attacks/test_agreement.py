@@ -15,6 +15,7 @@ from app.schemas.request import OptimizeRequest
 from benchmarks.agreement import request
 from benchmarks.tasks import as_pose, flange
 from models.registry import load_robot
+from optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from optimizer.methods import sqp_method
 from optimizer.optimize import optimize
 from optimizer.pareto import pareto
