@@ -242,7 +242,7 @@ def test_the_deployment_page_is_followed(tmp_path: Path) -> None:
 
         answer = post("/optimize", move(deadline=60))
         assert answer["status"] == "optimal"
-        assert str(post("/replay", {"answer": answer["id"], "step": 1e-3})["simulator"]).startswith("MuJoCo 4")
+        assert str(post("/replay", {"answer": answer["answer"], "step": 1e-3})["simulator"]).startswith("MuJoCo 4")
         key = "wrong"
         with pytest.raises(urllib.error.HTTPError, match="401"):
             post("/optimize", move())
