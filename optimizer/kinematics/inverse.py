@@ -280,7 +280,9 @@ class ClosedFormInverseKinematics:
     def _reached_beside(self, T: Array, members: int, limits: Limits, distance: float | None) -> _Reached:
         """What is reached beside a flange pose T (4, 4) that is out of reach by a `distance` [m] within `Reach`."""
         nothing = _Reached(np.zeros((0, self._chain.nq)), [], [])
-        if distance is None or distance > REACH.beyond:
+        # a redundant arm knows all of its self-motions; another one may be on one that it does not know
+        least = 0.0 if self._chain.nq > 6 else REACH.rounding
+        if distance is None or not least <= distance <= REACH.beyond:
             return nothing
         for direction in product((-1.0, 0.0, 1.0), repeat=3):
             if any(direction):

@@ -39,7 +39,7 @@ def check_each_once(lines: list[dict[str, Any]], job: dict[str, Any], requests: 
     assert [line["state"] for line in lines] == ["done"] * len(requests), job["counts"]
     assert len({line["answer"] for line in lines}) == len(requests)
     for line, request in zip(lines, requests, strict=True):
-        assert line["result"]["id"] == f"{job['id']}.{line['index']}"
+        assert line["result"]["request"] == f"{job['id']}.{line['index']}"
         if line["kind"] == "evaluate":
             assert line["result"]["duration"] == pytest.approx(request["evaluate"]["time_per_segment"])
 

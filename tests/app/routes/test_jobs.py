@@ -54,7 +54,7 @@ def test_every_kind_is_answered_as_by_its_endpoint(client: TestClient, mixed: An
         if each["answer"] is not None:
             kept = client.get(each["answer"]).json()
             assert kept["kind"] == each["kind"]
-            assert kept["answer"]["id"] == f"{job['id']}.{each['index']}"
+            assert kept["answer"]["request"] == f"{job['id']}.{each['index']}"
     alone = client.post("/optimize", json=optimization()["optimize"]).json()
     answer = client.get(job["requests"][0]["answer"]).json()["answer"]
     OptimizeResponse.model_validate(answer)

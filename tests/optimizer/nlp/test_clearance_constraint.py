@@ -35,6 +35,8 @@ WAY = np.array([0.0, -0.57, 0.27])
 REPLAY, STEP, GRADIENT_TOLERANCE = 1e-4, 1e-6, 1e-4
 # a limit that binds is used up to the solver's own margins
 USED = 0.999
+# one whose peaks between the points of the program are repaired is tightened by one and a half times their excess
+USED_AFTER_REPAIR = 0.997
 # above this a share is exact
 COUNTED_SHARE = 1 - (COUNTED - RESERVE) / SCALE
 # energies of the same motion solved apart
@@ -167,5 +169,5 @@ def test_a_wide_cone_changes_nothing_and_a_narrow_one_binds() -> None:
     tilt = float(path.ratios(q, v).max())
     wide, narrow = optimize(upright(1.5 * tilt)), optimize(upright(0.4 * tilt))
     assert wide.energy.electrical.total == pytest.approx(free.energy.electrical.total, rel=SAME_ENERGY)
-    assert USED < narrow.certificate.worst_ratio["tool_cone"] <= 1
+    assert USED_AFTER_REPAIR < narrow.certificate.worst_ratio["tool_cone"] <= 1
     assert narrow.energy.electrical.total > free.energy.electrical.total

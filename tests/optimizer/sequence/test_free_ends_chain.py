@@ -94,7 +94,7 @@ def _least_of_some(asked: WorkRound, chain: FreeEndsChain, rng: np.random.Genera
     limits = asked.arm.active_limits
     q_goal = entry[e] + wrapped(exit_[g] - entry[e])
     within = ((q_goal >= limits.q_min) & (q_goal <= limits.q_max)).all(axis=1)
-    bounds = [LeastBound(PreparedProblem.of(leg.prepared.freed)) for leg in legs]
+    bounds = [LeastBound(PreparedProblem.of(leg.prepared.freed())) for leg in legs]
 
     def between(k: int, a: Array, b: Array) -> Array:
         U = [np.array([legs[k].prepared.potential(each) for each in q]) for q in (a, b)]
@@ -205,7 +205,7 @@ def test_no_chain_through_free_stops_has_less(seed: int) -> None:
     for leg, (a, b) in zip(chain.legs, pairwise(places), strict=True):
         U = [np.array([leg.prepared.potential(each) for each in q]) for q in (a, b)]
         apart, gain = wrapped(b[None] - a[:, None]).reshape(-1, 6), (U[1][None] - U[0][:, None]).ravel()
-        between = LeastBound(PreparedProblem.of(leg.prepared.freed)).of(apart, gain).reshape(len(a), len(b))
+        between = LeastBound(PreparedProblem.of(leg.prepared.freed())).of(apart, gain).reshape(len(a), len(b))
         least = (least[:, None] + between).min(axis=0)
     bound = chain.least(NEVER)
     assert 0 < bound <= float(least[0]) + ROUNDING

@@ -38,6 +38,8 @@ ROUNDING = 1e-9
 QUADRATURE = 2e-5
 # relative; two solves that end where a step promises less than this
 PROGRESS = 5e-5
+# relative; two solves of one motion from different guesses, which may end in optima that differ by as much
+GUESSES = 5e-4
 ARM = Arm(robot=ROBOT, collisions=False)
 Q = [
     HOME + np.array(each)
@@ -242,7 +244,7 @@ def test_passes_at_the_same_place_are_one() -> None:
     assert [each.stop for each in found.moves[0].passes] == ["0", "1", "2", "3"]
     assert found.status == "optimal" and found.moves[0].solution.certificate.valid
     plain = optimize_round(of(Stop(name="1", target=Q[0], passed=True), Stop(name="rest", target=Q[1]), closed=False))
-    assert found.energy.electrical.total == pytest.approx(plain.energy.electrical.total, rel=PROGRESS)
+    assert found.energy.electrical.total == pytest.approx(plain.energy.electrical.total, rel=GUESSES)
 
 
 def test_waiting_is_not_at_a_stop_that_is_passed() -> None:
