@@ -44,7 +44,9 @@ async def events_after(store: Store, dispatcher: Dispatcher, job_id: str, number
     bell = changes.listen(job_id)
     quiet = 0.0
     try:
-        while not dispatcher.draining:
+        while True:
+            # what happened before the service stops is still told
+            is_last = dispatcher.draining
             read = partial(_batch, job_id=job_id, number=number)
             batch = await changes.shared((job_id, number), partial(store.read, read))
             number = batch.last
@@ -54,7 +56,7 @@ async def events_after(store: Store, dispatcher: Dispatcher, job_id: str, number
             elif quiet >= QUIET:
                 quiet = 0.0
                 yield _COMMENT
-            if batch.over:
+            if batch.over or is_last:
                 return
             # a batch that is not full has all that there is
             if batch.count < _BATCH:

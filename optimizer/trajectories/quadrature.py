@@ -69,8 +69,8 @@ def lobatto_nodes(breaks: Array) -> tuple[Array, Array]:
     return breaks[interval] + offset, weights
 
 
-# greatest interval of the certificate's grid [s], and least number of intervals: where torque changes sign in a motion of a
-# quarter of a second, 1 ms would leave the energy uncertain by more than 1e-3
+# greatest interval of the certificate's grid [s], and least number of intervals: in a motion of a quarter of a second,
+# 1 ms misses where torque changes sign, and leaves the energy uncertain by more than 1e-3
 GRID_PERIOD, LEAST_INTERVALS = 1e-3, 500
 
 
