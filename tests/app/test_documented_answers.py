@@ -1,0 +1,119 @@
+"""The numbers that the documentation prints beside a request are those of the service's own answer to it."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+import pytest
+
+from tests.app.live import ROOT, Server
+
+ENERGY = 5e-3
+"""Relative: the last digits of an optimum depend on the processor and on the compiler of the kernel."""
+SHARE = 0.5
+"""[%] of a gap or a saving, for the same reason."""
+
+BUSES: dict[str, dict[str, Any]] = {
+    "isolated": {"mode": "isolated"},
+    "shared": {"mode": "shared"},
+    "recuperating": {"mode": "recuperating", "efficiency": 0.9},
+}
+TOTAL, BOUND, GAP = ("energy/electrical/total", "energy/lower_bound", "energy/optimality_gap")
+# where it stands, what it looks like, the path and file of the request, what is changed of it, and the field it states
+SAID: list[tuple[str, str, str, dict[str, Any], str]] = [
+    ("README.md", r"saves more than another ([\d.]+) %", "optimize/paper_pose_1", {}, GAP),
+    ("docs/optimize.md", r"can save at most ([\d.]+) %", "optimize/pose_to_pose", {}, GAP),
+    ("docs/collisions.md", r"The motion needs ([\d.]+) J", "optimize/bin_to_shelf", {}, TOTAL),
+    ("docs/collisions.md", r"it\nneeds ([\d.]+) J", "optimize/bin_to_shelf", {"collisions": False}, TOTAL),
+    ("docs/evaluate.md", r'"nearest": \{"distance": ([\d.]+)', "evaluate/paper_motion_1", {}, "nearest/distance"),
+    ("docs/whatif.md", r"base needs ([\d.]+) J", "whatif/lighter_arm", {}, "base/electrical/total"),
+    *(
+        (
+            "docs/drives.md",
+            rf"\| `{name}`.*? \| [\d.]+ \| ([\d.]+) \|",
+            "optimize/storage_on_the_bus",
+            {"bus": bus},
+            TOTAL,
+        )
+        for name, bus in BUSES.items()
+    ),
+    *(
+        ("docs/targets.md", rf"\| {row} \| .*? \| {number} \|", f"optimize/paper_position_{row}", {}, field)
+        for row in (1, 2, 3)
+        for number, field in ((r"([\d.]+) \| [\d.]+ \| optimal", TOTAL), (r"[\d.]+ \| ([\d.]+) \| optimal", BOUND))
+    ),
+]
+SLOW: list[tuple[str, str, str, dict[str, Any], str]] = [
+    ("docs/paths.md", r"a seam of 0.4 m needs ([\d.]+) J", "optimize/seam_any_turn", {}, TOTAL),
+    ("docs/cycles.md", r"along lines: the round needs\n([\d.]+) J", "cycle/round_parts", {}, TOTAL),
+    ("docs/cycles.md", r"a seam of 0.4 m: the round needs ([\d.]+) J", "cycle/seam_any_turn", {}, TOTAL),
+]
+# pages with a shortened answer, and its request
+SHOWN = {
+    "README.md": "optimize/paper_pose_1",
+    "docs/optimize.md": "optimize/pose_to_pose",
+    "docs/targets.md": "optimize/free_orientation",
+}
+
+
+def answer_to(server: Server, request: str, changes: dict[str, Any]) -> dict[str, Any]:
+    body = json.loads((ROOT / f"examples/{request}.json").read_text())
+    answered: dict[str, Any] = server.post(f"/{request.split('/')[0]}", body | changes).json()
+    return answered
+
+
+def stated(page: str, pattern: str) -> float:
+    """The only number on a page that a pattern finds."""
+    (number,) = re.findall(pattern, (ROOT / page).read_text())
+    return float(number)
+
+
+@pytest.mark.parametrize(
+    ("page", "pattern", "request_file", "changes", "field"),
+    [*SAID, *(pytest.param(*row, marks=pytest.mark.long) for row in SLOW)],
+)
+def test_a_number_in_the_text(
+    server: Server, page: str, pattern: str, request_file: str, changes: dict[str, Any], field: str
+) -> None:
+    found: Any = answer_to(server, request_file, changes)
+    for name in field.split("/"):
+        found = found[name]
+    if pattern.endswith("%"):
+        assert stated(page, pattern) == pytest.approx(100 * found, abs=SHARE)
+    else:
+        assert stated(page, pattern) == pytest.approx(found, rel=ENERGY)
+
+
+@pytest.mark.parametrize(("page", "request_file"), SHOWN.items())
+def test_a_shortened_answer(server: Server, page: str, request_file: str) -> None:
+    answer = answer_to(server, request_file, {})
+    assert re.findall(r'"duration": [\d.]+,\s"status": "(\w+)"', (ROOT / page).read_text()) == [answer["status"]]
+    assert stated(page, r'"electrical": \{"total": ([\d.]+)') == pytest.approx(
+        answer["energy"]["electrical"]["total"], rel=ENERGY
+    )
+    assert stated(page, r'"lower_bound": [\d.]+, "optimality_gap": ([\d.]+)') == pytest.approx(
+        answer["energy"]["optimality_gap"], abs=SHARE / 100
+    )
+
+
+def test_what_the_readme_says_of_mechanical_work(server: Server) -> None:
+    answer = answer_to(server, "optimize/mechanical_fixed_duration", {})
+    counts = answer["candidate_counts"]
+    text = " ".join((ROOT / "README.md").read_text().split())
+    assert f"{counts['infeasible']} of 256 take too long, bounds rule out {counts['pruned']}, one is solved" in text
+    assert answer["status"] == "feasible"
+    assert f"here it is {100 * answer['energy']['optimality_gap']:.0f} %" in text
+
+
+@pytest.mark.long
+def test_the_table_of_the_front(server: Server) -> None:
+    answer = answer_to(server, "pareto/branch_switch", {})
+    rows = re.findall(
+        r"^\| ([\d.]+) \| ([\d.]+) \| `([\w/]+)` .* `(\w+)` \|$", (ROOT / "docs/pareto.md").read_text(), re.M
+    )
+    assert [(goal, status) for _, _, goal, status in rows] == [(p["goal"], p["status"]) for p in answer["points"]]
+    assert [float(energy) for _, energy, _, _ in rows] == pytest.approx(
+        [p["energy"] for p in answer["points"]], rel=ENERGY
+    )
