@@ -31,6 +31,9 @@ from optimizer.trajectories.spline import Spline, sampled, spline_of
 COARSE = 13
 # evenly spaced knots are not tried if less than this multiple of the shortest duration is allowed
 TIGHT = 1.12
+# multiple of the shortest duration below which a refinement has EXACT knots at once. Beyond it, torque holds most
+# motions back, and a refinement with REFINED knots first leads to better optima
+EXACT_BELOW = 1.2
 # share of the shortest duration by which a motion of COARSE control points near it is slower than the same motion with
 # knots at the switches of jerk: 0.03 to 0.075 in 30 of 32 random requests. Knots at the switches of the coarse motion
 # would keep the fine one from getting any faster than 1.003 of the shortest duration, at 0.1 to 0.25 % more energy
@@ -100,7 +103,7 @@ class FreeSpline(SqpMethod):
             list[SolveResult](),
         )
         if self._is_refined_at_once:
-            tried, guess = self._coarse_and_refined(guess, TIGHT * self._shortest)
+            tried, guess = self._coarse_and_refined(guess, EXACT_BELOW * self._shortest)
         return tried if tried and tried[-1].spline is not None else [*tried, self.improve(guess)]
 
     @property
@@ -112,9 +115,9 @@ class FreeSpline(SqpMethod):
         plain = not has_corners(problem.objective, problem.arm) and problem.arm.bus.mode != "storage"
         return self.is_sole and settled and plain and not problem.arm.scene.names and self.deadline.left > AMPLE
 
-    def _coarse_and_refined(self, guess: Guess, tight: float) -> tuple[list[SolveResult], Guess]:
+    def _coarse_and_refined(self, guess: Guess, exact_below: float) -> tuple[list[SolveResult], Guess]:
         """The coarse motion of a guess, checked for collisions alone, and the refined one. If the coarse one lasts less
-        than `tight` [s], knots are EXACT.
+        than `exact_below` [s], knots are EXACT.
 
         Where the last result has no motion, the coarse motion has to be checked: the guess for that is returned, too.
         """
@@ -127,7 +130,7 @@ class FreeSpline(SqpMethod):
         late = self.deadline.left < MULTIPLE * (left - self.deadline.left)
         if late or self.prepared.surroundings.worst_violation(coarse.spline) is not None:
             return [replace(coarse, spline=None)], found
-        return [coarse, self.refined(coarse.spline, fine=duration < tight)], found
+        return [coarse, self.refined(coarse.spline, fine=duration < exact_below)], found
 
     def _may_be_on_the_wrong_side(self, found: SolveResult) -> bool:
         """Whether a motion may have left obstacles on the wrong side."""
@@ -196,8 +199,8 @@ class FreeSpline(SqpMethod):
     def refined(self, spline: Spline, fine: bool) -> SolveResult:
         """From a motion of a first solve, with knots REFINED at the switches of jerk.
 
-        If `fine`, with knots EXACT at those of the faster motion that is expected. Where knots are at the ramps
-        already, they stay there, and the space contains the motion itself.
+        If `fine`, with knots EXACT; of a TIGHT motion, at those of the faster one that is expected. Where knots are at
+        the ramps already, they stay there, and the space contains the motion itself.
         """
         duration = spline.duration
         if RAMPS.are_in(spline):
@@ -208,7 +211,8 @@ class FreeSpline(SqpMethod):
         if not fine:
             return super().refined(spline, fine)
         shortest = float(seven_segment.shortest_duration(self.q_goal - self.q_start, self.coordinates.limits))
-        expected = max(duration - COARSE_LAG * shortest, shortest)
+        lag = COARSE_LAG * shortest if duration < TIGHT * shortest else 0.0
+        expected = max(duration - lag, shortest)
         space = self.graded(float(np.clip(expected, self.t_min, self.t_max)), EXACT)
         return self._solve_in(space, *sampled(spline))
 

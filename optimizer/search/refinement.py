@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from optimizer.deadline import DeadlinePassed, watch
-from optimizer.methods.free_spline import TIGHT
+from optimizer.methods.free_spline import EXACT_BELOW, TIGHT
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.search.attempts import improve, solve_from
 from optimizer.search.baselines import baselines, guesses, nearest
@@ -40,12 +40,12 @@ def refine(incumbent: Incumbent, candidate: Candidate) -> None:
     candidate.refined = True
     sharpen(incumbent, candidate)
     if method.may_refine(candidate.spline) and not deadline.passed:
-        coarse, tight = candidate.spline, is_tight(incumbent, candidate)
-        if tight and slides(incumbent.prepared, candidate):
+        coarse, exact = candidate.spline, lasts_below(EXACT_BELOW, incumbent, candidate)
+        if lasts_below(TIGHT, incumbent, candidate) and slides(incumbent.prepared, candidate):
             grade(incumbent, candidate)
         else:
-            improve(incumbent, candidate, lambda solver: solver.refined(coarse, fine=tight))
-        if tight and candidate.spline is coarse and not incumbent.deadline.passed:
+            improve(incumbent, candidate, lambda solver: solver.refined(coarse, fine=exact))
+        if exact and candidate.spline is coarse and not incumbent.deadline.passed:
             improve(incumbent, candidate, lambda solver: solver.refined(coarse, fine=False))
     if method.may_grade(candidate.spline) and not deadline.passed:
         solve_from(incumbent, candidate, sampled(candidate.spline), fine=True)
@@ -66,13 +66,13 @@ def refine(incumbent: Incumbent, candidate: Candidate) -> None:
         solve_from(incumbent, candidate, sampled(slower), fine=False, duration=longest)
 
 
-def is_tight(incumbent: Incumbent, candidate: Candidate) -> bool:
-    """Whether a motion is so near to the fastest one that its jerk switches nearly as in that one.
+def lasts_below(ratio: float, incumbent: Incumbent, candidate: Candidate) -> bool:
+    """Whether a motion takes less than a multiple of the shortest duration of its joints.
 
-    Then exact knots at the switches save some 0.3 % of its energy: the solves of a fixed duration so short have them.
+    Then its jerk switches nearly as in the fastest motion.
     """
     displacement = candidate.q_goal - candidate.q_start
-    return candidate.spline.duration < TIGHT * float(
+    return candidate.spline.duration < ratio * float(
         shortest_duration(displacement, incumbent.problem.arm.active_limits)
     )
 

@@ -275,8 +275,9 @@ class Run:
         solve_from(incumbent, candidate, sampled(known), fine=self.problem.method == "time_scaling")
         result = solve(incumbent, candidate)
         if result.spline is None:
-            # as it is known, it is no optimum
-            incumbent.cut_short |= candidate.attempt is not None and candidate.attempt.spline is known
+            # a known motion is no optimum if solves from it fail; it may be one if they end early, being no better
+            failed = result.status is not SolveStatus.PRUNED
+            incumbent.cut_short |= failed and candidate.attempt is not None and candidate.attempt.spline is known
             return
         incumbent.accept_if_better(candidate, result, prepared.energy(result.spline))
         if incumbent.method.may_refine(result.spline) and candidate.attempt is not result:
