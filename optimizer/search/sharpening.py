@@ -34,7 +34,7 @@ RESTARTS, FOLLOWED = 8, 3
 FEW, MIDDLE, DENSE = 13, 24, 40
 # fixed durations, in multiples of the one found, in which the first motion on an isolated bus is solved in the middle
 # space, too: from one duration to the next, the optimum of a free one may be in another basin, up to 1.7 % better
-AROUND = (0.94, 0.96, 0.98, 1.0, 1.03)
+AROUND = (0.93, 0.95, 0.97, 0.99, 1.0, 1.02)
 # relative decrease of the cost that a further step must promise, and in the last solve
 PROGRESS, LAST_PROGRESS = 1e-3, 2e-4
 # first solves are rough and coarse: those that need at most this ratio of the least energy are solved in the middle
