@@ -31,12 +31,10 @@ from optimizer.trajectories.spline import Spline, sampled, spline_of
 COARSE = 13
 # evenly spaced knots are not tried if less than this multiple of the shortest duration is allowed
 TIGHT = 1.12
-# multiple of the shortest duration below which a refinement has EXACT knots at once. Beyond it, torque holds most
-# motions back, and a refinement with REFINED knots first leads to better optima
+# multiple of the shortest duration below which a refinement has EXACT knots at once; beyond, REFINED ones lead further
 EXACT_BELOW = 1.2
-# share of the shortest duration by which a motion of COARSE control points near it is slower than the same motion with
-# knots at the switches of jerk: 0.03 to 0.075 in 30 of 32 random requests. Knots at the switches of the coarse motion
-# would keep the fine one from getting any faster than 1.003 of the shortest duration, at 0.1 to 0.25 % more energy
+# share of the shortest duration by which a TIGHT motion of COARSE control points is slower than the same motion with
+# knots at the switches of jerk: 0.03 to 0.075 in 30 of 32 random requests. Knots at its own switches would keep it slow
 COARSE_LAG = 0.07
 # multiplicity of knots at the switches of jerk: with 2 the slope of jerk may jump there, with 3 jerk itself
 REFINED, EXACT = 2, 3
@@ -98,10 +96,8 @@ class FreeSpline(SqpMethod):
 
     def _from_smoothed(self, space: Basis) -> list[SolveResult]:
         """The attempts from the smoothed time-optimal motion in a space; the last one counts."""
-        guess, tried = (
-            Guess(space, self._smoothed(space), 0.0, rough=True, progress=self._progress),
-            list[SolveResult](),
-        )
+        guess = Guess(space, self._smoothed(space), 0.0, rough=True, progress=self._progress)
+        tried = list[SolveResult]()
         if self._is_refined_at_once:
             tried, guess = self._coarse_and_refined(guess, EXACT_BELOW * self._shortest)
         return tried if tried and tried[-1].spline is not None else [*tried, self.improve(guess)]
