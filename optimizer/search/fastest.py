@@ -204,10 +204,11 @@ def find_fastest(incumbent: Incumbent, known: Sequence[Spline] = (), improve: bo
         if shortest > longest:
             raise DurationTooShort(least_duration(incumbent), late=incumbent.deadline.passed)
         return
-    if found.duration > longest:
-        raise found.too_slow
     candidate = found.candidate
-    spline = lasting(found.spline, max(found.duration, incumbent.problem.duration_min or 0.0))
+    # rounding may leave it a little longer than the same motion that was found before
+    spline = incumbent.allowed(lasting(found.spline, max(found.duration, incumbent.problem.duration_min or 0.0)))
+    if spline is None:
+        raise found.too_slow
     candidate.deferred = False
     if candidate.reason is Reason.NOT_CONFIRMED:
         candidate.settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
@@ -221,6 +222,8 @@ def find_fastest(incumbent: Incumbent, known: Sequence[Spline] = (), improve: bo
         incumbent.cut_short = True
     if improve:
         solve_from(incumbent, candidate, sampled(spline), fine=True)
+    if found.duration > longest and incumbent.best() is None:
+        raise found.too_slow
     # a motion that is only the fastest one is no optimum
     incumbent.cut_short |= candidate.attempt is not None and candidate.attempt.spline is spline
 

@@ -75,7 +75,7 @@ def test_on_an_isolated_bus_no_fixed_duration_needs_less_than_a_free_one() -> No
         assert energy(solved(ISOLATED, duration=duration)) > (1 - AGREED) * energy(free)
 
 
-@pytest.mark.parametrize("index", [5, 13, 21], ids=["tight limits", "payload", "plain"])
+@pytest.mark.parametrize("index", [5, 13, 21, 64], ids=["tight limits", "payload", "plain", "the fastest motion"])
 def test_its_own_duration_as_a_fixed_one_gives_the_same_energy(index: int) -> None:
     _, body = request(0, index)
     free = solved(body)
