@@ -13,7 +13,7 @@ import numpy as np
 from models.robot import Array, Limits
 from optimizer.collision.bodies import Indices
 from optimizer.energy.limited_torque import limited_parts
-from optimizer.energy.torque_bound import TorqueSamples, torque_bounds
+from optimizer.energy.torque_bound import SHARPNESS, TorqueSamples, torque_bounds
 from optimizer.kinematics.path_constraints import PathConstraints
 from optimizer.nlp.clearance_constraint import CLEARANCE, RESERVE, SCALE
 from optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
@@ -35,9 +35,6 @@ TORQUE_REPAIR = 1.5
 POSITION_POINTS, POSITION_REPAIR, ROUNDING = 512, 1.5, 1e-9
 # the greatest time scale that replaces another solve
 MOST_TIME_SCALE = 1 + 5e-4
-# a motion is checked at the quadrature points alone if its torques there, of rigid bodies and of friction with any
-# sign, stay below this ratio of the limits
-FAR_BELOW = 0.8
 # samples at which path constraints of a motion that collides are checked, and the multiple of an excess by which they
 # are tightened
 PATH_SAMPLES, PATH_REPAIR = 401, 1.5
@@ -76,7 +73,7 @@ def torque_peaks(prepared: PreparedProblem, spline: Spline) -> Array:
     _, _, v, a, tau, lost = prepared.report_samples(spline)
     smooth, friction = limited_parts(prepared.arm, tau, v, a, lost)
     most = np.abs(smooth).max(axis=0) + np.abs(friction).max(axis=0)
-    if (most <= FAR_BELOW * prepared.problem.arm.active_limits.tau_max).all():
+    if (most <= SHARPNESS.far_below * prepared.problem.arm.active_limits.tau_max).all():
         return np.asarray(np.abs(smooth + friction).max(axis=0))
     samples = TorqueSamples.of(spline.curve, prepared.torques, grid(spline.duration)[None])
     return torque_bounds(prepared.arm, spline.curve, prepared.torques, samples)

@@ -212,14 +212,11 @@ def find_fastest(incumbent: Incumbent, known: Sequence[Spline] = (), improve: bo
     candidate.deferred = False
     if candidate.reason is Reason.NOT_CONFIRMED:
         candidate.settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
-    try:
-        with watch(incumbent.deadline):
-            energy = incumbent.prepared.energy(spline)
-            if incumbent.certified(candidate, spline, energy).valid:
-                result = SolveResult(SolveStatus.SOLVED, "the fastest motion, retimed", spline=spline)
-                incumbent.accept_if_better(candidate, result, energy)
-    except DeadlinePassed:
-        incumbent.cut_short = True
+    energy = incumbent.confirmed_energy(candidate, spline)
+    if energy is not None:
+        result = SolveResult(SolveStatus.SOLVED, "the fastest motion, retimed", spline=spline)
+        incumbent.accept_if_better(candidate, result, energy)
+    incumbent.cut_short |= incumbent.deadline.passed
     if improve:
         solve_from(incumbent, candidate, sampled(spline), fine=True)
     if found.duration > longest and incumbent.best() is None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from optimizer.deadline import DeadlinePassed, watch
 from optimizer.methods.free_spline import FreeSpline
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.search.attempts import solve, solve_from
@@ -55,15 +54,9 @@ def _take(incumbent: Incumbent, best: Candidate, twin: Candidate, duration: floa
     """Accept the motion of `twin`, retimed to `duration` [s], and what is solved from it, if it needs less energy."""
     assert twin.attempt is not None and best.energy is not None
     motion = lasting(twin.spline, duration)
-    try:
-        with watch(incumbent.deadline):
-            energy = incumbent.prepared.energy(motion)
-            valid = incumbent.certified(twin, motion, energy).valid
-    except DeadlinePassed:
-        return
-    before = best.energy
-    if valid:
+    before, confirmed = best.energy, incumbent.confirmed_energy(twin, motion)
+    if confirmed is not None:
         found = SolveResult(SolveStatus.SOLVED, RETIMED, spline=motion, stationarity=twin.attempt.stationarity)
-        incumbent.accept_if_better(best, found, energy, twin)
-    if motion is not twin.spline and energy.of(incumbent.problem.objective) < PROMISING * before:
+        incumbent.accept_if_better(best, found, confirmed, twin)
+    if motion is not twin.spline and incumbent.prepared.cost_of(motion) < PROMISING * before:
         solve_from(incumbent, best, sampled(motion), fine=True)

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from optimizer.certificate import certify
-from optimizer.deadline import Deadline
+from optimizer.deadline import Deadline, DeadlinePassed, watch
 from optimizer.methods import method_of
 from optimizer.methods.method import Method, SolveResult
 from optimizer.prepared_problem import PreparedProblem
@@ -111,6 +111,15 @@ class Incumbent:
         """The certificate of a candidate's motion, checked against the targets of this candidate."""
         asked = narrowed(self.problem, candidate.start.target, candidate.goal.target)
         return certify(asked, spline, candidate.q_start, candidate.q_goal, energy)
+
+    def confirmed_energy(self, candidate: Candidate, spline: Spline) -> Energy | None:
+        """The energy of a motion of a candidate; None if its certificate does not confirm it before the deadline."""
+        try:
+            with watch(self.deadline):
+                energy = self.prepared.energy(spline)
+                return energy if self.certified(candidate, spline, energy).valid else None
+        except DeadlinePassed:
+            return None
 
     def tell_candidates(self) -> None:
         """Tell how many candidates there are."""

@@ -262,13 +262,8 @@ class Run:
             return
         least, most = self.problem.duration_min or 0.0, self.problem.duration_max or np.inf
         known = lasting(spline, float(np.clip(spline.duration, least, most)))
-        try:
-            with watch(incumbent.deadline):
-                energy = prepared.energy(known)
-                valid = incumbent.certified(candidate, known, energy).valid
-        except DeadlinePassed:
-            return
-        if valid:
+        energy = incumbent.confirmed_energy(candidate, known)
+        if energy is not None:
             incumbent.accept_if_better(
                 candidate, SolveResult(SolveStatus.SOLVED, "a known motion, retimed", spline=known), energy
             )

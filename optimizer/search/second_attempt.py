@@ -72,14 +72,8 @@ def _tightened(incumbent: Incumbent, candidate: Candidate) -> Arm | None:
 
 def _take(incumbent: Incumbent, candidate: Candidate, twin: Candidate) -> None:
     """Give the candidate the motion of `twin` if the certificate confirms it for the limits that were asked for."""
-    spline = twin.spline
-    try:
-        with watch(incumbent.deadline):
-            energy = incumbent.prepared.energy(spline)
-            valid = incumbent.certified(twin, spline, energy).valid
-    except DeadlinePassed:
-        return
-    if valid:
+    energy = incumbent.confirmed_energy(twin, twin.spline)
+    if energy is not None:
         candidate.move(twin)
         candidate.attempt, candidate.energy = twin.attempt, energy.of(incumbent.problem.objective)
         candidate.settle(CandidateStatus.SOLVED, Reason.METHOD, WITHIN_TIGHTER)

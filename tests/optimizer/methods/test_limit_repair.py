@@ -9,7 +9,8 @@ import pytest
 
 from models.robot import Array
 from optimizer.energy.limited_torque import limited_parts
-from optimizer.methods.limit_repair import FAR_BELOW, torque_peaks
+from optimizer.energy.torque_bound import SHARPNESS
+from optimizer.methods.limit_repair import torque_peaks
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.trajectories import bspline, seven_segment
 from optimizer.trajectories.bspline import Basis
@@ -38,7 +39,7 @@ def random_motion(prepared: PreparedProblem, space: Basis, spread: float, rng: n
 
 
 def estimate(prepared: PreparedProblem, spline: Spline) -> Array:
-    """What decides whether a motion is far below the torque limits (nq,): it must stay below FAR_BELOW of them."""
+    """What decides whether a motion is far below the torque limits (nq,): it must stay below `far_below` of them."""
     _, _, v, a, tau, _ = prepared.report_samples(spline)
     parts = limited_parts(prepared.arm, tau, v, a)
     return np.asarray(sum(np.abs(part).max(axis=0) for part in parts))
@@ -58,11 +59,11 @@ def test_what_is_far_below_the_torque_limits_is_within_them_everywhere(
             q, v, a = sample(spline, np.linspace(0.0, spline.duration, POINTS))
             truth = np.abs(prepared.limited_torques(q, v, a)).max(axis=0)
             worst = max(worst, float((truth / estimated).max()))
-            if (estimated <= FAR_BELOW * tau_max).all():
+            if (estimated <= SHARPNESS.far_below * tau_max).all():
                 skipped += 1
                 assert (truth <= tau_max).all()
             else:
                 assert (torque_peaks(prepared, spline) >= truth * (1 - 1e-3)).all()
     # with limits made to measure, every one of the motions would have been taken as far below them
-    assert worst <= 1 / FAR_BELOW
+    assert worst <= 1 / SHARPNESS.far_below
     assert skipped
