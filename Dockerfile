@@ -24,6 +24,7 @@ RUN mv /tmp/studio/scripts/requirements-node.lock /tmp/studio/ \
     && python3 -m venv /tmp/node && PATH=/tmp/node/bin:$PATH \
     && python /tmp/studio/scripts/vendor_studio.py && rm -rf /tmp/node
 COPY LICENSE ./
+COPY joulepath joulepath
 COPY models models
 COPY optimizer optimizer
 COPY app app
@@ -33,7 +34,7 @@ ENV JOULEPATH_CACHE_DIR=/opt/joulepath/kernels MPLCONFIGDIR=/opt/matplotlib
 COPY scripts/import_all.py /tmp/
 RUN mkdir /opt/matplotlib \
     && python /tmp/import_all.py \
-    && python -m optimizer.energy.precompile --portable
+    && python -m joulepath.optimizer.energy.precompile --portable
 
 FROM ${BASE_IMAGE}
 RUN apt-get update \
@@ -62,4 +63,4 @@ VOLUME /var/lib/joulepath
 EXPOSE 8000
 HEALTHCHECK --interval=10s --timeout=3s --start-period=30s --retries=3 \
     CMD ["python", "-c", "import os, urllib.request; urllib.request.urlopen(f'http://127.0.0.1:{os.environ[\"PORT\"]}/healthz', timeout=2)"]
-CMD ["python", "-m", "app"]
+CMD ["python", "-m", "joulepath.app"]

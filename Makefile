@@ -30,7 +30,7 @@ comma := ,
 .PHONY: serve test test-long bench lock clean ready lint kernels pytest pytest-long
 
 serve: $(VENV)/.runtime $(STUDIO)/vendor kernels
-	JOULEPATH_HOST=$(HOST) PORT=$(PORT) exec $(PY) -m app
+	JOULEPATH_HOST=$(HOST) PORT=$(PORT) exec $(PY) -m joulepath.app
 
 # what the tests need, side by side; bytecode, since they start many processes, even where those may write none
 ready: $(VENV)/.runtime $(COMPILER)
@@ -61,7 +61,7 @@ bench: $(VENV)/.benchmarks kernels
 	$(PY) -m benchmarks $(BENCH_ARGS)
 
 kernels: $(VENV)/.runtime $(COMPILER)
-	@$(if $(JOULEPATH_ROBOTS),$(PY) -m optimizer.energy.precompile $(subst $(comma), ,$(JOULEPATH_ROBOTS)))
+	@$(if $(JOULEPATH_ROBOTS),$(PY) -m joulepath.optimizer.energy.precompile $(subst $(comma), ,$(JOULEPATH_ROBOTS)))
 
 # The dev lockfile holds the runtime one whole, at the same versions.
 $(VENV)/.runtime: requirements.lock $(PY)

@@ -1,4 +1,4 @@
-"""`python -m app`: the service under uvicorn."""
+"""`python -m joulepath.app`: the service under uvicorn."""
 
 # Worker processes import this module too, so that everything that they do not need is imported inside `main`.
 from __future__ import annotations
@@ -15,17 +15,17 @@ def main() -> None:
     signal.signal(signal.SIGTERM, _exit)
     signal.signal(signal.SIGINT, _exit)
 
-    from app.engine.forkserver import start_forkserver
+    from joulepath.app.engine.forkserver import start_forkserver
 
     start_forkserver()
 
-    from app.engine.imports import importing
+    from joulepath.app.engine.imports import importing
 
     with importing():
-        from app.access.start import check_access
-        from app.logs import configure_logging
-        from app.server import serve
-        from app.settings import WrongSettings, read_settings
+        from joulepath.app.access.start import check_access
+        from joulepath.app.logs import configure_logging
+        from joulepath.app.server import serve
+        from joulepath.app.settings import WrongSettings, read_settings
 
     try:
         settings = read_settings()

@@ -10,30 +10,30 @@ from functools import partial
 from fastapi import FastAPI
 from starlette.middleware.cors import CORSMiddleware
 
-from app import __version__
-from app.access.key_ring import KeyRing
-from app.access.start import key_ring
-from app.cluster.link import Cluster
-from app.engine.pool import Engine
-from app.engine.warm_up import warm
-from app.http.authentication import authenticated
-from app.http.body_limit import BodyLimit
-from app.http.client import sender
-from app.http.compression import Compression
-from app.http.content_coding import ContentCoding
-from app.http.gate import Gate
-from app.http.handlers import install_handlers
-from app.http.head import Head
-from app.http.json_body import JsonBody
-from app.http.metrics import Metrics, RouteNote
-from app.http.openapi import install_openapi
-from app.http.request_context import RequestContext
-from app.http.sites import known_host, same_site
-from app.http.transfers import Answers, Bodies, BytesInFlight
-from app.jobs.dispatcher import Dispatcher
-from app.jobs.executor import ClusterExecutor, Executor, LocalExecutor
-from app.jobs.jobs import Jobs
-from app.routes import (
+from joulepath import __version__
+from joulepath.app.access.key_ring import KeyRing
+from joulepath.app.access.start import key_ring
+from joulepath.app.cluster.link import Cluster
+from joulepath.app.engine.pool import Engine
+from joulepath.app.engine.warm_up import warm
+from joulepath.app.http.authentication import authenticated
+from joulepath.app.http.body_limit import BodyLimit
+from joulepath.app.http.client import sender
+from joulepath.app.http.compression import Compression
+from joulepath.app.http.content_coding import ContentCoding
+from joulepath.app.http.gate import Gate
+from joulepath.app.http.handlers import install_handlers
+from joulepath.app.http.head import Head
+from joulepath.app.http.json_body import JsonBody
+from joulepath.app.http.metrics import Metrics, RouteNote
+from joulepath.app.http.openapi import install_openapi
+from joulepath.app.http.request_context import RequestContext
+from joulepath.app.http.sites import known_host, same_site
+from joulepath.app.http.transfers import Answers, Bodies, BytesInFlight
+from joulepath.app.jobs.dispatcher import Dispatcher
+from joulepath.app.jobs.executor import ClusterExecutor, Executor, LocalExecutor
+from joulepath.app.jobs.jobs import Jobs
+from joulepath.app.routes import (
     answers,
     cluster,
     compare,
@@ -61,9 +61,9 @@ from app.routes import (
     suggest,
     whatif,
 )
-from app.settings import Settings
-from app.store.store import Store
-from app.tasks.in_flight import InFlight
+from joulepath.app.settings import Settings
+from joulepath.app.store.store import Store
+from joulepath.app.tasks.in_flight import InFlight
 
 ROUTES = (
     optimize,

@@ -11,13 +11,13 @@ import socket
 import uvicorn
 from fastapi import FastAPI
 
-from app.access.start import log_access
-from app.engine.imports import keep
-from app.engine.pool import Engine
-from app.http.connection import Ceilings, Connection
-from app.jobs.jobs import Jobs
-from app.main import create_app
-from app.settings import Settings, WrongSettings
+from joulepath.app.access.start import log_access
+from joulepath.app.engine.imports import keep
+from joulepath.app.engine.pool import Engine
+from joulepath.app.http.connection import Ceilings, Connection
+from joulepath.app.jobs.jobs import Jobs
+from joulepath.app.main import create_app
+from joulepath.app.settings import Settings, WrongSettings
 
 _REFUSING_TIME = 0.25
 """Time [s] in which new requests still get a response (`shutting-down`), until load balancers know of the shutdown."""
@@ -121,7 +121,7 @@ def serve(settings: Settings) -> None:
         log_config=None,
         access_log=False,
         server_header=False,
-        # `app.http.client` reads their headers, from trusted proxies only
+        # `joulepath.app.http.client` reads their headers, from trusted proxies only
         proxy_headers=False,
         # the server ends the connections before this
         timeout_graceful_shutdown=math.ceil(settings.shutdown_grace) + 1,

@@ -222,7 +222,7 @@ class Settings(BaseSettings):
     @field_validator("robots")
     @classmethod
     def _known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        from models.registry import robot_names  # the default needs no check, and the service starts sooner
+        from joulepath.models.registry import robot_names  # the default needs no check, and the service starts sooner
 
         unknown = [name for name in names if name not in robot_names()]
         if unknown:

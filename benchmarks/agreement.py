@@ -20,20 +20,20 @@ from typing import Any
 import numpy as np
 import orjson
 
-from app.schemas.compare import CompareRequest
-from app.schemas.cycle import CycleRequest
-from app.schemas.pareto import ParetoRequest
-from app.schemas.request import OptimizeRequest
-from app.tasks.compare import CompareTask
-from app.tasks.cycle import CycleTask
-from app.tasks.optimize import OptimizeTask
-from app.tasks.pareto import ParetoTask
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
 from benchmarks.tasks import as_pose, flange
-from models.registry import load_robot
-from models.robot import Array, Robot
-from optimizer.exceptions import JoulepathError
+from joulepath.app.schemas.compare import CompareRequest
+from joulepath.app.schemas.cycle import CycleRequest
+from joulepath.app.schemas.pareto import ParetoRequest
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.app.tasks.compare import CompareTask
+from joulepath.app.tasks.cycle import CycleTask
+from joulepath.app.tasks.optimize import OptimizeTask
+from joulepath.app.tasks.pareto import ParetoTask
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.exceptions import JoulepathError
 
 Json = dict[str, Any]
 

@@ -15,8 +15,8 @@ from typing import Any
 import orjson
 import zstandard
 
-from app.schemas.examples.optimize import OPTIMIZE_EXAMPLES
 from benchmarks.service import ROOT, running
+from joulepath.app.schemas.examples.optimize import OPTIMIZE_EXAMPLES
 
 README = ROOT / "examples" / "optimize" / "paper_pose_1.json"
 NAMES = ("pose_to_pose", "any_of", "glue_line", "over_a_post")

@@ -20,8 +20,8 @@ from benchmarks.requests import Outcome, send_all
 from benchmarks.service import Service, running
 from benchmarks.statistics import Spread
 from benchmarks.tasks import Kind, request_tasks
-from models.registry import load_robot, robot_names
-from optimizer.energy.kernel_cache import compile_kernel
+from joulepath.models.registry import load_robot, robot_names
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
 
 KIND: Kind = "joint to pose"
 

@@ -23,27 +23,27 @@ from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.reference import perturbation
 from benchmarks.statistics import Spread
 from benchmarks.tasks import MOUNTS
-from models.registry import load_robot
-from models.robot import Array, Robot
-from optimizer.deadline import Deadline
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.exceptions import JoulepathError
-from optimizer.kinematics.inverse import required_inverse_kinematics
-from optimizer.kinematics.orientation_tolerance import sample_orientations
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.methods.free_spline import FreeSpline
-from optimizer.methods.sqp_method import Guess
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.bus import Bus
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.cycle import Cycle
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.targets import AnyOf
-from optimizer.search.ends import label_of
-from optimizer.trajectories import bspline
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.methods.free_spline import FreeSpline
+from joulepath.optimizer.methods.sqp_method import Guess
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.search.ends import label_of
+from joulepath.optimizer.trajectories import bspline
 
 POINTS = 40
 # members of each self-motion, and orientations of each free goal, among which the attack draws

@@ -15,17 +15,17 @@ from typing import Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.collision.model import CollisionModel
-from optimizer.collision.path_planner import Effort, plan_paths
-from optimizer.collision.state_validity import ValidityCheckers
-from optimizer.deadline import Deadline
-from optimizer.exceptions import SingularPose, UnreachablePose
-from optimizer.kinematics.inverse import required_inverse_kinematics
-from optimizer.nlp.clearance_constraint import RESERVE
-from optimizer.problem.arm import Arm
-from optimizer.problem.scene import Box, Capsule, Cylinder, Obstacle, Scene, Shape, Sphere, capsule_between
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.collision.path_planner import Effort, plan_paths
+from joulepath.optimizer.collision.state_validity import ValidityCheckers
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.nlp.clearance_constraint import RESERVE
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.scene import Box, Capsule, Cylinder, Obstacle, Scene, Shape, Sphere, capsule_between
 
 Cell = Literal["table", "shelf", "bin", "cage"]
 CELLS: tuple[Cell, ...] = ("table", "shelf", "bin", "cage")

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array, Drives, FrictionLaw, Limits, Robot
+from joulepath.models.robot import Array, Drives, FrictionLaw, Limits, Robot
 
 T = TypeVar("T", Limits, Drives, FrictionLaw)
 

@@ -10,10 +10,10 @@ import pinocchio as pin
 
 from benchmarks.motion import SplineMotion, worst_ratios
 from benchmarks.tasks import flange
-from models.registry import load_robot
-from models.robot import Array, Limits, Robot
-from optimizer.problem.arm import LIMIT_NAMES, Arm, Payload
-from optimizer.problem.problem import Problem
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Limits, Robot
+from joulepath.optimizer.problem.arm import LIMIT_NAMES, Arm, Payload
+from joulepath.optimizer.problem.problem import Problem
 
 # as the contract has them
 RATIO, REACH, BALANCE = 1 + 1e-6, 1e-6, 1e-3

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from optimizer.collision.model import CollisionModel
-from optimizer.collision.state_validity import StateValidityChecker
-from optimizer.problem.arm import Arm
-from optimizer.trajectories.spline import Spline, sample
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.collision.state_validity import StateValidityChecker
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.trajectories.spline import Spline, sample
 
 
 def collisions(arm: Arm, spline: Spline, period: float) -> int:

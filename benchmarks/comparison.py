@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 WHOLE = "joulepath, whole answer"
 PLOT = "time_against_energy.png"

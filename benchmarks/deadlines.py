@@ -20,25 +20,25 @@ from typing import Any
 
 import numpy as np
 
-from app.engine.result import json_document
-from app.engine.task import Task
-from app.http.problem_details import problem_content
-from app.schemas.compare import CompareRequest
-from app.schemas.pareto import ParetoRequest
-from app.schemas.request import OptimizeRequest
-from app.schemas.whatif import WhatifRequest
-from app.tasks.compare import CompareTask
-from app.tasks.evaluate import EvaluateTask
-from app.tasks.optimize import OptimizeTask
-from app.tasks.pareto import ParetoTask
-from app.tasks.whatif import WhatifTask
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.service import ROOT
 from benchmarks.statistics import Spread
 from benchmarks.tasks import as_pose, collision_free, flange
-from models.registry import load_robot
-from optimizer.exceptions import DeadlineExceeded, JoulepathError
-from optimizer.optimize import warm_up
+from joulepath.app.engine.result import json_document
+from joulepath.app.engine.task import Task
+from joulepath.app.http.problem_details import problem_content
+from joulepath.app.schemas.compare import CompareRequest
+from joulepath.app.schemas.pareto import ParetoRequest
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.app.schemas.whatif import WhatifRequest
+from joulepath.app.tasks.compare import CompareTask
+from joulepath.app.tasks.evaluate import EvaluateTask
+from joulepath.app.tasks.optimize import OptimizeTask
+from joulepath.app.tasks.pareto import ParetoTask
+from joulepath.app.tasks.whatif import WhatifTask
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
+from joulepath.optimizer.optimize import warm_up
 
 Fields = dict[str, Any]
 

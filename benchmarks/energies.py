@@ -25,14 +25,14 @@ from benchmarks.cells import cell_task
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.slow_moves import compare
 from benchmarks.tasks import collision_free, flange
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.exceptions import JoulepathError
-from optimizer.optimize import optimize, warm_up
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.optimize import optimize, warm_up
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
 
 Kind = Literal["joint to joint", "joint to pose", "mechanical", "payload", "cell"]
 KINDS: tuple[Kind, ...] = ("joint to joint", "joint to pose", "mechanical", "payload", "cell")

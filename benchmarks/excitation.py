@@ -17,11 +17,11 @@ from typing import Any, get_args
 import numpy as np
 
 from benchmarks.command import on_one_core, parser, write_json
-from models.registry import load_robot
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.excitation.excitation_problem import Criterion, ExcitationProblem
-from optimizer.excitation.excite import excite
-from optimizer.problem.arm import Arm
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.excitation.excitation_problem import Criterion, ExcitationProblem
+from joulepath.optimizer.excitation.excite import excite
+from joulepath.optimizer.problem.arm import Arm
 
 MOST_CONDITION, LEAST_CLEARANCE, MOST_TIME = 60.0, 0.02, 60.0
 SPEED = 0.54

@@ -23,21 +23,21 @@ from benchmarks.read_back.joint_trajectories import deviations, followed
 from benchmarks.read_back.point_programs import cut, deviation, read_krl, read_rapid, stated, through
 from benchmarks.read_back.random_motions import OWN, one_move
 from benchmarks.read_back.urscript_machine import Controller
-from models.robot import Array
-from optimizer.exceptions import FormatUnsuitable
-from optimizer.exports.csv_table import to_csv
-from optimizer.exports.franka import ROUNDING, to_franka
-from optimizer.exports.json_document import to_json
-from optimizer.exports.krl import to_krl
-from optimizer.exports.npz_arrays import to_npz
-from optimizer.exports.program import Move, Program
-from optimizer.exports.quintic_points import POSITION_TOLERANCE
-from optimizer.exports.rapid import to_rapid
-from optimizer.exports.ros_messages import to_moveit, to_ros2
-from optimizer.exports.urscript import SET_POINT_ERROR, to_urscript
-from optimizer.optimize import optimize
-from optimizer.problem.problem import Problem
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.exports.csv_table import to_csv
+from joulepath.optimizer.exports.franka import ROUNDING, to_franka
+from joulepath.optimizer.exports.json_document import to_json
+from joulepath.optimizer.exports.krl import to_krl
+from joulepath.optimizer.exports.npz_arrays import to_npz
+from joulepath.optimizer.exports.program import Move, Program
+from joulepath.optimizer.exports.quintic_points import POSITION_TOLERANCE
+from joulepath.optimizer.exports.rapid import to_rapid
+from joulepath.optimizer.exports.ros_messages import to_moveit, to_ros2
+from joulepath.optimizer.exports.urscript import SET_POINT_ERROR, to_urscript
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.trajectories.spline import Spline
 
 ROBOTS = ("ur5e", "ur10e", "kr10_r1100", "fr3", OWN)
 COUNT, SEED = 200, 17

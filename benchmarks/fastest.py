@@ -19,18 +19,18 @@ import numpy as np
 
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
-from models.registry import load_robot
-from models.robot import Array, Robot
-from optimizer.exceptions import DurationTooShort, JoulepathError
-from optimizer.linear_algebra import one_thread
-from optimizer.methods.duration_intervals import fastest
-from optimizer.optimize import optimize
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.problem import LEAST_DURATION, Problem
-from optimizer.search.attempts import in_time, solver_of
-from optimizer.search.run import Run
-from optimizer.trajectories import quintic
-from optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.exceptions import DurationTooShort, JoulepathError
+from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.methods.duration_intervals import fastest
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.problem import LEAST_DURATION, Problem
+from joulepath.optimizer.search.attempts import in_time, solver_of
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.trajectories import quintic
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 
 NEAR = 1.5  # rad
 # payloads as shares of the robot's rating, and where their centre of mass is [m], at most

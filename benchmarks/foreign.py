@@ -21,15 +21,15 @@ from typing import Any, Literal
 import numpy as np
 import orjson
 
-from app.convert.request import to_problem
-from app.http.problem_details import problem_content
-from app.schemas.request import OptimizeRequest
 from benchmarks.collision_replay import collisions
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
-from optimizer import optimize
-from optimizer.exceptions import JoulepathError
-from optimizer.optimize import warm_up
+from joulepath import optimize
+from joulepath.app.convert.request import to_problem
+from joulepath.app.http.problem_details import problem_content
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.optimize import warm_up
 
 Kind = Literal["joint", "pose"]
 KINDS: tuple[Kind, ...] = ("joint", "pose")

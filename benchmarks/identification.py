@@ -28,21 +28,21 @@ import numpy as np
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.identification_logs import MISSING, WRIST, folder, tx40, tx40_reference, ur3e
 from benchmarks.identification_standins import TORQUE_SENSOR, behind_the_gears, day_of, log_of
-from models.registry import load_robot
-from models.robot import Robot
-from models.uncertainty.ranges import P95
-from optimizer.identification.arm.base_parameters import base_parameters
-from optimizer.identification.estimates.estimate import Name
-from optimizer.identification.fits.base_fit import BaseFit, base_arm, fit_base
-from optimizer.identification.fits.fitting import fit_rows
-from optimizer.identification.identify import fit
-from optimizer.identification.options import Options
-from optimizer.identification.quality.interval import energy_sd, spread_of
-from optimizer.identification.quality.validation import power_errors, torque_errors
-from optimizer.identification.results import TorqueErrors
-from optimizer.identification.rows.clusters import clusters_of
-from optimizer.identification.rows.fit_rows import Rows, rows_of
-from optimizer.problem.arm import Payload
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Robot
+from joulepath.models.uncertainty.ranges import P95
+from joulepath.optimizer.identification.arm.base_parameters import base_parameters
+from joulepath.optimizer.identification.estimates.estimate import Name
+from joulepath.optimizer.identification.fits.base_fit import BaseFit, base_arm, fit_base
+from joulepath.optimizer.identification.fits.fitting import fit_rows
+from joulepath.optimizer.identification.identify import fit
+from joulepath.optimizer.identification.options import Options
+from joulepath.optimizer.identification.quality.interval import energy_sd, spread_of
+from joulepath.optimizer.identification.quality.validation import power_errors, torque_errors
+from joulepath.optimizer.identification.results import TorqueErrors
+from joulepath.optimizer.identification.rows.clusters import clusters_of
+from joulepath.optimizer.identification.rows.fit_rows import Rows, rows_of
+from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import Truth, off_the_model, recorded, truth_of
 
 # of simulated arms, days of each, the first that of the fit, and the standard deviation of their friction

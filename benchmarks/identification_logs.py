@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from models.own_arm.description import Description
-from models.own_arm.figures import own_figures
-from models.own_arm.robots import own_robot
-from models.registry import load_robot
-from models.robot import Array, Robot
-from optimizer.identification.logs.log import Log
-from optimizer.identification.logs.reading import read_log
-from optimizer.identification.options import Coupling
+from joulepath.models.own_arm.description import Description
+from joulepath.models.own_arm.figures import own_figures
+from joulepath.models.own_arm.robots import own_robot
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.identification.logs.log import Log
+from joulepath.optimizer.identification.logs.reading import read_log
+from joulepath.optimizer.identification.options import Coupling
 
 PLACE = "JOULEPATH_TEST_DATA"
 MISSING = f"{PLACE} does not name the folder of the real logs."

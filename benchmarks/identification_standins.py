@@ -12,10 +12,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import lfilter
 
-from models.robot import Array, Robot
-from optimizer.identification.logs.log import Log
-from optimizer.identification.logs.reading import read_log
-from optimizer.problem.arm import Payload
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.identification.logs.log import Log
+from joulepath.optimizer.identification.logs.reading import read_log
+from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import Noise, Recording, Truth, csv_of, recorded, rigid_torques, with_current
 
 RATE = 500.0

@@ -20,12 +20,12 @@ import pinocchio as pin
 
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
-from models.registry import load_robot, robot_names
-from models.robot import Array, Robot
-from optimizer.exceptions import JoulepathError
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.ik_solutions import IKSolution
-from optimizer.kinematics.inverse import InverseKinematics, required_inverse_kinematics
+from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.ik_solutions import IKSolution
+from joulepath.optimizer.kinematics.inverse import InverseKinematics, required_inverse_kinematics
 
 # m and rad: what a solution may miss its pose by, and a configuration itself or its curve
 ACCURACY, FOUND = 1e-9, 1e-6

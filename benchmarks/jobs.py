@@ -27,11 +27,11 @@ from typing import Any
 
 import numpy as np
 
-from app.schemas.examples.values import HOME, NEAR
 from benchmarks.command import parser, write_json
 from benchmarks.service import COMPUTED, START, Client, Service, a_cluster, processor_time, running
 from benchmarks.statistics import Spread
 from benchmarks.tasks import request_task
+from joulepath.app.schemas.examples.values import HOME, NEAR
 
 MOST_OVERHEAD = 3e-3  # [s] per request
 MOST_CLUSTER_OVERHEAD = 10e-3  # [s] per request

@@ -18,14 +18,14 @@ import time
 from functools import partial
 from typing import Any
 
-from app.access.client import OPERATOR
-from app.engine.result import StoredAnswer
-from app.store import studies
-from app.store.store import Store
-from app.store.studies import Step
-from app.store.tables import new_id
-from app.studies import answers
 from benchmarks.service import resident
+from joulepath.app.access.client import OPERATOR
+from joulepath.app.engine.result import StoredAnswer
+from joulepath.app.store import studies
+from joulepath.app.store.store import Store
+from joulepath.app.store.studies import Step
+from joulepath.app.store.tables import new_id
+from joulepath.app.studies import answers
 
 BLOCKS = (0, 100, 1000, 5000, 10_000, 20_000)
 REPEATS = 20

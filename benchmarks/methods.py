@@ -10,13 +10,13 @@ import time
 
 import numpy as np
 
-from models.registry import load_robot
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.exceptions import JoulepathError
-from optimizer.methods import METHODS
-from optimizer.optimize import optimize, warm_up
-from optimizer.problem.arm import Arm
-from optimizer.problem.problem import MethodName, Problem
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.methods import METHODS
+from joulepath.optimizer.optimize import optimize, warm_up
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.problem import MethodName, Problem
 
 # joints are within half a turn of zero, as in the paper's poses [rad]
 RANGE = np.pi

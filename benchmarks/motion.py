@@ -11,12 +11,12 @@ import numpy as np
 import pinocchio as pin
 from scipy.interpolate import BSpline
 
-from models.robot import Array
-from optimizer.energy.limited_torque import limited_torque
-from optimizer.energy.losses import breakdown
-from optimizer.problem.problem import Problem
-from optimizer.solution import Energy
-from optimizer.trajectories.limit_ratios import limit_ratios
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.limited_torque import limited_torque
+from joulepath.optimizer.energy.losses import breakdown
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.solution import Energy
+from joulepath.optimizer.trajectories.limit_ratios import limit_ratios
 
 PERIOD = 1e-3  # largest period of the fine grid [s]
 

@@ -18,14 +18,14 @@ import numpy as np
 import pinocchio as pin
 from scipy.stats import spearmanr
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer import Problem, optimize
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.inverse import required_inverse_kinematics
-from optimizer.problem.arm import Arm
-from optimizer.replay.evaluate import Evaluation, evaluate
-from optimizer.replay.recording import Waypoints
+from joulepath import Problem, optimize
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.replay.evaluate import Evaluation, evaluate
+from joulepath.optimizer.replay.recording import Waypoints
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "paper.md"

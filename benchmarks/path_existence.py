@@ -20,10 +20,10 @@ from ompl import util as ou
 
 from benchmarks.cells import draws
 from benchmarks.command import on_one_core, parser, write_json
-from models.robot import Array
-from optimizer.collision.model import collision_model
-from optimizer.collision.state_validity import StateValidityChecker
-from optimizer.problem.arm import Arm
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.model import collision_model
+from joulepath.optimizer.collision.state_validity import StateValidityChecker
+from joulepath.optimizer.problem.arm import Arm
 
 # distance [rad] between checked states of an edge, and farthest [rad] from the start that a joint goes
 STEP, FARTHEST = 0.05, 2 * np.pi

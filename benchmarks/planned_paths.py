@@ -17,27 +17,27 @@ from pathlib import Path
 
 import numpy as np
 
-from app.convert.request import to_problem
-from app.schemas.request import OptimizeRequest
 from benchmarks.cells import CellTask, cell_tasks
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.foreign import chosen, problems_of
 from benchmarks.statistics import Spread
-from models.registry import load_robot
-from models.robot import Array
-from optimizer import optimize
-from optimizer.collision.model import collision_model
-from optimizer.collision.path_planner import Effort, along, plan_paths
-from optimizer.collision.state_validity import ValidityCheckers
-from optimizer.deadline import Deadline
-from optimizer.exceptions import JoulepathError
-from optimizer.methods.free_spline import FreeSpline
-from optimizer.methods.method import SolveResult
-from optimizer.optimize import warm_up
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.problem import Problem
-from optimizer.trajectories.spline import sampled
+from joulepath import optimize
+from joulepath.app.convert.request import to_problem
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.model import collision_model
+from joulepath.optimizer.collision.path_planner import Effort, along, plan_paths
+from joulepath.optimizer.collision.state_validity import ValidityCheckers
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.methods.free_spline import FreeSpline
+from joulepath.optimizer.methods.method import SolveResult
+from joulepath.optimizer.optimize import warm_up
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.trajectories.spline import sampled
 
 ROBOT = "ur5e"
 # paths of a task, and motions of theirs that are refined

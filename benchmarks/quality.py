@@ -10,10 +10,10 @@ from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.reference import FILES, fingerprint, load, problem_of
 from benchmarks.statistics import Spread
 from benchmarks.tasks import move
-from models.registry import load_robot
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.exceptions import JoulepathError
-from optimizer.optimize import optimize
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.optimize import optimize
 
 # so long that no search ends early, and its result does not depend on the machine [s]
 AMPLE = 600.0

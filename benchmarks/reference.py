@@ -32,21 +32,21 @@ import orjson
 from benchmarks.command import on_one_core, parser
 from benchmarks.planners.casadi_opti import CasadiOptiGrid
 from benchmarks.tasks import Move, move
-from models.registry import load_robot
-from models.robot import Array, Robot
-from optimizer.deadline import Deadline
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.energy.plant import SHARPER_WIDTHS, WIDTH
-from optimizer.methods.duration_intervals import duration_intervals
-from optimizer.methods.free_spline import FreeSpline
-from optimizer.methods.sqp_method import Guess
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.problem import Problem
-from optimizer.solution import Objective
-from optimizer.trajectories import bspline
-from optimizer.trajectories.seven_segment import shortest_duration
-from optimizer.trajectories.spline import Spline
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.energy.plant import SHARPER_WIDTHS, WIDTH
+from joulepath.optimizer.methods.duration_intervals import duration_intervals
+from joulepath.optimizer.methods.free_spline import FreeSpline
+from joulepath.optimizer.methods.sqp_method import Guess
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.solution import Objective
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.optimizer.trajectories.spline import Spline
 
 FILES: dict[Objective, Path] = {
     "electrical": Path(__file__).with_name("reference_energies.json"),

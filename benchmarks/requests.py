@@ -25,7 +25,7 @@ from benchmarks.command import parser, write_json
 from benchmarks.service import Answer, Client, Service, running
 from benchmarks.statistics import Spread
 from benchmarks.tasks import KINDS, RequestTask, request_tasks
-from models.registry import robot_names
+from joulepath.models.registry import robot_names
 
 ANSWERED = 0.99  # least fraction of valid answers
 MOST_EXCESS = 1e-2  # largest relative excess of the energy over that of the time-scaled motion

@@ -34,19 +34,19 @@ import numpy as np
 
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.energy.dwell import holding_power
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.energy.plant import Plant
-from optimizer.optimize_round import optimize_round
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.free_order import FreeOrder
-from optimizer.problem.pose import Pose
-from optimizer.problem.stops import Stop
-from optimizer.problem.work_round import WorkRound
-from optimizer.sequence.round_solution import RoundSolution
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.dwell import holding_power
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.free_order import FreeOrder
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.sequence.round_solution import RoundSolution
 
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 PART, NOTHING = Payload(mass=2.0, com=np.array([0.0, 0.0, 0.05])), Payload()

@@ -17,29 +17,29 @@ from benchmarks.chains import chain
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread, exponent
 from benchmarks.tasks import move, moves, request_task
-from models.registry import load_robot
-from models.robot import Array, Robot
-from optimizer.collision.clearance_proof import proven_clearance
-from optimizer.collision.clouds import cloud_of
-from optimizer.collision.model import CollisionModel
-from optimizer.collision.state_validity import StateValidityChecker
-from optimizer.deadline import Deadline
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.exceptions import JoulepathError
-from optimizer.kinematics.inverse import required_inverse_kinematics
-from optimizer.methods.free_spline import FreeSpline
-from optimizer.methods.sqp_method import Guess
-from optimizer.nlp.clearance_constraint import COUNTED
-from optimizer.optimize import optimize, warm_up
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.branches import BranchFilter, Label
-from optimizer.problem.clouds import Points
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.scene import Obstacle, Scene
-from optimizer.trajectories import bspline
-from optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.collision.clearance_proof import proven_clearance
+from joulepath.optimizer.collision.clouds import cloud_of
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.collision.state_validity import StateValidityChecker
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.methods.free_spline import FreeSpline
+from joulepath.optimizer.methods.sqp_method import Guess
+from joulepath.optimizer.nlp.clearance_constraint import COUNTED
+from joulepath.optimizer.optimize import optimize, warm_up
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.branches import BranchFilter, Label
+from joulepath.optimizer.problem.clouds import Points
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.scene import Obstacle, Scene
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 
 CONTROL_POINTS = (8, 10, 13, 16, 20, 24, 28, 32)
 JOINTS = (2, 3, 4, 5, 6, 7)

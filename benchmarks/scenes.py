@@ -23,15 +23,15 @@ from benchmarks.cells import CELLS, CellTask, cell_tasks
 from benchmarks.collision_replay import collisions
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
-from models.registry import load_robot
-from models.robot import Array
-from optimizer import optimize
-from optimizer.exceptions import DeadlineExceeded, JoulepathError
-from optimizer.methods import METHODS
-from optimizer.methods.planned_paths import ALONG_PLANNED_PATH, FROM_PLANNED_PATH
-from optimizer.problem.arm import Arm
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import MethodName, Problem
+from joulepath import optimize
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
+from joulepath.optimizer.methods import METHODS
+from joulepath.optimizer.methods.planned_paths import ALONG_PLANNED_PATH, FROM_PLANNED_PATH
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import MethodName, Problem
 
 REPLAY = 1e-4  # s
 SOLVED = 0.99  # least fraction of solved tasks, of either kind

@@ -15,19 +15,19 @@ import numpy as np
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
 from benchmarks.tasks import collision_free
-from models.registry import load_robot
-from models.robot import Array, Robot
-from optimizer.collision.model import CollisionModel, collision_model
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.exceptions import JoulepathError
-from optimizer.kinematics.inverse import required_inverse_kinematics
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.optimize import optimize
-from optimizer.problem.arm import Arm
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.targets import Target
-from optimizer.search.run import Run
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.collision.model import CollisionModel, collision_model
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.targets import Target
+from joulepath.optimizer.search.run import Run
 
 ROBOTS = ("panda", "iiwa14")
 # so long that no search ends early [s]

@@ -1,4 +1,4 @@
-"""The service in a process of its own (`python -m app`), and clients over HTTP."""
+"""The service in a process of its own (`python -m joulepath.app`), and clients over HTTP."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def running(ready: bool = True, **environment: str) -> Iterator[Service]:
     with tempfile.TemporaryFile() as log, tempfile.TemporaryDirectory() as folder:
         given = {"JOULEPATH_DATABASE_URL": f"sqlite:///{folder}/joulepath.db"} | given
         began = time.perf_counter()
-        process = subprocess.Popen([sys.executable, "-m", "app"], cwd=ROOT, env=given, stdout=log, stderr=log)
+        process = subprocess.Popen([sys.executable, "-m", "joulepath.app"], cwd=ROOT, env=given, stdout=log, stderr=log)
         service = Service(process, port, began, log)
         try:
             if ready:
@@ -162,7 +162,7 @@ def a_cluster(workers: int) -> Iterator[str]:
     address = f"tcp://127.0.0.1:{port}"
     commands = [
         ["distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", f"{port}", "--no-dashboard"],
-        ["app.cli", "cluster-worker", address],
+        ["joulepath.app.cli", "cluster-worker", address],
     ]
     given = os.environ | {"JOULEPATH_WORKERS": f"{workers}", "JOULEPATH_LOG_LEVEL": "error"}
     with contextlib.ExitStack() as stack:

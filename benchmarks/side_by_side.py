@@ -20,7 +20,7 @@ from benchmarks.planners.__main__ import PLANNERS, attempt, planner_of
 from benchmarks.service import ROOT
 from benchmarks.statistics import Spread
 from benchmarks.tasks import moves
-from models.robot import Array
+from joulepath.models.robot import Array
 
 # what begins the lines that tell a time: planners may print others
 WALL = "wall "

@@ -23,21 +23,21 @@ from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.requirements import PROMISES
 from benchmarks.statistics import Spread
 from benchmarks.tasks import collision_free, flange
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.energy.plant import Plant
-from optimizer.exceptions import JoulepathError
-from optimizer.optimize import optimize
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.simulation.baseline_courses import ReportedBaseline, planned_baselines
-from optimizer.simulation.planned import PlannedMotion, PlannedTorques
-from optimizer.simulation.reference import course_of
-from optimizer.simulation.replay import Replay, replay
-from optimizer.simulation.simulated_arm import SimulatedArm
-from optimizer.solution import Solution
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.simulation.baseline_courses import ReportedBaseline, planned_baselines
+from joulepath.optimizer.simulation.planned import PlannedMotion, PlannedTorques
+from joulepath.optimizer.simulation.reference import course_of
+from joulepath.optimizer.simulation.replay import Replay, replay
+from joulepath.optimizer.simulation.simulated_arm import SimulatedArm
+from joulepath.optimizer.solution import Solution
 
 ROBOTS = ("ur5e", "ur10e", "panda", "kr10_r1100", "iiwa14", "ur3e", "xarm7")
 KINDS = ("joint to joint", "joint to pose", "cell")

@@ -23,20 +23,20 @@ import numpy as np
 from benchmarks.command import write_json
 from benchmarks.statistics import Spread
 from benchmarks.tasks import move
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.deadline import NEVER
-from optimizer.exceptions import JoulepathError
-from optimizer.methods.free_spline import FreeSpline
-from optimizer.methods.method import SolveResult
-from optimizer.methods.sqp_method import Guess
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.problem import Problem
-from optimizer.trajectories import bspline
-from optimizer.trajectories.bspline import Basis
-from optimizer.trajectories.spline import Spline, sampled
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import NEVER
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.methods.free_spline import FreeSpline
+from joulepath.optimizer.methods.method import SolveResult
+from joulepath.optimizer.methods.sqp_method import Guess
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.bspline import Basis
+from joulepath.optimizer.trajectories.spline import Spline, sampled
 
 SlowKind = Literal["all joints", "one joint", "tenth"]
 SLOW_KINDS: tuple[SlowKind, ...] = ("all joints", "one joint", "tenth")

@@ -16,17 +16,17 @@ import numpy as np
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
 from benchmarks.tasks import Move, moves
-from models.registry import load_robot
-from optimizer.collision.model import CollisionModel
-from optimizer.deadline import Deadline
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.methods import solver_for
-from optimizer.methods.method import SolveResult
-from optimizer.nlp.clearance_constraint import RESERVE
-from optimizer.optimize import warm_up
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.problem import MethodName, Problem
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.methods import solver_for
+from joulepath.optimizer.methods.method import SolveResult
+from joulepath.optimizer.nlp.clearance_constraint import RESERVE
+from joulepath.optimizer.optimize import warm_up
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.problem import MethodName, Problem
 
 PATIENCE = 60.0  # longest time of one solve [s]
 METHODS: tuple[MethodName, ...] = ("bspline", "time_scaling")

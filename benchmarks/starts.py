@@ -12,8 +12,8 @@ from benchmarks.command import parser, write_json
 from benchmarks.service import Answer, Service, running
 from benchmarks.statistics import Spread
 from benchmarks.tasks import request_task
-from models.registry import load_robot, robot_names
-from optimizer.energy.kernel_cache import compile_kernel
+from joulepath.models.registry import load_robot, robot_names
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
 
 PATIENCE = 90.0  # longest time for the first answer, and for the compiler [s]
 AFTER = 10  # measured requests after the kernel is compiled

@@ -9,11 +9,11 @@ from typing import Any, Literal
 import numpy as np
 import pinocchio as pin
 
-from models.registry import load_robot
-from models.robot import Array, Robot
-from optimizer.collision.model import CollisionModel
-from optimizer.nlp.clearance_constraint import RESERVE
-from optimizer.problem.arm import Arm
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.nlp.clearance_constraint import RESERVE
+from joulepath.optimizer.problem.arm import Arm
 
 Kind = Literal["joint to pose", "pose to pose"]
 KINDS: tuple[Kind, ...] = ("joint to pose", "pose to pose")

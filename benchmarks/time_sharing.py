@@ -24,8 +24,8 @@ import numpy as np
 from scipy.optimize import LinearConstraint, brentq, minimize
 
 from benchmarks.command import parser, write_json
-from models.robot import Array
-from optimizer.sequence.time_sharing import TimeSharing, energy_of
+from joulepath.models.robot import Array
+from joulepath.optimizer.sequence.time_sharing import TimeSharing, energy_of
 
 # the mode in which a robot waits on its motors
 MOTORS = "0"

@@ -31,27 +31,27 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.energy.limited_torque import limited_torque
-from optimizer.exceptions import NoTrajectory, PathInfeasible
-from optimizer.kinematics.orientation_tolerance import nearest_orientation
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.tool_path import ToolPath
-from optimizer.search.baselines import motion_energy
-from optimizer.search.path_baselines import along
-from optimizer.solution import Solution
-from optimizer.trajectories import ramped
-from optimizer.trajectories.quadrature import lobatto_nodes
-from optimizer.trajectories.spline import Spline
-from optimizer.trajectories.time_scalings import SampledMotion, even_speed
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.energy.limited_torque import limited_torque
+from joulepath.optimizer.exceptions import NoTrajectory, PathInfeasible
+from joulepath.optimizer.kinematics.orientation_tolerance import nearest_orientation
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.search.baselines import motion_energy
+from joulepath.optimizer.search.path_baselines import along
+from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.trajectories import ramped
+from joulepath.optimizer.trajectories.quadrature import lobatto_nodes
+from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.trajectories.time_scalings import SampledMotion, even_speed
 
 MIDDLE = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 # spread of the joints of the start [rad], lengths [m], greatest turn [rad], blend of a corner [m]

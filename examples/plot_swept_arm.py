@@ -16,14 +16,14 @@ from matplotlib.colors import LinearSegmentedColormap, to_hex, to_rgb
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 from scipy.spatial import ConvexHull
 
-from app.convert.request import to_problem
-from app.schemas.request import OptimizeRequest
-from models.robot import Array
-from optimizer.collision.bodies import Body
-from optimizer.collision.model import CollisionModel
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.optimize import optimize
-from optimizer.problem.arm import TOOL
+from joulepath.app.convert.request import to_problem
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.bodies import Body
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.arm import TOOL
 
 # Okabe and Ito's blue to orange, which colour-blind readers can tell apart
 OVER_TIME = LinearSegmentedColormap.from_list("over time", ["#0072B2", "#56B4E9", "#F0E442", "#E69F00", "#D55E00"])

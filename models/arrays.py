@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 
 def read_only(values: object, shape: tuple[int, ...], name: str) -> Array:

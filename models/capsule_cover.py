@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.robot import Array, LinkCapsule
+from joulepath.models.robot import Array, LinkCapsule
 
 # pieces with a longest edge below this [m] are not cut any further: they lie outside, or where capsules only touch
 SMALLEST = 2e-5

@@ -1,6 +1,8 @@
-"""Fit capsules to the links: `python -m models.fit_capsules ROBOT MESHES [link …]` prints rows for figures.yaml.
+"""Fit capsules to the links: `python -m joulepath.models.fit_capsules ROBOT MESHES [link …]` prints rows for
+figures.yaml.
 
-MESHES is a folder as in `models.meshes`. The fit starts from the capsules in figures.yaml and is local: how many
+MESHES is a folder as in `joulepath.models.meshes`. The fit starts from the capsules in figures.yaml and is local:
+how many
 capsules a link has, and where each of them begins, is the choice of who writes the rows.
 
 It minimises ∫ (OFFSET + d) dV over what is inside of a capsule and outside of the link: d [m] is the distance from the
@@ -21,10 +23,10 @@ import pinocchio as pin
 from scipy.ndimage import binary_dilation, distance_transform_edt, label
 from scipy.optimize import Bounds, minimize
 
-from models.capsule_cover import not_held, outside
-from models.meshes import link_surfaces, sampled
-from models.registry import load_robot
-from models.robot import Array, LinkCapsule, Mask, Robot
+from joulepath.models.capsule_cover import not_held, outside
+from joulepath.models.meshes import link_surfaces, sampled
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, LinkCapsule, Mask, Robot
 
 # edge of a grid cell, and how far [m] from the link overhang is weighed
 CELL, REACH = 0.003, 0.08

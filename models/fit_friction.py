@@ -1,6 +1,7 @@
-"""Fit the friction laws to the friction table: `python -m models.fit_friction [robot]` prints the coefficients.
+"""Fit the friction laws to the friction table: `python -m joulepath.models.fit_friction [robot]` prints the
+coefficients.
 
-Both laws are members of `models.robot.FrictionLaw` with non-negative coefficients, fitted on relative errors:
+Both laws are members of `joulepath.models.robot.FrictionLaw` with non-negative coefficients, fitted on relative errors:
 
 - `curved`: least worst error over the table. For a given `speed` that is a linear program in coulomb, curved and
   viscous (Boyd and Vandenberghe, Convex Optimization, 6.1.1), so the fit is a search over `speed` alone.
@@ -14,8 +15,8 @@ import sys
 import numpy as np
 from scipy.optimize import linprog, minimize_scalar, nnls
 
-from models.registry import load_figures
-from models.robot import Array
+from joulepath.models.registry import load_figures
+from joulepath.models.robot import Array
 
 # range of `speed` [rad/s]: below it, curved · asinh(v / speed) is almost logarithmic over the table, above it linear
 LEAST_SPEED, GREATEST_SPEED = 1e-3, 1e1

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 Kind = Literal["housing", "cap", "ring", "tube", "foot"]
 

@@ -7,8 +7,8 @@ from typing import Any, cast, get_args
 import numpy as np
 import pinocchio as pin
 
-from models.arrays import read_only
-from models.robot import (
+from joulepath.models.arrays import read_only
+from joulepath.models.robot import (
     Array,
     DefaultMotion,
     Drives,
@@ -20,8 +20,8 @@ from models.robot import (
     TorqueSide,
     link_names,
 )
-from models.shape_sizes import check_lengths
-from models.urdf import urdf_of
+from joulepath.models.shape_sizes import check_lengths
+from joulepath.models.urdf import urdf_of
 
 # figures of the section `collision` that are no link's capsules
 NO_LINKS = ("elbow", "meshes", "never_meet")

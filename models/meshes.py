@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 # what is shown, in detail, and the coarser surfaces that the maker made for collision checking
 KINDS = ("visual", "collision")

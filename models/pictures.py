@@ -14,9 +14,9 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import cKDTree
 
-from models.meshes import installed, mesh_file, mesh_placement
-from models.registry import load_robot
-from models.robot import Array
+from joulepath.models.meshes import installed, mesh_file, mesh_placement
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
 
 if TYPE_CHECKING:
     from trimesh import Trimesh

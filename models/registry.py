@@ -11,8 +11,8 @@ from typing import Any
 
 import yaml
 
-from models.from_figures import robot_of
-from models.robot import Robot
+from joulepath.models.from_figures import robot_of
+from joulepath.models.robot import Robot
 
 # libyaml where PyYAML has it: ten times as fast
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -24,7 +24,7 @@ DESCRIPTIONS = (".yaml", ".yml")
 @cache
 def robot_names() -> tuple[str, ...]:
     """Names that `load_robot` knows: the folders beside this module that hold figures."""
-    return tuple(sorted(folder.name for folder in files("models").iterdir() if (folder / FIGURES).is_file()))
+    return tuple(sorted(folder.name for folder in files("joulepath.models").iterdir() if (folder / FIGURES).is_file()))
 
 
 _LOADING = threading.Lock()
@@ -42,7 +42,9 @@ def load_robot(robot: str | PathLike[str], figures: str | PathLike[str] | dict[s
     if figures is not None:
         return _identified(load_robot(robot), figures)
     if isinstance(robot, PathLike) or robot.endswith(DESCRIPTIONS):
-        from models.own_arm.robots import read_robot  # its validator takes as long to import as all of this package
+        from joulepath.models.own_arm.robots import (
+            read_robot,  # its validator takes as long to import as all of this package
+        )
 
         return read_robot(Path(robot))
     # robots are compared by identity, and `cache` lets two threads that miss at the same time both load one
@@ -52,15 +54,15 @@ def load_robot(robot: str | PathLike[str], figures: str | PathLike[str] | dict[s
 
 def _identified(robot: Robot, figures: str | PathLike[str] | dict[str, Any]) -> Robot:
     """The robot with the figures of a document, or of a file. Raises InvalidFigures or OSError."""
-    from models.own_arm.robots import own_robot  # as above
-    from models.uncertainty.document import with_document
+    from joulepath.models.own_arm.robots import own_robot  # as above
+    from joulepath.models.uncertainty.document import with_document
 
     document = figures if isinstance(figures, dict) else _read_document(Path(figures))
     return own_robot(robot.name, with_document(robot.name, robot.figures, document))
 
 
 def _read_document(path: Path) -> Any:
-    from models.uncertainty.document import InvalidFigures
+    from joulepath.models.uncertainty.document import InvalidFigures
 
     try:
         return yaml.load(path.read_text(encoding="utf-8"), Loader=LOADER)
@@ -80,6 +82,6 @@ def load_figures(name: str) -> dict[str, Any]:
     """
     if name not in robot_names():
         raise LookupError(f"There is no robot named {name!r}: use one of {', '.join(robot_names())}.")
-    text = (files("models") / name / FIGURES).read_text(encoding="utf-8")
+    text = (files("joulepath.models") / name / FIGURES).read_text(encoding="utf-8")
     figures: dict[str, Any] = yaml.load(text, Loader=LOADER)
     return figures

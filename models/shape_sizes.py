@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 
 @dataclass(frozen=True)

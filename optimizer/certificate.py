@@ -9,31 +9,31 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
-from optimizer.collision.clearance_proof import proven_clearance
-from optimizer.collision.close_pass import close_pass
-from optimizer.collision.model import collision_model
-from optimizer.deadline import checkpoint
-from optimizer.energy.dwell import dwell_energy, holding_power
-from optimizer.energy.losses import breakdown, friction_torque, relative_error
-from optimizer.energy.torque_bound import TorqueSamples, torque_bounds
-from optimizer.kinematics.orientation_tolerance import excess_angle
-from optimizer.kinematics.rigid_body_model import rigid_body_model
-from optimizer.kinematics.tcp import T_last_tcp
-from optimizer.kinematics.tool_course import ToolCourse
-from optimizer.linear_algebra import one_thread
-from optimizer.problem.arm import Arm
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.targets import Single, single
-from optimizer.problem.tool_cone import ToolCone
-from optimizer.problem.tool_path import SPEED_TOLERANCE, ToolPath
-from optimizer.solution import Certificate, Energy
-from optimizer.trajectories.limit_ratios import limit_ratios
-from optimizer.trajectories.passing import deviations
-from optimizer.trajectories.quadrature import grid, simpson_weights
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.clearance_proof import proven_clearance
+from joulepath.optimizer.collision.close_pass import close_pass
+from joulepath.optimizer.collision.model import collision_model
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.energy.dwell import dwell_energy, holding_power
+from joulepath.optimizer.energy.losses import breakdown, friction_torque, relative_error
+from joulepath.optimizer.energy.torque_bound import TorqueSamples, torque_bounds
+from joulepath.optimizer.kinematics.orientation_tolerance import excess_angle
+from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.kinematics.tcp import T_last_tcp
+from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.targets import Single, single
+from joulepath.optimizer.problem.tool_cone import ToolCone
+from joulepath.optimizer.problem.tool_path import SPEED_TOLERANCE, ToolPath
+from joulepath.optimizer.solution import Certificate, Energy
+from joulepath.optimizer.trajectories.limit_ratios import limit_ratios
+from joulepath.optimizer.trajectories.passing import deviations
+from joulepath.optimizer.trajectories.quadrature import grid, simpson_weights
+from joulepath.optimizer.trajectories.spline import Spline
 
 # instants of the grid between two looks at the deadline: some ten milliseconds
 BLOCK = 5000

@@ -9,9 +9,9 @@ from typing import Protocol
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.deadline import checkpoint
-from optimizer.exceptions import InvalidTable
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.exceptions import InvalidTable
 
 FIRST_ROW = 2
 """Line of the first row of numbers: the header is line 1."""

@@ -35,8 +35,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from models.robot import Array
-    from optimizer.solution import CandidateReport, Clearance, UnreachableTarget
+    from joulepath.models.robot import Array
+    from joulepath.optimizer.solution import CandidateReport, Clearance, UnreachableTarget
 
 # arm configurations that an error lists at most: an end of free orientation has hundreds
 MOST_BRANCHES = 64

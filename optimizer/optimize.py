@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import time
 
-from models.registry import load_robot
-from optimizer.deadline import Clock
-from optimizer.energy.kernel import kernel_for
-from optimizer.linear_algebra import one_thread
-from optimizer.methods import METHODS
-from optimizer.native.library_cache import PATIENCE
-from optimizer.native.shared_library import shared_library
-from optimizer.problem.arm import Arm
-from optimizer.problem.problem import Problem
-from optimizer.progress import Tell, forward, nobody
-from optimizer.search.run import Run
-from optimizer.solution import Solution
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.deadline import Clock
+from joulepath.optimizer.energy.kernel import kernel_for
+from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.methods import METHODS
+from joulepath.optimizer.native.library_cache import PATIENCE
+from joulepath.optimizer.native.shared_library import shared_library
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.progress import Tell, forward, nobody
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.solution import Solution
 
 
 def optimize(problem: Problem, clock: Clock = time.perf_counter, tell: Tell = nobody) -> Solution:
@@ -23,7 +23,8 @@ def optimize(problem: Problem, clock: Clock = time.perf_counter, tell: Tell = no
 
     `clock` gives the time [s] for the problem's deadline. `tell` gets what is found, while the search runs.
 
-    Raises the errors of `optimizer.exceptions`: UnreachablePose, SingularPose, NoReachableTarget, TorqueInfeasible,
+    Raises the errors of `joulepath.optimizer.exceptions`: UnreachablePose, SingularPose, NoReachableTarget,
+    TorqueInfeasible,
     StartInCollision, GoalInCollision, DurationTooShort, NoTrajectory, NoCollisionFreeTrajectory, DeadlineExceeded, or
     InvalidProblem for a payload beyond the robot's rating or ends outside the tool's cone.
     """

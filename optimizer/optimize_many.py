@@ -10,10 +10,10 @@ from itertools import islice
 from queue import SimpleQueue
 from typing import Protocol
 
-from optimizer.exceptions import JoulepathError
-from optimizer.optimize import optimize
-from optimizer.problem.problem import Problem
-from optimizer.solution import Solution
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.solution import Solution
 
 # problems that are handed out ahead of time: however many there are, memory does not grow with them
 AHEAD = 64

@@ -8,32 +8,32 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
-from optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
-from optimizer.exceptions import DeadlineExceeded, JoulepathError, NoTrajectory
-from optimizer.in_hand import least_certified
-from optimizer.linear_algebra import one_thread
-from optimizer.problem.work_round import WorkRound
-from optimizer.progress import Improved, Tell, forward, nobody, only_improved
-from optimizer.sequence.against_stopping import SHARE, Rested, as_passed, start_from, stopping_baselines
-from optimizer.sequence.divided_paths import with_divided_paths
-from optimizer.sequence.free_orientations import with_free_orientations
-from optimizer.sequence.last_posture import with_last_posture
-from optimizer.sequence.move_problem import LEAST_TIME
-from optimizer.sequence.moves import moves_of
-from optimizer.sequence.order_search import OrderSearch
-from optimizer.sequence.proven_bound import proven_bound
-from optimizer.sequence.round_baselines import (
+from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
+from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError, NoTrajectory
+from joulepath.optimizer.in_hand import least_certified
+from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.progress import Improved, Tell, forward, nobody, only_improved
+from joulepath.optimizer.sequence.against_stopping import SHARE, Rested, as_passed, start_from, stopping_baselines
+from joulepath.optimizer.sequence.divided_paths import with_divided_paths
+from joulepath.optimizer.sequence.free_orientations import with_free_orientations
+from joulepath.optimizer.sequence.last_posture import with_last_posture
+from joulepath.optimizer.sequence.move_problem import LEAST_TIME
+from joulepath.optimizer.sequence.moves import moves_of
+from joulepath.optimizer.sequence.order_search import OrderSearch
+from joulepath.optimizer.sequence.proven_bound import proven_bound
+from joulepath.optimizer.sequence.round_baselines import (
     compared_again,
     controller_default,
     given_order,
     move_by_move,
     of_chain,
 )
-from optimizer.sequence.round_search import RoundSearch
-from optimizer.sequence.round_solution import Move, Needed, RoundBaseline, RoundSolution, needed_by
-from optimizer.sequence.rounds_in_hand import RoundInHand, shared, simple_rounds
-from optimizer.sequence.stored_round import with_storage
-from optimizer.sequence.timed_round import TimedSearch
+from joulepath.optimizer.sequence.round_search import RoundSearch
+from joulepath.optimizer.sequence.round_solution import Move, Needed, RoundBaseline, RoundSolution, needed_by
+from joulepath.optimizer.sequence.rounds_in_hand import RoundInHand, shared, simple_rounds
+from joulepath.optimizer.sequence.stored_round import with_storage
+from joulepath.optimizer.sequence.timed_round import TimedSearch
 
 # relative: what a round in a given time may need above the least of its chain, and still be optimal
 WELL_SHARED = 1e-3

@@ -28,17 +28,17 @@ from typing import Literal
 
 import numpy as np
 
-from optimizer.deadline import Clock
-from optimizer.exceptions import DeadlineExceeded, DurationTooShort, InvalidProblem, NoTrajectory
-from optimizer.linear_algebra import one_thread
-from optimizer.problem.problem import Problem
-from optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, forward, nobody
-from optimizer.search.fastest import fastest, fastest_of
-from optimizer.search.reserve import report_time
-from optimizer.search.run import Run
-from optimizer.search.sampled_ends import between
-from optimizer.solution import Solution
-from optimizer.trajectories.spline import Spline
+from joulepath.optimizer.deadline import Clock
+from joulepath.optimizer.exceptions import DeadlineExceeded, DurationTooShort, InvalidProblem, NoTrajectory
+from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, forward, nobody
+from joulepath.optimizer.search.fastest import fastest, fastest_of
+from joulepath.optimizer.search.reserve import report_time
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.search.sampled_ends import between
+from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.trajectories.spline import Spline
 
 LEAST_POINTS, MOST_POINTS = 2, 100
 # share of the time left for the search of the fastest motion, and for each end of the front

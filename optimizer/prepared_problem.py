@@ -8,26 +8,26 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.collision.model import ClosestPair
-from optimizer.energy.dwell import dwell_energy, holding_power, waits
-from optimizer.energy.interval import arm_spread
-from optimizer.energy.plant import Plant
-from optimizer.energy.sensitivity import waiting_sensitivity
-from optimizer.kinematics.course_tracing import Trace, joint_path, traces
-from optimizer.kinematics.least_speed import LeastSpeed
-from optimizer.kinematics.least_time import least_time
-from optimizer.kinematics.path_constraints import PathConstraints, path_constraints_of
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.kinematics.tool_course import ToolCourse
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.targets import Target
-from optimizer.solution import Energy, Sensitivity
-from optimizer.surroundings import Surroundings
-from optimizer.trajectories.limit_ratios import too_much
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.model import ClosestPair
+from joulepath.optimizer.energy.dwell import dwell_energy, holding_power, waits
+from joulepath.optimizer.energy.interval import arm_spread
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.energy.sensitivity import waiting_sensitivity
+from joulepath.optimizer.kinematics.course_tracing import Trace, joint_path, traces
+from joulepath.optimizer.kinematics.least_speed import LeastSpeed
+from joulepath.optimizer.kinematics.least_time import least_time
+from joulepath.optimizer.kinematics.path_constraints import PathConstraints, path_constraints_of
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.targets import Target
+from joulepath.optimizer.solution import Energy, Sensitivity
+from joulepath.optimizer.surroundings import Surroundings
+from joulepath.optimizer.trajectories.limit_ratios import too_much
+from joulepath.optimizer.trajectories.spline import Spline
 
 # value of a second in a minimum-time solve [W]: a hundred times what energy could make up for
 TIME_WEIGHT = 1e4

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 
 @dataclass(frozen=True)

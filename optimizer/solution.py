@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Literal, NamedTuple
 
-from models.robot import Array, Limits
-from optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
+from joulepath.optimizer.trajectories.spline import Spline
 
 # what is minimised: energy drawn from the supply, or mechanical work
 Objective = Literal["electrical", "mechanical"]
@@ -36,7 +36,8 @@ class Trajectory:
 @dataclass(frozen=True)
 class Sensitivity:
     """How an electrical energy hangs on the figures of the arm: its `gradient` (p,) in the order of
-    `models.uncertainty.parameters`, and by how much the mean over their errors is above the energy itself [J]."""
+    `joulepath.models.uncertainty.parameters`, and by how much the mean over their errors is above the energy itself
+    [J]."""
 
     gradient: Array
     shift: float

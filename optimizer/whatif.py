@@ -10,18 +10,18 @@ import time
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
-from optimizer.certificate import certify
-from optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
-from optimizer.energy.interval import with_interval
-from optimizer.exceptions import DeadlineExceeded, JoulepathError
-from optimizer.linear_algebra import one_thread
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import Problem, narrowed
-from optimizer.search.incumbent import SLACK
-from optimizer.search.run import Run
-from optimizer.solution import Certificate, Energy, Solution
-from optimizer.trajectories.spline import Spline
+from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
+from joulepath.optimizer.energy.interval import with_interval
+from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
+from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import Problem, narrowed
+from joulepath.optimizer.search.incumbent import SLACK
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.solution import Certificate, Energy, Solution
+from joulepath.optimizer.trajectories.spline import Spline
 
 # least deadline of a search [s]; shares of the time that the first search leaves to the base motion, and of what is
 # left then for a search from it

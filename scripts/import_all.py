@@ -10,20 +10,18 @@ import pkgutil
 import sys
 from pathlib import Path
 
-PACKAGES = ("app", "optimizer", "models")
 LATE = ("mujoco",)
 """Packages that are imported only when they are needed."""
-ONLY_INSIDE = ("app.store.migrations.env",)
+ONLY_INSIDE = ("joulepath.app.store.migrations.env",)
 """Modules that only their caller can import: Alembic runs this one."""
 
 
 def main() -> None:
-    """Runs the command, in the folder of the packages."""
+    """Runs the command, in the folder of the package."""
     sys.path.insert(0, str(Path.cwd()))
-    for package in PACKAGES:
-        for module in pkgutil.walk_packages([package], f"{package}."):
-            if not module.name.endswith("__main__") and module.name not in ONLY_INSIDE:
-                importlib.import_module(module.name)
+    for module in pkgutil.walk_packages(["joulepath"], "joulepath."):
+        if not module.name.endswith("__main__") and module.name not in ONLY_INSIDE:
+            importlib.import_module(module.name)
     for name in LATE:
         importlib.import_module(name)
 

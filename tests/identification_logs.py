@@ -12,9 +12,9 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array, Robot
-from optimizer.identification.logs.log import EffortMeaning, Log, Move
-from optimizer.problem.arm import Payload
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.identification.logs.log import EffortMeaning, Log, Move
+from joulepath.optimizer.problem.arm import Payload
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 

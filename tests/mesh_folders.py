@@ -1,7 +1,8 @@
 """Where the meshes of the robots are: in a package that tests install, or in a folder that the environment names.
 
 The package `airo-models` ships those of UR3e and UR5e. No package ships those of UR10e and UR16e: tests of theirs run
-where ROBOT_MESHES names a folder with `ur10e` and `ur16e`, each as in `models.meshes`: the maker's files, as OBJ. Parts
+where ROBOT_MESHES names a folder with `ur10e` and `ur16e`, each as in `joulepath.models.meshes`: the maker's files,
+as OBJ. Parts
 that a UR16e shares with the UR10e are in both.
 """
 
@@ -10,7 +11,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from models.meshes import SHIFTS, installed
+from joulepath.models.meshes import SHIFTS, installed
 
 # robots whose meshes the package ships
 SHIPPED = ("ur3e", "ur5e")

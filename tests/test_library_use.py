@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-import optimizer
+import joulepath
 
 PUBLIC = {
     "AnyOf",
@@ -51,28 +51,28 @@ PUBLIC = {
 
 
 def test_the_public_names_are_a_promise() -> None:
-    assert set(optimizer.__all__) == PUBLIC
-    assert optimizer.__all__ == sorted(optimizer.__all__)
-    # `optimizer.optimize` is also a module: the name must stay the function's however the package was imported
-    assert callable(optimizer.optimize) and callable(optimizer.optimize_many)
-    assert callable(optimizer.pareto)
-    assert callable(optimizer.optimize_round)
+    assert set(joulepath.__all__) == PUBLIC
+    assert joulepath.__all__ == sorted(joulepath.__all__)
+    # `optimizer.optimize` is also a module, whose import must not hide the function
+    assert callable(joulepath.optimize) and callable(joulepath.optimize_many)
+    assert callable(joulepath.pareto)
+    assert callable(joulepath.optimize_round)
 
 
 def test_one_except_clause_catches_every_error() -> None:
-    exported = [getattr(optimizer, name) for name in PUBLIC]
+    exported = [getattr(joulepath, name) for name in PUBLIC]
     errors = [each for each in exported if isinstance(each, type) and issubclass(each, BaseException)]
     assert len(errors) == 15
-    assert all(issubclass(error, optimizer.JoulepathError) for error in errors)
+    assert all(issubclass(error, joulepath.JoulepathError) for error in errors)
 
 
 def test_a_motion_without_http() -> None:
     """The ten lines of the README: joints to joints, everything else left to its default."""
     start, goal = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]), np.array([1.0, -1.2, 1.8, -2.0, -1.3, 0.5])
-    solution = optimizer.optimize(
-        optimizer.Problem(arm=optimizer.Arm(robot=optimizer.load_robot("ur5e")), start=start, goal=goal)
+    solution = joulepath.optimize(
+        joulepath.Problem(arm=joulepath.Arm(robot=joulepath.load_robot("ur5e")), start=start, goal=goal)
     )
-    assert isinstance(solution, optimizer.Solution)
+    assert isinstance(solution, joulepath.Solution)
     assert solution.certificate.valid
     assert solution.trajectory.q[0] == pytest.approx(start)
     assert solution.trajectory.q[-1] == pytest.approx(goal)

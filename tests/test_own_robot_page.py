@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from models.own_arm.description import Collision, Description, Drives, Electronics
+from joulepath.models.own_arm.description import Collision, Description, Drives, Electronics
 from tests.models.test_capsule_cover import meshes as arm_folder
 
 ROOT = Path(__file__).parents[1]

@@ -101,7 +101,7 @@ def functions(path: Path) -> Iterator[tuple[ast.FunctionDef | ast.AsyncFunctionD
 def test_the_floors_name_exactly_what_there_is(package: str) -> None:
     """A layer in parentheses may be absent; import-linter itself ignores one that does not exist."""
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
-    (contract,) = (each for each in contracts if each.get("containers") == [package.replace("/", ".")])
+    (contract,) = (each for each in contracts if each.get("containers") == [f"joulepath.{package.replace('/', '.')}"])
     layers = [layer.strip() for floor in contract["layers"] for layer in re.split(r"[|:]", floor)]
     optional = {layer.strip("()") for layer in layers if layer.startswith("(")}
     named = {layer.strip("()") for layer in layers}

@@ -21,6 +21,7 @@ import pytest
 from tests.app.requests import move
 
 ROOT = Path(__file__).parents[1]
+PACKAGES = ("app", "optimizer", "models")
 PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check")
 # a cold start of the service with one worker, on a busy machine [s]
 START = 90.0
@@ -97,26 +98,26 @@ def clean(variables: os._Environ[str] | dict[str, str]) -> dict[str, str]:
 def test_the_wheel_holds_all_that_runs(wheel: Path) -> None:
     """Every tracked file of the three packages, the libraries of the page, and nothing else beside the metadata."""
     tracked = subprocess.run(
-        ["git", "ls-files", "--cached", "--others", "--exclude-standard", "app", "optimizer", "models"],
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard", "joulepath", *PACKAGES],
         cwd=ROOT, capture_output=True, text=True, check=True,
     ).stdout.split()  # fmt: skip
     vendor = (ROOT / "app" / "static" / "studio" / "vendor").rglob("*")
-    present = {name for name in tracked if (ROOT / name).exists()} | {
-        str(each.relative_to(ROOT)) for each in vendor if each.is_file()
-    }
+    present = {name for name in tracked if (ROOT / name).is_file()}
+    present |= {str(each.relative_to(ROOT)) for each in vendor if each.is_file()}
+    present = {name if name.startswith("joulepath/") else f"joulepath/{name}" for name in present}
     with zipfile.ZipFile(wheel) as archive:
         held = {name for name in archive.namelist() if ".dist-info/" not in name}
     assert held == present
-    assert {f"{package}/py.typed" for package in ("app", "optimizer", "models")} <= held
-    assert "models/ur5e/figures.yaml" in held
-    assert any(name.startswith("app/store/migrations/versions/v0001") for name in held)
+    assert "joulepath/py.typed" in held
+    assert "joulepath/models/ur5e/figures.yaml" in held
+    assert any(name.startswith("joulepath/app/store/migrations/versions/v0001") for name in held)
 
 
 @pytest.mark.long
 def test_the_library_comes_from_the_wheel(run: Run, environment: Path) -> None:
     code = (
-        "import optimizer; from optimizer import Arm, Problem, optimize, load_robot; "
-        "print(optimizer.__file__, load_robot('ur5e').nq)"
+        "import joulepath; from joulepath import Arm, Problem, optimize, load_robot; "
+        "print(joulepath.__file__, load_robot('ur5e').nq)"
     )
     path, nq = run("python", "-c", code).stdout.split()
     assert Path(path).is_relative_to(environment.parent)
@@ -131,7 +132,7 @@ def test_the_console_command_works_from_anywhere(run: Run) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("command", [("python", "-m", "app"), ("joulepath", "serve")])
+@pytest.mark.parametrize("command", [("python", "-m", "joulepath.app"), ("joulepath", "serve")])
 def test_the_service_starts_from_anywhere(environment: Path, tmp_path: Path, command: tuple[str, ...]) -> None:
     """Ready, with a database that its migrations have made, and ended by SIGTERM."""
     with socket.socket() as free:

@@ -6,7 +6,7 @@ import hmac
 import logging
 from pathlib import Path
 
-from app.access.key_file import ApiKey, WrongKeyFile, hash_of, read_keys
+from joulepath.app.access.key_file import ApiKey, WrongKeyFile, hash_of, read_keys
 
 logger = logging.getLogger(__name__)
 

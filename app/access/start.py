@@ -5,9 +5,9 @@ from __future__ import annotations
 import logging
 from ipaddress import ip_address
 
-from app.access.key_file import WrongKeyFile
-from app.access.key_ring import KeyRing
-from app.settings import Settings, WrongSettings
+from joulepath.app.access.key_file import WrongKeyFile
+from joulepath.app.access.key_ring import KeyRing
+from joulepath.app.settings import Settings, WrongSettings
 
 logger = logging.getLogger(__name__)
 

@@ -1,8 +1,8 @@
-"""`python -m app.cli`: the console command where the package is not installed, as in the container image."""
+"""`python -m joulepath.app.cli`: the console command where the package is not installed, as in the container image."""
 
 from __future__ import annotations
 
-from app.cli.main import main
+from joulepath.app.cli.main import main
 
 if __name__ == "__main__":
     main()

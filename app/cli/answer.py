@@ -14,9 +14,9 @@ import click
 import orjson
 
 if TYPE_CHECKING:
-    from app.engine.result import TaskResult
-    from app.engine.task import Task
-    from app.schemas.common import Request
+    from joulepath.app.engine.result import TaskResult
+    from joulepath.app.engine.task import Task
+    from joulepath.app.schemas.common import Request
 
 M = TypeVar("M", bound="Request")
 
@@ -51,9 +51,9 @@ def validated(model: type[M], body: bytes, request_id: str) -> M:
     """The request in a JSON body. Raises Refused."""
     from pydantic import ValidationError
 
-    from app.convert.json_text import parsed_json
-    from app.exceptions import InvalidRequest
-    from app.http.problem_details import invalid_request
+    from joulepath.app.convert.json_text import parsed_json
+    from joulepath.app.exceptions import InvalidRequest
+    from joulepath.app.http.problem_details import invalid_request
 
     try:
         return model.model_validate(parsed_json(body))
@@ -65,8 +65,8 @@ def validated(model: type[M], body: bytes, request_id: str) -> M:
 
 def answered(task: Task, deadline: float, request_id: str) -> bytes:
     """The answer of a task for which `deadline` [s] is left. Raises Refused."""
-    from app.exceptions import ServiceError
-    from optimizer.exceptions import JoulepathError
+    from joulepath.app.exceptions import ServiceError
+    from joulepath.optimizer.exceptions import JoulepathError
 
     try:
         result = _run(task, deadline)
@@ -77,9 +77,9 @@ def answered(task: Task, deadline: float, request_id: str) -> bytes:
 
 def _run(task: Task, deadline: float) -> TaskResult:
     """The result of a task, with the log, the robot and the figures that it takes from the database."""
-    from app.cli.store import with_figures, with_log, with_own_robot
-    from app.exceptions import UnknownFigures, UnknownLog
-    from optimizer.exceptions import UnknownRobot
+    from joulepath.app.cli.store import with_figures, with_log, with_own_robot
+    from joulepath.app.exceptions import UnknownFigures, UnknownLog
+    from joulepath.optimizer.exceptions import UnknownRobot
 
     try:
         return task.run(deadline)
@@ -98,8 +98,8 @@ def _run(task: Task, deadline: float) -> TaskResult:
 
 def refused(error: Exception, request_id: str | None = None) -> Refused:
     """What a command raises for an error of the library or the service."""
-    from app.engine.result import json_document
-    from app.http.problem_details import problem_content
+    from joulepath.app.engine.result import json_document
+    from joulepath.app.http.problem_details import problem_content
 
     return Refused(json_document(problem_content(error, request_id or new_id())))
 
@@ -109,11 +109,11 @@ def compile_kernel_of(robot_name: str) -> None:
 
     Without a C compiler, and for a robot that nobody knows, nothing happens. One that hangs is told and given up.
     """
-    from app.cli.store import robot_named
-    from app.exceptions import StoreUnavailable
-    from optimizer.energy.kernel_cache import compile_kernel
-    from optimizer.exceptions import UnknownRobot
-    from optimizer.native.library_cache import PATIENCE, CompilerHangs
+    from joulepath.app.cli.store import robot_named
+    from joulepath.app.exceptions import StoreUnavailable
+    from joulepath.optimizer.energy.kernel_cache import compile_kernel
+    from joulepath.optimizer.exceptions import UnknownRobot
+    from joulepath.optimizer.native.library_cache import PATIENCE, CompilerHangs
 
     try:
         compile_kernel(robot_named(robot_name), patience=replace(PATIENCE, compiler=PATIENCE.command))

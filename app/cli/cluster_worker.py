@@ -19,16 +19,16 @@ def cluster_worker(scheduler: str) -> None:
     JOULEPATH_WORKERS processes compute, by default one for each CPU. Services with JOULEPATH_CLUSTER=SCHEDULER send the
     work. SIGTERM and Ctrl-C end it with 0: what it is at work on is then done elsewhere.
     """
-    from app.settings import WrongSettings, read_settings
+    from joulepath.app.settings import WrongSettings, read_settings
 
     try:
         settings = read_settings({"cluster": scheduler})
     except WrongSettings as error:
         raise click.UsageError(str(error)) from None
 
-    from app.cluster.dask_worker import serve
-    from app.engine.forkserver import start_forkserver
-    from app.logs import configure_logging
+    from joulepath.app.cluster.dask_worker import serve
+    from joulepath.app.engine.forkserver import start_forkserver
+    from joulepath.app.logs import configure_logging
 
     start_forkserver()
     configure_logging(settings.log_level)

@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from app.cli.answer import FILE, OUTPUT
-from app.cli.search import proof, search
+from joulepath.app.cli.answer import FILE, OUTPUT
+from joulepath.app.cli.search import proof, search
 
 
 @click.command(
@@ -24,8 +24,8 @@ def cycle(file: str, output: Path | None) -> None:
     FILE is the JSON of `POST /cycle`, or - for standard input. The answer is JSON, too. If standard error is a
     terminal, a summary follows: energy, duration, status, lower bound, gap and savings.
     """
-    from app.schemas.cycle import CycleRequest
-    from app.tasks.cycle import CycleTask
+    from joulepath.app.schemas.cycle import CycleRequest
+    from joulepath.app.tasks.cycle import CycleTask
 
     search(CycleRequest, CycleTask, file, output, summary_of)
 

@@ -9,8 +9,8 @@ from typing import Any, Literal
 import click
 import orjson
 
-from app.cli import terminal
-from app.cli.answer import FILE, OUTPUT, answered, content_of, new_id, parsed, write
+from joulepath.app.cli import terminal
+from joulepath.app.cli.answer import FILE, OUTPUT, answered, content_of, new_id, parsed, write
 
 Kind = Literal["json", "csv"]
 
@@ -70,7 +70,7 @@ def evaluate(
 
 
 def _answer(file: str, kind: Kind, fields: dict[str, Any], wanted: Kind, deadline: float) -> bytes:
-    from app.tasks.evaluate import EvaluateTask
+    from joulepath.app.tasks.evaluate import EvaluateTask
 
     # as the query of POST /evaluate has them: each is JSON
     query = {name: orjson.dumps(value).decode() for name, value in fields.items()}

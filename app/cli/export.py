@@ -8,9 +8,9 @@ from typing import Any
 import click
 import orjson
 
-from app.cli import terminal
-from app.cli.answer import FILE, OUTPUT, answered, content_of, new_id, validated, write
-from app.cli.kept_answers import WithStore
+from joulepath.app.cli import terminal
+from joulepath.app.cli.answer import FILE, OUTPUT, answered, content_of, new_id, validated, write
+from joulepath.app.cli.kept_answers import WithStore
 
 # wall time [s] that an export may take; it takes milliseconds
 DEADLINE = 120.0
@@ -37,8 +37,8 @@ def export(format: str, file: str, output: Path | None, speed_scale: float, opti
     in the database; or - for standard input. If standard error is a terminal, a summary follows: how far the file
     deviates, and what it leaves out.
     """
-    from app.schemas.export import OPTIONS_OF, ExportFormat, ExportRequest
-    from app.tasks.export import ExportResult, ExportTask
+    from joulepath.app.schemas.export import OPTIONS_OF, ExportFormat, ExportRequest
+    from joulepath.app.tasks.export import ExportResult, ExportTask
 
     chosen, request_id = ExportFormat(format), new_id()
     given = _given(options)

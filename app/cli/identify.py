@@ -10,8 +10,8 @@ from typing import Any
 
 import click
 
-from app.cli import terminal
-from app.cli.answer import OUTPUT, answered, new_id, parsed, validated, write
+from joulepath.app.cli import terminal
+from joulepath.app.cli.answer import OUTPUT, answered, new_id, parsed, validated, write
 
 _GZIP = b"\x1f\x8b"
 _PIECE = 1 << 20
@@ -82,8 +82,8 @@ def identify(
     LOGS are CSV files of RTDE, of ROS `JointState` or of the service's own form, plain or packed with gzip. The answer
     is the `result` of `GET /identifications/{id}`; its `document` can be sent to `PUT /figures`.
     """
-    from app.schemas.identifications import IdentifyRequest
-    from app.schemas.logs import LogSettings
+    from joulepath.app.schemas.identifications import IdentifyRequest
+    from joulepath.app.schemas.logs import LogSettings
 
     request_id = new_id()
     carried = None if payload is None else {"mass": payload, "com": list(com)}
@@ -103,7 +103,7 @@ def identify(
 
 
 def _answered(asked: Any, read: Any, request_id: str) -> bytes:
-    from app.tasks.identify import IdentifyTask
+    from joulepath.app.tasks.identify import IdentifyTask
 
     return answered(IdentifyTask(asked, read, request_id), asked.deadline, request_id)
 

@@ -8,9 +8,9 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from app.engine.result import TaskResult
-    from app.store.store import Store
-    from app.tasks.kept_answers import WithKeptAnswers
+    from joulepath.app.engine.result import TaskResult
+    from joulepath.app.store.store import Store
+    from joulepath.app.tasks.kept_answers import WithKeptAnswers
 
 
 @dataclass
@@ -23,7 +23,7 @@ class WithStore:
 
     def run(self, deadline: float) -> TaskResult:
         """The task's result."""
-        from app.exceptions import PartsNeeded
+        from joulepath.app.exceptions import PartsNeeded
 
         try:
             self.result = self.task.run(deadline)
@@ -33,8 +33,8 @@ class WithStore:
 
 
 def _from_store(names: list[str]) -> dict[str, bytes]:
-    from app.cli.store import in_store
-    from app.store import answers
+    from joulepath.app.cli.store import in_store
+    from joulepath.app.store import answers
 
     def body_of(name: str, store: Store) -> Awaitable[bytes]:
         return store.read(lambda session: answers.get(session, name.rpartition("/")[2])[1])

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from app.cli.answer import write
-from app.cli.table import table
+from joulepath.app.cli.answer import write
+from joulepath.app.cli.table import table
 
 if TYPE_CHECKING:
-    from app.access.key_file import ApiKey
+    from joulepath.app.access.key_file import ApiKey
 
 _FILE = click.option(
     "--file",
@@ -61,7 +61,7 @@ def add(name: str, role: str, file: Path) -> None:
     """
     from pydantic import ValidationError
 
-    from app.access.key_file import new_key
+    from joulepath.app.access.key_file import new_key
 
     try:
         secret, entry = new_key(name, role)  # type: ignore[arg-type]
@@ -84,7 +84,7 @@ Example:
 @_FILE
 def list_keys(file: Path) -> None:
     """Lists the keys: name, role, id and time. The keys themselves are nowhere."""
-    from app.access.key_file import WrongKeyFile, read_keys
+    from joulepath.app.access.key_file import WrongKeyFile, read_keys
 
     try:
         entries = read_keys(file)
@@ -112,7 +112,7 @@ def remove(name_or_id: str, file: Path) -> None:
 
 @contextmanager
 def _changing(file: Path) -> Iterator[list[ApiKey]]:
-    from app.access.key_file import WrongKeyFile, changing
+    from joulepath.app.access.key_file import WrongKeyFile, changing
 
     try:
         with changing(file) as entries:

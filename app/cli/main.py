@@ -6,20 +6,20 @@ import sys
 
 import click
 
-from app import __version__
-from app.cli.answer import Refused
-from app.cli.cluster_worker import cluster_worker
-from app.cli.cycle import cycle
-from app.cli.evaluate import evaluate
-from app.cli.exit_codes import ANSWERED, INTERRUPTED, INVALID, of_problem
-from app.cli.export import export
-from app.cli.identify import identify
-from app.cli.interrupts import interruptible
-from app.cli.keys import keys
-from app.cli.optimize import optimize
-from app.cli.replay import replay
-from app.cli.robots import robots
-from app.cli.serve import serve
+from joulepath import __version__
+from joulepath.app.cli.answer import Refused
+from joulepath.app.cli.cluster_worker import cluster_worker
+from joulepath.app.cli.cycle import cycle
+from joulepath.app.cli.evaluate import evaluate
+from joulepath.app.cli.exit_codes import ANSWERED, INTERRUPTED, INVALID, of_problem
+from joulepath.app.cli.export import export
+from joulepath.app.cli.identify import identify
+from joulepath.app.cli.interrupts import interruptible
+from joulepath.app.cli.keys import keys
+from joulepath.app.cli.optimize import optimize
+from joulepath.app.cli.replay import replay
+from joulepath.app.cli.robots import robots
+from joulepath.app.cli.serve import serve
 
 
 @click.group(

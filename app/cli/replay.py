@@ -8,9 +8,9 @@ from typing import Any
 import click
 import orjson
 
-from app.cli import terminal
-from app.cli.answer import FILE, OUTPUT, answered, content_of, new_id, parsed, validated, write
-from app.cli.kept_answers import WithStore
+from joulepath.app.cli import terminal
+from joulepath.app.cli.answer import FILE, OUTPUT, answered, content_of, new_id, parsed, validated, write
+from joulepath.app.cli.kept_answers import WithStore
 
 
 @click.command(
@@ -49,8 +49,8 @@ def replay(
     in the database; or - for standard input. If standard error is a terminal, a summary follows: deviations, energies,
     contacts, savings.
     """
-    from app.schemas.replay import ReplayRequest
-    from app.tasks.replay import ReplayTask
+    from joulepath.app.schemas.replay import ReplayRequest
+    from joulepath.app.tasks.replay import ReplayTask
 
     body = {"answer": _json(content_of(file), "FILE"), "perturb": dict(perturb) or None, **options}
     if arm is not None:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from app.cli.answer import refused, write
-from app.cli.store import in_store
-from app.cli.table import table
+from joulepath.app.cli.answer import refused, write
+from joulepath.app.cli.store import in_store
+from joulepath.app.cli.table import table
 
 if TYPE_CHECKING:
     from sqlalchemy.orm import Session
@@ -49,17 +49,17 @@ def add(file: Path, name: str | None, replace: bool) -> None:
 
     FILE is a YAML file that names a URDF and says what a URDF does not hold: see docs/own_robot.md.
     """
-    from app.access.client import OPERATOR
-    from app.exceptions import ServiceError
-    from app.schemas.own_arm import NAME_PATTERN
-    from app.settings import Settings
-    from app.store import robots as stored
-    from app.store.tables import OwnRobot, now
-    from models.own_arm.description import InvalidArm
-    from models.own_arm.figures import own_figures
-    from models.own_arm.reading import read_description
-    from models.trust import energy_trust
-    from optimizer.exceptions import InvalidProblem
+    from joulepath.app.access.client import OPERATOR
+    from joulepath.app.exceptions import ServiceError
+    from joulepath.app.schemas.own_arm import NAME_PATTERN
+    from joulepath.app.settings import Settings
+    from joulepath.app.store import robots as stored
+    from joulepath.app.store.tables import OwnRobot, now
+    from joulepath.models.own_arm.description import InvalidArm
+    from joulepath.models.own_arm.figures import own_figures
+    from joulepath.models.own_arm.reading import read_description
+    from joulepath.models.trust import energy_trust
+    from joulepath.optimizer.exceptions import InvalidProblem
 
     name = file.stem if name is None else name
     if not NAME_PATTERN.fullmatch(name):
@@ -89,10 +89,10 @@ Example:
 @click.argument("name")
 def remove(name: str) -> None:
     """Deletes a robot that was added. Studies and stored answers about it stay."""
-    from app.access.client import OPERATOR
-    from app.exceptions import ServiceError
-    from app.store import robots as stored
-    from optimizer.exceptions import UnknownRobot
+    from joulepath.app.access.client import OPERATOR
+    from joulepath.app.exceptions import ServiceError
+    from joulepath.app.store import robots as stored
+    from joulepath.optimizer.exceptions import UnknownRobot
 
     try:
         in_store(lambda store: store.write(partial(stored.delete, name=name, client=OPERATOR)))
@@ -102,10 +102,10 @@ def remove(name: str) -> None:
 
 def _table() -> str:
     """Bundled robots, then those in the database; without these where the database does not answer."""
-    from app.exceptions import StoreUnavailable
-    from app.store import robots as stored
-    from models.registry import load_robot, robot_names
-    from models.trust import ENERGY_SECTIONS, trust_letters
+    from joulepath.app.exceptions import StoreUnavailable
+    from joulepath.app.store import robots as stored
+    from joulepath.models.registry import load_robot, robot_names
+    from joulepath.models.trust import ENERGY_SECTIONS, trust_letters
 
     head = (
         "name",

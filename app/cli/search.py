@@ -6,13 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.cli import terminal
-from app.cli.answer import answered, compile_kernel_of, content_of, new_id, parsed, validated, write
+from joulepath.app.cli import terminal
+from joulepath.app.cli.answer import answered, compile_kernel_of, content_of, new_id, parsed, validated, write
 
 if TYPE_CHECKING:
-    from app.engine.task import Task
-    from app.schemas.cycle import CycleRequest
-    from app.schemas.request import OptimizeRequest
+    from joulepath.app.engine.task import Task
+    from joulepath.app.schemas.cycle import CycleRequest
+    from joulepath.app.schemas.request import OptimizeRequest
 
 Summary = Callable[[dict[str, Any]], dict[str, str]]
 

@@ -22,7 +22,7 @@ Example:
 @click.option("--host", help="Address to listen on. Default: JOULEPATH_HOST, or 127.0.0.1: this machine only.")
 @click.option("--port", type=click.IntRange(0, 65535), help="TCP port. Default: JOULEPATH_PORT or PORT, or 8000.")
 def serve(host: str | None, port: int | None) -> None:
-    """Starts the HTTP service, as `python -m app` does.
+    """Starts the HTTP service, as `python -m joulepath.app` does.
 
     All other settings are environment variables, see docs/settings.md.
     """
@@ -32,6 +32,6 @@ def serve(host: str | None, port: int | None) -> None:
     if port is not None:
         os.environ["JOULEPATH_PORT"] = str(port)
 
-    from app.__main__ import main
+    from joulepath.app.__main__ import main
 
     main()

@@ -6,7 +6,7 @@ import asyncio
 import logging
 import signal
 
-from app.settings import Settings
+from joulepath.app.settings import Settings
 
 logger = logging.getLogger(__name__)
 
@@ -24,7 +24,9 @@ async def serve(address: str, settings: Settings) -> None:
     stopping = asyncio.create_task(stopped.wait())
     while not stopped.is_set():
         # the processes that compute are none of Dask's: it is not to watch their memory
-        worker = Worker(address, nthreads=settings.workers, memory_limit=0, preload=["app.cluster"], dashboard=False)
+        worker = Worker(
+            address, nthreads=settings.workers, memory_limit=0, preload=["joulepath.app.cluster"], dashboard=False
+        )
         working = asyncio.ensure_future(_until_closed(worker))
         await asyncio.wait({working, stopping}, return_when=asyncio.FIRST_COMPLETED)
         if stopped.is_set():

@@ -9,10 +9,10 @@ import uuid
 from concurrent.futures import CancelledError as Cancelled
 from typing import TYPE_CHECKING, Any
 
-from app.cluster.machine import RESOURCES, compute, resource, version
-from app.engine.work import Ended, Take, Work
-from app.exceptions import ClusterUnavailable, WorkerDied
-from optimizer.progress import nobody
+from joulepath.app.cluster.machine import RESOURCES, compute, resource, version
+from joulepath.app.engine.work import Ended, Take, Work
+from joulepath.app.exceptions import ClusterUnavailable, WorkerDied
+from joulepath.optimizer.progress import nobody
 
 if TYPE_CHECKING:
     from distributed import Client, Future

@@ -1,4 +1,4 @@
-"""One machine of a cluster: an engine inside a Dask worker, as `dask worker --preload app.cluster` starts it.
+"""One machine of a cluster: an engine inside a Dask worker, as `dask worker --preload joulepath.app.cluster` starts it.
 
 Dask carries tasks. It does not compute them: cancelling one of its futures stops no computation. A task is a coroutine
 here, which has it computed by a process of the engine, and kills that process once Dask no longer wants the result.
@@ -10,18 +10,18 @@ import asyncio
 import hashlib
 import pickle
 from functools import cache, partial
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
-from app.engine.pool import Engine
-from app.engine.task import Task
-from app.engine.warm_up import warm
-from app.engine.work import Ended, Work, taking
-from app.exceptions import WorkerDied
-from app.settings import read_settings
-from optimizer.progress import Event, nobody
+import joulepath
+from joulepath.app.engine.pool import Engine
+from joulepath.app.engine.task import Task
+from joulepath.app.engine.warm_up import warm
+from joulepath.app.engine.work import Ended, Work, taking
+from joulepath.app.exceptions import WorkerDied
+from joulepath.app.settings import read_settings
+from joulepath.optimizer.progress import Event, nobody
 
 if TYPE_CHECKING:
     from distributed import Worker
@@ -34,7 +34,6 @@ _WANTED = ("executing", "long-running", "resumed")
 """States of a task, in a Dask worker, whose result somebody waits for."""
 _engines: WeakKeyDictionary[Worker, Engine] = WeakKeyDictionary()
 
-_PACKAGES = ("app", "optimizer", "models")
 _CODE = ("*.py", "*.c", "*.yaml")
 
 
@@ -42,10 +41,10 @@ _CODE = ("*.py", "*.c", "*.yaml")
 def version() -> str:
     """A digest of the code and the figures of this installation: objects that travel are read by the same ones only."""
     digest = hashlib.sha256()
-    for package in _PACKAGES:
-        folder = Path(str(find_spec(package).origin)).parent  # type: ignore[union-attr]
+    package = Path(joulepath.__file__).parent
+    for folder in sorted(each for each in package.iterdir() if each.is_dir()):
         for file in sorted(file for kind in _CODE for file in folder.rglob(kind)):
-            digest.update(f"{package}/{file.relative_to(folder)}\n".encode())
+            digest.update(f"{file.relative_to(package)}\n".encode())
             digest.update(file.read_bytes())
     return digest.hexdigest()[:16]
 

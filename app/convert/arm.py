@@ -6,17 +6,17 @@ import math
 
 import numpy as np
 
-from app.convert.identified import with_figures
-from app.convert.own_robots import own_figures_of, own_robot_of
-from app.convert.pose import to_base, to_matrix
-from app.convert.scene import to_attachment, to_scene, to_tool
-from app.schemas import arm as asked
-from models.registry import load_robot, robot_names
-from models.robot import Array, Limits, Robot
-from optimizer.exceptions import InvalidProblem, UnknownRobot
-from optimizer.problem.arm import INVERTER_PARTS, LIMIT_NAMES, Arm, Inverter, Payload
-from optimizer.problem.bus import Bus
-from optimizer.problem.tool_cone import ToolCone
+from joulepath.app.convert.identified import with_figures
+from joulepath.app.convert.own_robots import own_figures_of, own_robot_of
+from joulepath.app.convert.pose import to_base, to_matrix
+from joulepath.app.convert.scene import to_attachment, to_scene, to_tool
+from joulepath.app.schemas import arm as asked
+from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.robot import Array, Limits, Robot
+from joulepath.optimizer.exceptions import InvalidProblem, UnknownRobot
+from joulepath.optimizer.problem.arm import INVERTER_PARTS, LIMIT_NAMES, Arm, Inverter, Payload
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.tool_cone import ToolCone
 
 
 def robot_named(name: str) -> Robot:

@@ -6,7 +6,7 @@ from typing import Any
 
 import orjson
 
-from app.schemas.arm import ArmRequest
+from joulepath.app.schemas.arm import ArmRequest
 
 LARGEST = 1 << 16
 """Largest arm [byte of JSON] that is repeated: a front repeats it a hundred times."""

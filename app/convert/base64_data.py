@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 
-from optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.exceptions import InvalidProblem
 
 
 def decoded(data: str, field: str) -> bytes:

@@ -6,9 +6,9 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from app.convert.fields import fields
-from app.schemas.request import WhichCandidates
-from optimizer.solution import CandidateReport, CandidateStatus
+from joulepath.app.convert.fields import fields
+from joulepath.app.schemas.request import WhichCandidates
+from joulepath.optimizer.solution import CandidateReport, CandidateStatus
 
 MOST_IN_A_PROBLEM = 64
 """Candidates that an error document lists at most. A search can have thousands, most of them for the same reason."""

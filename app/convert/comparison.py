@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from app.convert.fields import fields
-from app.convert.solution import baseline_fields, optimality_gap
-from app.schemas import request as asked
-from app.schemas.compare import ROW_FIELDS, CompareRequest
-from optimizer.problem.problem import MethodName
-from optimizer.solution import Solution
+from joulepath.app.convert.fields import fields
+from joulepath.app.convert.solution import baseline_fields, optimality_gap
+from joulepath.app.schemas import request as asked
+from joulepath.app.schemas.compare import ROW_FIELDS, CompareRequest
+from joulepath.optimizer.problem.problem import MethodName
+from joulepath.optimizer.solution import Solution
 
 
 def to_compare_response(

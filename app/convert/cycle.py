@@ -7,30 +7,30 @@ from typing import Any
 
 import numpy as np
 
-from app.convert.arm import to_arm, to_limits, to_payload
-from app.convert.fields import fields
-from app.convert.pose import to_base
-from app.convert.request import to_branch, to_target, to_target_pose, to_tool_path
-from app.convert.solution import energy_fields, optimality_gap
-from app.convert.until import time_left, until
-from app.convert.warnings import DIVIDED, MISSED, NO_DEFAULT_MOTION, certified_warnings
-from app.schemas import cycle as asked
-from app.schemas.arm import MoveLimits
-from app.schemas.path import Line as LineRequest
-from app.schemas.path import StopPath as StopPathRequest
-from app.schemas.response import Clearance
-from app.schemas.stop import StopRequest
-from models.robot import Robot
-from optimizer.deadline import Deadline
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.free_order import FreeOrder
-from optimizer.problem.line import Line
-from optimizer.problem.stop_path import StopPath, at_stop
-from optimizer.problem.stops import Stop
-from optimizer.problem.targets import Target
-from optimizer.problem.work_round import WorkRound
-from optimizer.sequence.round_solution import Move, RoundSolution
-from optimizer.solution import Objective, Solution
+from joulepath.app.convert.arm import to_arm, to_limits, to_payload
+from joulepath.app.convert.fields import fields
+from joulepath.app.convert.pose import to_base
+from joulepath.app.convert.request import to_branch, to_target, to_target_pose, to_tool_path
+from joulepath.app.convert.solution import energy_fields, optimality_gap
+from joulepath.app.convert.until import time_left, until
+from joulepath.app.convert.warnings import DIVIDED, MISSED, NO_DEFAULT_MOTION, certified_warnings
+from joulepath.app.schemas import cycle as asked
+from joulepath.app.schemas.arm import MoveLimits
+from joulepath.app.schemas.path import Line as LineRequest
+from joulepath.app.schemas.path import StopPath as StopPathRequest
+from joulepath.app.schemas.response import Clearance
+from joulepath.app.schemas.stop import StopRequest
+from joulepath.models.robot import Robot
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.free_order import FreeOrder
+from joulepath.optimizer.problem.line import Line
+from joulepath.optimizer.problem.stop_path import StopPath, at_stop
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.targets import Target
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.sequence.round_solution import Move, RoundSolution
+from joulepath.optimizer.solution import Objective, Solution
 
 _PLACE = ("label", "q", "target")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from io import StringIO
 
-from optimizer.sequence.round_solution import Move, RoundSolution
+from joulepath.optimizer.sequence.round_solution import Move, RoundSolution
 
 Row = list[float | str]
 

@@ -11,20 +11,20 @@ from typing import Any
 
 import numpy as np
 
-from app.convert.arm_fields import arm_fields
-from app.convert.fields import fields
-from app.convert.motion_csv import MotionCsv
-from app.convert.recorded import reading_of
-from app.convert.solution import energy_fields
-from app.convert.warnings import sampled_warnings
-from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings, SampledClearance
-from optimizer.csv_table import FIRST_ROW
-from optimizer.exceptions import InvalidProblem
-from optimizer.identification.logs.recorded import Measured, motion_of
-from optimizer.replay.evaluate import Evaluation
-from optimizer.replay.interval_energy import IntervalEnergy
-from optimizer.replay.recording import Log, Waypoints, in_blocks
-from optimizer.replay.sampler import Samples
+from joulepath.app.convert.arm_fields import arm_fields
+from joulepath.app.convert.fields import fields
+from joulepath.app.convert.motion_csv import MotionCsv
+from joulepath.app.convert.recorded import reading_of
+from joulepath.app.convert.solution import energy_fields
+from joulepath.app.convert.warnings import sampled_warnings
+from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings, SampledClearance
+from joulepath.optimizer.csv_table import FIRST_ROW
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.identification.logs.recorded import Measured, motion_of
+from joulepath.optimizer.replay.evaluate import Evaluation
+from joulepath.optimizer.replay.interval_energy import IntervalEnergy
+from joulepath.optimizer.replay.recording import Log, Waypoints, in_blocks
+from joulepath.optimizer.replay.sampler import Samples
 
 
 @dataclass(frozen=True)

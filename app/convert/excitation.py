@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from app.convert.arm import to_arm
-from app.convert.arm_fields import arm_fields
-from app.convert.fields import fields
-from app.convert.solution import certificate_fields, energy_fields, trajectory_fields
-from app.convert.until import time_left, until
-from app.schemas.excitation import ExcitationRequest
-from optimizer.deadline import Deadline
-from optimizer.excitation.excitation_problem import LEAST_DEADLINE, ExcitationProblem
-from optimizer.excitation.excite import Excitation
+from joulepath.app.convert.arm import to_arm
+from joulepath.app.convert.arm_fields import arm_fields
+from joulepath.app.convert.fields import fields
+from joulepath.app.convert.solution import certificate_fields, energy_fields, trajectory_fields
+from joulepath.app.convert.until import time_left, until
+from joulepath.app.schemas.excitation import ExcitationRequest
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.excitation.excitation_problem import LEAST_DEADLINE, ExcitationProblem
+from joulepath.optimizer.excitation.excite import Excitation
 
 
 def to_excitation_problem(request: ExcitationRequest, deadline: float) -> ExcitationProblem:

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from app.exceptions import InvalidRequest
-from app.schemas import export as asked
-from app.schemas.export import OPTIONS_OF, ExportFormat, ExportRequest
-from optimizer.exports.axes import Axes
-from optimizer.exports.csv_table import to_csv
-from optimizer.exports.facts import ExportedFile
-from optimizer.exports.franka import FrankaOptions, to_franka
-from optimizer.exports.json_document import to_json
-from optimizer.exports.krl import KrlOptions, to_krl
-from optimizer.exports.npz_arrays import to_npz
-from optimizer.exports.program import Program
-from optimizer.exports.rapid import RapidOptions, to_rapid
-from optimizer.exports.ros_messages import Encoding, RosOptions, to_moveit, to_ros2
-from optimizer.exports.urscript import UrscriptOptions, to_urscript
+from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.schemas import export as asked
+from joulepath.app.schemas.export import OPTIONS_OF, ExportFormat, ExportRequest
+from joulepath.optimizer.exports.axes import Axes
+from joulepath.optimizer.exports.csv_table import to_csv
+from joulepath.optimizer.exports.facts import ExportedFile
+from joulepath.optimizer.exports.franka import FrankaOptions, to_franka
+from joulepath.optimizer.exports.json_document import to_json
+from joulepath.optimizer.exports.krl import KrlOptions, to_krl
+from joulepath.optimizer.exports.npz_arrays import to_npz
+from joulepath.optimizer.exports.program import Program
+from joulepath.optimizer.exports.rapid import RapidOptions, to_rapid
+from joulepath.optimizer.exports.ros_messages import Encoding, RosOptions, to_moveit, to_ros2
+from joulepath.optimizer.exports.urscript import UrscriptOptions, to_urscript
 
 
 def _check_options(request: ExportRequest, format: ExportFormat) -> None:

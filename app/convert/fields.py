@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from optimizer.exceptions import InvalidProblem
-from optimizer.solution import UnreachableTarget
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.solution import UnreachableTarget
 
 
 def unreachable_fields(target: UnreachableTarget) -> dict[str, Any]:

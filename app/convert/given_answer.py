@@ -8,19 +8,19 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.convert.arm import to_arm
-from app.exceptions import InvalidRequest
-from app.schemas.arm import ArmRequest
-from app.schemas.common import RobotName
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem
-from optimizer.exports.certified import check_samples
-from optimizer.exports.program import Move, Program, Rest
-from optimizer.problem.arm import Arm
-from optimizer.problem.work_round import LONGEST_ROUND, MOST_STOPS
-from optimizer.replay.sampler import MOST_SAMPLES
-from optimizer.trajectories.spline import Spline
-from optimizer.trajectories.through_samples import spline_through
+from joulepath.app.convert.arm import to_arm
+from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.schemas.arm import ArmRequest
+from joulepath.app.schemas.common import RobotName
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.exports.certified import check_samples
+from joulepath.optimizer.exports.program import Move, Program, Rest
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.work_round import LONGEST_ROUND, MOST_STOPS
+from joulepath.optimizer.replay.sampler import MOST_SAMPLES
+from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.trajectories.through_samples import spline_through
 
 MOST_KNOTS, HIGHEST_DEGREE, LONGEST_REST = 4096, 31, LONGEST_ROUND
 # of a stop: a move, two lines, a path, a dwell and a wait

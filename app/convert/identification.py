@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from app.schemas.identifications import Fraction, IdentifyRequest
-from models.robot import Array
-from optimizer.identification.document import document_of
-from optimizer.identification.fits.payload_fit import Carried
-from optimizer.identification.identify import Identification
-from optimizer.identification.options import Options
-from optimizer.identification.results import Curves, Validation
+from joulepath.app.schemas.identifications import Fraction, IdentifyRequest
+from joulepath.models.robot import Array
+from joulepath.optimizer.identification.document import document_of
+from joulepath.optimizer.identification.fits.payload_fit import Carried
+from joulepath.optimizer.identification.identify import Identification
+from joulepath.optimizer.identification.options import Options
+from joulepath.optimizer.identification.results import Curves, Validation
 
 DECIMALS = 4
 """Of the times, torques and powers of a picture."""

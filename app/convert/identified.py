@@ -8,11 +8,11 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any
 
-from app.exceptions import UnknownFigures
-from models.own_arm.robots import own_robot
-from models.robot import Robot
-from models.uncertainty.document import merged
-from optimizer.exceptions import InvalidProblem
+from joulepath.app.exceptions import UnknownFigures
+from joulepath.models.own_arm.robots import own_robot
+from joulepath.models.robot import Robot
+from joulepath.models.uncertainty.document import merged
+from joulepath.optimizer.exceptions import InvalidProblem
 
 
 @dataclass(frozen=True)

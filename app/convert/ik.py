@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from app.convert.fields import fields
-from app.convert.scene import to_attachment, to_scene, to_tool
-from app.schemas.ik import IKRequest
-from models.robot import Robot
-from optimizer.collision.model import ClosestPair
-from optimizer.kinematics.ik_solutions import IKSolution
-from optimizer.problem.arm import Arm, Payload
+from joulepath.app.convert.fields import fields
+from joulepath.app.convert.scene import to_attachment, to_scene, to_tool
+from joulepath.app.schemas.ik import IKRequest
+from joulepath.models.robot import Robot
+from joulepath.optimizer.collision.model import ClosestPair
+from joulepath.optimizer.kinematics.ik_solutions import IKSolution
+from joulepath.optimizer.problem.arm import Arm, Payload
 
 
 def to_ik_response(

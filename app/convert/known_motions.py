@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 import orjson
 
-from app.convert.packed import packed, unpacked
-from optimizer.sequence.known_motions import KnownMotion, KnownMotions
-from optimizer.trajectories.spline import Spline
+from joulepath.app.convert.packed import packed, unpacked
+from joulepath.optimizer.sequence.known_motions import KnownMotion, KnownMotions
+from joulepath.optimizer.trajectories.spline import Spline
 
 _SPLINE = ("degree", "knots", "control_points")
 

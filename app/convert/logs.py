@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from app.convert.arm import robot_named, to_payload
-from app.schemas.logs import LogSettings
-from optimizer.identification.logs.log import Log
-from optimizer.identification.logs.reading import LogOptions, Reading, read_log
+from joulepath.app.convert.arm import robot_named, to_payload
+from joulepath.app.schemas.logs import LogSettings
+from joulepath.optimizer.identification.logs.log import Log
+from joulepath.optimizer.identification.logs.reading import LogOptions, Reading, read_log
 
 
 def to_log_options(settings: LogSettings, most_bytes: int) -> LogOptions:

@@ -13,14 +13,14 @@ from typing import Literal
 
 from cachetools import LRUCache, cached
 
-from app.convert.base64_data import decoded
-from models.uploads.glb import check_glb
-from models.uploads.limits import UnreadableFile
-from models.uploads.mesh import read_mesh
-from models.uploads.mesh_text import MeshSize
-from optimizer.deadline import checkpoint
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.clouds import MOST_TRIANGLES, TriangleMesh
+from joulepath.app.convert.base64_data import decoded
+from joulepath.models.uploads.glb import check_glb
+from joulepath.models.uploads.limits import UnreadableFile
+from joulepath.models.uploads.mesh import read_mesh
+from joulepath.models.uploads.mesh_text import MeshSize
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.clouds import MOST_TRIANGLES, TriangleMesh
 
 # meshes that are kept for the next request with the same file, of so many triangles in all: 72 bytes each
 MOST_KEPT_TRIANGLES = 400_000

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from app.convert.base64_data import decoded
-from app.schemas import own_arm as asked
-from models.own_arm.description import Collision, Description, Drives, Electronics, Motion, PerJoint
-from models.own_arm.mesh_files import in_zip
-from optimizer.deadline import checkpoint
+from joulepath.app.convert.base64_data import decoded
+from joulepath.app.schemas import own_arm as asked
+from joulepath.models.own_arm.description import Collision, Description, Drives, Electronics, Motion, PerJoint
+from joulepath.models.own_arm.mesh_files import in_zip
+from joulepath.optimizer.deadline import checkpoint
 
 
 def to_description(arm: asked.OwnArm) -> Description:

@@ -7,10 +7,10 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
 
-from models.own_arm.robots import own_robot
-from models.robot import Robot
-from models.shape_sizes import WrongSize
-from optimizer.exceptions import InvalidProblem
+from joulepath.models.own_arm.robots import own_robot
+from joulepath.models.robot import Robot
+from joulepath.models.shape_sizes import WrongSize
+from joulepath.optimizer.exceptions import InvalidProblem
 
 _ROBOT: ContextVar[tuple[str, dict[str, Any]] | None] = ContextVar("own robot", default=None)
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from app.schemas import common as asked
-from models.robot import Array, Robot
-from optimizer.problem.pose import Pose
+from joulepath.app.schemas import common as asked
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.problem.pose import Pose
 
 
 def to_pose(position: Sequence[float], orientation: asked.WithQuaternion | asked.WithRpy | asked.WithRotvec) -> Pose:

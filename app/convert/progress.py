@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from app.convert.fields import fields
-from app.convert.solution import optimality_gap
-from optimizer.progress import CandidatesFound, CandidateTried, Event
+from joulepath.app.convert.fields import fields
+from joulepath.app.convert.solution import optimality_gap
+from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Event
 
 
 def to_event(event: Event) -> tuple[str, dict[str, Any]]:

@@ -10,17 +10,17 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
-from app.convert.arm import robot_named, to_payload
-from app.convert.logs import to_log_options
-from app.exceptions import UnknownLog
-from app.schemas.arm import Payload
-from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
-from app.schemas.logs import LogSettings
-from optimizer.exceptions import InvalidProblem, InvalidTable
-from optimizer.identification.logs.log import Log
-from optimizer.identification.logs.log_errors import EffortNotUsable
-from optimizer.identification.logs.reading import LogOptions, Reading, check_header, read
-from optimizer.problem import arm as library
+from joulepath.app.convert.arm import robot_named, to_payload
+from joulepath.app.convert.logs import to_log_options
+from joulepath.app.exceptions import UnknownLog
+from joulepath.app.schemas.arm import Payload
+from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
+from joulepath.app.schemas.logs import LogSettings
+from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
+from joulepath.optimizer.identification.logs.log import Log
+from joulepath.optimizer.identification.logs.log_errors import EffortNotUsable
+from joulepath.optimizer.identification.logs.reading import LogOptions, Reading, check_header, read
+from joulepath.optimizer.problem import arm as library
 
 S = TypeVar("S", bound=EvaluateSettings)
 

@@ -8,16 +8,16 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from app.convert.fields import fields
-from app.convert.given_answer import Number, Part
-from app.schemas.replay import DeepestContact, Perturb, SimulatedMotion
-from optimizer.exports.program import Move
-from optimizer.simulation.baseline_courses import ReportedBaseline, planned_baselines
-from optimizer.simulation.outcome import Outcome
-from optimizer.simulation.planned import PlannedMotion, PlannedTorques
-from optimizer.simulation.reference import course_of
-from optimizer.simulation.replay import Quantity, Replay
-from optimizer.solution import BaselineName, Energy, Objective
+from joulepath.app.convert.fields import fields
+from joulepath.app.convert.given_answer import Number, Part
+from joulepath.app.schemas.replay import DeepestContact, Perturb, SimulatedMotion
+from joulepath.optimizer.exports.program import Move
+from joulepath.optimizer.simulation.baseline_courses import ReportedBaseline, planned_baselines
+from joulepath.optimizer.simulation.outcome import Outcome
+from joulepath.optimizer.simulation.planned import PlannedMotion, PlannedTorques
+from joulepath.optimizer.simulation.reference import course_of
+from joulepath.optimizer.simulation.replay import Quantity, Replay
+from joulepath.optimizer.solution import BaselineName, Energy, Objective
 
 
 class _Electrical(Part):

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.convert.arm import to_arm
-from app.convert.pose import to_base, to_base_pose, to_pose
-from app.convert.until import time_left, until
-from app.schemas import request as asked
-from app.schemas.orientation import ConeOrientedPose as ConeOrientedPoseSchema
-from app.schemas.orientation import InCone, TargetPose
-from app.schemas.path import Path, StopPath
-from models.robot import Array, Robot
-from optimizer.deadline import Deadline
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.cycle import Cycle
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import LONGEST_DURATION, Problem
-from optimizer.problem.targets import AnyOf, Single, Target
-from optimizer.problem.tool_path import ToolPath
-from optimizer.replay.sampler import MOST_SAMPLES
+from joulepath.app.convert.arm import to_arm
+from joulepath.app.convert.pose import to_base, to_base_pose, to_pose
+from joulepath.app.convert.until import time_left, until
+from joulepath.app.schemas import request as asked
+from joulepath.app.schemas.orientation import ConeOrientedPose as ConeOrientedPoseSchema
+from joulepath.app.schemas.orientation import InCone, TargetPose
+from joulepath.app.schemas.path import Path, StopPath
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import LONGEST_DURATION, Problem
+from joulepath.optimizer.problem.targets import AnyOf, Single, Target
+from joulepath.optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.replay.sampler import MOST_SAMPLES
 
 
 def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:

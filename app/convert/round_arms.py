@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from app.convert.arm_fields import arm_fields
-from app.schemas.arm import Payload
-from app.schemas.cycle import CycleRequest
-from optimizer.problem.arm import LIMIT_NAMES, Arm
-from optimizer.sequence.round_solution import RoundSolution
+from joulepath.app.convert.arm_fields import arm_fields
+from joulepath.app.schemas.arm import Payload
+from joulepath.app.schemas.cycle import CycleRequest
+from joulepath.optimizer.problem.arm import LIMIT_NAMES, Arm
+from joulepath.optimizer.sequence.round_solution import RoundSolution
 
 
 def arms_of_moves(request: CycleRequest, found: RoundSolution) -> list[dict[str, Any] | None]:

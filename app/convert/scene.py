@@ -8,14 +8,14 @@ from typing import TypeVar
 
 import numpy as np
 
-from app.convert.mesh_file import mesh_from_file
-from app.convert.pose import to_base, to_matrix
-from app.convert.voxels import occupied_cells
-from app.schemas import scene as asked
-from models.robot import Array, Robot
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.clouds import Points, Voxels
-from optimizer.problem.scene import (
+from joulepath.app.convert.mesh_file import mesh_from_file
+from joulepath.app.convert.pose import to_base, to_matrix
+from joulepath.app.convert.voxels import occupied_cells
+from joulepath.app.schemas import scene as asked
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.clouds import Points, Voxels
+from joulepath.optimizer.problem.scene import (
     Attachment,
     Box,
     Capsule,

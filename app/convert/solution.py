@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from app.convert.candidates import candidate_counts, candidate_fields, chosen
-from app.convert.fields import fields, unreachable_fields
-from app.convert.warnings import certified_warnings
-from app.schemas.request import WhichCandidates
-from app.schemas.response import Clearance
-from optimizer.problem.arm import LIMIT_NAMES
-from optimizer.problem.problem import MethodName
-from optimizer.solution import (
+from joulepath.app.convert.candidates import candidate_counts, candidate_fields, chosen
+from joulepath.app.convert.fields import fields, unreachable_fields
+from joulepath.app.convert.warnings import certified_warnings
+from joulepath.app.schemas.request import WhichCandidates
+from joulepath.app.schemas.response import Clearance
+from joulepath.optimizer.problem.arm import LIMIT_NAMES
+from joulepath.optimizer.problem.problem import MethodName
+from joulepath.optimizer.solution import (
     Certificate,
     ElectricalEnergy,
     Energy,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from optimizer.deadline import Deadline, DeadlinePassed, watch
-from optimizer.exceptions import DeadlineExceeded
+from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
+from joulepath.optimizer.exceptions import DeadlineExceeded
 
 _LEAST_TIME = 1e-3
 """Shortest time of a computation [s]: one whose time was used up by the reading still says so by itself."""

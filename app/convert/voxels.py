@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from app.convert.base64_data import decoded
-from app.schemas.scene import MOST_CELLS, VoxelBits, Voxels
-from optimizer.exceptions import InvalidProblem
+from joulepath.app.convert.base64_data import decoded
+from joulepath.app.schemas.scene import MOST_CELLS, VoxelBits, Voxels
+from joulepath.optimizer.exceptions import InvalidProblem
 
 
 def occupied_cells(given: Voxels) -> npt.NDArray[np.int64]:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from optimizer.collision.close_pass import CLOSE
-from optimizer.collision.stand_ins import StandInSettings
-from optimizer.problem.arm import PAYLOAD, TOOL
-from optimizer.replay.evaluate import Evaluation
-from optimizer.simulation.outcome import Outcome
-from optimizer.simulation.planned import PlannedMotion
-from optimizer.simulation.replay import Replay
-from optimizer.simulation.shapes import unsimulated
-from optimizer.solution import Clearance, Solution
+from joulepath.optimizer.collision.close_pass import CLOSE
+from joulepath.optimizer.collision.stand_ins import StandInSettings
+from joulepath.optimizer.problem.arm import PAYLOAD, TOOL
+from joulepath.optimizer.replay.evaluate import Evaluation
+from joulepath.optimizer.simulation.outcome import Outcome
+from joulepath.optimizer.simulation.planned import PlannedMotion
+from joulepath.optimizer.simulation.replay import Replay
+from joulepath.optimizer.simulation.shapes import unsimulated
+from joulepath.optimizer.solution import Clearance, Solution
 
 ADVICE = "Make sure that the arm and its cell are known as accurately, or ask for a margin."
 

@@ -9,7 +9,7 @@ from contextlib import asynccontextmanager, contextmanager
 from enum import Enum, auto
 from typing import Generic, Protocol, TypeVar
 
-from app.exceptions import Busy, TooManyRequests
+from joulepath.app.exceptions import Busy, TooManyRequests
 
 
 class Usable(Protocol):

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-from optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, nobody
 
 _tell: ContextVar[Tell] = ContextVar("tell", default=nobody)
 

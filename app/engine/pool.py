@@ -11,17 +11,17 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
 
-from app.engine.census import Census
-from app.engine.fair_queue import FairQueue, Place
-from app.engine.forkserver import start_forkserver
-from app.engine.result import TaskResult
-from app.engine.spare import SpareWorkers
-from app.engine.task import Task
-from app.engine.worker import Worker
-from app.exceptions import Preempted, ShuttingDown, WorkerDied
-from app.settings import Settings
-from optimizer.exceptions import DeadlineExceeded
-from optimizer.progress import Tell, nobody
+from joulepath.app.engine.census import Census
+from joulepath.app.engine.fair_queue import FairQueue, Place
+from joulepath.app.engine.forkserver import start_forkserver
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.engine.spare import SpareWorkers
+from joulepath.app.engine.task import Task
+from joulepath.app.engine.worker import Worker
+from joulepath.app.exceptions import Preempted, ShuttingDown, WorkerDied
+from joulepath.app.settings import Settings
+from joulepath.optimizer.exceptions import DeadlineExceeded
+from joulepath.optimizer.progress import Tell, nobody
 
 logger = logging.getLogger(__name__)
 

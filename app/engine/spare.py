@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from app.engine.census import Census
-from app.engine.fair_queue import PATIENCE, FairQueue
-from app.engine.work import Ended, Take, Work
-from app.engine.worker import Worker
-from app.exceptions import Preempted, WorkerDied
-from optimizer.exceptions import DeadlineExceeded
+from joulepath.app.engine.census import Census
+from joulepath.app.engine.fair_queue import PATIENCE, FairQueue
+from joulepath.app.engine.work import Ended, Take, Work
+from joulepath.app.engine.worker import Worker
+from joulepath.app.exceptions import Preempted, WorkerDied
+from joulepath.optimizer.exceptions import DeadlineExceeded
 
 
 @dataclass(eq=False)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import logging
 from typing import Protocol
 
-from app.engine.result import TaskResult
-from app.exceptions import ServiceError, TaskFailed
-from optimizer.deadline import Stopped, checkpoint, is_stopped
-from optimizer.exceptions import JoulepathError
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions import ServiceError, TaskFailed
+from joulepath.optimizer.deadline import Stopped, checkpoint, is_stopped
+from joulepath.optimizer.exceptions import JoulepathError
 
 logger = logging.getLogger(__name__)
 

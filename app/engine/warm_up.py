@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from optimizer.optimize import warm_up
+from joulepath.optimizer.optimize import warm_up
 
 
 def warm(robots: Sequence[str]) -> None:

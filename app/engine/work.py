@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
-from app.engine.result import TaskResult
-from app.engine.task import Task
-from optimizer.progress import Tell, nobody
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.engine.task import Task
+from joulepath.optimizer.progress import Tell, nobody
 
 SHORT = 0.05
 """Most that short work takes [s]."""

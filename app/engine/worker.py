@@ -20,15 +20,15 @@ from functools import partial
 from multiprocessing.connection import Connection, wait
 from typing import Any, TypeVar
 
-from app.engine.forkserver import CONTEXT
-from app.engine.listening import listening
-from app.engine.result import TaskResult
-from app.engine.task import Task, outcome
-from app.engine.work import Ended, Take, Work
-from app.exceptions import Preempted, WorkerDied
-from app.logs import configure_logging
-from optimizer.deadline import Stopped, stoppable
-from optimizer.progress import Event, Tell, nobody
+from joulepath.app.engine.forkserver import CONTEXT
+from joulepath.app.engine.listening import listening
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.engine.task import Task, outcome
+from joulepath.app.engine.work import Ended, Take, Work
+from joulepath.app.exceptions import Preempted, WorkerDied
+from joulepath.app.logs import configure_logging
+from joulepath.optimizer.deadline import Stopped, stoppable
+from joulepath.optimizer.progress import Event, Tell, nobody
 
 logger = logging.getLogger(__name__)
 

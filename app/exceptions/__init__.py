@@ -1,12 +1,12 @@
-"""The service's own errors. How each looks over HTTP is in `app.http.problem_details`."""
+"""The service's own errors. How each looks over HTTP is in `joulepath.app.http.problem_details`."""
 
 from __future__ import annotations
 
-from app.exceptions.access import CrossSite, NoKey, NotOwner, RoleTooLow, WrongHost, WrongKey
-from app.exceptions.base import InvalidRequest, ServiceError
-from app.exceptions.figures import FiguresInUse, TooManyFigures, UnknownFigures
-from app.exceptions.pictures import NoMeshes
-from app.exceptions.queue import (
+from joulepath.app.exceptions.access import CrossSite, NoKey, NotOwner, RoleTooLow, WrongHost, WrongKey
+from joulepath.app.exceptions.base import InvalidRequest, ServiceError
+from joulepath.app.exceptions.figures import FiguresInUse, TooManyFigures, UnknownFigures
+from joulepath.app.exceptions.pictures import NoMeshes
+from joulepath.app.exceptions.queue import (
     Busy,
     ClientDisconnected,
     ClusterUnavailable,
@@ -23,7 +23,7 @@ from app.exceptions.queue import (
     TooManyWaiting,
     WorkerDied,
 )
-from app.exceptions.stored import (
+from joulepath.app.exceptions.stored import (
     AnswerInUse,
     BundledRobot,
     EmptyStudy,
@@ -42,7 +42,7 @@ from app.exceptions.stored import (
     UnknownLog,
     UnknownStudy,
 )
-from app.exceptions.transport import (
+from joulepath.app.exceptions.transport import (
     BodyTooLarge,
     HeadTooLarge,
     MalformedHttp,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.exceptions.base import ServiceError
+from joulepath.app.exceptions.base import ServiceError
 
 
 class NoMeshes(ServiceError):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from app.exceptions.base import ServiceError
+from joulepath.app.exceptions.base import ServiceError
 
 StoreFault = Literal["full", "read-only", "locked", "deleted", "unreachable"]
 """What is wrong with the database."""

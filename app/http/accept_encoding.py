@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from app.http.weights import weights
+from joulepath.app.http.weights import weights
 
 Coding = Literal["zstd", "gzip", "identity"]
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 from starlette.requests import Request
 
-from app.access.key_ring import KeyRing
-from app.access.rules import check_role, needed_role
-from app.exceptions import NoKey, WrongKey
-from app.http.client import client_of
+from joulepath.app.access.key_ring import KeyRing
+from joulepath.app.access.rules import check_role, needed_role
+from joulepath.app.exceptions import NoKey, WrongKey
+from joulepath.app.http.client import client_of
 
 SCHEME = "Bearer"
 REALM = "joulepath"

@@ -10,7 +10,7 @@ from starlette.datastructures import Headers
 from starlette.requests import HTTPConnection
 from starlette.types import Scope
 
-from app.access.client import Client
+from joulepath.app.access.client import Client
 
 Address = IPv4Address | IPv6Address
 ProxyHeader = Literal["X-Forwarded-For", "Forwarded"]

@@ -15,9 +15,9 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.exceptions import NotAcceptable
-from app.http.accept_encoding import Coding, preferred
-from app.http.handlers import problem_response
+from joulepath.app.exceptions import NotAcceptable
+from joulepath.app.http.accept_encoding import Coding, preferred
+from joulepath.app.http.handlers import problem_response
 
 _LEAST = 1024
 """Smaller bodies [byte] fit into one packet anyway."""

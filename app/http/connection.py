@@ -23,9 +23,9 @@ import httptools
 from uvicorn._types import ASGI3Application
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
 
-from app.access.client import Client
-from app.engine.result import json_document
-from app.exceptions import (
+from joulepath.app.access.client import Client
+from joulepath.app.engine.result import json_document
+from joulepath.app.exceptions import (
     HeadTooLarge,
     MalformedHttp,
     RequestTimeout,
@@ -34,8 +34,8 @@ from app.exceptions import (
     TooManyConnections,
     TooManyConnectionsOfClient,
 )
-from app.http.handlers import PROBLEM_MEDIA_TYPE
-from app.http.problem_details import problem_content, problem_type
+from joulepath.app.http.handlers import PROBLEM_MEDIA_TYPE
+from joulepath.app.http.problem_details import problem_content, problem_type
 
 logger = logging.getLogger("app.connection")
 

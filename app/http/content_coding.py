@@ -12,8 +12,8 @@ import zstandard
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.exceptions import InvalidRequest, UnsupportedCoding
-from app.http.refused_body import RefusedBody
+from joulepath.app.exceptions import InvalidRequest, UnsupportedCoding
+from joulepath.app.http.refused_body import RefusedBody
 
 _PIECE = 1 << 16
 """Bytes that are unpacked at a time: what a body takes at most before its size is checked."""

@@ -13,13 +13,13 @@ from fastapi import Request
 from starlette.responses import StreamingResponse
 from starlette.types import Message, Receive, Scope, Send
 
-from app.convert.progress import to_event
-from app.engine.result import TaskResult, json_document
-from app.exceptions import ClientDisconnected, ServiceError, TooManyBytes, TooManyBytesOfClient
-from app.http.disconnect import disconnected
-from app.http.handlers import problem_response
-from optimizer.exceptions import JoulepathError
-from optimizer.progress import Event, Tell, forward
+from joulepath.app.convert.progress import to_event
+from joulepath.app.engine.result import TaskResult, json_document
+from joulepath.app.exceptions import ClientDisconnected, ServiceError, TooManyBytes, TooManyBytesOfClient
+from joulepath.app.http.disconnect import disconnected
+from joulepath.app.http.handlers import problem_response
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.progress import Event, Tell, forward
 
 logger = logging.getLogger(__name__)
 

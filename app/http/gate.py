@@ -7,8 +7,8 @@ from collections.abc import Callable
 from starlette.requests import Request
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from app.exceptions import ServiceError
-from app.http.handlers import problem_response
+from joulepath.app.exceptions import ServiceError
+from joulepath.app.http.handlers import problem_response
 
 
 class Gate:

@@ -9,8 +9,8 @@ from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
-from app.engine.result import TaskResult, json_document
-from app.exceptions import (
+from joulepath.app.engine.result import TaskResult, json_document
+from joulepath.app.exceptions import (
     BodyTooLarge,
     InvalidRequest,
     MethodNotAllowed,
@@ -19,10 +19,10 @@ from app.exceptions import (
     ServiceError,
     UnsupportedMediaType,
 )
-from app.http.authentication import challenge
-from app.http.problem_details import invalid_request, problem_content, problem_type
-from app.http.refused_body import RefusedBody
-from optimizer.exceptions import JoulepathError
+from joulepath.app.http.authentication import challenge
+from joulepath.app.http.problem_details import invalid_request, problem_content, problem_type
+from joulepath.app.http.refused_body import RefusedBody
+from joulepath.optimizer.exceptions import JoulepathError
 
 CACHE_HEADER = "Joulepath-Cache"
 PROBLEM_MEDIA_TYPE = "application/problem+json"

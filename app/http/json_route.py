@@ -8,9 +8,9 @@ from typing import Any
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
 
-from app.convert.json_text import parsed_json
-from app.exceptions import InvalidRequest
-from app.http.refused_body import RefusedBody
+from joulepath.app.convert.json_text import parsed_json
+from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.http.refused_body import RefusedBody
 
 
 class JsonRequest(Request):

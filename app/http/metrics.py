@@ -11,7 +11,7 @@ from prometheus_client.metrics_core import CounterMetricFamily, GaugeMetricFamil
 from prometheus_client.registry import Collector
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from app.engine.pool import Engine
+from joulepath.app.engine.pool import Engine
 
 _NO_ROUTE = "none"
 _OTHER = "other"

@@ -10,10 +10,10 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
-from app.access.rules import needed_role
-from app.http.authentication import SCHEME
-from app.http.sites import PROBES
-from app.schemas.errors import (
+from joulepath.app.access.rules import needed_role
+from joulepath.app.http.authentication import SCHEME
+from joulepath.app.http.sites import PROBES
+from joulepath.app.schemas.errors import (
     PROBLEMS,
     Busy,
     CrossSite,
@@ -25,11 +25,11 @@ from app.schemas.errors import (
     Unauthenticated,
     WrongHost,
 )
-from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
-from app.schemas.examples import BODY_EXAMPLES
-from app.schemas.jobs import NewJob
-from app.schemas.logs import LogSettings
-from app.settings import Settings
+from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
+from joulepath.app.schemas.examples import BODY_EXAMPLES
+from joulepath.app.schemas.jobs import NewJob
+from joulepath.app.schemas.logs import LogSettings
+from joulepath.app.settings import Settings
 
 _SECURITY = "apiKey"
 _REF = "#/components/schemas/{model}"

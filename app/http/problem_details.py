@@ -8,9 +8,9 @@ from typing import Any
 from fastapi.exceptions import RequestValidationError
 from pydantic import ValidationError
 
-from app.convert.candidates import candidate_counts, candidate_fields, most_telling
-from app.convert.fields import fields, location, unreachable_fields
-from app.exceptions import (
+from joulepath.app.convert.candidates import candidate_counts, candidate_fields, most_telling
+from joulepath.app.convert.fields import fields, location, unreachable_fields
+from joulepath.app.exceptions import (
     AnswerInUse,
     BodyTooLarge,
     Busy,
@@ -53,12 +53,12 @@ from app.exceptions import (
     WorkerDied,
     WrongHost,
 )
-from app.http.validation_messages import told
-from app.schemas import errors as problems
-from optimizer import exceptions as optimizer_errors
-from optimizer.excitation.errors import ExcitationInfeasible
-from optimizer.identification import errors as identification_errors
-from optimizer.identification.logs.log_errors import EffortNotUsable, LogTooLarge
+from joulepath.app.http.validation_messages import told
+from joulepath.app.schemas import errors as problems
+from joulepath.optimizer import exceptions as optimizer_errors
+from joulepath.optimizer.excitation.errors import ExcitationInfeasible
+from joulepath.optimizer.identification import errors as identification_errors
+from joulepath.optimizer.identification.logs.log_errors import EffortNotUsable, LogTooLarge
 
 TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     InvalidRequest: problems.Validation,

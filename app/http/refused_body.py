@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from starlette.exceptions import HTTPException
 
-from app.exceptions import ServiceError
+from joulepath.app.exceptions import ServiceError
 
 
 class RefusedBody(HTTPException):

@@ -12,11 +12,11 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.access.client import Client
-from app.exceptions import ClientDisconnected
-from app.http.handlers import problem_response
-from app.http.metrics import Metrics
-from app.http.sites import PROBES
+from joulepath.app.access.client import Client
+from joulepath.app.exceptions import ClientDisconnected
+from joulepath.app.http.handlers import problem_response
+from joulepath.app.http.metrics import Metrics
+from joulepath.app.http.sites import PROBES
 
 logger = logging.getLogger("app.request")
 

@@ -10,8 +10,8 @@ from urllib.parse import urlsplit
 
 from starlette.requests import Request
 
-from app.access.rules import needed_role
-from app.exceptions import CrossSite, WrongHost
+from joulepath.app.access.rules import needed_role
+from joulepath.app.exceptions import CrossSite, WrongHost
 
 EVERYONE = "*"
 _HOST = re.compile(r"(\[(?P<address>[0-9A-Fa-f:.]+)\]|(?P<name>[^:\[\]]+))(:[0-9]*)?")

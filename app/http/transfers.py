@@ -9,11 +9,11 @@ from starlette.datastructures import Headers
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.exceptions import RequestTimeout, TooManyBytes, TooManyBytesOfClient
-from app.http.client import client_of
-from app.http.handlers import problem_response
-from app.http.refused_body import RefusedBody
-from app.http.turns import Turns
+from joulepath.app.exceptions import RequestTimeout, TooManyBytes, TooManyBytesOfClient
+from joulepath.app.http.client import client_of
+from joulepath.app.http.handlers import problem_response
+from joulepath.app.http.refused_body import RefusedBody
+from joulepath.app.http.turns import Turns
 
 _SMALL = 1 << 16
 """Largest body or answer [byte] that does not count: small requests find room whatever others hold."""

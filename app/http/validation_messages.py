@@ -12,12 +12,12 @@ from typing import Any, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from app.convert.json_text import EMPTY, PLAIN_NAME
-from app.schemas.common import KEY_HEADER, NO_CONTROLS, UNKNOWN_FIELD, nearest
-from app.schemas.common import Request as RequestModel
-from app.schemas.own_arm import NAME_PATTERN
-from app.schemas.queries import PAGE_PATTERN
-from app.schemas.scene import BASE64
+from joulepath.app.convert.json_text import EMPTY, PLAIN_NAME
+from joulepath.app.schemas.common import KEY_HEADER, NO_CONTROLS, UNKNOWN_FIELD, nearest
+from joulepath.app.schemas.common import Request as RequestModel
+from joulepath.app.schemas.own_arm import NAME_PATTERN
+from joulepath.app.schemas.queries import PAGE_PATTERN
+from joulepath.app.schemas.scene import BASE64
 
 _OBJECT = "Give a JSON object: names and values in braces"
 _MESSAGES = {

@@ -11,13 +11,13 @@ from typing import Any
 
 import orjson
 
-from app.convert.packed import unpacked
-from app.schemas.errors import PREFIX
-from app.store import jobs
-from app.store.job_events import eta, progress
-from app.store.jobs import JobView
-from app.store.store import Store
-from app.store.tables import JobRequest, now
+from joulepath.app.convert.packed import unpacked
+from joulepath.app.schemas.errors import PREFIX
+from joulepath.app.store import jobs
+from joulepath.app.store.job_events import eta, progress
+from joulepath.app.store.jobs import JobView
+from joulepath.app.store.store import Store
+from joulepath.app.store.tables import JobRequest, now
 
 _BATCH = 20
 """Results that are read at a time: an answer may have a hundred kilobytes."""

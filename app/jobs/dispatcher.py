@@ -9,20 +9,20 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from functools import partial
 
-from app.engine.work import Ended
-from app.exceptions import StoreUnavailable, TaskFailed
-from app.jobs.changes import Changes
-from app.jobs.equals import Equals, Sorted
-from app.jobs.executor import Executor
-from app.jobs.heap import Heap, Held, Taker
-from app.jobs.holder import is_gone, new_holder
-from app.jobs.progress import Found
-from app.jobs.work import defect, outcome_of
-from app.settings import Settings
-from app.store import jobs, leases
-from app.store.leases import Key, Outcome
-from app.store.store import Store
-from app.store.tables import now as present_time
+from joulepath.app.engine.work import Ended
+from joulepath.app.exceptions import StoreUnavailable, TaskFailed
+from joulepath.app.jobs.changes import Changes
+from joulepath.app.jobs.equals import Equals, Sorted
+from joulepath.app.jobs.executor import Executor
+from joulepath.app.jobs.heap import Heap, Held, Taker
+from joulepath.app.jobs.holder import is_gone, new_holder
+from joulepath.app.jobs.progress import Found
+from joulepath.app.jobs.work import defect, outcome_of
+from joulepath.app.settings import Settings
+from joulepath.app.store import jobs, leases
+from joulepath.app.store.leases import Key, Outcome
+from joulepath.app.store.store import Store
+from joulepath.app.store.tables import now as present_time
 
 logger = logging.getLogger(__name__)
 

@@ -9,18 +9,18 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
-from app import __version__
-from app.convert.packed import packed, unpacked
-from app.engine.result import AnswerFigures, TaskResult
-from app.exceptions import StoreUnavailable
-from app.jobs.heap import Held
-from app.jobs.work import request_id_of
-from app.store import cache, known_motions
-from app.store.cache import Asked
-from app.store.leases import Outcome
-from app.store.store import Store
-from app.store.tables import Answer
-from app.tasks.answer_cache import asked_for
+from joulepath import __version__
+from joulepath.app.convert.packed import packed, unpacked
+from joulepath.app.engine.result import AnswerFigures, TaskResult
+from joulepath.app.exceptions import StoreUnavailable
+from joulepath.app.jobs.heap import Held
+from joulepath.app.jobs.work import request_id_of
+from joulepath.app.store import cache, known_motions
+from joulepath.app.store.cache import Asked
+from joulepath.app.store.leases import Outcome
+from joulepath.app.store.store import Store
+from joulepath.app.store.tables import Answer
+from joulepath.app.tasks.answer_cache import asked_for
 
 ALONE = ("optimize", "compare", "evaluate")
 """Endpoints whose answers refer to no other answer. The others refer to answers that are kept as long as their job."""

@@ -11,9 +11,9 @@ from functools import partial
 from fastapi.sse import format_sse_event
 from sqlalchemy.orm import Session
 
-from app.jobs.dispatcher import Dispatcher
-from app.store import job_events
-from app.store.store import Store
+from joulepath.app.jobs.dispatcher import Dispatcher
+from joulepath.app.store import job_events
+from joulepath.app.store.store import Store
 
 _BATCH = 500
 LOOK = 1.0

@@ -7,20 +7,20 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol, TypeGuard
 
-from app.cluster.link import Cluster
-from app.convert.packed import unpacked
-from app.engine.pool import Engine
-from app.engine.result import TaskResult
-from app.engine.task import Task
-from app.engine.work import Ended, Take, Work, result_of
-from app.exceptions import Preempted, ServiceError, UnknownFigures, UnknownLog
-from app.schemas.identifications import IdentifyRequest
-from app.store import logs
-from app.store.store import Store
-from app.tasks.arm_engine import ArmEngine
-from app.tasks.job_request import IDENTIFY, JobRequestTask
-from optimizer.exceptions import JoulepathError, UnknownRobot
-from optimizer.progress import Tell, nobody
+from joulepath.app.cluster.link import Cluster
+from joulepath.app.convert.packed import unpacked
+from joulepath.app.engine.pool import Engine
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.engine.task import Task
+from joulepath.app.engine.work import Ended, Take, Work, result_of
+from joulepath.app.exceptions import Preempted, ServiceError, UnknownFigures, UnknownLog
+from joulepath.app.schemas.identifications import IdentifyRequest
+from joulepath.app.store import logs
+from joulepath.app.store.store import Store
+from joulepath.app.tasks.arm_engine import ArmEngine
+from joulepath.app.tasks.job_request import IDENTIFY, JobRequestTask
+from joulepath.optimizer.exceptions import JoulepathError, UnknownRobot
+from joulepath.optimizer.progress import Tell, nobody
 
 
 class Executor(Protocol):

@@ -9,12 +9,12 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
-from app.engine.work import Ended, Work
-from app.jobs.progress import HEARD, Found
-from app.jobs.work import MOST_PREEMPTIONS, task_of
-from app.store.cache import Asked
-from app.store.leases import Lease
-from optimizer.progress import nobody
+from joulepath.app.engine.work import Ended, Work
+from joulepath.app.jobs.progress import HEARD, Found
+from joulepath.app.jobs.work import MOST_PREEMPTIONS, task_of
+from joulepath.app.store.cache import Asked
+from joulepath.app.store.leases import Lease
+from joulepath.optimizer.progress import nobody
 
 SMALL = 1 << 12
 """Size of a small request [byte], compressed."""

@@ -8,12 +8,12 @@ from functools import partial
 
 from sqlalchemy.exc import IntegrityError
 
-from app.access.client import Client
-from app.jobs.dispatcher import Dispatcher
-from app.settings import Settings
-from app.store import jobs
-from app.store.jobs import JobView, NewJob
-from app.store.store import Store
+from joulepath.app.access.client import Client
+from joulepath.app.jobs.dispatcher import Dispatcher
+from joulepath.app.settings import Settings
+from joulepath.app.store import jobs
+from joulepath.app.store.jobs import JobView, NewJob
+from joulepath.app.store.store import Store
 
 LOOK = 1.0
 """Time [s] after which work of other services is looked for."""
@@ -28,7 +28,7 @@ class Jobs:
     settings: Settings
 
     async def create(self, new: NewJob, key: str | None, owner: str | None) -> tuple[str, bool]:
-        """See `app.store.jobs.create`. Raises KeyReused, TooManyWaiting or StoreUnavailable."""
+        """See `joulepath.app.store.jobs.create`. Raises KeyReused, TooManyWaiting or StoreUnavailable."""
         write = partial(jobs.create, new=new, key=key, most_waiting=self.settings.max_waiting, owner=owner)
         try:
             made = await self.store.write(write)

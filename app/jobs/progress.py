@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from app.store.job_events import Report
-from optimizer.progress import CandidateTried, Event, Improved, forward
+from joulepath.app.store.job_events import Report
+from joulepath.optimizer.progress import CandidateTried, Event, Improved, forward
 
 HEARD = ("cycle", "pareto")
 """Endpoints whose requests take long, so that their progress is worth an event."""

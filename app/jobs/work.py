@@ -9,9 +9,9 @@ from typing import Any
 
 import orjson
 
-from app.engine.result import TaskResult, json_document
-from app.engine.work import Ended
-from app.exceptions import (
+from joulepath.app.engine.result import TaskResult, json_document
+from joulepath.app.engine.work import Ended
+from joulepath.app.exceptions import (
     ClusterUnavailable,
     Preempted,
     ServiceError,
@@ -21,10 +21,10 @@ from app.exceptions import (
     TooManyDeaths,
     WorkerDied,
 )
-from app.http.problem_details import problem_content
-from app.store.leases import Lease, Outcome
-from app.tasks.job_request import JobRequestTask, JobResult
-from optimizer.exceptions import JoulepathError
+from joulepath.app.http.problem_details import problem_content
+from joulepath.app.store.leases import Lease, Outcome
+from joulepath.app.tasks.job_request import JobRequestTask, JobResult
+from joulepath.optimizer.exceptions import JoulepathError
 
 logger = logging.getLogger(__name__)
 

@@ -8,14 +8,14 @@ from typing import Annotated
 import orjson
 from fastapi import APIRouter, Path, Query, Response
 
-from app.engine.result import TaskResult
-from app.http.handlers import result_response
-from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceClient, ServiceStore
-from app.schemas import errors as problems
-from app.schemas.answers import AnswerList, AnswerPage, AnswerSummary, StoredAnswer
-from app.schemas.examples.values import ANSWER_ID
-from app.store import answers
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.http.handlers import result_response
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.routes.dependencies import ServiceClient, ServiceStore
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.answers import AnswerList, AnswerPage, AnswerSummary, StoredAnswer
+from joulepath.app.schemas.examples.values import ANSWER_ID
+from joulepath.app.store import answers
 
 router = APIRouter(prefix="/answers", tags=["answers"])
 

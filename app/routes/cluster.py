@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceCluster
-from app.schemas import errors as problems
-from app.schemas.cluster import ClusterState, Machine
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.routes.dependencies import ServiceCluster
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.cluster import ClusterState, Machine
 
 router = APIRouter(tags=["health"])
 

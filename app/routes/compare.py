@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
-from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceArmEngine, ServiceSettings
-from app.routes.large_bodies import LargeBodyRoute
-from app.routes.later import ACCEPTED, ServiceLater
-from app.routes.parameters import deadline_of
-from app.routes.problem_lists import MOTION_PROBLEMS
-from app.routes.reply import BY_EVENTS, ServiceReply
-from app.schemas import errors as problems
-from app.schemas.compare import CompareRequest, CompareResponse
-from app.tasks.compare import CompareTask
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings
+from joulepath.app.routes.large_bodies import LargeBodyRoute
+from joulepath.app.routes.later import ACCEPTED, ServiceLater
+from joulepath.app.routes.parameters import deadline_of
+from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
+from joulepath.app.routes.reply import BY_EVENTS, ServiceReply
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.compare import CompareRequest, CompareResponse
+from joulepath.app.tasks.compare import CompareTask
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 

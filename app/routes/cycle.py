@@ -4,21 +4,27 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
-from app.engine.result import TaskResult
-from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceArmEngine, ServiceCache, ServiceClient, ServiceSettings, ServiceStore
-from app.routes.large_bodies import LargeBodyRoute
-from app.routes.later import ACCEPTED, ServiceLater
-from app.routes.parameters import WantedFormat, deadline_of
-from app.routes.problem_lists import CYCLE_PROBLEMS
-from app.routes.reply import BY_EVENTS, ServiceReply
-from app.schemas import errors as problems
-from app.schemas.cycle import CycleRequest, CycleResponse
-from app.store.store_answers import keep_answer, store_answers
-from app.tasks.cycle import CycleTask
-from app.tasks.read_body import HeldBody
-from app.tasks.request_key import cell_of
-from optimizer.progress import Tell
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.routes.dependencies import (
+    ServiceArmEngine,
+    ServiceCache,
+    ServiceClient,
+    ServiceSettings,
+    ServiceStore,
+)
+from joulepath.app.routes.large_bodies import LargeBodyRoute
+from joulepath.app.routes.later import ACCEPTED, ServiceLater
+from joulepath.app.routes.parameters import WantedFormat, deadline_of
+from joulepath.app.routes.problem_lists import CYCLE_PROBLEMS
+from joulepath.app.routes.reply import BY_EVENTS, ServiceReply
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.cycle import CycleRequest, CycleResponse
+from joulepath.app.store.store_answers import keep_answer, store_answers
+from joulepath.app.tasks.cycle import CycleTask
+from joulepath.app.tasks.read_body import HeldBody
+from joulepath.app.tasks.request_key import cell_of
+from joulepath.optimizer.progress import Tell
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 

@@ -6,18 +6,18 @@ from typing import Annotated
 
 from fastapi import Depends, Request
 
-from app.access.client import Client
-from app.cluster.link import Cluster
-from app.engine.pool import ClientEngine, Engine
-from app.http.client import client_of
-from app.http.metrics import Metrics
-from app.jobs.jobs import Jobs
-from app.routes.parameters import is_fresh
-from app.settings import Settings
-from app.store.store import Store
-from app.tasks.answer_cache import AnswerCache
-from app.tasks.arm_engine import ArmEngine
-from app.tasks.in_flight import InFlight
+from joulepath.app.access.client import Client
+from joulepath.app.cluster.link import Cluster
+from joulepath.app.engine.pool import ClientEngine, Engine
+from joulepath.app.http.client import client_of
+from joulepath.app.http.metrics import Metrics
+from joulepath.app.jobs.jobs import Jobs
+from joulepath.app.routes.parameters import is_fresh
+from joulepath.app.settings import Settings
+from joulepath.app.store.store import Store
+from joulepath.app.tasks.answer_cache import AnswerCache
+from joulepath.app.tasks.arm_engine import ArmEngine
+from joulepath.app.tasks.in_flight import InFlight
 
 # coroutines, because FastAPI would run plain functions in a thread
 

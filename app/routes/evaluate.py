@@ -6,22 +6,22 @@ from typing import IO, Any, Literal
 
 from fastapi import APIRouter, Request, Response
 
-from app.exceptions import InvalidRequest, UnsupportedMediaType
-from app.http.disconnect import unless_disconnected
-from app.http.handlers import result_response
-from app.http.json_body import FORM, TEXT
-from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceArmEngine, ServiceSettings
-from app.routes.later import ACCEPTED, ServiceLater, deadlines
-from app.routes.parameters import WantedFormat, is_fresh
-from app.routes.problem_lists import WORKER_PROBLEMS
-from app.routes.query_settings import query_parameters
-from app.routes.uploads import upload
-from app.schemas import errors as problems
-from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateResponse
-from app.schemas.examples.evaluate import CSV_TABLE
-from app.tasks.evaluate import EvaluateTask
-from app.tasks.job_body import JobBodyTask
+from joulepath.app.exceptions import InvalidRequest, UnsupportedMediaType
+from joulepath.app.http.disconnect import unless_disconnected
+from joulepath.app.http.handlers import result_response
+from joulepath.app.http.json_body import FORM, TEXT
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings
+from joulepath.app.routes.later import ACCEPTED, ServiceLater, deadlines
+from joulepath.app.routes.parameters import WantedFormat, is_fresh
+from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
+from joulepath.app.routes.query_settings import query_parameters
+from joulepath.app.routes.uploads import upload
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateResponse
+from joulepath.app.schemas.examples.evaluate import CSV_TABLE
+from joulepath.app.tasks.evaluate import EvaluateTask
+from joulepath.app.tasks.job_body import JobBodyTask
 
 router = APIRouter(tags=["motion"])
 

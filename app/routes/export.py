@@ -7,16 +7,16 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Request, Response
 
-from app.http.disconnect import unless_disconnected
-from app.http.openapi import problem_responses
-from app.http.weights import JSON, is_wanted
-from app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
-from app.routes.kept_answers import with_kept_answers
-from app.routes.large_bodies import LargeBodyRoute
-from app.routes.problem_lists import WORKER_PROBLEMS
-from app.schemas import errors as problems
-from app.schemas.export import FORMATS, ExportFormat, ExportRequest
-from app.tasks.export import ExportResult, ExportTask
+from joulepath.app.http.disconnect import unless_disconnected
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.http.weights import JSON, is_wanted
+from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
+from joulepath.app.routes.kept_answers import with_kept_answers
+from joulepath.app.routes.large_bodies import LargeBodyRoute
+from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.export import FORMATS, ExportFormat, ExportRequest
+from joulepath.app.tasks.export import ExportResult, ExportTask
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 

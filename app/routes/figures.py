@@ -11,22 +11,22 @@ from fastapi import APIRouter, Path, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
-from app.http.disconnect import unless_disconnected
-from app.http.openapi import problem_responses
-from app.http.weights import is_wanted
-from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
-from app.routes.large_bodies import LargeBodyRoute
-from app.routes.parameters import LOCATION_HEADER
-from app.routes.problem_lists import WORKER_PROBLEMS
-from app.schemas import errors as problems
-from app.schemas.examples.figures import FIGURES, UNKNOWN_ID
-from app.schemas.figures import FiguresDetail, FiguresDocument, FiguresList, FiguresSummary
-from app.store import figures
-from app.store.store import Store
-from app.store.tables import Figures
-from app.tasks.arm_engine import robot_in
-from app.tasks.figures import FiguresTask
-from models.uncertainty.document import merged
+from joulepath.app.http.disconnect import unless_disconnected
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.http.weights import is_wanted
+from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from joulepath.app.routes.large_bodies import LargeBodyRoute
+from joulepath.app.routes.parameters import LOCATION_HEADER
+from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.examples.figures import FIGURES, UNKNOWN_ID
+from joulepath.app.schemas.figures import FiguresDetail, FiguresDocument, FiguresList, FiguresSummary
+from joulepath.app.store import figures
+from joulepath.app.store.store import Store
+from joulepath.app.store.tables import Figures
+from joulepath.app.tasks.arm_engine import robot_in
+from joulepath.app.tasks.figures import FiguresTask
+from joulepath.models.uncertainty.document import merged
 
 router = APIRouter(prefix="/figures", tags=["robots"], route_class=LargeBodyRoute)
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from app.exceptions import NotReady, StoreUnavailable
-from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceEngine, ServiceStore
-from app.schemas import errors as problems
-from app.schemas.health import Alive, Ready
+from joulepath.app.exceptions import NotReady, StoreUnavailable
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.routes.dependencies import ServiceEngine, ServiceStore
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.health import Alive, Ready
 
 router = APIRouter(tags=["health"])
 

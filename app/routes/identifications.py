@@ -9,17 +9,17 @@ import orjson
 from fastapi import APIRouter, Path, Query, Request, Response
 from sqlalchemy.orm import Session
 
-from app.convert.packed import unpacked
-from app.engine.result import TaskResult
-from app.exceptions import InvalidRequest, UnknownIdentification, UnknownJob
-from app.http.handlers import result_response
-from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceClient, ServiceJobs, ServiceStore
-from app.routes.later import deadlines
-from app.routes.parameters import CREATED_HEADERS, Key, set_location
-from app.schemas import errors as problems
-from app.schemas.examples.values import IDENTIFICATION_ID
-from app.schemas.identifications import (
+from joulepath.app.convert.packed import unpacked
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions import InvalidRequest, UnknownIdentification, UnknownJob
+from joulepath.app.http.handlers import result_response
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.routes.dependencies import ServiceClient, ServiceJobs, ServiceStore
+from joulepath.app.routes.later import deadlines
+from joulepath.app.routes.parameters import CREATED_HEADERS, Key, set_location
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.examples.values import IDENTIFICATION_ID
+from joulepath.app.schemas.identifications import (
     Identification,
     IdentificationList,
     IdentificationPage,
@@ -27,12 +27,12 @@ from app.schemas.identifications import (
     ListedIdentification,
     ResidualCurves,
 )
-from app.store import answers
-from app.store import jobs as stored_jobs
-from app.store import logs as stored_logs
-from app.store.tables import Figures, Job, JobRequest
-from app.tasks.job_body import job_of_one
-from app.tasks.job_request import IDENTIFY, RESIDUALS
+from joulepath.app.store import answers
+from joulepath.app.store import jobs as stored_jobs
+from joulepath.app.store import logs as stored_logs
+from joulepath.app.store.tables import Figures, Job, JobRequest
+from joulepath.app.tasks.job_body import job_of_one
+from joulepath.app.tasks.job_request import IDENTIFY, RESIDUALS
 
 router = APIRouter(prefix="/identifications", tags=["logs"])
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
-from app.http.disconnect import unless_disconnected
-from app.http.handlers import result_response
-from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceArmEngine, ServiceSettings
-from app.routes.large_bodies import LargeBodyRoute
-from app.routes.parameters import deadline_of
-from app.routes.problem_lists import WORKER_PROBLEMS
-from app.schemas import errors as problems
-from app.schemas.ik import IKRequest, IKResponse
-from app.tasks.ik import IKTask
+from joulepath.app.http.disconnect import unless_disconnected
+from joulepath.app.http.handlers import result_response
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings
+from joulepath.app.routes.large_bodies import LargeBodyRoute
+from joulepath.app.routes.parameters import deadline_of
+from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.ik import IKRequest, IKResponse
+from joulepath.app.tasks.ik import IKTask
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 

@@ -9,30 +9,36 @@ from typing import Annotated, Any, TypeVar
 import orjson
 from fastapi import APIRouter, Path, Request, Response
 
-from app.access.rules import check_owner
-from app.engine.result import StoredAnswer, TaskResult
-from app.exceptions import InvalidRequest
-from app.http.disconnect import unless_disconnected
-from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceArmEngine, ServiceCache, ServiceClient, ServiceSettings, ServiceStore
-from app.routes.large_bodies import LargeBodyRoute
-from app.routes.parameters import CREATED_HEADERS, Key, StudyId, deadline_of, set_location
-from app.routes.problem_lists import MOTION_PROBLEMS
-from app.routes.uploads import upload
-from app.schemas import errors as problems
-from app.schemas.studies import IterationBody, IterationDetail
-from app.store import studies
-from app.store.cache import Answered, Asked
-from app.store.tables import Study
-from app.studies.answers import detail
-from app.tasks.answer_cache import AnswerCache
-from app.tasks.answer_figures import figures_of
-from app.tasks.arm_engine import ArmEngine
-from app.tasks.evaluate import EvaluateTask
-from app.tasks.optimize import OptimizeTask
-from app.tasks.read_body import HeldBody
-from app.tasks.study_step import StudyStep, StudyStepTask, large_step, study_step
-from optimizer.exceptions import InvalidProblem, InvalidTable, OutsideLimits
+from joulepath.app.access.rules import check_owner
+from joulepath.app.engine.result import StoredAnswer, TaskResult
+from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.http.disconnect import unless_disconnected
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.routes.dependencies import (
+    ServiceArmEngine,
+    ServiceCache,
+    ServiceClient,
+    ServiceSettings,
+    ServiceStore,
+)
+from joulepath.app.routes.large_bodies import LargeBodyRoute
+from joulepath.app.routes.parameters import CREATED_HEADERS, Key, StudyId, deadline_of, set_location
+from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
+from joulepath.app.routes.uploads import upload
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.studies import IterationBody, IterationDetail
+from joulepath.app.store import studies
+from joulepath.app.store.cache import Answered, Asked
+from joulepath.app.store.tables import Study
+from joulepath.app.studies.answers import detail
+from joulepath.app.tasks.answer_cache import AnswerCache
+from joulepath.app.tasks.answer_figures import figures_of
+from joulepath.app.tasks.arm_engine import ArmEngine
+from joulepath.app.tasks.evaluate import EvaluateTask
+from joulepath.app.tasks.optimize import OptimizeTask
+from joulepath.app.tasks.read_body import HeldBody
+from joulepath.app.tasks.study_step import StudyStep, StudyStepTask, large_step, study_step
+from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable, OutsideLimits
 
 T = TypeVar("T")
 router = APIRouter(route_class=LargeBodyRoute, prefix="/studies", tags=["studies"])

@@ -8,22 +8,28 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
-from app.exceptions import UnsupportedMediaType
-from app.http.disconnect import unless_disconnected
-from app.http.event_stream import EVENT_SCHEMA, EVENT_STREAM, EVENT_STREAM_HEADERS
-from app.http.openapi import problem_responses
-from app.jobs.answers import as_csv, as_lines, detail, summary
-from app.jobs.events import events_after
-from app.routes.dependencies import ServiceClient, ServiceClientEngine, ServiceJobs, ServiceSettings, ServiceStore
-from app.routes.later import deadlines
-from app.routes.parameters import CREATED_HEADERS, Key, WantedFormat, is_fresh, set_location
-from app.routes.uploads import upload
-from app.schemas import errors as problems
-from app.schemas.examples.jobs import RESULTS_CSV, RESULTS_LINES
-from app.schemas.examples.values import JOB_ID
-from app.schemas.jobs import Job, JobDetail, JobList, JobPage, NewJob, RequestPage
-from app.store import jobs as stored_jobs
-from app.tasks.job_body import JobBodyTask, Validated
+from joulepath.app.exceptions import UnsupportedMediaType
+from joulepath.app.http.disconnect import unless_disconnected
+from joulepath.app.http.event_stream import EVENT_SCHEMA, EVENT_STREAM, EVENT_STREAM_HEADERS
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.jobs.answers import as_csv, as_lines, detail, summary
+from joulepath.app.jobs.events import events_after
+from joulepath.app.routes.dependencies import (
+    ServiceClient,
+    ServiceClientEngine,
+    ServiceJobs,
+    ServiceSettings,
+    ServiceStore,
+)
+from joulepath.app.routes.later import deadlines
+from joulepath.app.routes.parameters import CREATED_HEADERS, Key, WantedFormat, is_fresh, set_location
+from joulepath.app.routes.uploads import upload
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.examples.jobs import RESULTS_CSV, RESULTS_LINES
+from joulepath.app.schemas.examples.values import JOB_ID
+from joulepath.app.schemas.jobs import Job, JobDetail, JobList, JobPage, NewJob, RequestPage
+from joulepath.app.store import jobs as stored_jobs
+from joulepath.app.tasks.job_body import JobBodyTask, Validated
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 

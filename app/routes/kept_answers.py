@@ -5,12 +5,12 @@ from __future__ import annotations
 from functools import partial
 from typing import Protocol, Self
 
-from app.engine.result import TaskResult
-from app.engine.task import Task
-from app.exceptions import PartsNeeded
-from app.store import answers
-from app.store.store import Store
-from app.tasks.arm_engine import ArmEngine
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.engine.task import Task
+from joulepath.app.exceptions import PartsNeeded
+from joulepath.app.store import answers
+from joulepath.app.store.store import Store
+from joulepath.app.tasks.arm_engine import ArmEngine
 
 PREFIX = "/answers/"
 # an id, then the moves of a round

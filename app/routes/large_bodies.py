@@ -11,10 +11,10 @@ from fastapi import Depends, Request, Response
 from fastapi.routing import APIRoute
 from pydantic import BaseModel
 
-from app.http.disconnect import unless_disconnected
-from app.http.json_route import JsonRoute, strictly
-from app.routes.dependencies import ServiceClientEngine, ServiceSettings
-from app.tasks.read_body import HeldBody, ReadBodyTask, held
+from joulepath.app.http.disconnect import unless_disconnected
+from joulepath.app.http.json_route import JsonRoute, strictly
+from joulepath.app.routes.dependencies import ServiceClientEngine, ServiceSettings
+from joulepath.app.tasks.read_body import HeldBody, ReadBodyTask, held
 
 LARGE = 1 << 16
 """Size of a body [byte] above which a worker reads it. The largest that is read here takes a few milliseconds."""

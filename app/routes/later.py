@@ -9,18 +9,18 @@ from typing import Annotated, Any
 import orjson
 from fastapi import Depends, Header, Request, Response
 
-from app.convert.packed import unpacked
-from app.http.disconnect import unless_disconnected
-from app.http.handlers import PROBLEM_MEDIA_TYPE
-from app.jobs.answers import summary
-from app.routes.dependencies import ServiceClient, ServiceClientEngine, ServiceJobs, ServiceSettings
-from app.routes.parameters import CREATED_HEADERS, Key, is_fresh, set_location
-from app.schemas.common import Request as RequestModel
-from app.schemas.jobs import Job
-from app.store import jobs as stored_jobs
-from app.store.jobs import NewJob
-from app.tasks.job_body import Deadlines, JobBodyTask, JobOfOneTask, Validated, job_of_one
-from app.tasks.read_body import HeldBody
+from joulepath.app.convert.packed import unpacked
+from joulepath.app.http.disconnect import unless_disconnected
+from joulepath.app.http.handlers import PROBLEM_MEDIA_TYPE
+from joulepath.app.jobs.answers import summary
+from joulepath.app.routes.dependencies import ServiceClient, ServiceClientEngine, ServiceJobs, ServiceSettings
+from joulepath.app.routes.parameters import CREATED_HEADERS, Key, is_fresh, set_location
+from joulepath.app.schemas.common import Request as RequestModel
+from joulepath.app.schemas.jobs import Job
+from joulepath.app.store import jobs as stored_jobs
+from joulepath.app.store.jobs import NewJob
+from joulepath.app.tasks.job_body import Deadlines, JobBodyTask, JobOfOneTask, Validated, job_of_one
+from joulepath.app.tasks.read_body import HeldBody
 
 ACCEPTED: dict[int | str, dict[str, Any]] = {
     202: {

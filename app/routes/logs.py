@@ -10,21 +10,21 @@ import orjson
 from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
-from app.exceptions import UnsupportedMediaType
-from app.http.disconnect import unless_disconnected
-from app.http.json_body import FORM, TEXT
-from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
-from app.routes.parameters import LOCATION_HEADER, set_location
-from app.routes.problem_lists import WORKER_PROBLEMS
-from app.routes.query_settings import query_parameters, settings_of
-from app.routes.uploads import upload
-from app.schemas import errors as problems
-from app.schemas.examples.values import LOG_ID
-from app.schemas.logs import LogDetail, LogList, LogPage, LogSettings, LogSummary
-from app.store import logs
-from app.store.tables import StoredLog, new_id, now
-from app.tasks.read_log import ReadLogTask
+from joulepath.app.exceptions import UnsupportedMediaType
+from joulepath.app.http.disconnect import unless_disconnected
+from joulepath.app.http.json_body import FORM, TEXT
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from joulepath.app.routes.parameters import LOCATION_HEADER, set_location
+from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
+from joulepath.app.routes.query_settings import query_parameters, settings_of
+from joulepath.app.routes.uploads import upload
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.examples.values import LOG_ID
+from joulepath.app.schemas.logs import LogDetail, LogList, LogPage, LogSettings, LogSummary
+from joulepath.app.store import logs
+from joulepath.app.store.tables import StoredLog, new_id, now
+from joulepath.app.tasks.read_log import ReadLogTask
 
 router = APIRouter(prefix="/logs", tags=["logs"])
 

@@ -6,10 +6,10 @@ import asyncio
 
 from fastapi import APIRouter, Request, Response
 
-from app.exceptions import StoreUnavailable
-from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceEngine, ServiceMetrics, ServiceStore
-from app.store.store import Store
+from joulepath.app.exceptions import StoreUnavailable
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.routes.dependencies import ServiceEngine, ServiceMetrics, ServiceStore
+from joulepath.app.store.store import Store
 
 router = APIRouter(tags=["health"])
 

@@ -4,20 +4,26 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
-from app.engine.result import TaskResult
-from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceArmEngine, ServiceCache, ServiceClient, ServiceSettings, ServiceStore
-from app.routes.large_bodies import LargeBodyRoute
-from app.routes.later import ACCEPTED, ServiceLater
-from app.routes.parameters import CACHED_HEADERS, deadline_of
-from app.routes.problem_lists import MOTION_PROBLEMS
-from app.routes.reply import BY_EVENTS, ServiceReply
-from app.schemas import errors as problems
-from app.schemas.request import OptimizeRequest
-from app.schemas.response import OptimizeResponse
-from app.store.store_answers import keep_answer
-from app.tasks.optimize import OptimizeTask
-from optimizer.progress import Tell, nobody
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.routes.dependencies import (
+    ServiceArmEngine,
+    ServiceCache,
+    ServiceClient,
+    ServiceSettings,
+    ServiceStore,
+)
+from joulepath.app.routes.large_bodies import LargeBodyRoute
+from joulepath.app.routes.later import ACCEPTED, ServiceLater
+from joulepath.app.routes.parameters import CACHED_HEADERS, deadline_of
+from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
+from joulepath.app.routes.reply import BY_EVENTS, ServiceReply
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.app.schemas.response import OptimizeResponse
+from joulepath.app.store.store_answers import keep_answer
+from joulepath.app.tasks.optimize import OptimizeTask
+from joulepath.optimizer.progress import Tell, nobody
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 

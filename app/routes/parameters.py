@@ -6,13 +6,13 @@ from typing import Annotated, Literal, Protocol
 
 from fastapi import Depends, Header, Path, Request, Response
 
-from app.exceptions import InvalidRequest
-from app.http.event_stream import EVENT_STREAM
-from app.http.handlers import CACHE_HEADER
-from app.http.weights import is_wanted
-from app.schemas.common import KEY_HEADER
-from app.schemas.examples.values import STUDY_ID
-from app.schemas.studies import IdempotencyKey
+from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.http.event_stream import EVENT_STREAM
+from joulepath.app.http.handlers import CACHE_HEADER
+from joulepath.app.http.weights import is_wanted
+from joulepath.app.schemas.common import KEY_HEADER
+from joulepath.app.schemas.examples.values import STUDY_ID
+from joulepath.app.schemas.studies import IdempotencyKey
 
 
 class WithDeadline(Protocol):

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
-from app.engine.result import TaskResult
-from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
-from app.routes.large_bodies import LargeBodyRoute
-from app.routes.later import ACCEPTED, ServiceLater
-from app.routes.parameters import WantedFormat, deadline_of
-from app.routes.problem_lists import MOTION_PROBLEMS
-from app.routes.reply import BY_EVENTS, ServiceReply
-from app.schemas import errors as problems
-from app.schemas.pareto import ParetoRequest, ParetoResponse
-from app.store.store_answers import store_answers
-from app.tasks.pareto import ParetoTask
-from optimizer.progress import Tell
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from joulepath.app.routes.large_bodies import LargeBodyRoute
+from joulepath.app.routes.later import ACCEPTED, ServiceLater
+from joulepath.app.routes.parameters import WantedFormat, deadline_of
+from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
+from joulepath.app.routes.reply import BY_EVENTS, ServiceReply
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.pareto import ParetoRequest, ParetoResponse
+from joulepath.app.store.store_answers import store_answers
+from joulepath.app.tasks.pareto import ParetoTask
+from joulepath.optimizer.progress import Tell
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.schemas import errors as problems
+from joulepath.app.schemas import errors as problems
 
 WORKER_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
     problems.Validation,

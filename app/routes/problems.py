@@ -11,10 +11,10 @@ from typing import Annotated
 from fastapi import APIRouter, Path
 from fastapi.responses import HTMLResponse
 
-from app.exceptions import NotFound
-from app.http.openapi import problem_responses
-from app.schemas import errors as problems
-from app.schemas.errors import PROBLEMS, ProblemDetails
+from joulepath.app.exceptions import NotFound
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.errors import PROBLEMS, ProblemDetails
 
 router = APIRouter(prefix="/problems", tags=["problems"])
 

@@ -8,10 +8,10 @@ from typing import Any, TypeVar
 from fastapi import Request
 from pydantic import ValidationError
 
-from app.convert.query import query_values
-from app.exceptions import InvalidRequest
-from app.http.problem_details import invalid_request
-from app.schemas.common import Request as RequestModel
+from joulepath.app.convert.query import query_values
+from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.http.problem_details import invalid_request
+from joulepath.app.schemas.common import Request as RequestModel
 
 M = TypeVar("M", bound=RequestModel)
 _REF = "#/components/schemas/{model}"

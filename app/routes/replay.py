@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
-from app.http.disconnect import unless_disconnected
-from app.http.handlers import result_response
-from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
-from app.routes.kept_answers import with_kept_answers
-from app.routes.large_bodies import LargeBodyRoute
-from app.routes.parameters import deadline_of
-from app.routes.problem_lists import WORKER_PROBLEMS
-from app.schemas import errors as problems
-from app.schemas.replay import ReplayRequest, ReplayResponse
-from app.tasks.replay import ReplayTask
+from joulepath.app.http.disconnect import unless_disconnected
+from joulepath.app.http.handlers import result_response
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
+from joulepath.app.routes.kept_answers import with_kept_answers
+from joulepath.app.routes.large_bodies import LargeBodyRoute
+from joulepath.app.routes.parameters import deadline_of
+from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.replay import ReplayRequest, ReplayResponse
+from joulepath.app.tasks.replay import ReplayTask
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 

@@ -7,12 +7,12 @@ from typing import Annotated, Any
 
 from fastapi import Depends, Request, Response
 
-from app.http.disconnect import unless_disconnected
-from app.http.event_stream import EVENT_STREAM, EventStream, Work
-from app.http.handlers import result_response
-from app.http.weights import is_wanted
-from app.schemas.examples.progress import EVENTS
-from optimizer.progress import nobody
+from joulepath.app.http.disconnect import unless_disconnected
+from joulepath.app.http.event_stream import EVENT_STREAM, EventStream, Work
+from joulepath.app.http.handlers import result_response
+from joulepath.app.http.weights import is_wanted
+from joulepath.app.schemas.examples.progress import EVENTS
+from joulepath.optimizer.progress import nobody
 
 BY_EVENTS: dict[str, Any] = {EVENT_STREAM: {"schema": {"type": "string"}, "example": EVENTS}}
 """Content of the 200 of a route whose progress can be listened to."""

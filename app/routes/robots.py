@@ -11,28 +11,28 @@ from fastapi import APIRouter, Path, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
-from app.access.client import Client
-from app.exceptions import NoMeshes, RobotExists
-from app.http.disconnect import unless_disconnected
-from app.http.entity_tag import is_known
-from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceClient, ServiceClientEngine, ServiceSettings, ServiceStore
-from app.routes.large_bodies import LargeBodyRoute
-from app.routes.parameters import LOCATION_HEADER
-from app.routes.problem_lists import ADDING_PROBLEMS
-from app.schemas import errors as problems
-from app.schemas.own_arm import NewRobot, OwnArm, OwnName
-from app.schemas.robots import Friction, FrictionLaw, RobotDetail, RobotList, RobotSummary
-from app.store import robots
-from app.store.tables import OwnRobot, now
-from app.tasks.own_robot import OwnRobotTask
-from app.tasks.pictures import MEDIA_TYPE, PictureTask, digest, kept
-from models.form import link_bodies
-from models.pictures import picture_sources
-from models.registry import load_robot, robot_names
-from models.robot import FrictionLaw as Law
-from models.trust import TRUST, energy_trust
-from models.urdf import urdf_of
+from joulepath.app.access.client import Client
+from joulepath.app.exceptions import NoMeshes, RobotExists
+from joulepath.app.http.disconnect import unless_disconnected
+from joulepath.app.http.entity_tag import is_known
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.routes.dependencies import ServiceClient, ServiceClientEngine, ServiceSettings, ServiceStore
+from joulepath.app.routes.large_bodies import LargeBodyRoute
+from joulepath.app.routes.parameters import LOCATION_HEADER
+from joulepath.app.routes.problem_lists import ADDING_PROBLEMS
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.own_arm import NewRobot, OwnArm, OwnName
+from joulepath.app.schemas.robots import Friction, FrictionLaw, RobotDetail, RobotList, RobotSummary
+from joulepath.app.store import robots
+from joulepath.app.store.tables import OwnRobot, now
+from joulepath.app.tasks.own_robot import OwnRobotTask
+from joulepath.app.tasks.pictures import MEDIA_TYPE, PictureTask, digest, kept
+from joulepath.models.form import link_bodies
+from joulepath.models.pictures import picture_sources
+from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.robot import FrictionLaw as Law
+from joulepath.models.trust import TRUST, energy_trust
+from joulepath.models.urdf import urdf_of
 
 router = APIRouter(prefix="/robots", tags=["robots"], route_class=LargeBodyRoute)
 

@@ -9,17 +9,17 @@ from fastapi import APIRouter, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
-from app.convert.identified import identified_as, with_figures
-from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceClient, ServiceStore
-from app.routes.large_bodies import LargeBodyRoute
-from app.routes.parameters import CREATED_HEADERS, Key, StudyId, WantedFormat, set_location
-from app.schemas import errors as problems
-from app.schemas.examples.studies import STUDY_CSV
-from app.schemas.studies import Study, StudyList, StudyPage, StudyRequest, StudySummary
-from app.store import studies
-from app.studies.answers import as_csv, full, summary
-from app.tasks.arm_engine import identified, robot_in
+from joulepath.app.convert.identified import identified_as, with_figures
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.routes.dependencies import ServiceClient, ServiceStore
+from joulepath.app.routes.large_bodies import LargeBodyRoute
+from joulepath.app.routes.parameters import CREATED_HEADERS, Key, StudyId, WantedFormat, set_location
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.examples.studies import STUDY_CSV
+from joulepath.app.schemas.studies import Study, StudyList, StudyPage, StudyRequest, StudySummary
+from joulepath.app.store import studies
+from joulepath.app.studies.answers import as_csv, full, summary
+from joulepath.app.tasks.arm_engine import identified, robot_in
 
 router = APIRouter(prefix="/studies", tags=["studies"], route_class=LargeBodyRoute)
 

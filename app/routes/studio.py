@@ -13,8 +13,8 @@ from pathlib import PurePosixPath
 from fastapi import APIRouter, Request
 from fastapi.responses import RedirectResponse, Response
 
-from app.exceptions import NotFound
-from app.http.entity_tag import is_known
+from joulepath.app.exceptions import NotFound
+from joulepath.app.http.entity_tag import is_known
 
 router = APIRouter(include_in_schema=False)
 
@@ -84,7 +84,7 @@ def _policy() -> str:
 @cache
 def _files() -> dict[str, _File]:
     """Every file of the page by its path; nothing else can be asked for."""
-    found, folders = {}, [(PurePosixPath(), files("app") / "static" / "studio")]
+    found, folders = {}, [(PurePosixPath(), files("joulepath") / "app" / "static" / "studio")]
     while folders:
         path, folder = folders.pop()
         for entry in folder.iterdir():

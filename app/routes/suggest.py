@@ -10,23 +10,23 @@ from typing import Annotated, Any
 import orjson
 from fastapi import APIRouter, Query, Request, Response
 
-from app.engine.result import TaskResult
-from app.exceptions import Busy, EmptyStudy, TaskFailed, WorkerDied
-from app.http.disconnect import unless_disconnected
-from app.http.handlers import result_response
-from app.http.openapi import problem_responses
-from app.http.problem_details import problem_type
-from app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
-from app.routes.parameters import StudyId, allowed_deadline
-from app.schemas import errors as problems
-from app.schemas.request import OptimizeRequest
-from app.schemas.suggestions import Suggestions, SuggestQuery
-from app.store import answers, studies
-from app.store.store import Store
-from app.studies.suggestions import Proposal, base_of, proposals
-from app.tasks.arm_engine import ArmEngine, known_here
-from app.tasks.optimize import OptimizeTask
-from optimizer.exceptions import DeadlineExceeded, JoulepathError
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions import Busy, EmptyStudy, TaskFailed, WorkerDied
+from joulepath.app.http.disconnect import unless_disconnected
+from joulepath.app.http.handlers import result_response
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.http.problem_details import problem_type
+from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
+from joulepath.app.routes.parameters import StudyId, allowed_deadline
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.app.schemas.suggestions import Suggestions, SuggestQuery
+from joulepath.app.store import answers, studies
+from joulepath.app.store.store import Store
+from joulepath.app.studies.suggestions import Proposal, base_of, proposals
+from joulepath.app.tasks.arm_engine import ArmEngine, known_here
+from joulepath.app.tasks.optimize import OptimizeTask
+from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 
 router = APIRouter(prefix="/studies", tags=["studies"])
 

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
-from app.http.disconnect import unless_disconnected
-from app.http.handlers import result_response
-from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
-from app.routes.large_bodies import LargeBodyRoute
-from app.routes.later import ACCEPTED, ServiceLater
-from app.routes.parameters import deadline_of
-from app.routes.problem_lists import MOTION_PROBLEMS
-from app.schemas import errors as problems
-from app.schemas.whatif import WhatifRequest, WhatifResponse
-from app.store.store_answers import store_answers
-from app.tasks.whatif import WhatifTask
+from joulepath.app.http.disconnect import unless_disconnected
+from joulepath.app.http.handlers import result_response
+from joulepath.app.http.openapi import problem_responses
+from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from joulepath.app.routes.large_bodies import LargeBodyRoute
+from joulepath.app.routes.later import ACCEPTED, ServiceLater
+from joulepath.app.routes.parameters import deadline_of
+from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.whatif import WhatifRequest, WhatifResponse
+from joulepath.app.store.store_answers import store_answers
+from joulepath.app.tasks.whatif import WhatifTask
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 

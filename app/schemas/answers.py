@@ -5,9 +5,9 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Any
 
-from app.schemas.common import Response, described, part
-from app.schemas.examples.values import ANSWER_ID, CREATED
-from app.schemas.queries import Query, after_of, limit_of, next_of
+from joulepath.app.schemas.common import Response, described, part
+from joulepath.app.schemas.examples.values import ANSWER_ID, CREATED
+from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
 
 
 class KeptAnswer(Response):

@@ -8,11 +8,11 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
 from pydantic_core import InitErrorDetails
 
-from app.schemas.common import FiguresId, Frame, Request, Vector3, described, frame_of
-from app.schemas.examples.figures import FIGURES_ID
-from app.schemas.examples.values import BOX
-from app.schemas.orientation import Cone
-from app.schemas.scene import CarriedShape, CellRequest, LinkNames, touched_links
+from joulepath.app.schemas.common import FiguresId, Frame, Request, Vector3, described, frame_of
+from joulepath.app.schemas.examples.figures import FIGURES_ID
+from joulepath.app.schemas.examples.values import BOX
+from joulepath.app.schemas.orientation import Cone
+from joulepath.app.schemas.scene import CarriedShape, CellRequest, LinkNames, touched_links
 
 # with a smaller limit, a motion would exceed the largest duration
 Rate = Annotated[float, Field(ge=1e-2, le=1e6)]

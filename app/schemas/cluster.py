@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.schemas.common import Response, described, part
+from joulepath.app.schemas.common import Response, described, part
 
 
 class Machine(Response):

@@ -11,10 +11,10 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from app.schemas.examples.values import ANSWER_ID, REQUEST_ID
-from app.schemas.lengths import ROBOT_LENGTH
-from optimizer.problem.names import is_plain
-from optimizer.problem.pose import QUATERNION_TOLERANCE
+from joulepath.app.schemas.examples.values import ANSWER_ID, REQUEST_ID
+from joulepath.app.schemas.lengths import ROBOT_LENGTH
+from joulepath.optimizer.problem.names import is_plain
+from joulepath.optimizer.problem.pose import QUATERNION_TOLERANCE
 
 _LONGEST_TYPO = 64
 _SHORTEST = 3

@@ -7,11 +7,11 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
-from app.schemas.common import Answer, Response, described, part
-from app.schemas.request import MotionRequest
-from app.schemas.response import GAP, LOWER_BOUND, OBJECTIVE, Baseline, OptimizeResponse
-from optimizer.problem.problem import MethodName
-from optimizer.solution import Objective
+from joulepath.app.schemas.common import Answer, Response, described, part
+from joulepath.app.schemas.request import MotionRequest
+from joulepath.app.schemas.response import GAP, LOWER_BOUND, OBJECTIVE, Baseline, OptimizeResponse
+from joulepath.optimizer.problem.problem import MethodName
+from joulepath.optimizer.solution import Objective
 
 ALL: list[MethodName] = list(get_args(MethodName))
 _PROBLEM = {"type": "/problems/duration-too-short", "title": "Duration too short", "status": 422}

@@ -7,11 +7,11 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, Tag, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from app.schemas.arm import ArmRequest
-from app.schemas.common import Answer, Response, described, part
-from app.schemas.energy import MotionEnergy, SavingInterval
-from app.schemas.examples.values import ANSWER_PATH
-from app.schemas.request import (
+from joulepath.app.schemas.arm import ArmRequest
+from joulepath.app.schemas.common import Answer, Response, described, part
+from joulepath.app.schemas.energy import MotionEnergy, SavingInterval
+from joulepath.app.schemas.examples.values import ANSWER_PATH
+from joulepath.app.schemas.request import (
     SECONDS_OR_RANGE,
     Branch,
     DurationRange,
@@ -20,14 +20,14 @@ from app.schemas.request import (
     WhichCandidates,
     which_candidates,
 )
-from app.schemas.response import GAP, WARNINGS, Clearance, Configuration, WorstRatio
-from app.schemas.stop import PlainName, StopRequest
-from app.settings import LONGEST_DEADLINE
-from optimizer.problem.free_order import MOST_FREE_STOPS
-from optimizer.problem.problem import MethodName
-from optimizer.problem.work_round import LONGEST_ROUND, MOST_STOPS
-from optimizer.sequence.round_solution import RoundBaselineName
-from optimizer.solution import Objective
+from joulepath.app.schemas.response import GAP, WARNINGS, Clearance, Configuration, WorstRatio
+from joulepath.app.schemas.stop import PlainName, StopRequest
+from joulepath.app.settings import LONGEST_DEADLINE
+from joulepath.optimizer.problem.free_order import MOST_FREE_STOPS
+from joulepath.optimizer.problem.problem import MethodName
+from joulepath.optimizer.problem.work_round import LONGEST_ROUND, MOST_STOPS
+from joulepath.optimizer.sequence.round_solution import RoundBaselineName
+from joulepath.optimizer.solution import Objective
 
 # of a round with more stops, the default deadline is longer, and samples are no closer: answers stay as large as before
 _MANY_STOPS, _LONG_DEADLINE, _LEAST_PERIOD = 100, 120.0, 1e-3

@@ -7,19 +7,19 @@ from typing import Annotated, Literal, Self
 from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from app.schemas.arm import ArmRequest, one_or_each
-from app.schemas.common import JointPositions, MotionAnswer, Request, Response, described, part
-from app.schemas.energy import MotionEnergy
-from app.schemas.examples.values import LOG_ID
-from app.schemas.examples.values import PAPER_HOME as _HOME
-from app.schemas.examples.values import PAPER_POSE as _THERE
-from app.schemas.lengths import ID_LENGTH
-from app.schemas.log_file import LogFile
-from app.schemas.request import Seconds
-from app.schemas.response import BODIES, WARNINGS, SampledMotion
-from optimizer.problem.problem import LONGEST_DURATION
-from optimizer.replay.limit_report import LimitName
-from optimizer.replay.sampler import MOST_SAMPLES
+from joulepath.app.schemas.arm import ArmRequest, one_or_each
+from joulepath.app.schemas.common import JointPositions, MotionAnswer, Request, Response, described, part
+from joulepath.app.schemas.energy import MotionEnergy
+from joulepath.app.schemas.examples.values import LOG_ID
+from joulepath.app.schemas.examples.values import PAPER_HOME as _HOME
+from joulepath.app.schemas.examples.values import PAPER_POSE as _THERE
+from joulepath.app.schemas.lengths import ID_LENGTH
+from joulepath.app.schemas.log_file import LogFile
+from joulepath.app.schemas.request import Seconds
+from joulepath.app.schemas.response import BODIES, WARNINGS, SampledMotion
+from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.replay.limit_report import LimitName
+from joulepath.optimizer.replay.sampler import MOST_SAMPLES
 
 MAX_ROWS = 100_000
 """Largest number of rows of a motion sent as JSON; a CSV file may have more."""

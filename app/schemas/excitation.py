@@ -6,12 +6,12 @@ from typing import Annotated
 
 from pydantic import Field
 
-from app.schemas.arm import ArmRequest
-from app.schemas.common import MotionAnswer, Response, described, part
-from app.schemas.energy import MotionEnergy
-from app.schemas.examples.values import HOME
-from app.schemas.response import Certificate, Trajectory
-from optimizer.excitation.excitation_problem import Criterion, Part
+from joulepath.app.schemas.arm import ArmRequest
+from joulepath.app.schemas.common import MotionAnswer, Response, described, part
+from joulepath.app.schemas.energy import MotionEnergy
+from joulepath.app.schemas.examples.values import HOME
+from joulepath.app.schemas.response import Certificate, Trajectory
+from joulepath.optimizer.excitation.excitation_problem import Criterion, Part
 
 _ALL: list[Part] = ["inertials", "rotor", "friction"]
 _Angles = Annotated[list[Annotated[float, Field(ge=-1e3, le=1e3)]], Field(min_length=1, max_length=16)]

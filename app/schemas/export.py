@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from app.schemas.common import Request, described
-from app.schemas.given_answer import AnswerRequest
+from joulepath.app.schemas.common import Request, described
+from joulepath.app.schemas.given_answer import AnswerRequest
 
 
 class ExportFormat(StrEnum):

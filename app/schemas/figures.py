@@ -7,9 +7,9 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from app.schemas.common import Request, Response, RobotName, described, part
-from app.schemas.examples.figures import COVARIANCE, DRIVES, FIGURES_ID, FRICTION
-from app.schemas.examples.values import CREATED
+from joulepath.app.schemas.common import Request, Response, RobotName, described, part
+from joulepath.app.schemas.examples.figures import COVARIANCE, DRIVES, FIGURES_ID, FRICTION
+from joulepath.app.schemas.examples.values import CREATED
 
 Section = dict[str, Any]
 NAMES = (

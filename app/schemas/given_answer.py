@@ -7,9 +7,9 @@ from typing import Any
 from pydantic import model_validator
 from pydantic_core import PydanticCustomError
 
-from app.schemas.arm import ArmRequest
-from app.schemas.common import Request, described
-from app.schemas.examples.values import ANSWER_ID
+from joulepath.app.schemas.arm import ArmRequest
+from joulepath.app.schemas.common import Request, described
+from joulepath.app.schemas.examples.values import ANSWER_ID
 
 
 class AnswerRequest(Request):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from app.schemas.common import Response, described
+from joulepath.app.schemas.common import Response, described
 
 
 class Alive(Response):

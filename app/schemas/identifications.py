@@ -7,10 +7,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from app.schemas.common import Request, Response, described, part
-from app.schemas.examples.figures import FIGURES_ID
-from app.schemas.examples.values import CREATED, IDENTIFICATION_ID, LOG_ID
-from app.schemas.queries import Query, after_of, limit_of, next_of
+from joulepath.app.schemas.common import Request, Response, described, part
+from joulepath.app.schemas.examples.figures import FIGURES_ID
+from joulepath.app.schemas.examples.values import CREATED, IDENTIFICATION_ID, LOG_ID
+from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
 
 MOST_LOGS = 32
 Target = Literal["friction", "rotor", "torque_constant", "power", "payload"]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from app.schemas.common import Answer, BasePose, Response, described, part
-from app.schemas.examples.values import BOX, HOME, LABEL
-from app.schemas.response import BODIES
-from app.schemas.scene import CarriedBody, CellRequest
-from optimizer.problem.problem import LONGEST_DURATION
+from joulepath.app.schemas.common import Answer, BasePose, Response, described, part
+from joulepath.app.schemas.examples.values import BOX, HOME, LABEL
+from joulepath.app.schemas.response import BODIES
+from joulepath.app.schemas.scene import CarriedBody, CellRequest
+from joulepath.optimizer.problem.problem import LONGEST_DURATION
 
 
 class IKRequest(CellRequest):

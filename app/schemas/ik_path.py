@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from app.schemas.common import (
+from joulepath.app.schemas.common import (
     Answer,
     BasePose,
     Frame,
@@ -20,9 +20,9 @@ from app.schemas.common import (
     frame_of,
     part,
 )
-from app.schemas.examples.ik import ARC
-from app.schemas.examples.values import HOME
-from optimizer.problem.problem import LONGEST_DURATION
+from joulepath.app.schemas.examples.ik import ARC
+from joulepath.app.schemas.examples.values import HOME
+from joulepath.optimizer.problem.problem import LONGEST_DURATION
 
 MAXARC = 1000
 """Largest number of points of a path."""

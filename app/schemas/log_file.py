@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from app.schemas.common import NO_CONTROLS, Request, described
-from app.schemas.lengths import NAME_LENGTH
+from joulepath.app.schemas.common import NO_CONTROLS, Request, described
+from joulepath.app.schemas.lengths import NAME_LENGTH
 
 EffortMeaning = Literal["current", "torque", "external"]
 _Column = Annotated[str, Field(min_length=1, max_length=NAME_LENGTH, pattern=NO_CONTROLS)]

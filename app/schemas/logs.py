@@ -7,12 +7,12 @@ from typing import Annotated
 
 from pydantic import Field
 
-from app.schemas.arm import Payload
-from app.schemas.common import NO_CONTROLS, PLAIN, Response, RobotName, Vector3, described, part
-from app.schemas.examples.values import CREATED, LOG_ID
-from app.schemas.log_file import EffortMeaning, LogFile
-from app.schemas.queries import Query, after_of, limit_of, next_of
-from app.schemas.studies import Name
+from joulepath.app.schemas.arm import Payload
+from joulepath.app.schemas.common import NO_CONTROLS, PLAIN, Response, RobotName, Vector3, described, part
+from joulepath.app.schemas.examples.values import CREATED, LOG_ID
+from joulepath.app.schemas.log_file import EffortMeaning, LogFile
+from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
+from joulepath.app.schemas.studies import Name
 
 Tag = Annotated[str, Field(min_length=1, max_length=32, pattern=NO_CONTROLS), PLAIN]
 

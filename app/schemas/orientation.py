@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Discriminator, Tag
 from pydantic_core import PydanticCustomError
 
-from app.schemas.common import (
+from joulepath.app.schemas.common import (
     BaseQuaternionPose,
     BaseRotvecPose,
     BaseRpyPose,

@@ -7,11 +7,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from app.schemas.common import NO_CONTROLS, PLAIN, Request, described
-from app.schemas.examples.own_arm import URDF
-from app.schemas.lengths import NAME_LENGTH, ROBOT_LENGTH
-from models.own_arm.description import WIDEST
-from models.shape_sizes import SIZES
+from joulepath.app.schemas.common import NO_CONTROLS, PLAIN, Request, described
+from joulepath.app.schemas.examples.own_arm import URDF
+from joulepath.app.schemas.lengths import NAME_LENGTH, ROBOT_LENGTH
+from joulepath.models.own_arm.description import WIDEST
+from joulepath.models.shape_sizes import SIZES
 
 Positive = Annotated[float, Field(ge=1e-6, le=1e6)]
 NotNegative = Annotated[float, Field(ge=0, le=1e6)]

@@ -6,13 +6,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from app.schemas.common import Answer, Response, described, part
-from app.schemas.examples.values import ANSWER_PATH, LABEL
-from app.schemas.request import DurationRange, OptimizeRequest
-from app.schemas.response import OBJECTIVE
-from app.settings import LONGEST_DEADLINE
-from optimizer.problem.problem import MethodName
-from optimizer.solution import Objective
+from joulepath.app.schemas.common import Answer, Response, described, part
+from joulepath.app.schemas.examples.values import ANSWER_PATH, LABEL
+from joulepath.app.schemas.request import DurationRange, OptimizeRequest
+from joulepath.app.schemas.response import OBJECTIVE
+from joulepath.app.settings import LONGEST_DEADLINE
+from joulepath.optimizer.problem.problem import MethodName
+from joulepath.optimizer.solution import Objective
 
 
 class ParetoRequest(OptimizeRequest):

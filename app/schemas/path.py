@@ -7,11 +7,11 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, Tag, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from app.schemas.arm import Speed
-from app.schemas.common import BasePose, Request, described, number_or_object
-from app.schemas.orientation import Axis, ConeOrientedPose, TargetPose
-from optimizer.problem.line import LEAST_DISTANCE, MOST_DISTANCE
-from optimizer.problem.tool_path import (
+from joulepath.app.schemas.arm import Speed
+from joulepath.app.schemas.common import BasePose, Request, described, number_or_object
+from joulepath.app.schemas.orientation import Axis, ConeOrientedPose, TargetPose
+from joulepath.optimizer.problem.line import LEAST_DISTANCE, MOST_DISTANCE
+from joulepath.optimizer.problem.tool_path import (
     LEAST_RAMP,
     LEAST_TOLERANCE,
     MOST_POINTS,

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import ConfigDict
 
-from app.schemas.common import Request, described
+from joulepath.app.schemas.common import Request, described
 
 PAGE_PATTERN = r"^[0-9]{1,16}_[0-9a-f-]{36}$"
 

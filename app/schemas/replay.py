@@ -6,14 +6,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from app.schemas.common import Answer, Request, Response, described, part
-from app.schemas.given_answer import AnswerRequest
-from app.schemas.response import BODIES
-from app.settings import LONGEST_DEADLINE
-from optimizer.simulation.controller import ControlName
-from optimizer.simulation.outcome import TOUCH
-from optimizer.simulation.replay import Quantity
-from optimizer.solution import BaselineName
+from joulepath.app.schemas.common import Answer, Request, Response, described, part
+from joulepath.app.schemas.given_answer import AnswerRequest
+from joulepath.app.schemas.response import BODIES
+from joulepath.app.settings import LONGEST_DEADLINE
+from joulepath.optimizer.simulation.controller import ControlName
+from joulepath.optimizer.simulation.outcome import TOUCH
+from joulepath.optimizer.simulation.replay import Quantity
+from joulepath.optimizer.solution import BaselineName
 
 Fraction = Annotated[float, Field(gt=0, le=0.9)]
 

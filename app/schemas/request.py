@@ -8,14 +8,14 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, Tag, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from app.schemas.arm import ArmRequest
-from app.schemas.common import JointPositions, Request, by_field, described, number_or_object
-from app.schemas.orientation import TargetPose
-from app.schemas.path import Path
-from app.settings import LONGEST_DEADLINE
-from optimizer.problem.problem import LONGEST_DURATION, BoundEffort, MethodName
-from optimizer.replay.sampler import MOST_SAMPLES
-from optimizer.solution import Objective
+from joulepath.app.schemas.arm import ArmRequest
+from joulepath.app.schemas.common import JointPositions, Request, by_field, described, number_or_object
+from joulepath.app.schemas.orientation import TargetPose
+from joulepath.app.schemas.path import Path
+from joulepath.app.settings import LONGEST_DEADLINE
+from joulepath.optimizer.problem.problem import LONGEST_DURATION, BoundEffort, MethodName
+from joulepath.optimizer.replay.sampler import MOST_SAMPLES
+from joulepath.optimizer.solution import Objective
 
 Seconds = Annotated[float, Field(ge=1e-3, le=LONGEST_DURATION)]
 

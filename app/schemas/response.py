@@ -1,4 +1,5 @@
-"""What `POST /optimize` answers. `app.convert` builds answers without these models, for speed; tests check that both
+"""What `POST /optimize` answers. `joulepath.app.convert` builds answers without these models, for speed; tests check
+that both
 agree."""
 
 from __future__ import annotations
@@ -7,13 +8,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from app.schemas.common import MotionAnswer, Response, described, part
-from app.schemas.energy import Joints, MotionEnergy, SavingInterval
-from app.schemas.examples.values import ANSWER_PATH, HOME, LABEL, STANDING_STILL
-from app.schemas.limits_in_force import LimitsInForce
-from optimizer.collision.close_pass import CLOSE
-from optimizer.problem.problem import MethodName
-from optimizer.solution import Objective
+from joulepath.app.schemas.common import MotionAnswer, Response, described, part
+from joulepath.app.schemas.energy import Joints, MotionEnergy, SavingInterval
+from joulepath.app.schemas.examples.values import ANSWER_PATH, HOME, LABEL, STANDING_STILL
+from joulepath.app.schemas.limits_in_force import LimitsInForce
+from joulepath.optimizer.collision.close_pass import CLOSE
+from joulepath.optimizer.problem.problem import MethodName
+from joulepath.optimizer.solution import Objective
 
 Samples = list[float]
 JointSamples = list[Joints]

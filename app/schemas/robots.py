@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from app.schemas.common import Response, described, part
+from joulepath.app.schemas.common import Response, described, part
 
 
 class Parameter(Response):

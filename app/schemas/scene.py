@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from app.schemas.common import (
+from joulepath.app.schemas.common import (
     IDENTITY,
     NO_CONTROLS,
     PLAIN,
@@ -18,12 +18,12 @@ from app.schemas.common import (
     described,
     frame_of,
 )
-from app.schemas.examples.values import BOX, MESH_FILE, TOOL, at
-from models.shape_sizes import SIZES
-from optimizer.problem.arm import MOST_PARTS
-from optimizer.problem.clouds import MOST_ALONG_EDGE, MOST_POINTS, MOST_VOXELS
-from optimizer.problem.names import LONGEST_NAME
-from optimizer.problem.scene import DEFAULT_MARGIN, MOST_OBSTACLES, MOST_VERTICES
+from joulepath.app.schemas.examples.values import BOX, MESH_FILE, TOOL, at
+from joulepath.models.shape_sizes import SIZES
+from joulepath.optimizer.problem.arm import MOST_PARTS
+from joulepath.optimizer.problem.clouds import MOST_ALONG_EDGE, MOST_POINTS, MOST_VOXELS
+from joulepath.optimizer.problem.names import LONGEST_NAME
+from joulepath.optimizer.problem.scene import DEFAULT_MARGIN, MOST_OBSTACLES, MOST_VERTICES
 
 _POSE = {"position": [0.5, 0.1, 0.2], "quaternion": [0.0, 0.0, 0.0, 1.0]}
 _POSE_TEXT = "Pose of the shape: of an obstacle in the scene's `frame`, of a payload in the flange frame."

@@ -7,13 +7,13 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from app.schemas.arm import MoveLimits, Payload
-from app.schemas.common import NO_CONTROLS, PLAIN, Request, described
-from app.schemas.path import Line, StopPath
-from app.schemas.request import Branch, Target
-from optimizer.problem.names import LONGEST_NAME
-from optimizer.problem.problem import LONGEST_DURATION
-from optimizer.problem.scene import MOST_OBSTACLES
+from joulepath.app.schemas.arm import MoveLimits, Payload
+from joulepath.app.schemas.common import NO_CONTROLS, PLAIN, Request, described
+from joulepath.app.schemas.path import Line, StopPath
+from joulepath.app.schemas.request import Branch, Target
+from joulepath.optimizer.problem.names import LONGEST_NAME
+from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.problem.scene import MOST_OBSTACLES
 
 PlainName = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME, pattern=NO_CONTROLS), PLAIN]
 

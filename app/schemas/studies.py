@@ -7,14 +7,24 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, RootModel, Tag
 
-from app.schemas.common import NO_CONTROLS, PLAIN, FiguresId, Request, Response, RobotName, by_field, described, part
-from app.schemas.evaluate import EvaluateRequest
-from app.schemas.examples.figures import FIGURES_ID
-from app.schemas.examples.values import ANSWER_ID, CREATED, EVALUATE, OPTIMIZE, STUDY_ID
-from app.schemas.lengths import KEY_LENGTH, NAME_LENGTH
-from app.schemas.queries import Query, after_of, limit_of, next_of
-from app.schemas.request import OptimizeRequest
-from optimizer.solution import Objective
+from joulepath.app.schemas.common import (
+    NO_CONTROLS,
+    PLAIN,
+    FiguresId,
+    Request,
+    Response,
+    RobotName,
+    by_field,
+    described,
+    part,
+)
+from joulepath.app.schemas.evaluate import EvaluateRequest
+from joulepath.app.schemas.examples.figures import FIGURES_ID
+from joulepath.app.schemas.examples.values import ANSWER_ID, CREATED, EVALUATE, OPTIMIZE, STUDY_ID
+from joulepath.app.schemas.lengths import KEY_LENGTH, NAME_LENGTH
+from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.optimizer.solution import Objective
 
 Name = Annotated[str, Field(min_length=1, max_length=NAME_LENGTH, pattern=NO_CONTROLS), PLAIN]
 IdempotencyKey = Annotated[str, Field(min_length=1, max_length=KEY_LENGTH, pattern=r"^[!-~]+$")]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Literal
 
-from app.schemas.common import Response, described, part
-from app.schemas.examples.values import OPTIMIZE, STUDY_ID
-from app.schemas.queries import Query
-from app.schemas.studies import IterationEnergy
+from joulepath.app.schemas.common import Response, described, part
+from joulepath.app.schemas.examples.values import OPTIMIZE, STUDY_ID
+from joulepath.app.schemas.queries import Query
+from joulepath.app.schemas.studies import IterationEnergy
 
 
 class SuggestQuery(Query):

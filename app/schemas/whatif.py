@@ -7,17 +7,17 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from app.schemas.arm import ArmRequest
-from app.schemas.common import Answer, Request, Response, described, part
-from app.schemas.energy import ElectricalEnergy
-from app.schemas.evaluate import EvaluateRequest
-from app.schemas.examples.values import ANSWER_PATH, EVALUATE, OPTIMIZE
-from app.schemas.request import OptimizeRequest
-from app.schemas.response import OBJECTIVE, Certificate
-from app.schemas.studies import Name
-from app.settings import LONGEST_DEADLINE
-from optimizer.problem.names import first_repeated
-from optimizer.solution import Objective
+from joulepath.app.schemas.arm import ArmRequest
+from joulepath.app.schemas.common import Answer, Request, Response, described, part
+from joulepath.app.schemas.energy import ElectricalEnergy
+from joulepath.app.schemas.evaluate import EvaluateRequest
+from joulepath.app.schemas.examples.values import ANSWER_PATH, EVALUATE, OPTIMIZE
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.app.schemas.response import OBJECTIVE, Certificate
+from joulepath.app.schemas.studies import Name
+from joulepath.app.settings import LONGEST_DEADLINE
+from joulepath.optimizer.problem.names import first_repeated
+from joulepath.optimizer.solution import Objective
 
 MOST_CHANGES = 16
 

@@ -9,13 +9,13 @@ from sqlalchemy import and_, func, or_, select
 from sqlalchemy import delete as delete_from
 from sqlalchemy.orm import Session, defer
 
-from app.access.client import Client
-from app.access.rules import check_owner
-from app.convert.packed import packed, unpacked
-from app.engine.result import StoredAnswer
-from app.exceptions import AnswerInUse, UnknownAnswer
-from app.store.paging import position_after, position_of
-from app.store.tables import Answer, Job, is_id, now
+from joulepath.app.access.client import Client
+from joulepath.app.access.rules import check_owner
+from joulepath.app.convert.packed import packed, unpacked
+from joulepath.app.engine.result import StoredAnswer
+from joulepath.app.exceptions import AnswerInUse, UnknownAnswer
+from joulepath.app.store.paging import position_after, position_of
+from joulepath.app.store.tables import Answer, Job, is_id, now
 
 
 def put(

@@ -10,7 +10,7 @@ from sqlalchemy import select
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
 
-from app.store.tables import Answer, CachedAnswer
+from joulepath.app.store.tables import Answer, CachedAnswer
 
 
 class Meaning(TypedDict):

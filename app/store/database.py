@@ -17,7 +17,7 @@ from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url, 
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import ConnectionPoolEntry
 
-from app.store.sqlite_file import check, identity
+from joulepath.app.store.sqlite_file import check, identity
 
 logger = logging.getLogger(__name__)
 

@@ -9,16 +9,17 @@ from typing import Any
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from app.access.client import Client
-from app.access.rules import check_owner
-from app.exceptions import FiguresInUse, TooManyFigures, UnknownFigures
-from app.store.tables import Figures, Study, is_id, now
+from joulepath.app.access.client import Client
+from joulepath.app.access.rules import check_owner
+from joulepath.app.exceptions import FiguresInUse, TooManyFigures, UnknownFigures
+from joulepath.app.store.tables import Figures, Study, is_id, now
 
 _SPACE = uuid.UUID("6d0c5a0e-7b0e-5d5f-9a53-1d1f5b1c4a9e")
 
 
 def new_figures(robot: str, content: dict[str, Any], owner: str | None) -> Figures:
-    """Figures that take the place of the robot's own, as `models.uncertainty.document.replaced_in` gives them; not yet
+    """Figures that take the place of the robot's own, as `joulepath.models.uncertainty.document.replaced_in` gives
+    them; not yet
     in the database."""
     text = json.dumps([robot, content], sort_keys=True)
     return Figures(id=str(uuid.uuid5(_SPACE, text)), robot=robot, created=now(), owner=owner, content=content)

@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from app.store.tables import Job, JobEvent, JobRequest
+from joulepath.app.store.tables import Job, JobEvent, JobRequest
 
 PROGRESS_PERIOD = timedelta(seconds=0.5)
 """Least time between two events `progress`."""

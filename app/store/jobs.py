@@ -11,13 +11,13 @@ from sqlalchemy import ColumnElement, Select, and_, func, insert, or_, select
 from sqlalchemy import delete as delete_from
 from sqlalchemy.orm import Session, defer
 
-from app.access.client import Client
-from app.access.rules import check_owner
-from app.exceptions import JobNotCancellable, KeyReused, TooManyWaiting, UnknownJob
-from app.store.cache import Meaning
-from app.store.job_events import ENDED, Counts, conclude, counts_of, record, request_ended, set_state
-from app.store.paging import position_after, position_of
-from app.store.tables import Answer, Job, JobRequest, is_id, new_id, now
+from joulepath.app.access.client import Client
+from joulepath.app.access.rules import check_owner
+from joulepath.app.exceptions import JobNotCancellable, KeyReused, TooManyWaiting, UnknownJob
+from joulepath.app.store.cache import Meaning
+from joulepath.app.store.job_events import ENDED, Counts, conclude, counts_of, record, request_ended, set_state
+from joulepath.app.store.paging import position_after, position_of
+from joulepath.app.store.tables import Answer, Job, JobRequest, is_id, new_id, now
 
 Ts = TypeVarTuple("Ts")
 

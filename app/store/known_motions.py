@@ -9,7 +9,7 @@ from sqlalchemy import delete, select
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
 
-from app.store.tables import KnownMotion, now
+from joulepath.app.store.tables import KnownMotion, now
 
 MOST_OF_A_CELL = 400
 """Motions that a round is given: those of its cell that were used last, some 1 kB each."""

@@ -15,12 +15,12 @@ from typing import Any, Literal
 from sqlalchemy import select, tuple_, update
 from sqlalchemy.orm import Session, defer
 
-from app.engine.result import AnswerFigures, StoredAnswer
-from app.exceptions import TooManyFigures
-from app.store import answers, cache, figures, jobs, known_motions
-from app.store.cache import Answered, Asked, Meaning
-from app.store.job_events import Report, conclude, progress_is_due, record_progress, request_ended, set_state
-from app.store.tables import Job, JobRequest, new_id
+from joulepath.app.engine.result import AnswerFigures, StoredAnswer
+from joulepath.app.exceptions import TooManyFigures
+from joulepath.app.store import answers, cache, figures, jobs, known_motions
+from joulepath.app.store.cache import Answered, Asked, Meaning
+from joulepath.app.store.job_events import Report, conclude, progress_is_due, record_progress, request_ended, set_state
+from joulepath.app.store.tables import Job, JobRequest, new_id
 
 Key = tuple[str, int]
 """A request: the id of its job and its index."""

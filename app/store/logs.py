@@ -6,11 +6,11 @@ from sqlalchemy import and_, func, or_, select
 from sqlalchemy import delete as delete_from
 from sqlalchemy.orm import Session, defer
 
-from app.access.client import Client
-from app.access.rules import check_owner
-from app.exceptions import TooManyLogs, UnknownLog
-from app.store.paging import position_after, position_of
-from app.store.tables import StoredLog, is_id
+from joulepath.app.access.client import Client
+from joulepath.app.access.rules import check_owner
+from joulepath.app.exceptions import TooManyLogs, UnknownLog
+from joulepath.app.store.paging import position_after, position_of
+from joulepath.app.store.tables import StoredLog, is_id
 
 _LIGHT = defer(StoredLog.body, raiseload=True)
 """Leaves out the file of a log."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from app.access.client import Client
-from app.access.rules import check_owner
-from app.exceptions import BundledRobot, RobotExists, TooManyRobots
-from app.store.tables import OwnRobot
-from models.registry import robot_names
-from optimizer.exceptions import UnknownRobot
+from joulepath.app.access.client import Client
+from joulepath.app.access.rules import check_owner
+from joulepath.app.exceptions import BundledRobot, RobotExists, TooManyRobots
+from joulepath.app.store.tables import OwnRobot
+from joulepath.models.registry import robot_names
+from joulepath.optimizer.exceptions import UnknownRobot
 
 
 def check_own(name: str) -> None:

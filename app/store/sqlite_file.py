@@ -11,7 +11,7 @@ import logging
 import os
 from pathlib import Path
 
-from app.store.faults import DatabaseMoved, room
+from joulepath.app.store.faults import DatabaseMoved, room
 
 logger = logging.getLogger(__name__)
 

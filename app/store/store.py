@@ -17,11 +17,11 @@ from sqlalchemy.exc import DBAPIError, IntegrityError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 from sqlalchemy.orm import Session
 
-from app.exceptions import StoreFault, StoreUnavailable
-from app.store.database import OPENED, create_database_engine, is_writable, migrate, room_inside, sqlite_file
-from app.store.faults import LEAST_ROOM, DatabaseMoved, fault_of, room
-from app.store.pruning import Pruning
-from app.store.sqlite_file import Reserve, check, log_size
+from joulepath.app.exceptions import StoreFault, StoreUnavailable
+from joulepath.app.store.database import OPENED, create_database_engine, is_writable, migrate, room_inside, sqlite_file
+from joulepath.app.store.faults import LEAST_ROOM, DatabaseMoved, fault_of, room
+from joulepath.app.store.pruning import Pruning
+from joulepath.app.store.sqlite_file import Reserve, check, log_size
 
 logger = logging.getLogger(__name__)
 

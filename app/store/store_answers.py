@@ -9,12 +9,12 @@ from functools import partial
 
 from sqlalchemy.orm import Session
 
-from app.engine.result import StoredAnswer, TaskResult
-from app.exceptions import StoreUnavailable
-from app.settings import Settings
-from app.store import answers, cache, known_motions
-from app.store.cache import Answered, Asked
-from app.store.store import Store
+from joulepath.app.engine.result import StoredAnswer, TaskResult
+from joulepath.app.exceptions import StoreUnavailable
+from joulepath.app.settings import Settings
+from joulepath.app.store import answers, cache, known_motions
+from joulepath.app.store.cache import Answered, Asked
+from joulepath.app.store.store import Store
 
 
 class _TooLarge(Exception):

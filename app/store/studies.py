@@ -9,14 +9,14 @@ from sqlalchemy import and_, or_, select
 from sqlalchemy import delete as delete_from
 from sqlalchemy.orm import Session, defer
 
-from app.access.client import Client
-from app.access.rules import check_owner
-from app.engine.result import StoredAnswer
-from app.exceptions import KeyReused, UnknownIteration, UnknownStudy
-from app.store import answers, cache
-from app.store.cache import Answered
-from app.store.paging import position_after, position_of
-from app.store.tables import Iteration, Study, is_id, new_id, now
+from joulepath.app.access.client import Client
+from joulepath.app.access.rules import check_owner
+from joulepath.app.engine.result import StoredAnswer
+from joulepath.app.exceptions import KeyReused, UnknownIteration, UnknownStudy
+from joulepath.app.store import answers, cache
+from joulepath.app.store.cache import Answered
+from joulepath.app.store.paging import position_after, position_of
+from joulepath.app.store.tables import Iteration, Study, is_id, new_id, now
 
 _LIGHT = defer(Iteration.request, raiseload=True)
 """Leaves out the request of an iteration."""

@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import JSON, DateTime, Dialect, ForeignKey, Index, LargeBinary, MetaData, String, TypeDecorator
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
-from app.schemas.lengths import HOLDER_LENGTH, ID_LENGTH, KEY_LENGTH, NAME_LENGTH, OWNER_LENGTH, ROBOT_LENGTH
+from joulepath.app.schemas.lengths import HOLDER_LENGTH, ID_LENGTH, KEY_LENGTH, NAME_LENGTH, OWNER_LENGTH, ROBOT_LENGTH
 
 # SQLite can alter a constraint only if it has a name
 _NAMES = {

@@ -7,10 +7,10 @@ from dataclasses import asdict
 from io import StringIO
 from typing import Any
 
-from app.schemas import studies as schemas
-from app.store.studies import Entry, History, State, energy_of
-from app.store.tables import Iteration, Study
-from app.studies.progress import progress, step
+from joulepath.app.schemas import studies as schemas
+from joulepath.app.store.studies import Entry, History, State, energy_of
+from joulepath.app.store.tables import Iteration, Study
+from joulepath.app.studies.progress import progress, step
 
 _COLUMNS = {
     "number": "iteration",

@@ -12,14 +12,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from app.convert.arm import to_arm
-from app.schemas.arm import ArmRequest
-from app.schemas.request import OptimizeRequest
-from models.robot import Array
-from optimizer.kinematics.inverse import inverse_kinematics_for
-from optimizer.kinematics.tcp import rotated_poses
-from optimizer.problem.arm import Arm
-from optimizer.problem.problem import LONGEST_DURATION
+from joulepath.app.convert.arm import to_arm
+from joulepath.app.schemas.arm import ArmRequest
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
+from joulepath.optimizer.kinematics.tcp import rotated_poses
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.problem import LONGEST_DURATION
 
 Step = Literal["method", "branch", "orientation", "duration", "payload"]
 Fields = dict[str, Any]

@@ -9,20 +9,20 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
-from app.convert.packed import unpacked
-from app.engine.result import TaskResult
-from app.exceptions import StoreUnavailable
-from app.schemas.common import Request
-from app.store import cache, known_motions
-from app.store.cache import Asked, Meaning
-from app.store.store import Store
-from app.store.tables import Answer, now
-from app.tasks.arm_engine import own_figures
-from app.tasks.in_flight import Compute, InFlight
-from app.tasks.read_body import HeldBody
-from app.tasks.request_key import key_of, meaning_of
-from models.registry import robot_names
-from optimizer.exceptions import UnknownRobot
+from joulepath.app.convert.packed import unpacked
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions import StoreUnavailable
+from joulepath.app.schemas.common import Request
+from joulepath.app.store import cache, known_motions
+from joulepath.app.store.cache import Asked, Meaning
+from joulepath.app.store.store import Store
+from joulepath.app.store.tables import Answer, now
+from joulepath.app.tasks.arm_engine import own_figures
+from joulepath.app.tasks.in_flight import Compute, InFlight
+from joulepath.app.tasks.read_body import HeldBody
+from joulepath.app.tasks.request_key import key_of, meaning_of
+from joulepath.models.registry import robot_names
+from joulepath.optimizer.exceptions import UnknownRobot
 
 PATIENCE = 0.25
 """Longest time [s] that a look into the database may take: what it may save is little more."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import uuid
 from typing import Any
 
-from app.engine.result import StoredAnswer, json_document
-from app.exceptions import InvalidRequest
-from app.tasks.answer_figures import figures_of
+from joulepath.app.engine.result import StoredAnswer, json_document
+from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.tasks.answer_figures import figures_of
 
 MOST_BYTES = 1 << 26
 """Largest total size [byte], before compression, of the answers that one result refers to."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from app.engine.result import AnswerFigures
+from joulepath.app.engine.result import AnswerFigures
 
 
 def figures_of(answer: Mapping[str, Any]) -> AnswerFigures:

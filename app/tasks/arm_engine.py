@@ -7,18 +7,18 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
 
-from app.convert.identified import Identified, identified_as
-from app.convert.own_robots import own_robot_named, own_robot_of
-from app.convert.recorded import GivenLog, log_given
-from app.engine.result import TaskResult
-from app.engine.task import Task
-from app.exceptions import UnknownFigures, UnknownLog
-from app.store import figures, logs, robots
-from app.store.store import Store
-from models.registry import load_robot, robot_names
-from models.robot import Robot
-from optimizer.exceptions import UnknownRobot
-from optimizer.progress import Tell, nobody
+from joulepath.app.convert.identified import Identified, identified_as
+from joulepath.app.convert.own_robots import own_robot_named, own_robot_of
+from joulepath.app.convert.recorded import GivenLog, log_given
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.engine.task import Task
+from joulepath.app.exceptions import UnknownFigures, UnknownLog
+from joulepath.app.store import figures, logs, robots
+from joulepath.app.store.store import Store
+from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.robot import Robot
+from joulepath.optimizer.exceptions import UnknownRobot
+from joulepath.optimizer.progress import Tell, nobody
 
 
 class Runner(Protocol):

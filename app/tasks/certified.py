@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from optimizer.solution import Solution
+from joulepath.optimizer.solution import Solution
 
 
 def certified(solution: Solution) -> Solution:

@@ -6,23 +6,23 @@ from dataclasses import dataclass
 
 import orjson
 
-from app.convert.arm_fields import arm_fields
-from app.convert.comparison import to_compare_response, to_optimize_request
-from app.convert.request import to_problem
-from app.convert.solution import to_optimize_response
-from app.engine.listening import listener
-from app.engine.result import TaskResult, json_document
-from app.http.problem_details import problem_content
-from app.schemas.compare import CompareRequest
-from app.tasks.certified import certified
-from app.tasks.deadline_shares import DeadlineShares
-from optimizer.deadline import Deadline
-from optimizer.exceptions import DeadlineExceeded, JoulepathError
-from optimizer.methods import METHODS
-from optimizer.optimize import optimize
-from optimizer.problem.problem import MethodName
-from optimizer.progress import CandidatesFound, CandidateTried, Improved, forward
-from optimizer.solution import Solution
+from joulepath.app.convert.arm_fields import arm_fields
+from joulepath.app.convert.comparison import to_compare_response, to_optimize_request
+from joulepath.app.convert.request import to_problem
+from joulepath.app.convert.solution import to_optimize_response
+from joulepath.app.engine.listening import listener
+from joulepath.app.engine.result import TaskResult, json_document
+from joulepath.app.http.problem_details import problem_content
+from joulepath.app.schemas.compare import CompareRequest
+from joulepath.app.tasks.certified import certified
+from joulepath.app.tasks.deadline_shares import DeadlineShares
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
+from joulepath.optimizer.methods import METHODS
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.problem import MethodName
+from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, forward
+from joulepath.optimizer.solution import Solution
 
 
 @dataclass(frozen=True)

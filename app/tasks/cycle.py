@@ -6,21 +6,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from app.convert.cycle import to_cycle_response, to_work_round
-from app.convert.cycle_csv import to_cycle_csv
-from app.convert.known_motions import to_kept, to_known_motions
-from app.convert.round_arms import arms_of_moves
-from app.convert.solution import to_optimize_response
-from app.engine.listening import listener
-from app.engine.result import TaskResult
-from app.schemas.cycle import CycleRequest
-from app.tasks.answer_collector import AnswerCollector
-from app.tasks.answer_figures import figures_of
-from app.tasks.certified import certified
-from optimizer.optimize_round import optimize_round
-from optimizer.sequence.known_motions import knowing
-from optimizer.sequence.round_solution import RoundSolution
-from optimizer.solution import Solution
+from joulepath.app.convert.cycle import to_cycle_response, to_work_round
+from joulepath.app.convert.cycle_csv import to_cycle_csv
+from joulepath.app.convert.known_motions import to_kept, to_known_motions
+from joulepath.app.convert.round_arms import arms_of_moves
+from joulepath.app.convert.solution import to_optimize_response
+from joulepath.app.engine.listening import listener
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.schemas.cycle import CycleRequest
+from joulepath.app.tasks.answer_collector import AnswerCollector
+from joulepath.app.tasks.answer_figures import figures_of
+from joulepath.app.tasks.certified import certified
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.sequence.known_motions import knowing
+from joulepath.optimizer.sequence.round_solution import RoundSolution
+from joulepath.optimizer.solution import Solution
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from optimizer.deadline import Deadline
+from joulepath.optimizer.deadline import Deadline
 
 LEAST_SHARE = 1e-3
 """Shortest share [s]: a run whose time was used up by earlier runs still reports that by itself."""

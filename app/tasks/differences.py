@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from app.convert.fields import fields
-from app.convert.solution import energy_fields
-from optimizer.energy.losses import ENERGY_FLOOR
-from optimizer.solution import ElectricalEnergy, Energy
+from joulepath.app.convert.fields import fields
+from joulepath.app.convert.solution import energy_fields
+from joulepath.optimizer.energy.losses import ENERGY_FLOOR
+from joulepath.optimizer.solution import ElectricalEnergy, Energy
 
 
 def quantities(energy: Energy, duration: float) -> dict[str, Any]:

@@ -9,23 +9,30 @@ from typing import Literal, TypeVar
 
 from pydantic import ValidationError
 
-from app.convert.arm import to_arm
-from app.convert.evaluation import Evaluated, own_times, to_csv_motion, to_csv_table, to_evaluate_response, to_motion
-from app.convert.fields import location
-from app.convert.json_text import parsed_json
-from app.convert.motion_csv import MotionCsv
-from app.convert.query import query_values
-from app.convert.recorded import as_logged, read_csv, reading_of, told_by
-from app.convert.until import until
-from app.engine.result import TaskResult
-from app.exceptions import InvalidRequest
-from app.http.problem_details import invalid_request
-from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
-from optimizer.deadline import Deadline
-from optimizer.exceptions import InvalidProblem, InvalidTable, OutsideLimits
-from optimizer.identification.logs.reading import Reading
-from optimizer.identification.logs.recorded import measured, motion_of
-from optimizer.replay.evaluate import evaluate
+from joulepath.app.convert.arm import to_arm
+from joulepath.app.convert.evaluation import (
+    Evaluated,
+    own_times,
+    to_csv_motion,
+    to_csv_table,
+    to_evaluate_response,
+    to_motion,
+)
+from joulepath.app.convert.fields import location
+from joulepath.app.convert.json_text import parsed_json
+from joulepath.app.convert.motion_csv import MotionCsv
+from joulepath.app.convert.query import query_values
+from joulepath.app.convert.recorded import as_logged, read_csv, reading_of, told_by
+from joulepath.app.convert.until import until
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.http.problem_details import invalid_request
+from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable, OutsideLimits
+from joulepath.optimizer.identification.logs.reading import Reading
+from joulepath.optimizer.identification.logs.recorded import measured, motion_of
+from joulepath.optimizer.replay.evaluate import evaluate
 
 M = TypeVar("M", EvaluateRequest, EvaluateCsvSettings)
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from app.convert.excitation import to_excitation_csv, to_excitation_problem, to_excitation_response
-from app.engine.result import TaskResult
-from app.schemas.excitation import ExcitationRequest
-from optimizer.excitation.excite import excite
+from joulepath.app.convert.excitation import to_excitation_csv, to_excitation_problem, to_excitation_response
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.schemas.excitation import ExcitationRequest
+from joulepath.optimizer.excitation.excite import excite
 
 
 @dataclass(frozen=True)

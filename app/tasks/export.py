@@ -6,17 +6,17 @@ from dataclasses import dataclass, field
 
 from pydantic import ValidationError
 
-from app.convert.exported_file import to_file
-from app.convert.given_answer import paths_of_moves, to_program
-from app.convert.until import until
-from app.engine.result import TaskResult
-from app.http.problem_details import invalid_request
-from app.schemas.export import ExportFormat, ExportRequest
-from app.tasks.kept_answers import WithKeptAnswers
-from optimizer.deadline import Deadline
-from optimizer.exports.certified import certified
-from optimizer.exports.facts import NOT_RUN, ExportedFile
-from optimizer.exports.program import Program
+from joulepath.app.convert.exported_file import to_file
+from joulepath.app.convert.given_answer import paths_of_moves, to_program
+from joulepath.app.convert.until import until
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.http.problem_details import invalid_request
+from joulepath.app.schemas.export import ExportFormat, ExportRequest
+from joulepath.app.tasks.kept_answers import WithKeptAnswers
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.exports.certified import certified
+from joulepath.optimizer.exports.facts import NOT_RUN, ExportedFile
+from joulepath.optimizer.exports.program import Program
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from app.convert.arm import robot_named
-from app.engine.result import TaskResult
-from app.schemas.figures import FiguresDocument
-from models.own_arm.robots import own_robot
-from models.uncertainty.document import InvalidFigures, merged, replaced_in
-from optimizer.exceptions import InvalidProblem
+from joulepath.app.convert.arm import robot_named
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.schemas.figures import FiguresDocument
+from joulepath.models.own_arm.robots import own_robot
+from joulepath.models.uncertainty.document import InvalidFigures, merged, replaced_in
+from joulepath.optimizer.exceptions import InvalidProblem
 
 
 @dataclass(frozen=True)

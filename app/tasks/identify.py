@@ -6,17 +6,17 @@ import uuid
 from dataclasses import dataclass
 from typing import Any
 
-from app.convert.arm import robot_named
-from app.convert.fields import location
-from app.convert.identification import identification_fields, residual_fields, to_options
-from app.convert.logs import stored_log
-from app.convert.until import until
-from app.engine.result import AnswerFigures, StoredAnswer, TaskResult, json_document
-from app.exceptions import InvalidRequest
-from app.schemas.identifications import IdentifyRequest
-from optimizer.deadline import Deadline
-from optimizer.exceptions import InvalidProblem
-from optimizer.identification.identify import fit
+from joulepath.app.convert.arm import robot_named
+from joulepath.app.convert.fields import location
+from joulepath.app.convert.identification import identification_fields, residual_fields, to_options
+from joulepath.app.convert.logs import stored_log
+from joulepath.app.convert.until import until
+from joulepath.app.engine.result import AnswerFigures, StoredAnswer, TaskResult, json_document
+from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.schemas.identifications import IdentifyRequest
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.identification.identify import fit
 
 Stored = tuple[dict[str, Any], bytes]
 """Settings and packed file of a log."""

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from app.convert.arm import robot_named
-from app.convert.ik import to_collision_arm, to_ik_response
-from app.convert.pose import to_base_pose, to_matrix
-from app.convert.until import until
-from app.engine.result import TaskResult
-from app.schemas.ik import IKRequest
-from optimizer.collision.model import collision_model
-from optimizer.deadline import Deadline
-from optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.app.convert.arm import robot_named
+from joulepath.app.convert.ik import to_collision_arm, to_ik_response
+from joulepath.app.convert.pose import to_base_pose, to_matrix
+from joulepath.app.convert.until import until
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.schemas.ik import IKRequest
+from joulepath.optimizer.collision.model import collision_model
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.convert.arm import robot_named
-from app.convert.fields import fields
-from app.convert.pose import to_base, to_base_pose, to_matrix
-from app.engine.result import TaskResult
-from app.schemas.ik_path import IKPathRequest
-from optimizer.deadline import Deadline
-from optimizer.kinematics.path_following import follow
-from optimizer.problem.arm import Arm
+from joulepath.app.convert.arm import robot_named
+from joulepath.app.convert.fields import fields
+from joulepath.app.convert.pose import to_base, to_base_pose, to_matrix
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.schemas.ik_path import IKPathRequest
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.kinematics.path_following import follow
+from joulepath.optimizer.problem.arm import Arm
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from typing import Any
 
-from app.engine.result import TaskResult
-from app.exceptions import ServiceError, WorkerDied
-from app.store.cache import Asked
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions import ServiceError, WorkerDied
+from joulepath.app.store.cache import Asked
 
 Compute = Callable[[float], Coroutine[Any, Any, TaskResult]]
 """Computes an answer, with so much time [s]."""

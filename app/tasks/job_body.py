@@ -9,17 +9,17 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from app.convert.json_text import parsed_json
-from app.convert.packed import packed
-from app.engine.result import TaskResult
-from app.exceptions import InvalidRequest
-from app.http.problem_details import MOST_ERRORS, invalid_request
-from app.schemas.common import Request
-from app.schemas.evaluate import EvaluateRequest
-from app.schemas.jobs import NewJob as JobModel
-from app.store.jobs import NewJob, NewRequest
-from app.tasks.read_body import HeldBody
-from app.tasks.request_key import meaning_of
+from joulepath.app.convert.json_text import parsed_json
+from joulepath.app.convert.packed import packed
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.http.problem_details import MOST_ERRORS, invalid_request
+from joulepath.app.schemas.common import Request
+from joulepath.app.schemas.evaluate import EvaluateRequest
+from joulepath.app.schemas.jobs import NewJob as JobModel
+from joulepath.app.store.jobs import NewJob, NewRequest
+from joulepath.app.tasks.read_body import HeldBody
+from joulepath.app.tasks.request_key import meaning_of
 
 
 @dataclass(frozen=True)

@@ -9,27 +9,27 @@ from typing import Any
 
 import orjson
 
-from app.convert.evaluation import to_evaluate_response
-from app.convert.packed import packed, unpacked
-from app.engine.result import TaskResult
-from app.schemas.compare import CompareRequest
-from app.schemas.cycle import CycleRequest
-from app.schemas.evaluate import EvaluateRequest
-from app.schemas.identifications import IdentifyRequest
-from app.schemas.pareto import ParetoRequest
-from app.schemas.request import OptimizeRequest
-from app.schemas.whatif import WhatifRequest
-from app.store.leases import FoundFigures
-from app.tasks.answer_figures import figures_of
-from app.tasks.compare import CompareTask
-from app.tasks.cycle import CycleTask
-from app.tasks.evaluate import evaluated
-from app.tasks.figures import replacing
-from app.tasks.identify import IdentifyTask, Stored
-from app.tasks.optimize import OptimizeTask
-from app.tasks.pareto import ParetoTask
-from app.tasks.whatif import WhatifTask
-from optimizer.deadline import Deadline
+from joulepath.app.convert.evaluation import to_evaluate_response
+from joulepath.app.convert.packed import packed, unpacked
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.schemas.compare import CompareRequest
+from joulepath.app.schemas.cycle import CycleRequest
+from joulepath.app.schemas.evaluate import EvaluateRequest
+from joulepath.app.schemas.identifications import IdentifyRequest
+from joulepath.app.schemas.pareto import ParetoRequest
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.app.schemas.whatif import WhatifRequest
+from joulepath.app.store.leases import FoundFigures
+from joulepath.app.tasks.answer_figures import figures_of
+from joulepath.app.tasks.compare import CompareTask
+from joulepath.app.tasks.cycle import CycleTask
+from joulepath.app.tasks.evaluate import evaluated
+from joulepath.app.tasks.figures import replacing
+from joulepath.app.tasks.identify import IdentifyTask, Stored
+from joulepath.app.tasks.optimize import OptimizeTask
+from joulepath.app.tasks.pareto import ParetoTask
+from joulepath.app.tasks.whatif import WhatifTask
+from joulepath.optimizer.deadline import Deadline
 
 IDENTIFY, CYCLE = "identify", "cycle"
 """Kinds of requests that need something of the database: stored logs, and motions that are known."""

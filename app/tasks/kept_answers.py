@@ -7,8 +7,8 @@ from typing import Any, Self
 
 import orjson
 
-from app.engine.result import TaskResult
-from app.exceptions import InvalidRequest, PartsNeeded
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions import InvalidRequest, PartsNeeded
 
 
 @dataclass(frozen=True, kw_only=True)

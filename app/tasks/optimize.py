@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from app.convert.arm_fields import arm_fields
-from app.convert.request import to_problem
-from app.convert.solution import to_optimize_response
-from app.engine.listening import listener
-from app.engine.result import TaskResult
-from app.schemas.request import OptimizeRequest
-from app.tasks.answer_figures import figures_of
-from app.tasks.certified import certified
-from optimizer.optimize import optimize
+from joulepath.app.convert.arm_fields import arm_fields
+from joulepath.app.convert.request import to_problem
+from joulepath.app.convert.solution import to_optimize_response
+from joulepath.app.engine.listening import listener
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.app.tasks.answer_figures import figures_of
+from joulepath.app.tasks.certified import certified
+from joulepath.optimizer.optimize import optimize
 
 
 @dataclass(frozen=True)

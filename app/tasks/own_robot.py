@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from app.convert.own_arm import to_description
-from app.convert.until import until
-from app.engine.result import TaskResult
-from app.schemas.own_arm import OwnArm
-from models.own_arm.description import InvalidArm
-from models.own_arm.figures import own_figures
-from models.own_arm.robots import own_robot
-from optimizer.deadline import Deadline, checkpoint
-from optimizer.exceptions import InvalidProblem
+from joulepath.app.convert.own_arm import to_description
+from joulepath.app.convert.until import until
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.schemas.own_arm import OwnArm
+from joulepath.models.own_arm.description import InvalidArm
+from joulepath.models.own_arm.figures import own_figures
+from joulepath.models.own_arm.robots import own_robot
+from joulepath.optimizer.deadline import Deadline, checkpoint
+from joulepath.optimizer.exceptions import InvalidProblem
 
 
 @dataclass(frozen=True)

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from io import StringIO
 from typing import Any, Literal
 
-from app.convert.arm_fields import arm_fields
-from app.convert.fields import fields
-from app.convert.request import to_problem
-from app.convert.solution import to_optimize_response
-from app.engine.listening import listener
-from app.engine.result import TaskResult
-from app.schemas.pareto import ParetoRequest
-from app.tasks.answer_collector import AnswerCollector
-from optimizer.pareto import Front, pareto
-from optimizer.solution import Solution
+from joulepath.app.convert.arm_fields import arm_fields
+from joulepath.app.convert.fields import fields
+from joulepath.app.convert.request import to_problem
+from joulepath.app.convert.solution import to_optimize_response
+from joulepath.app.engine.listening import listener
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.schemas.pareto import ParetoRequest
+from joulepath.app.tasks.answer_collector import AnswerCollector
+from joulepath.optimizer.pareto import Front, pareto
+from joulepath.optimizer.solution import Solution
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,11 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
-import models.meshes
-import models.pictures
-from app.engine.result import TaskResult
-from models.pictures import picture, picture_sources
-from optimizer.native.library_cache import cache_directory, workplace
+import joulepath.models.meshes
+import joulepath.models.pictures
+from joulepath.app.engine.result import TaskResult
+from joulepath.models.pictures import picture, picture_sources
+from joulepath.optimizer.native.library_cache import cache_directory, workplace
 
 logger = logging.getLogger(__name__)
 
@@ -28,7 +28,10 @@ def digest(robot: str) -> str | None:
     if sources is None:
         return None
     h = hashlib.sha256(repr([version(name) for name in ("trimesh", "fast-simplification")]).encode())
-    for path in (*(Path(str(module.__file__)) for module in (models.meshes, models.pictures)), *sources):
+    for path in (
+        *(Path(str(module.__file__)) for module in (joulepath.models.meshes, joulepath.models.pictures)),
+        *sources,
+    ):
         h.update(path.read_bytes())
     return h.hexdigest()[:24]
 

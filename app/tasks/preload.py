@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 from importlib import import_module
 
-from app.engine.imports import importing
+from joulepath.app.engine.imports import importing
 
 TASKS = (
     "compare",
@@ -26,11 +26,11 @@ TASKS = (
 
 with importing():
     for name in TASKS:
-        import_module(f"app.tasks.{name}")
+        import_module(f"joulepath.app.tasks.{name}")
     # imported where it is called, because the process that answers HTTP does not need it
     import_module("toppra")
     # whose fields messages about large bodies name
-    import_module("app.schemas.studies")
+    import_module("joulepath.app.schemas.studies")
 
 # SIGTERM from a service manager reaches every process of the service. This one ends with its parent, and its end would
 # end the workers, which must last until the requests in flight are answered.

@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.convert.arm import robot_named
-from app.convert.fields import location
-from app.convert.logs import report_fields, to_log_options
-from app.convert.until import until
-from app.engine.result import TaskResult
-from app.exceptions import InvalidRequest
-from app.schemas.logs import LogSettings
-from optimizer.deadline import Deadline
-from optimizer.exceptions import InvalidProblem, InvalidTable
-from optimizer.identification.logs.reading import read
+from joulepath.app.convert.arm import robot_named
+from joulepath.app.convert.fields import location
+from joulepath.app.convert.logs import report_fields, to_log_options
+from joulepath.app.convert.until import until
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.schemas.logs import LogSettings
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
+from joulepath.optimizer.identification.logs.reading import read
 
 
 @dataclass(frozen=True)

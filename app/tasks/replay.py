@@ -7,19 +7,19 @@ from typing import Any, Literal
 
 from pydantic import ValidationError
 
-from app.convert.given_answer import paths_of_moves, to_program
-from app.convert.replay import to_perturbation, to_planned_motion, to_replayed_motion
-from app.convert.until import until
-from app.convert.warnings import replay_warnings
-from app.engine.result import TaskResult
-from app.http.problem_details import invalid_request
-from app.schemas.replay import ReplayRequest
-from app.tasks.kept_answers import WithKeptAnswers
-from optimizer.deadline import Deadline
-from optimizer.simulation.controller import ControlName
-from optimizer.simulation.planned import PlannedMotion
-from optimizer.simulation.replay import replay
-from optimizer.simulation.simulator import mujoco
+from joulepath.app.convert.given_answer import paths_of_moves, to_program
+from joulepath.app.convert.replay import to_perturbation, to_planned_motion, to_replayed_motion
+from joulepath.app.convert.until import until
+from joulepath.app.convert.warnings import replay_warnings
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.http.problem_details import invalid_request
+from joulepath.app.schemas.replay import ReplayRequest
+from joulepath.app.tasks.kept_answers import WithKeptAnswers
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.simulation.controller import ControlName
+from joulepath.optimizer.simulation.planned import PlannedMotion
+from joulepath.optimizer.simulation.replay import replay
+from joulepath.optimizer.simulation.simulator import mujoco
 
 PERTURBED_NOTHING = "The arm carries no payload: to change it has no effect."
 NO_BASELINES = (

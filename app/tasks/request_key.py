@@ -8,11 +8,11 @@ from typing import Any
 import orjson
 from pydantic import BaseModel
 
-from app import __version__
-from app.schemas.arm import ArmRequest
-from app.schemas.cycle import CycleRequest
-from app.schemas.whatif import WhatifRequest
-from app.store.cache import Meaning
+from joulepath import __version__
+from joulepath.app.schemas.arm import ArmRequest
+from joulepath.app.schemas.cycle import CycleRequest
+from joulepath.app.schemas.whatif import WhatifRequest
+from joulepath.app.store.cache import Meaning
 
 _FORM = 2
 """Form of the answers: requests are not answered by one of another form."""

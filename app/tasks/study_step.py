@@ -6,12 +6,12 @@ import pickle
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from app.engine.result import TaskResult
-from app.schemas.evaluate import EvaluateRequest
-from app.schemas.request import OptimizeRequest
-from app.schemas.studies import IterationBody, OptimizeStep
-from app.tasks.read_body import HeldBody, pickled_body
-from optimizer.exceptions import InvalidProblem
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.schemas.evaluate import EvaluateRequest
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.app.schemas.studies import IterationBody, OptimizeStep
+from joulepath.app.tasks.read_body import HeldBody, pickled_body
+from joulepath.optimizer.exceptions import InvalidProblem
 
 R = TypeVar("R", OptimizeRequest, EvaluateRequest)
 

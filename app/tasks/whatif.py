@@ -7,30 +7,30 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from app.convert.arm import to_arm
-from app.convert.arm_fields import arm_fields
-from app.convert.evaluation import Evaluated, to_evaluate_response, to_motion
-from app.convert.recorded import as_logged
-from app.convert.request import to_problem
-from app.convert.solution import certificate_fields, to_optimize_response
-from app.convert.until import time_left, until
-from app.engine.result import TaskResult
-from app.http.problem_details import problem_content
-from app.schemas.evaluate import EvaluateRequest
-from app.schemas.request import OptimizeRequest
-from app.schemas.whatif import Change, WhatifRequest
-from app.tasks.answer_collector import AnswerCollector
-from app.tasks.certified import certified
-from app.tasks.deadline_shares import DeadlineShares
-from app.tasks.differences import differences, of_base
-from optimizer.deadline import Deadline
-from optimizer.exceptions import DeadlineExceeded, InvalidProblem, InvalidTable, OutsideLimits
-from optimizer.optimize import optimize
-from optimizer.problem.arm import Arm
-from optimizer.problem.problem import Problem
-from optimizer.replay.evaluate import Evaluation, evaluate
-from optimizer.solution import Solution
-from optimizer.whatif import Changed, whatif
+from joulepath.app.convert.arm import to_arm
+from joulepath.app.convert.arm_fields import arm_fields
+from joulepath.app.convert.evaluation import Evaluated, to_evaluate_response, to_motion
+from joulepath.app.convert.recorded import as_logged
+from joulepath.app.convert.request import to_problem
+from joulepath.app.convert.solution import certificate_fields, to_optimize_response
+from joulepath.app.convert.until import time_left, until
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.http.problem_details import problem_content
+from joulepath.app.schemas.evaluate import EvaluateRequest
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.app.schemas.whatif import Change, WhatifRequest
+from joulepath.app.tasks.answer_collector import AnswerCollector
+from joulepath.app.tasks.certified import certified
+from joulepath.app.tasks.deadline_shares import DeadlineShares
+from joulepath.app.tasks.differences import differences, of_base
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, InvalidTable, OutsideLimits
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.replay.evaluate import Evaluation, evaluate
+from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.whatif import Changed, whatif
 
 R = TypeVar("R", OptimizeRequest, EvaluateRequest)
 T = TypeVar("T")

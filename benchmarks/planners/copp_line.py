@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from benchmarks.motion import Motion
-from models.robot import Array, Robot
+from joulepath.models.robot import Array, Robot
 
 # stations are denser near the ends, where the motion is slow: even spacing would cost time there
 _X = np.linspace(0.0, 1.0, 201)

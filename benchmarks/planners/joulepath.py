@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from benchmarks.motion import SplineMotion
-from models.robot import Array, Robot
-from optimizer.deadline import Deadline
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.exceptions import JoulepathError
-from optimizer.methods import solver_for
-from optimizer.optimize import optimize, warm_up
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.problem import Problem
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.methods import solver_for
+from joulepath.optimizer.optimize import optimize, warm_up
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.trajectories.spline import Spline
 
 PATIENCE = 10.0  # s
 

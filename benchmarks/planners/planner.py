@@ -6,7 +6,7 @@ from importlib.metadata import version
 from typing import Protocol
 
 from benchmarks.motion import Motion
-from models.robot import Array
+from joulepath.models.robot import Array
 
 # of planners that minimise energy: control points and nodes of joulepath's own first solve
 CONTROL_POINTS, NODES = 13, 31

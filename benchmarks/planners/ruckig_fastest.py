@@ -6,7 +6,7 @@ import numpy as np
 import ruckig
 
 from benchmarks.motion import Motion
-from models.robot import Array, Robot
+from joulepath.models.robot import Array, Robot
 
 INSTANT = 1e-6  # step of the finite difference that gives jerk from acceleration [s]
 

@@ -10,7 +10,7 @@ import toppra
 from toppra import algorithm, constraint
 
 from benchmarks.motion import Motion
-from models.robot import Array, Robot
+from joulepath.models.robot import Array, Robot
 
 logging.getLogger("toppra").setLevel(logging.ERROR)
 

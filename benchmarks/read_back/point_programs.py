@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from models.robot import Array
-from optimizer.exports.facts import ExportedFile
-from optimizer.exports.program import Program
+from joulepath.models.robot import Array
+from joulepath.optimizer.exports.facts import ExportedFile
+from joulepath.optimizer.exports.program import Program
 
 NUMBER = r"-?\d+\.\d+"
 # the statements that the generated programs use, in the forms of the makers' manuals

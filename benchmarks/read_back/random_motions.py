@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.exports.program import Move, Program
-from optimizer.problem.arm import Arm
-from optimizer.trajectories.bspline import DEGREE, clamped
-from optimizer.trajectories.spline import Spline, least_time_scale, retimed
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.exports.program import Move, Program
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.trajectories.bspline import DEGREE, clamped
+from joulepath.optimizer.trajectories.spline import Spline, least_time_scale, retimed
 
 OWN = "own_arm"
 

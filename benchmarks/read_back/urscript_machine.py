@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 SIGNATURES: dict[str, tuple[str, ...]] = {
     # names of the arguments in the maker's script manual, PolyScope 5

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from optimizer import Arm, Problem, load_robot, optimize
+from joulepath import Arm, Problem, load_robot, optimize
 
 home = np.radians([0, -90, 90, -90, -90, 0])
 shelf = np.radians([60, -70, 100, -115, -75, 30])

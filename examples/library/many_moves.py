@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from optimizer import Arm, Pose, Problem, load_robot, optimize_many
+from joulepath import Arm, Pose, Problem, load_robot, optimize_many
 
 START = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 

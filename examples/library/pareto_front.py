@@ -10,7 +10,7 @@ import sys
 import numpy as np
 from matplotlib.figure import Figure
 
-from optimizer import Arm, Problem, load_robot, pareto
+from joulepath import Arm, Problem, load_robot, pareto
 
 POINTS = 4
 

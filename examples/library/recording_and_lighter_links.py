@@ -9,10 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from optimizer import Arm, Problem, load_robot, optimize
-from optimizer.replay.evaluate import evaluate
-from optimizer.replay.recording import Log, in_blocks
-from optimizer.whatif import whatif
+from joulepath import Arm, Problem, load_robot, optimize
+from joulepath.optimizer.replay.evaluate import evaluate
+from joulepath.optimizer.replay.recording import Log, in_blocks
+from joulepath.optimizer.whatif import whatif
 
 arm = Arm(robot=load_robot("ur5e"))
 lighter = replace(arm, link_mass_scale=np.full(arm.robot.nq, 0.7))

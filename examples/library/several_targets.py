@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
-from optimizer import AnyOf, Arm, Payload, Pose, Problem, load_robot, optimize
-from optimizer.problem.scene import Box, Obstacle, Scene
+from joulepath import AnyOf, Arm, Payload, Pose, Problem, load_robot, optimize
+from joulepath.models.robot import Array
+from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
 
 
 def pointing_down(x: float, y: float, z: float) -> Array:

@@ -6,9 +6,9 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.spatial import ConvexHull, QhullError
 
-from models.capsule_cover import outside
-from models.robot import Array, LinkCapsule
-from models.uploads.limits import Checkpoint, unwatched
+from joulepath.models.capsule_cover import outside
+from joulepath.models.robot import Array, LinkCapsule
+from joulepath.models.uploads.limits import Checkpoint, unwatched
 
 # m: places of the ends are rounded to this, the radius up to it
 DIGIT = 1e-5

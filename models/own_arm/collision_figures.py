@@ -9,17 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from models.own_arm import rules
-from models.own_arm.description import LONGEST_NAME, WIDEST, Description, InvalidArm
-from models.own_arm.figure import assumed, stated
-from models.own_arm.link_shapes import LinkShapes, Rows, check_near
-from models.own_arm.meeting_pairs import pairs_that_meet
-from models.own_arm.srdf import disabled_pairs
-from models.own_arm.upright import UprightChain
-from models.own_arm.urdf_chain import Chain
-from models.shape_sizes import WrongSize, check_lengths
-from models.uploads.limits import Checkpoint
-from models.urdf import BASE
+from joulepath.models.own_arm import rules
+from joulepath.models.own_arm.description import LONGEST_NAME, WIDEST, Description, InvalidArm
+from joulepath.models.own_arm.figure import assumed, stated
+from joulepath.models.own_arm.link_shapes import LinkShapes, Rows, check_near
+from joulepath.models.own_arm.meeting_pairs import pairs_that_meet
+from joulepath.models.own_arm.srdf import disabled_pairs
+from joulepath.models.own_arm.upright import UprightChain
+from joulepath.models.own_arm.urdf_chain import Chain
+from joulepath.models.shape_sizes import WrongSize, check_lengths
+from joulepath.models.uploads.limits import Checkpoint
+from joulepath.models.urdf import BASE
 
 # a link shorter than this, over its capsule's radius, has a ball
 SHORT = 1e-3

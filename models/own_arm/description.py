@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from models.robot import TorqueSide
+from joulepath.models.robot import TorqueSide
 
 # one number for all joints, or one per joint from base to tip
 PerJoint = float | tuple[float, ...]
@@ -33,7 +33,8 @@ class InvalidArm(ValueError):
 
 @dataclass(frozen=True)
 class Drives:
-    """Joint-side figures of motors and gears; what is None follows from the torque limits (`models.own_arm.rules`).
+    """Joint-side figures of motors and gears; what is None follows from the torque limits
+    (`joulepath.models.own_arm.rules`).
 
     `rotor_inertia` [kg·m²], `coulomb` [N·m] and `viscous` [N·m·s/rad] friction, `copper` [W/(N·m)²]: copper loss over
     the square of the motor torque.

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from models.own_arm import rules
-from models.own_arm.description import Description, InvalidArm
-from models.own_arm.figure import assumed, either, per_joint
-from models.own_arm.rules import NOTES
-from models.robot import Array
+from joulepath.models.own_arm import rules
+from joulepath.models.own_arm.description import Description, InvalidArm
+from joulepath.models.own_arm.figure import assumed, either, per_joint
+from joulepath.models.own_arm.rules import NOTES
+from joulepath.models.robot import Array
 
 _PLAIN = "Behind the gear."
 

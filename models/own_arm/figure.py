@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from models.own_arm.description import Description, InvalidArm, PerJoint
-from models.robot import Array
+from joulepath.models.own_arm.description import Description, InvalidArm, PerJoint
+from joulepath.models.robot import Array
 
 # no limit, inertia or friction of an arm is beyond these, in SI units
 LEAST, MOST = 1e-6, 1e6

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from models.from_figures import NO_LINKS
-from models.own_arm import rules
-from models.own_arm.collision_figures import collision_figures
-from models.own_arm.description import Description, InvalidArm
-from models.own_arm.energy_figures import drives, electronics, friction
-from models.own_arm.figure import assumed, either, per_joint, stated
-from models.own_arm.upright import UprightChain
-from models.own_arm.urdf_chain import Chain, chain_of
-from models.uploads.limits import Checkpoint, unwatched
-from models.urdf import BASE, FLANGE
+from joulepath.models.from_figures import NO_LINKS
+from joulepath.models.own_arm import rules
+from joulepath.models.own_arm.collision_figures import collision_figures
+from joulepath.models.own_arm.description import Description, InvalidArm
+from joulepath.models.own_arm.energy_figures import drives, electronics, friction
+from joulepath.models.own_arm.figure import assumed, either, per_joint, stated
+from joulepath.models.own_arm.upright import UprightChain
+from joulepath.models.own_arm.urdf_chain import Chain, chain_of
+from joulepath.models.uploads.limits import Checkpoint, unwatched
+from joulepath.models.urdf import BASE, FLANGE
 
 # kg and kg·m², m, rad: beyond these, a description is in other units
 HEAVIEST, LONGEST, FARTHEST_TURN = 1e4, 50.0, 100.0

@@ -14,15 +14,15 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pinocchio as pin
 
-from models.own_arm.capsule_around import capsule_around
-from models.own_arm.description import WIDEST, CapsuleRow, Description, InvalidArm
-from models.own_arm.mesh_files import corners
-from models.own_arm.robot_xml import numbers
-from models.own_arm.upright import UprightChain
-from models.own_arm.urdf_chain import ORIGIN, Chain
-from models.robot import Array
-from models.shape_sizes import WrongSize, check_lengths, check_scale, check_surface
-from models.uploads.limits import LIMITS, Checkpoint
+from joulepath.models.own_arm.capsule_around import capsule_around
+from joulepath.models.own_arm.description import WIDEST, CapsuleRow, Description, InvalidArm
+from joulepath.models.own_arm.mesh_files import corners
+from joulepath.models.own_arm.robot_xml import numbers
+from joulepath.models.own_arm.upright import UprightChain
+from joulepath.models.own_arm.urdf_chain import ORIGIN, Chain
+from joulepath.models.robot import Array
+from joulepath.models.shape_sizes import WrongSize, check_lengths, check_scale, check_surface
+from joulepath.models.uploads.limits import LIMITS, Checkpoint
 
 # largest mesh of a link, and farthest place of a shape from its joint [m]: files in millimetres need a scale
 LARGEST, FARTHEST = 5.0, 50.0

@@ -8,11 +8,11 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from models.own_arm.link_shapes import Rows
-from models.own_arm.upright import UprightChain, turn_onto
-from models.own_arm.urdf_chain import Chain
-from models.robot import Array
-from models.uploads.limits import Checkpoint
+from joulepath.models.own_arm.link_shapes import Rows
+from joulepath.models.own_arm.upright import UprightChain, turn_onto
+from joulepath.models.own_arm.urdf_chain import Chain
+from joulepath.models.robot import Array
+from joulepath.models.uploads.limits import Checkpoint
 
 # random configurations over which pairs are looked at, and the share of them from which on two links cannot be apart.
 # Joints have the ranges that links leave them: a pair that meets this often with a guessed capsule says that it is too

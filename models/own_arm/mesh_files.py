@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from models.own_arm.description import LONGEST_NAME, InvalidArm
-from models.robot import Array
-from models.uploads.limits import LIMITS, Checkpoint, UnreadableFile, unwatched
-from models.uploads.mesh import read_mesh
-from models.uploads.mesh_text import MeshSize
-from models.uploads.xml_tree import xml_tree
+from joulepath.models.own_arm.description import LONGEST_NAME, InvalidArm
+from joulepath.models.robot import Array
+from joulepath.models.uploads.limits import LIMITS, Checkpoint, UnreadableFile, unwatched
+from joulepath.models.uploads.mesh import read_mesh
+from joulepath.models.uploads.mesh_text import MeshSize
+from joulepath.models.uploads.xml_tree import xml_tree
 
 # kinds that are read; of others, as of DAE, a link has its capsule from joint to joint
 KINDS = ("stl", "obj")

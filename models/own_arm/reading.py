@@ -10,8 +10,8 @@ from typing import Any
 import yaml
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from models.own_arm.description import Collision, Description, Drives, Electronics, InvalidArm, Motion
-from models.own_arm.mesh_files import in_folder, in_zip
+from joulepath.models.own_arm.description import Collision, Description, Drives, Electronics, InvalidArm, Motion
+from joulepath.models.own_arm.mesh_files import in_folder, in_zip
 
 # no conversion of types, no unknown fields
 for _part in (Collision, Description, Drives, Electronics, Motion):

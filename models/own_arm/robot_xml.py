@@ -6,10 +6,10 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from models.own_arm.description import InvalidArm
-from models.robot import Array
-from models.uploads.limits import Checkpoint, UnreadableFile
-from models.uploads.xml_tree import xml_tree
+from joulepath.models.own_arm.description import InvalidArm
+from joulepath.models.robot import Array
+from joulepath.models.uploads.limits import Checkpoint, UnreadableFile
+from joulepath.models.uploads.xml_tree import xml_tree
 
 
 def robot_element(text: str, field: str, checkpoint: Checkpoint) -> Element:

@@ -10,10 +10,10 @@ from typing import Any
 
 from cachetools import LRUCache, cached
 
-from models.from_figures import robot_of
-from models.own_arm.figures import own_figures
-from models.own_arm.reading import read_description
-from models.robot import MOST_ROBOTS, Robot
+from joulepath.models.from_figures import robot_of
+from joulepath.models.own_arm.figures import own_figures
+from joulepath.models.own_arm.reading import read_description
+from joulepath.models.robot import MOST_ROBOTS, Robot
 
 
 def _content(name: str, figures: dict[str, Any]) -> tuple[str, bytes]:

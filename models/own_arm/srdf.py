@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from models.own_arm.robot_xml import robot_element
-from models.uploads.limits import Checkpoint
+from joulepath.models.own_arm.robot_xml import robot_element
+from joulepath.models.uploads.limits import Checkpoint
 
 
 def disabled_pairs(text: str, checkpoint: Checkpoint) -> list[tuple[str, str]]:

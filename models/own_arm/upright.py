@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from models.own_arm.urdf_chain import Chain
-from models.robot import Array
+from joulepath.models.own_arm.urdf_chain import Chain
+from joulepath.models.robot import Array
 
 
 @dataclass(frozen=True)

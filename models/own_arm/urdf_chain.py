@@ -13,10 +13,10 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pinocchio as pin
 
-from models.own_arm.description import LONGEST_NAME, Description, InvalidArm
-from models.own_arm.robot_xml import number, numbers, robot_element
-from models.robot import Array
-from models.uploads.limits import Checkpoint, unwatched
+from joulepath.models.own_arm.description import LONGEST_NAME, Description, InvalidArm
+from joulepath.models.own_arm.robot_xml import number, numbers, robot_element
+from joulepath.models.robot import Array
+from joulepath.models.uploads.limits import Checkpoint, unwatched
 
 MOST_JOINTS, MOST_ELEMENTS = 16, 5_000
 MOST_NAMES = 12

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from models.arrays import read_only
-from models.robot import Array
-from models.uncertainty.parameters import BASE_POWER, DRIVES, FRICTION, LINKS
+from joulepath.models.arrays import read_only
+from joulepath.models.robot import Array
+from joulepath.models.uncertainty.parameters import BASE_POWER, DRIVES, FRICTION, LINKS
 
 TOP = ("covariance", "session_sd", "move_sd")
 # parts of a friction law, of which `load` may be left out, and figures of the other sections, with their least and

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from models.robot import Array, Drives, FrictionLaw
+from joulepath.models.robot import Array, Drives, FrictionLaw
 
 # power of the electronics [W], then those with one value per joint; friction as in FrictionLaw, the rest as in Drives
 BASE_POWER = "base_power"

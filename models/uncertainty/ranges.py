@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from models.robot import Array, Mask, Robot
+from joulepath.models.robot import Array, Mask, Robot
 
 # quantile of the standard normal distribution at 95 %
 P95 = 1.6448536269514722
@@ -23,7 +23,7 @@ ENGINEERING = "E"
 @cache
 def default_ranges() -> dict[str, Any]:
     """The entries of the file, by name."""
-    text = (files("models.uncertainty") / "default_ranges.yaml").read_text(encoding="utf-8")
+    text = (files("joulepath.models.uncertainty") / "default_ranges.yaml").read_text(encoding="utf-8")
     ranges: dict[str, Any] = yaml.safe_load(text)
     return ranges
 

@@ -14,11 +14,11 @@ from functools import cached_property, lru_cache
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from models.robot import Array, Robot
-from models.trust import trust_letters
-from models.uncertainty.document import Covariance, covariance_of
-from models.uncertainty.parameters import BASE_POWER, LINKS, count, index, place, values
-from models.uncertainty.ranges import default_ranges, large_joints, lognormal, range_of
+from joulepath.models.robot import Array, Robot
+from joulepath.models.trust import trust_letters
+from joulepath.models.uncertainty.document import Covariance, covariance_of
+from joulepath.models.uncertainty.parameters import BASE_POWER, LINKS, count, index, place, values
+from joulepath.models.uncertainty.ranges import default_ranges, large_joints, lognormal, range_of
 
 DRAWS = 2048
 SEED = 18

@@ -6,8 +6,8 @@ import json
 import struct
 from typing import Any
 
-from models.uploads.limits import LIMITS, UnreadableFile
-from models.uploads.mesh_text import MeshSize
+from joulepath.models.uploads.limits import LIMITS, UnreadableFile
+from joulepath.models.uploads.mesh_text import MeshSize
 
 _MAGIC, _JSON = b"glTF", 0x4E4F534A
 _TRIANGLES = 4

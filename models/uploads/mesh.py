@@ -8,9 +8,9 @@ from io import BytesIO
 import numpy as np
 import numpy.typing as npt
 
-from models.robot import Array
-from models.uploads.limits import Checkpoint, UnreadableFile, unwatched
-from models.uploads.mesh_text import MeshSize, plain_obj, plain_stl
+from joulepath.models.robot import Array
+from joulepath.models.uploads.limits import Checkpoint, UnreadableFile, unwatched
+from joulepath.models.uploads.mesh_text import MeshSize, plain_obj, plain_stl
 
 _STL_HEAD, _STL_TRIANGLE = 84, 50  # bytes
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from io import BytesIO
 from itertools import pairwise
 
-from models.uploads.limits import LIMITS, Checkpoint, UnreadableFile
+from joulepath.models.uploads.limits import LIMITS, Checkpoint, UnreadableFile
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
-from models.uploads.limits import LIMITS, Checkpoint, UnreadableFile, unwatched
+from joulepath.models.uploads.limits import LIMITS, Checkpoint, UnreadableFile, unwatched
 
 
 def xml_tree(text: str, checkpoint: Checkpoint = unwatched) -> Element:

@@ -25,13 +25,13 @@ from itertools import product
 import numpy as np
 from cachetools import LRUCache, cached
 
-from models.robot import Array
-from optimizer.bounds.inertia_spectrum import InertiaSpectrum
-from optimizer.kinematics.forward import joint_placements, link_frames
-from optimizer.kinematics.rigid_body_model import rigid_body_model
-from optimizer.kinematics.vectors import cross
-from optimizer.native.shared_library import address, shared_library
-from optimizer.problem.arm import Arm
+from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.inertia_spectrum import InertiaSpectrum
+from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
+from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.kinematics.vectors import cross
+from joulepath.optimizer.native.shared_library import address, shared_library
+from joulepath.optimizer.problem.arm import Arm
 
 # chains of which the inertia's terms, and bounds of several orders, are kept
 _MOST_KEPT, _BOUNDS_KEPT = 8, 32

@@ -74,12 +74,12 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array, Limits
-from optimizer.bounds.friction_conjugate import FrictionConjugate
-from optimizer.bounds.least_potential import LeastPotential
-from optimizer.bounds.path_terms import PathTerms
-from optimizer.bounds.speed_conjugate import SpeedConjugate
-from optimizer.bounds.weights import Weights
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.bounds.friction_conjugate import FrictionConjugate
+from joulepath.optimizer.bounds.least_potential import LeastPotential
+from joulepath.optimizer.bounds.path_terms import PathTerms
+from joulepath.optimizer.bounds.speed_conjugate import SpeedConjugate
+from joulepath.optimizer.bounds.weights import Weights
 
 # what a denominator is at least
 _TINY = 1e-300

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array, FrictionLaw
+from joulepath.models.robot import Array, FrictionLaw
 
 # ends of the intervals of speed: in knees of Coulomb friction, and as shares of the greatest speed
 _IN_KNEES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)

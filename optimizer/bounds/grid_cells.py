@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.native.shared_library import address, shared_library
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.native.shared_library import address, shared_library
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.bounds.chain_derivatives import ChainDerivatives
-from optimizer.bounds.path_curvature import STEP
-from optimizer.native.shared_library import address, shared_library
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
+from joulepath.optimizer.bounds.path_curvature import STEP
+from joulepath.optimizer.native.shared_library import address, shared_library
 
 
 @dataclass(frozen=True)

@@ -50,10 +50,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from models.robot import Array, Mask
-from optimizer.bounds.chain_derivatives import ChainDerivatives
-from optimizer.bounds.straight_line import Line
-from optimizer.problem.arm import Arm
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
+from joulepath.optimizer.bounds.straight_line import Line
+from joulepath.optimizer.problem.arm import Arm
 
 # τ of the proof, and the share of the convexity that Coulomb friction's rise may take
 TAU, RISE = 0.5, 0.35

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import fftn
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 # samples of a joint
 _SAMPLES = 5

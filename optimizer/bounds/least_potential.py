@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from models.robot import Array
-from optimizer.bounds.path_terms import PathTerms
-from optimizer.bounds.weights import Weights
-from optimizer.native.shared_library import address, shared_library
+from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.path_terms import PathTerms
+from joulepath.optimizer.bounds.weights import Weights
+from joulepath.optimizer.native.shared_library import address, shared_library
 
 # τ of the proof: what the others' share of a momentum's change is weighted with
 _TAU = 1.0

@@ -7,9 +7,9 @@ from math import prod
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.bounds.chain_derivatives import ChainDerivatives
-from optimizer.bounds.grid_cells import Curvature
+from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
+from joulepath.optimizer.bounds.grid_cells import Curvature
 
 STEP = 1e-5
 """Step of the difference along the multipliers, relative to them."""

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.bounds.chain_derivatives import ChainDerivatives
-from optimizer.bounds.grid_cells import Curvature, GridCells, Spacing
-from optimizer.bounds.grid_points import GridPoints
-from optimizer.bounds.path_curvature import PathCurvature
-from optimizer.bounds.reference import Reference
+from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
+from joulepath.optimizer.bounds.grid_cells import Curvature, GridCells, Spacing
+from joulepath.optimizer.bounds.grid_points import GridPoints
+from joulepath.optimizer.bounds.path_curvature import PathCurvature
+from joulepath.optimizer.bounds.reference import Reference
 
 
 @dataclass(frozen=True)

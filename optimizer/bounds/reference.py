@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array, Limits
+from joulepath.models.robot import Array, Limits
 
 # what a half side of the region is at least [rad], so that no joint's is empty
 _LEAST_HALF = 1e-6

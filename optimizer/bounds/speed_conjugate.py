@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from models.robot import Array, Limits
-from optimizer.bounds.friction_conjugate import FrictionConjugate
-from optimizer.bounds.path_terms import PathTerms
-from optimizer.bounds.time_parts import TimeParts
-from optimizer.bounds.weights import Weights
-from optimizer.native.shared_library import address, shared_library
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.bounds.friction_conjugate import FrictionConjugate
+from joulepath.optimizer.bounds.path_terms import PathTerms
+from joulepath.optimizer.bounds.time_parts import TimeParts
+from joulepath.optimizer.bounds.weights import Weights
+from joulepath.optimizer.native.shared_library import address, shared_library
 
 # halvings of the interval that holds the multiplier of a joint's displacement
 _BISECTIONS = 9

@@ -11,8 +11,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from models.robot import Array
-from optimizer.bounds.chain_derivatives import ChainDerivatives
+from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
 
 # steps of a line
 NODES = 16

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array, Limits
-from optimizer.bounds.reference import greatest_speed
-from optimizer.collision.bodies import Indices
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.bounds.reference import greatest_speed
+from joulepath.optimizer.collision.bodies import Indices
 
 # a part is no longer than this [s] while speed is short of time to build up, nor are there more of them in a step
 _SHORT, _MOST = 0.015, 24

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 
 @dataclass(frozen=True)

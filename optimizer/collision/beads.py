@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.collision.bodies import Indices
-from optimizer.collision.many_points import into, picked, placed, pose_columns
-from optimizer.collision.pair_arrays import PairArrays
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.bodies import Indices
+from joulepath.optimizer.collision.many_points import into, picked, placed, pose_columns
+from joulepath.optimizer.collision.pair_arrays import PairArrays
 
 
 class Beads:

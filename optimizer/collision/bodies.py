@@ -7,14 +7,14 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array, Robot
-from optimizer.collision.clouds import Cloud, cloud_of
-from optimizer.collision.cores import Core, core_of
-from optimizer.collision.cores import Indices as Indices
-from optimizer.problem.arm import PAYLOAD, TOOL, Arm
-from optimizer.problem.clouds import Cloud as CloudShape
-from optimizer.problem.clouds import Points
-from optimizer.problem.scene import Attachment, Obstacle
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.collision.clouds import Cloud, cloud_of
+from joulepath.optimizer.collision.cores import Core, core_of
+from joulepath.optimizer.collision.cores import Indices as Indices
+from joulepath.optimizer.problem.arm import PAYLOAD, TOOL, Arm
+from joulepath.optimizer.problem.clouds import Cloud as CloudShape
+from joulepath.optimizer.problem.clouds import Points
+from joulepath.optimizer.problem.scene import Attachment, Obstacle
 
 
 @dataclass(frozen=True, eq=False)

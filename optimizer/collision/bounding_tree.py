@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.collision.cores import Indices
-from optimizer.deadline import checkpoint
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.cores import Indices
+from joulepath.optimizer.deadline import checkpoint
 
 # parts of a leaf at most, and queries that are searched at once: they bound the memory
 LEAF, AT_ONCE = 16, 1024

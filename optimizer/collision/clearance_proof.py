@@ -35,12 +35,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.collision.bodies import Indices
-from optimizer.collision.model import CollisionModel
-from optimizer.collision.pair_distance import WitnessPoints
-from optimizer.solution import Clearance
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.collision.bodies import Indices
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.collision.pair_distance import WitnessPoints
+from joulepath.optimizer.solution import Clearance
+from joulepath.optimizer.trajectories.spline import Spline
 
 # an interval is done if its bound is this near to the least sampled distance: absolutely [m], or relative to it
 GAP, RELATIVE_GAP = 1e-4, 0.01

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.collision.many_points import cross
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.many_points import cross
 
 # two cores nearer than this [m] touch: the direction from one to the other is only rounding
 TOUCHING = 1e-10

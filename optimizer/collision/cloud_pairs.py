@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.collision.bodies import Body, Indices
-from optimizer.collision.clouds import Cloud, ConvexAgainstCloud, Witness
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.bodies import Body, Indices
+from joulepath.optimizer.collision.clouds import Cloud, ConvexAgainstCloud, Witness
 
 
 @dataclass(frozen=True)

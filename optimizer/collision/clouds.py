@@ -13,13 +13,13 @@ from typing import overload
 import numpy as np
 from cachetools import LRUCache, cached
 
-from models.robot import Array
-from optimizer.collision.bounding_tree import ROUNDING, BoundingTree, point_segment
-from optimizer.collision.closed_form_distance import box_segment, segment_segment, triangle_segment
-from optimizer.collision.coal_distance import ConvexPairs
-from optimizer.collision.cores import Core, Indices, box_corners, least_height
-from optimizer.problem.clouds import Cloud as Shape
-from optimizer.problem.clouds import Points, TriangleMesh, Voxels, parts_of
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.bounding_tree import ROUNDING, BoundingTree, point_segment
+from joulepath.optimizer.collision.closed_form_distance import box_segment, segment_segment, triangle_segment
+from joulepath.optimizer.collision.coal_distance import ConvexPairs
+from joulepath.optimizer.collision.cores import Core, Indices, box_corners, least_height
+from joulepath.optimizer.problem.clouds import Cloud as Shape
+from joulepath.optimizer.problem.clouds import Points, TriangleMesh, Voxels, parts_of
 
 # trees that are kept for the next request with the same obstacle: of so many parts in all [1]. A part takes up to 200
 # bytes

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import ConvexHull
 
-from models.robot import Array
-from optimizer.collision.cores import Core
-from optimizer.deadline import checkpoint
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.cores import Core
+from joulepath.optimizer.deadline import checkpoint
 
 # tolerances of the distance [m], tried in turn. Coal's default of 1e-6 is too coarse for the line search of the
 # optimiser; deep inside a round body, EPA may not converge to the finest, and the next is tried

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.collision.bodies import Indices
-from optimizer.collision.pair_arrays import PairArrays
-from optimizer.native.shared_library import address
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.bodies import Indices
+from joulepath.optimizer.collision.pair_arrays import PairArrays
+from joulepath.optimizer.native.shared_library import address
 
 # in the order of the C
 _SIZES = ("frames", "bodies", "most_points")

@@ -13,9 +13,9 @@ from typing import assert_never
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from models.robot import Array
-from optimizer.problem.clouds import Points, TriangleMesh, Voxels
-from optimizer.problem.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Shape, Sphere
+from joulepath.models.robot import Array
+from joulepath.optimizer.problem.clouds import Points, TriangleMesh, Voxels
+from joulepath.optimizer.problem.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Shape, Sphere
 
 Indices = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 

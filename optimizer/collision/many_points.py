@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.collision.cores import Indices
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.cores import Indices
 
 
 def pose_columns(T: Array) -> Array:

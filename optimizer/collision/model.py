@@ -12,12 +12,12 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from models.robot import MOST_ROBOTS, Array, Mask, Robot
-from optimizer.collision.bodies import Body, Indices, bodies_of
-from optimizer.collision.pair_distance import PairGeometry, WitnessPoints
-from optimizer.kinematics.forward import joint_placements, link_frames
-from optimizer.native.shared_library import shared_library
-from optimizer.problem.arm import Arm
+from joulepath.models.robot import MOST_ROBOTS, Array, Mask, Robot
+from joulepath.optimizer.collision.bodies import Body, Indices, bodies_of
+from joulepath.optimizer.collision.pair_distance import PairGeometry, WitnessPoints
+from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
+from joulepath.optimizer.native.shared_library import shared_library
+from joulepath.optimizer.problem.arm import Arm
 
 # along a motion, the distances at every so many samples are computed first
 STRIDE = 6

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.collision.beads import Beads
-from optimizer.collision.bodies import Indices
-from optimizer.collision.closed_form_distance import box_segment, segment_segment
-from optimizer.collision.many_points import cross, into, picked, placed, pose_columns, turned
-from optimizer.collision.pair_arrays import PairArrays, PairKind
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.beads import Beads
+from joulepath.optimizer.collision.bodies import Indices
+from joulepath.optimizer.collision.closed_form_distance import box_segment, segment_segment
+from joulepath.optimizer.collision.many_points import cross, into, picked, placed, pose_columns, turned
+from joulepath.optimizer.collision.pair_arrays import PairArrays, PairKind
 
 
 class NumpyDistances:

@@ -8,8 +8,8 @@ from enum import IntEnum
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.collision.bodies import Body, Indices
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.collision.bodies import Body, Indices
 
 # beads that cover a body
 BEADS = 4

@@ -14,13 +14,13 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.collision.bodies import Body, Indices
-from optimizer.collision.cloud_pairs import CloudPairs
-from optimizer.collision.coal_distance import ConvexPairs
-from optimizer.collision.compiled_distances import CompiledDistances
-from optimizer.collision.numpy_distances import NumpyDistances
-from optimizer.collision.pair_arrays import PairArrays, PairKind
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.bodies import Body, Indices
+from joulepath.optimizer.collision.cloud_pairs import CloudPairs
+from joulepath.optimizer.collision.coal_distance import ConvexPairs
+from joulepath.optimizer.collision.compiled_distances import CompiledDistances
+from joulepath.optimizer.collision.numpy_distances import NumpyDistances
+from joulepath.optimizer.collision.pair_arrays import PairArrays, PairKind
 
 
 @dataclass(frozen=True)

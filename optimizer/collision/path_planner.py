@@ -16,13 +16,13 @@ from itertools import pairwise
 import numpy as np
 from ompl import util as ou
 
-from models.robot import Array, Limits
-from optimizer.collision.model import CollisionModel, collision_model
-from optimizer.collision.path_search import RANGE, Box, PathSearch, joint_weights
-from optimizer.collision.state_validity import ValidityCheckers
-from optimizer.deadline import Deadline
-from optimizer.problem.arm import Arm
-from optimizer.trajectories import quintic
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.collision.model import CollisionModel, collision_model
+from joulepath.optimizer.collision.path_search import RANGE, Box, PathSearch, joint_weights
+from joulepath.optimizer.collision.state_validity import ValidityCheckers
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.trajectories import quintic
 
 # clearance [m] of a path beyond the margins: the first that the start and a goal have, too
 RESERVES = (5e-3, 5e-4, 0.0)

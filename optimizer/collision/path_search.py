@@ -14,11 +14,11 @@ import numpy as np
 from ompl import base as ob
 from ompl import geometric as og
 
-from models.robot import Array
-from optimizer.collision.model import CollisionModel
-from optimizer.collision.state_validity import StateValidityChecker
-from optimizer.deadline import Deadline
-from optimizer.problem.arm import Arm
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.collision.state_validity import StateValidityChecker
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.problem.arm import Arm
 
 # OMPL's range: maximum length [rad] of an edge of the trees, in weighted joints
 RANGE = 0.4

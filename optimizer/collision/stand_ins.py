@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.robot import Array
-from models.shape_sizes import SIZES
-from optimizer.collision.model import CollisionModel
-from optimizer.problem.arm import Arm
-from optimizer.problem.scene import Attachment, Scene, Sphere, capsule_between
-from optimizer.solution import Clearance
+from joulepath.models.robot import Array
+from joulepath.models.shape_sizes import SIZES
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.scene import Attachment, Scene, Sphere, capsule_between
+from joulepath.optimizer.solution import Clearance
 
 
 @dataclass(frozen=True)

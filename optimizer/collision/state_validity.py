@@ -13,12 +13,12 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
-from optimizer.collision.bodies import Body
-from optimizer.collision.coal_distance import SKIN, coal_shape
-from optimizer.collision.model import CollisionModel
-from optimizer.kinematics.tcp import T_last_tcp
-from optimizer.problem.arm import Arm
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.bodies import Body
+from joulepath.optimizer.collision.coal_distance import SKIN, coal_shape
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.kinematics.tcp import T_last_tcp
+from joulepath.optimizer.problem.arm import Arm
 
 
 class StateValidityChecker:

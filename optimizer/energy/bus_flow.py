@@ -32,8 +32,8 @@ from itertools import accumulate
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.problem.bus import Bus
+from joulepath.models.robot import Array
+from joulepath.optimizer.problem.bus import Bus
 
 
 @dataclass(frozen=True)

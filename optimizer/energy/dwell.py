@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.energy.losses import power_flow
-from optimizer.problem.arm import Arm
-from optimizer.problem.cycle import Cycle
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.losses import power_flow
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.cycle import Cycle
 
 
 @dataclass(frozen=True)

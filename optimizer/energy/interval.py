@@ -1,7 +1,7 @@
 """How well a motion's energy is known, from the errors that the figures of the arm may have.
 
 The variance has three parts: that of the figures, by the gradient of the energy; what the model cannot express of a
-motion, a mean power times its duration; and the friction of another day. See `models.uncertainty.spread`.
+motion, a mean power times its duration; and the friction of another day. See `joulepath.models.uncertainty.spread`.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.robot import Array
-from models.uncertainty.parameters import BASE_POWER
-from models.uncertainty.spread import Spread, spread_of
-from optimizer.problem.arm import INVERTER_PARTS, Arm
-from optimizer.solution import Energy, EnergyInterval, SavingInterval, Sensitivity
+from joulepath.models.robot import Array
+from joulepath.models.uncertainty.parameters import BASE_POWER
+from joulepath.models.uncertainty.spread import Spread, spread_of
+from joulepath.optimizer.problem.arm import INVERTER_PARTS, Arm
+from joulepath.optimizer.solution import Energy, EnergyInterval, SavingInterval, Sensitivity
 
 MOVE = "move"
 

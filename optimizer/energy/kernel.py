@@ -5,7 +5,7 @@ request may change (payload, gravity, drives, friction, objective) is a paramete
 system's C compiler and stored on disk: see `kernel_cache`. Until the compiled library exists, or if there is no
 compiler, CasADi's virtual machine evaluates the same expressions.
 
-`python -m optimizer.energy.precompile` compiles the kernels of all robots, or of those named.
+`python -m joulepath.optimizer.energy.precompile` compiles the kernels of all robots, or of those named.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from models.robot import MOST_ROBOTS, Array, Robot
-from optimizer.deadline import checkpoint
-from optimizer.energy.kernel_cache import compile_kernel, library_paths
-from optimizer.energy.kernel_expressions import build
-from optimizer.energy.kernel_functions import Compiled, Evaluation, Functions, Interpreted
-from optimizer.native.library_cache import compiler, is_intact, mark_used, seal_path
+from joulepath.models.robot import MOST_ROBOTS, Array, Robot
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.energy.kernel_cache import compile_kernel, library_paths
+from joulepath.optimizer.energy.kernel_expressions import build
+from joulepath.optimizer.energy.kernel_functions import Compiled, Evaluation, Functions, Interpreted
+from joulepath.optimizer.native.library_cache import compiler, is_intact, mark_used, seal_path
 
 log = logging.getLogger(__name__)
 

@@ -9,19 +9,19 @@ from pathlib import Path
 
 import numpy as np
 
-import models.robot
-from models.robot import Robot
-from optimizer.energy import inverse_dynamics, kernel_expressions, kernel_source, losses
-from optimizer.energy.kernel_expressions import SYMBOLICS, build
-from optimizer.energy.kernel_source import PORTABLE, Vectors, source, vectors
-from optimizer.native import library_cache
-from optimizer.native.library_cache import PATIENCE, Patience, cache_directory, compile_library
+import joulepath.models.robot
+from joulepath.models.robot import Robot
+from joulepath.optimizer.energy import inverse_dynamics, kernel_expressions, kernel_source, losses
+from joulepath.optimizer.energy.kernel_expressions import SYMBOLICS, build
+from joulepath.optimizer.energy.kernel_source import PORTABLE, Vectors, source, vectors
+from joulepath.optimizer.native import library_cache
+from joulepath.optimizer.native.library_cache import PATIENCE, Patience, cache_directory, compile_library
 
 # at -O1 it takes twice as long to compile, and runs a tenth faster: the code is one long run of multiplications. All
 # processors round alike without contraction
 COMPILER_FLAGS = ("-Og", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off", "-Wno-psabi")
 # modules whose code decides what is compiled
-SOURCES = (models.robot, inverse_dynamics, losses, kernel_expressions, kernel_source)
+SOURCES = (joulepath.models.robot, inverse_dynamics, losses, kernel_expressions, kernel_source)
 
 
 def digest(robot: Robot, using: Vectors) -> str:

@@ -9,9 +9,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from models.robot import Array, Drives, FrictionLaw, Robot
-from optimizer.energy.inverse_dynamics import SymbolicPayload, inverse_dynamics
-from optimizer.energy.losses import drawn_power, flow_with, friction_torque, smooth_abs
+from joulepath.models.robot import Array, Drives, FrictionLaw, Robot
+from joulepath.optimizer.energy.inverse_dynamics import SymbolicPayload, inverse_dynamics
+from joulepath.optimizer.energy.losses import drawn_power, flow_with, friction_torque, smooth_abs
 
 # Held while expressions are built, turned into functions, mapped or freed. CasADi works on them without Python's global
 # lock, all expressions share constants and caches, and only some of its builds guard these against other threads.

@@ -13,8 +13,8 @@ from typing import Protocol
 import casadi as ca
 import numpy as np
 
-from models.robot import Array
-from optimizer.energy.kernel_expressions import SYMBOLICS, sizes
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.kernel_expressions import SYMBOLICS, sizes
 
 
 class Evaluation:

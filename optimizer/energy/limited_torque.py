@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.energy.losses import friction_torque
-from optimizer.problem.arm import Arm
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.losses import friction_torque
+from joulepath.optimizer.problem.arm import Arm
 
 
 def limited_parts(arm: Arm, tau: Array, v: Array, a: Array, lost: Array | None = None) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 BODY = 10
 """Parameters of a body."""

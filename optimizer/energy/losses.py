@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from models.robot import Array, Drives, FrictionLaw
-from optimizer.energy.bus_flow import exchange
-from optimizer.problem.arm import Arm
-from optimizer.solution import ElectricalEnergy, Energy, JointEnergy, MechanicalEnergy, StorageUse
+from joulepath.models.robot import Array, Drives, FrictionLaw
+from joulepath.optimizer.energy.bus_flow import exchange
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.solution import ElectricalEnergy, Energy, JointEnergy, MechanicalEnergy, StorageUse
 
 ENERGY_FLOOR = 1e-6  # J; errors of energies below it are relative to it
 

@@ -10,18 +10,18 @@ from typing import Generic, TypeVar
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array, FrictionLaw
-from optimizer.energy.bus_flow import charges, drawn_at
-from optimizer.energy.interval import arm_spread
-from optimizer.energy.kernel import Kernel, kernel_for
-from optimizer.energy.kernel_expressions import Parameters
-from optimizer.energy.limited_torque import limited_torque
-from optimizer.energy.losses import breakdown, flow_with, friction_torque, power_flow
-from optimizer.energy.sensitivity import energy_sensitivity
-from optimizer.kinematics.rigid_body_model import rigid_body_model
-from optimizer.problem.arm import Arm
-from optimizer.solution import Energy, Sensitivity, Trajectory
-from optimizer.trajectories.spline import Spline, fine_samples, sample
+from joulepath.models.robot import Array, FrictionLaw
+from joulepath.optimizer.energy.bus_flow import charges, drawn_at
+from joulepath.optimizer.energy.interval import arm_spread
+from joulepath.optimizer.energy.kernel import Kernel, kernel_for
+from joulepath.optimizer.energy.kernel_expressions import Parameters
+from joulepath.optimizer.energy.limited_torque import limited_torque
+from joulepath.optimizer.energy.losses import breakdown, flow_with, friction_torque, power_flow
+from joulepath.optimizer.energy.sensitivity import energy_sensitivity
+from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.solution import Energy, Sensitivity, Trajectory
+from joulepath.optimizer.trajectories.spline import Spline, fine_samples, sample
 
 Found = TypeVar("Found")
 # quadrature weights (k,) [s], and q, v, a, torques and friction's torques (k, nq) of a motion

@@ -1,4 +1,5 @@
-"""`python -m optimizer.energy.precompile [--portable] [ROBOT …]` compiles the kernels of robots, and the library that
+"""`python -m joulepath.optimizer.energy.precompile [--portable] [ROBOT …]` compiles the kernels of robots, and the
+library that
 all arms share, so that no request is interpreted.
 
 Without a name it compiles those of all robots. With `--portable` they serve on every processor of this kind, as in an
@@ -9,9 +10,9 @@ from __future__ import annotations
 
 import sys
 
-from models.registry import load_robot, robot_names
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.native.shared_library import compile_shared
+from joulepath.models.registry import load_robot, robot_names
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.native.shared_library import compile_shared
 
 if __name__ == "__main__":
     portable = "--portable" in sys.argv

@@ -20,15 +20,15 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import ndtr
 
-from models.robot import Array
-from models.uncertainty.parameters import PER_JOINT, count
-from models.uncertainty.spread import Spread
-from optimizer.energy.bus_flow import exchange
-from optimizer.energy.link_regressor import BODY, rigid_regressor
-from optimizer.energy.losses import friction_torque
-from optimizer.problem.arm import Arm
-from optimizer.problem.cycle import Cycle
-from optimizer.solution import Sensitivity
+from joulepath.models.robot import Array
+from joulepath.models.uncertainty.parameters import PER_JOINT, count
+from joulepath.models.uncertainty.spread import Spread
+from joulepath.optimizer.energy.bus_flow import exchange
+from joulepath.optimizer.energy.link_regressor import BODY, rigid_regressor
+from joulepath.optimizer.energy.losses import friction_torque
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.solution import Sensitivity
 
 # of a surplus that is stored, the storage takes all but rounding
 _STORED = 1e-9

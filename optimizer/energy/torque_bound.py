@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline
 
-from models.robot import Array, Mask
-from optimizer.energy.limited_torque import limited_parts
-from optimizer.energy.losses import friction_torque
-from optimizer.problem.arm import Arm
-from optimizer.trajectories.quadrature import Indices
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.energy.limited_torque import limited_parts
+from joulepath.optimizer.energy.losses import friction_torque
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.trajectories.quadrature import Indices
 
 Torques = Callable[[Array, Array, Array], Array]
 """Torques (k, nq) [N·m] of rigid bodies and rotors at q [rad], v [rad/s], a [rad/s²], shapes (k, nq)."""

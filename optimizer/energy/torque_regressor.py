@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import pinocchio as pin
 
-from optimizer.energy.inverse_dynamics import Body, body_torques
+from joulepath.optimizer.energy.inverse_dynamics import Body, body_torques
 
 
 def torque_regressor(model: pin.Model, q: ca.SX, v: ca.SX, a: ca.SX, gravity: ca.SX) -> ca.SX:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from optimizer.exceptions import JoulepathError
+from joulepath.optimizer.exceptions import JoulepathError
 
 
 class ExcitationInfeasible(JoulepathError):

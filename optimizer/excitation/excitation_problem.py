@@ -7,11 +7,11 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.arrays import frozen, per_joint
-from optimizer.replay.sampler import MOST_SAMPLES
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.arrays import frozen, per_joint
+from joulepath.optimizer.replay.sampler import MOST_SAMPLES
 
 Part = Literal["inertials", "rotor", "friction"]
 """Parameters that are to be told apart: base parameters of the links, rotor inertias, friction (Coulomb, viscous,

@@ -12,24 +12,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import OptimizeResult, minimize
 
-from models.robot import Array
-from optimizer.certificate import certify
-from optimizer.collision.model import CollisionModel, collision_model
-from optimizer.deadline import Deadline
-from optimizer.energy.plant import Plant
-from optimizer.exceptions import DeadlineExceeded
-from optimizer.excitation.errors import ExcitationInfeasible
-from optimizer.excitation.excitation_problem import ExcitationProblem
-from optimizer.excitation.fourier import FourierBasis
-from optimizer.excitation.information import Information
-from optimizer.excitation.limits import ClearancePenalty, excess, range_excess, torque_excess
-from optimizer.excitation.torque_columns import TorqueColumns
-from optimizer.linear_algebra import one_thread
-from optimizer.problem.arm import Arm
-from optimizer.problem.problem import Problem
-from optimizer.problem.scene import HalfSpace, Obstacle, Scene
-from optimizer.solution import Certificate, Energy, Trajectory
-from optimizer.trajectories.spline import Spline, retimed
+from joulepath.models.robot import Array
+from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.collision.model import CollisionModel, collision_model
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.exceptions import DeadlineExceeded
+from joulepath.optimizer.excitation.errors import ExcitationInfeasible
+from joulepath.optimizer.excitation.excitation_problem import ExcitationProblem
+from joulepath.optimizer.excitation.fourier import FourierBasis
+from joulepath.optimizer.excitation.information import Information
+from joulepath.optimizer.excitation.limits import ClearancePenalty, excess, range_excess, torque_excess
+from joulepath.optimizer.excitation.torque_columns import TorqueColumns
+from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.scene import HalfSpace, Obstacle, Scene
+from joulepath.optimizer.solution import Certificate, Energy, Trajectory
+from joulepath.optimizer.trajectories.spline import Spline, retimed
 
 MOUNTING_PLANE = "mounting plane"
 # states of the period at which columns are computed; at each of them the limits, too

@@ -13,9 +13,9 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import null_space
 
-from models.robot import Array
-from optimizer.trajectories.bspline import DEGREE, clamped, fit
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.trajectories.bspline import DEGREE, clamped, fit
+from joulepath.optimizer.trajectories.spline import Spline
 
 # knot spans of the spline for every harmonic: it differs from the series by some 1e-9 rad
 _SPANS = 24

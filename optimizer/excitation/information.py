@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.excitation.excitation_problem import Criterion
+from joulepath.models.robot import Array
+from joulepath.optimizer.excitation.excitation_problem import Criterion
 
 # eigenvalue of the scaled information that counts as zero
 _SINGULAR = 1e-12

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.collision.model import CollisionModel
-from optimizer.energy.limited_torque import limited_torque
-from optimizer.problem.arm import Arm
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.energy.limited_torque import limited_torque
+from joulepath.optimizer.problem.arm import Arm
 
 # share of a limit that the penalty begins at: it gives way a little
 _KEPT = 0.97

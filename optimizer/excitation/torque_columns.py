@@ -8,14 +8,14 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
-from optimizer.energy.link_regressor import body_parameters
-from optimizer.energy.torque_regressor import torque_regressor
-from optimizer.excitation.excitation_problem import Part
-from optimizer.identification.arm.base_parameters import base_parameters
-from optimizer.identification.fits.torque_fit import LEAST_LOAD_SPREAD
-from optimizer.kinematics.rigid_body_model import rigid_body_model
-from optimizer.problem.arm import Arm
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.link_regressor import body_parameters
+from joulepath.optimizer.energy.torque_regressor import torque_regressor
+from joulepath.optimizer.excitation.excitation_problem import Part
+from joulepath.optimizer.identification.arm.base_parameters import base_parameters
+from joulepath.optimizer.identification.fits.torque_fit import LEAST_LOAD_SPREAD
+from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.problem.arm import Arm
 
 # speed [rad/s] over which the sign of a speed is smoothed: friction of slower joints tells little
 KNEE = 0.05

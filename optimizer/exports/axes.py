@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.exceptions import FormatUnsuitable
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import FormatUnsuitable
 
 
 @dataclass(frozen=True)

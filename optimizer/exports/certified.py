@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.certificate import certify
-from optimizer.energy.plant import Plant
-from optimizer.exceptions import InvalidProblem, NotCertified, OutsideLimits
-from optimizer.exports.program import Move, Program
-from optimizer.linear_algebra import one_thread
-from optimizer.problem.problem import LONGEST_DURATION, Problem
-from optimizer.solution import Certificate
+from joulepath.models.robot import Array
+from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.exceptions import InvalidProblem, NotCertified, OutsideLimits
+from joulepath.optimizer.exports.program import Move, Program
+from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.problem.problem import LONGEST_DURATION, Problem
+from joulepath.optimizer.solution import Certificate
 
 # largest difference of given samples from the motion: rounding of q [rad], and of v, a, tau relative to their limits
 SAMPLE_TOLERANCE = 1e-6

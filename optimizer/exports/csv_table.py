@@ -6,9 +6,9 @@ from io import StringIO
 
 import numpy as np
 
-from optimizer.exports.facts import ExportedFile
-from optimizer.exports.program import Program
-from optimizer.exports.rows import times
+from joulepath.optimizer.exports.facts import ExportedFile
+from joulepath.optimizer.exports.program import Program
+from joulepath.optimizer.exports.rows import times
 
 
 def to_csv(program: Program, period: float = 0.008) -> ExportedFile:

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline, CubicSpline
 
-from models.robot import Array
-from optimizer.exports.program import Move
+from joulepath.models.robot import Array
+from joulepath.optimizer.exports.program import Move
 
 SHORTEST = 0.02
 """Least time [s] between two points: controllers plan a few dozen points a second."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from optimizer.exceptions import FormatUnsuitable
-from optimizer.exports.program import Program
+from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.exports.program import Program
 
 NOT_RUN = "Not run on hardware: run it in the simulator of the maker, then slowly, with a hand at the stop button."
 _LONGEST_COMMENT = 160

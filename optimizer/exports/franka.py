@@ -13,10 +13,10 @@ from typing import Literal
 
 import numpy as np
 
-from optimizer.exceptions import FormatUnsuitable
-from optimizer.exports.facts import ExportedFile, check_joints, header
-from optimizer.exports.program import Program
-from optimizer.exports.rows import MOST_ROWS, ticks
+from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.exports.facts import ExportedFile, check_joints, header
+from joulepath.optimizer.exports.program import Program
+from joulepath.optimizer.exports.rows import MOST_ROWS, ticks
 
 PERIOD = 1e-3
 """Period [s] of the control interface."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from optimizer.exports.facts import NOT_RUN, ExportedFile
-from optimizer.exports.program import Move, Program, Timed
+from joulepath.optimizer.exports.facts import NOT_RUN, ExportedFile
+from joulepath.optimizer.exports.program import Move, Program, Timed
 
 
 def to_json(program: Program) -> ExportedFile:

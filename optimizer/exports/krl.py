@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from models.robot import Array
-from optimizer.exports.axes import Axes
-from optimizer.exports.even_points import EvenPoints, even_points, smooth, straight
-from optimizer.exports.facts import ExportedFile, check_joints, comment, header, output_note
-from optimizer.exports.program import Move, Program, Timed
-from optimizer.problem.arm import Payload
+from joulepath.models.robot import Array
+from joulepath.optimizer.exports.axes import Axes
+from joulepath.optimizer.exports.even_points import EvenPoints, even_points, smooth, straight
+from joulepath.optimizer.exports.facts import ExportedFile, check_joints, comment, header, output_note
+from joulepath.optimizer.exports.program import Move, Program, Timed
+from joulepath.optimizer.problem.arm import Payload
 
 
 @dataclass(frozen=True)

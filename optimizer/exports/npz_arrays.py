@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from optimizer.exports.facts import ExportedFile
-from optimizer.exports.program import Move, Program
-from optimizer.exports.rows import times
+from joulepath.optimizer.exports.facts import ExportedFile
+from joulepath.optimizer.exports.program import Move, Program
+from joulepath.optimizer.exports.rows import times
 
 
 def to_npz(program: Program, period: float = 0.008) -> ExportedFile:

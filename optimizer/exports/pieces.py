@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.trajectories.spline import Spline
 
 
 def breaks(spline: Spline) -> Array:

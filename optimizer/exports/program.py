@@ -8,11 +8,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from models.robot import Array, Robot
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.arm import Arm, Payload
-from optimizer.sequence.round_solution import RoundSolution
-from optimizer.trajectories.spline import Spline, retimed, sample
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.sequence.round_solution import RoundSolution
+from joulepath.optimizer.trajectories.spline import Spline, retimed, sample
 
 JOIN = 1e-6
 """Largest jump [rad] of a joint from the end of a move to the start of the next."""

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.exceptions import FormatUnsuitable
-from optimizer.exports.pieces import breaks
-from optimizer.exports.program import Move, Program
-from optimizer.trajectories.spline import Spline, sample
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.exports.pieces import breaks
+from joulepath.optimizer.exports.program import Move, Program
+from joulepath.optimizer.trajectories.spline import Spline, sample
 
 POSITION_TOLERANCE, VELOCITY_TOLERANCE = 1e-4, 1e-2
 """Largest deviation from the spline [rad], [rad/s]."""

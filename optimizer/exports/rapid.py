@@ -9,12 +9,12 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-from optimizer.exceptions import FormatUnsuitable
-from optimizer.exports.axes import Axes
-from optimizer.exports.even_points import EvenPoints, even_points, rounded, straight
-from optimizer.exports.facts import ExportedFile, check_joints, comment, header, output_note
-from optimizer.exports.program import Move, Program, Timed
-from optimizer.problem.arm import Payload
+from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.exports.axes import Axes
+from joulepath.optimizer.exports.even_points import EvenPoints, even_points, rounded, straight
+from joulepath.optimizer.exports.facts import ExportedFile, check_joints, comment, header, output_note
+from joulepath.optimizer.exports.program import Move, Program, Timed
+from joulepath.optimizer.problem.arm import Payload
 
 SIGNAL = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 """Names that RAPID has for signals."""

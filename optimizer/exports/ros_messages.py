@@ -12,9 +12,9 @@ from typing import Any, Literal
 
 import yaml
 
-from optimizer.exports.facts import ExportedFile, header
-from optimizer.exports.program import Program
-from optimizer.exports.quintic_points import QuinticPoints, quintic_points
+from joulepath.optimizer.exports.facts import ExportedFile, header
+from joulepath.optimizer.exports.program import Program
+from joulepath.optimizer.exports.quintic_points import QuinticPoints, quintic_points
 
 Encoding = Literal["yaml", "json"]
 GOAL_TOLERANCE, GOAL_TIME = 0.01, 1

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.exceptions import FormatUnsuitable
-from optimizer.exports.program import Program
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.exports.program import Program
 
 MOST_ROWS = 100_000
 """Most rows of a table: some ten megabytes."""

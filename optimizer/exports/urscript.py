@@ -15,14 +15,14 @@ from typing import Literal
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.exceptions import FormatUnsuitable
-from optimizer.exports.facts import ExportedFile, check_joints, comment, header, output_note
-from optimizer.exports.pieces import pieces
-from optimizer.exports.program import Move, Program, Timed
-from optimizer.exports.urscript_parts import CHECKS, serving
-from optimizer.problem.arm import Payload
-from optimizer.trajectories.spline import peak_rates
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.exports.facts import ExportedFile, check_joints, comment, header, output_note
+from joulepath.optimizer.exports.pieces import pieces
+from joulepath.optimizer.exports.program import Move, Program, Timed
+from joulepath.optimizer.exports.urscript_parts import CHECKS, serving
+from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.trajectories.spline import peak_rates
 
 MOST_PIECES = 2_000
 """Most polynomials of a program: about a megabyte."""

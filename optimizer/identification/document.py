@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.identification.fits.whole_fit import LINK_NAMES
-from optimizer.identification.results import IdentifiedFigures
+from joulepath.models.robot import Array
+from joulepath.optimizer.identification.fits.whole_fit import LINK_NAMES
+from joulepath.optimizer.identification.results import IdentifiedFigures
 
 LAW = "identified"
 """Name of the friction law."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from optimizer.exceptions import JoulepathError
+from joulepath.optimizer.exceptions import JoulepathError
 
 
 class NotExcited(JoulepathError):

@@ -7,29 +7,29 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.robot import Array, Mask, Robot
-from models.uncertainty.parameters import LINKS
-from optimizer.energy.link_regressor import BODY, body_parameters
-from optimizer.exceptions import InvalidProblem
-from optimizer.identification.arm.fitted_arm import own_arm
-from optimizer.identification.errors import NoPowerChannel, NotExcited, PayloadUnknown
-from optimizer.identification.estimates.estimate import Estimate, Name
-from optimizer.identification.estimates.grouped import lag_one
-from optimizer.identification.fits.block import own_value, terms_of
-from optimizer.identification.fits.fitting import LINK_MASS_SCALE, Fitted, fit_rows, motor_torque
-from optimizer.identification.fits.payload_fit import Carried, joints_without_gravity, loaded, payload_of
-from optimizer.identification.fits.temperature import temperatures_of
-from optimizer.identification.fits.torque_fit import MOST_RELATIVE_SD, UNSURE, ZERO
-from optimizer.identification.fits.whole_fit import LINK, LINK_NAMES
-from optimizer.identification.logs.log import Log
-from optimizer.identification.logs.log_errors import EffortNotUsable
-from optimizer.identification.options import Options
-from optimizer.identification.quality.advice import advice_of
-from optimizer.identification.quality.curves import curves_of
-from optimizer.identification.quality.interval import Spread, sessions, spread_of
-from optimizer.identification.quality.structure import inertials_of, physical_of, structure_of
-from optimizer.identification.quality.validation import Fold, validate
-from optimizer.identification.results import (
+from joulepath.models.robot import Array, Mask, Robot
+from joulepath.models.uncertainty.parameters import LINKS
+from joulepath.optimizer.energy.link_regressor import BODY, body_parameters
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.identification.arm.fitted_arm import own_arm
+from joulepath.optimizer.identification.errors import NoPowerChannel, NotExcited, PayloadUnknown
+from joulepath.optimizer.identification.estimates.estimate import Estimate, Name
+from joulepath.optimizer.identification.estimates.grouped import lag_one
+from joulepath.optimizer.identification.fits.block import own_value, terms_of
+from joulepath.optimizer.identification.fits.fitting import LINK_MASS_SCALE, Fitted, fit_rows, motor_torque
+from joulepath.optimizer.identification.fits.payload_fit import Carried, joints_without_gravity, loaded, payload_of
+from joulepath.optimizer.identification.fits.temperature import temperatures_of
+from joulepath.optimizer.identification.fits.torque_fit import MOST_RELATIVE_SD, UNSURE, ZERO
+from joulepath.optimizer.identification.fits.whole_fit import LINK, LINK_NAMES
+from joulepath.optimizer.identification.logs.log import Log
+from joulepath.optimizer.identification.logs.log_errors import EffortNotUsable
+from joulepath.optimizer.identification.options import Options
+from joulepath.optimizer.identification.quality.advice import advice_of
+from joulepath.optimizer.identification.quality.curves import curves_of
+from joulepath.optimizer.identification.quality.interval import Spread, sessions, spread_of
+from joulepath.optimizer.identification.quality.structure import inertials_of, physical_of, structure_of
+from joulepath.optimizer.identification.quality.validation import Fold, validate
+from joulepath.optimizer.identification.results import (
     Advice,
     Curves,
     IdentifiedFigures,
@@ -40,10 +40,10 @@ from optimizer.identification.results import (
     Temperatures,
     Validation,
 )
-from optimizer.identification.rows.fit_rows import Rows, rows_of
-from optimizer.identification.rows.split import held_out
-from optimizer.linear_algebra import one_thread
-from optimizer.problem.arm import Payload
+from joulepath.optimizer.identification.rows.fit_rows import Rows, rows_of
+from joulepath.optimizer.identification.rows.split import held_out
+from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.problem.arm import Payload
 
 WHITE = 0.3
 """Correlation of neighbouring residuals up to which they count as independent."""

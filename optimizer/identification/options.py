@@ -8,8 +8,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem
 
 Target = Literal["friction", "rotor", "torque_constant", "power", "payload"]
 Term = Literal["coulomb", "viscous", "load", "offset", "curved"]

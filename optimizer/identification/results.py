@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from models.robot import Array
-from optimizer.identification.estimates.estimate import Name
-from optimizer.identification.rows.fit_rows import Numbers
+from joulepath.models.robot import Array
+from joulepath.optimizer.identification.estimates.estimate import Name
+from joulepath.optimizer.identification.rows.fit_rows import Numbers
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from models.robot import Array
-from optimizer.kinematics.chain import Chain
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.chain import Chain
 
 # added to the diagonal of a system that may be singular; square of a length that is none
 TINY, NO_SQUARE = 1e-14, 1e-28

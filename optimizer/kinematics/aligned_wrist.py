@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.kinematics.angles import nearest_turn, wrapped
-from optimizer.problem.branches import BranchLabel
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
+from joulepath.optimizer.problem.branches import BranchLabel
 
 
 @dataclass(frozen=True, eq=False)

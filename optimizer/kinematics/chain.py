@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
-from optimizer.kinematics.forward import joint_placements
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.forward import joint_placements
 
 # sine of an angle below which its axis is taken from the sine alone
 _TINY = 1e-12

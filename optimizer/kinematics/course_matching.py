@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 # a point is looked for so many times as far ahead on the course as the motion and its tolerances reach
 AHEAD = 2.0

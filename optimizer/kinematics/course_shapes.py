@@ -10,9 +10,9 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.tool_path import SAME_POSE, TURNING, ToolPath
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.tool_path import SAME_POSE, TURNING, ToolPath
 
 # bends of a right angle that are counted at most
 MOST_BENDS = 10

@@ -14,16 +14,16 @@ from typing import Literal
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from models.robot import Array, Robot
-from optimizer.deadline import checkpoint
-from optimizer.kinematics import newton
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.tcp import flange_pose, tcp_pose
-from optimizer.kinematics.tool_course import ToolCourse
-from optimizer.kinematics.turning_sheet import TurningSheet, shortest, turning_of, turning_through, values_of
-from optimizer.problem.arm import Arm
-from optimizer.trajectories import bspline
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.kinematics import newton
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.tcp import flange_pose, tcp_pose
+from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.kinematics.turning_sheet import TurningSheet, shortest, turning_of, turning_through, values_of
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.spline import Spline
 
 # longest way [m] from point to point, and how many there are at least on a straight piece and on half of a corner
 STEP, ON_PIECE = 0.005, 32

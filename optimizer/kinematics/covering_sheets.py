@@ -26,13 +26,13 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from models.robot import MOST_ROBOTS, Array, Robot
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.joint_axes import JointAxes
-from optimizer.kinematics.nearby_arm import NearbyArm
-from optimizer.kinematics.redundant_boxes import Cells, HeldBoxes, held_boxes
-from optimizer.kinematics.redundant_pose import RedundantPose
-from optimizer.kinematics.spherical_shoulder import SphericalShoulder
+from joulepath.models.robot import MOST_ROBOTS, Array, Robot
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.joint_axes import JointAxes
+from joulepath.optimizer.kinematics.nearby_arm import NearbyArm
+from joulepath.optimizer.kinematics.redundant_boxes import Cells, HeldBoxes, held_boxes
+from joulepath.optimizer.kinematics.redundant_pose import RedundantPose
+from joulepath.optimizer.kinematics.spherical_shoulder import SphericalShoulder
 
 # parts that a turn of the last angle is cut into, then parts of those in which a sheet may end, and so on
 PARTS = (64, 4, 4, 4)

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from models.robot import Array, Mask
-from optimizer.kinematics.across_curve import step_across
-from optimizer.kinematics.angles import nearest_turn, wrapped
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.hermite import hermite
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.kinematics.across_curve import step_across
+from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.hermite import hermite
 
 # steps [rad]: the first, the longest, and one below which the curve ends; factors after a good and a bad one
 FIRST, LONGEST, LEAST, LONGER, SHORTER = 0.15, 0.4, 1e-5, 1.6, 0.4

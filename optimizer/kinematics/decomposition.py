@@ -19,23 +19,23 @@ import eaik.pybindings.EAIK as eaik
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array, Limits, Mask
-from optimizer.exceptions import SingularPose
-from optimizer.kinematics.aligned_wrist import AlignedWrist
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.chain import Chain, miss, pose_error
-from optimizer.kinematics.forward import link_frames
-from optimizer.kinematics.isolated import SINGULAR_VALUE, distinct, lies_on_a_curve
-from optimizer.kinematics.jacobians import geometric_jacobian
-from optimizer.kinematics.joint_axes import JointAxes
-from optimizer.kinematics.named_branches import NamedBranches, in_order, numbered
-from optimizer.kinematics.newton import EXACT, solved
-from optimizer.kinematics.reach import REACH
-from optimizer.kinematics.spherical_wrist import ALIGNED, LABELS, SphericalWrist, branch_numbers
-from optimizer.kinematics.ur_closed_form import URClosedForm
-from optimizer.kinematics.valley import along_valleys
-from optimizer.kinematics.wrist_angles import WristAngles
-from optimizer.problem.branches import BranchLabel, NumberedBranch
+from joulepath.models.robot import Array, Limits, Mask
+from joulepath.optimizer.exceptions import SingularPose
+from joulepath.optimizer.kinematics.aligned_wrist import AlignedWrist
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.chain import Chain, miss, pose_error
+from joulepath.optimizer.kinematics.forward import link_frames
+from joulepath.optimizer.kinematics.isolated import SINGULAR_VALUE, distinct, lies_on_a_curve
+from joulepath.optimizer.kinematics.jacobians import geometric_jacobian
+from joulepath.optimizer.kinematics.joint_axes import JointAxes
+from joulepath.optimizer.kinematics.named_branches import NamedBranches, in_order, numbered
+from joulepath.optimizer.kinematics.newton import EXACT, solved
+from joulepath.optimizer.kinematics.reach import REACH
+from joulepath.optimizer.kinematics.spherical_wrist import ALIGNED, LABELS, SphericalWrist, branch_numbers
+from joulepath.optimizer.kinematics.ur_closed_form import URClosedForm
+from joulepath.optimizer.kinematics.valley import along_valleys
+from joulepath.optimizer.kinematics.wrist_angles import WristAngles
+from joulepath.optimizer.problem.branches import BranchLabel, NumberedBranch
 
 # greatest difference [m, rad] of an arm from the simplest one nearby by which it counts as this one: that of angles
 # written with ten digits

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
-from optimizer.native.shared_library import address, shared_library
+from joulepath.models.robot import Array
+from joulepath.optimizer.native.shared_library import address, shared_library
 
 
 def joint_placements(model: pin.Model) -> Array:

@@ -14,12 +14,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from models.robot import Array, Mask
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.redundant_boxes import with_shoulder
-from optimizer.kinematics.redundant_curve import CurveStack, RedundantCurve
-from optimizer.kinematics.redundant_pose import RedundantPose
-from optimizer.problem.branches import Label
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.redundant_boxes import with_shoulder
+from joulepath.optimizer.kinematics.redundant_curve import CurveStack, RedundantCurve
+from joulepath.optimizer.kinematics.redundant_pose import RedundantPose
+from joulepath.optimizer.problem.branches import Label
 
 # sine of the angle between first and third axis, and error [m] of the distance from shoulder to wrist, below which a
 # pose is on the singularity: every member reaches it to a part of what is promised of a solution

@@ -7,8 +7,8 @@ from math import ceil, floor, tau
 
 import numpy as np
 
-from models.robot import Array, Limits, Mask
-from optimizer.kinematics.ur_closed_form import ROUNDING
+from joulepath.models.robot import Array, Limits, Mask
+from joulepath.optimizer.kinematics.ur_closed_form import ROUNDING
 
 
 def full_turn_alternatives(q: Array, q_min: Array, q_max: Array) -> list[list[float]]:

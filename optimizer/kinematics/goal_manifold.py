@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.kinematics.forward import joint_placements, link_frames
-from optimizer.kinematics.jacobians import geometric_jacobian
-from optimizer.kinematics.tcp import T_last_tcp
-from optimizer.problem.arm import Arm
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
+from joulepath.optimizer.kinematics.jacobians import geometric_jacobian
+from joulepath.optimizer.kinematics.tcp import T_last_tcp
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 
 # a configuration reaches the pose up to this error [m, rad]; Newton steps back onto the manifold, each at most so
 # long [rad]

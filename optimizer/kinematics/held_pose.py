@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
-from optimizer.kinematics.chain import pose_error
-from optimizer.kinematics.tcp import T_last_tcp, tcp_pose
-from optimizer.problem.arm import Arm
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.chain import pose_error
+from joulepath.optimizer.kinematics.tcp import T_last_tcp, tcp_pose
+from joulepath.optimizer.problem.arm import Arm
 
 # the pose is held to this error [m, rad]; Newton steps, of which a few suffice near the curve
 HELD, STEPS = 1e-11, 12

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 
 def hermite(share: Array, q0: Array, q1: Array, slope0: Array, slope1: Array) -> Array:

@@ -11,10 +11,10 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.self_motion import SelfMotion
-from optimizer.problem.branches import BranchLabel
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.self_motion import SelfMotion
+from joulepath.optimizer.problem.branches import BranchLabel
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,24 +22,24 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from models.robot import MOST_ROBOTS, Array, Limits, Robot
-from optimizer.exceptions import InvalidProblem, SingularPose, UnreachablePose
-from optimizer.kinematics import redundant_curve, traced_curve
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.decomposition import DecomposedArm
-from optimizer.kinematics.full_turns import full_turn_alternatives, nearest_turns
-from optimizer.kinematics.ik_solutions import IKSolution, PrincipalSolution, Singularities
-from optimizer.kinematics.isolated import distinct
-from optimizer.kinematics.multi_start import MultiStart
-from optimizer.kinematics.reach import REACH, at_the_edge, out_of_reach
-from optimizer.kinematics.redundant_arm import RedundantArm
-from optimizer.kinematics.redundant_curve import RedundantCurve
-from optimizer.kinematics.self_motion import SelfMotion, is_point, spread, without_gaps
-from optimizer.kinematics.tcp import flange_pose
-from optimizer.kinematics.traced_arm import TracedArm
-from optimizer.kinematics.traced_curve import TracedCurve
-from optimizer.kinematics.ur_closed_form import URClosedForm
-from optimizer.problem.branches import BranchLabel
+from joulepath.models.robot import MOST_ROBOTS, Array, Limits, Robot
+from joulepath.optimizer.exceptions import InvalidProblem, SingularPose, UnreachablePose
+from joulepath.optimizer.kinematics import redundant_curve, traced_curve
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.decomposition import DecomposedArm
+from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives, nearest_turns
+from joulepath.optimizer.kinematics.ik_solutions import IKSolution, PrincipalSolution, Singularities
+from joulepath.optimizer.kinematics.isolated import distinct
+from joulepath.optimizer.kinematics.multi_start import MultiStart
+from joulepath.optimizer.kinematics.reach import REACH, at_the_edge, out_of_reach
+from joulepath.optimizer.kinematics.redundant_arm import RedundantArm
+from joulepath.optimizer.kinematics.redundant_curve import RedundantCurve
+from joulepath.optimizer.kinematics.self_motion import SelfMotion, is_point, spread, without_gaps
+from joulepath.optimizer.kinematics.tcp import flange_pose
+from joulepath.optimizer.kinematics.traced_arm import TracedArm
+from joulepath.optimizer.kinematics.traced_curve import TracedCurve
+from joulepath.optimizer.kinematics.ur_closed_form import URClosedForm
+from joulepath.optimizer.problem.branches import BranchLabel
 
 # greatest error [m, rad] of the forward kinematics of a solution against the pose
 ACCURACY = 1e-9

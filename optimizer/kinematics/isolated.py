@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.newton import solved
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.newton import solved
 
 # configurations that differ by less are one [rad]: on a fold of two branches, rounding parts them by 1e-7
 SAME = 1e-6

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.kinematics.vectors import cross
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.vectors import cross
 
 
 def point_jacobian(frames: Array, link: int, x: Array) -> Array:

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.forward import link_frames
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.forward import link_frames
 
 # sine of an angle between neighbouring axes below which they count as parallel: far more than rounded angles make
 PARALLEL = 2e-4

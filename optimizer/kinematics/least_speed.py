@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.kinematics.forward import joint_placements
-from optimizer.kinematics.path_constraints import ConstraintRatios, PathConstraints, PointSpeedConstraint
-from optimizer.kinematics.tcp import T_last_tcp, tcp_pose
-from optimizer.kinematics.tool_course import ToolCourse
-from optimizer.problem.arm import Arm
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.forward import joint_placements
+from joulepath.optimizer.kinematics.path_constraints import ConstraintRatios, PathConstraints, PointSpeedConstraint
+from joulepath.optimizer.kinematics.tcp import T_last_tcp, tcp_pose
+from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.problem.arm import Arm
 
 # points on each piece of the course between which its length is measured, and the way between two [m] at most
 MEASURED, STEP = 32, 0.002

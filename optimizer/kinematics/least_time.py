@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from optimizer.kinematics.tool_course import ToolCourse
-from optimizer.problem.arm import Arm
-from optimizer.problem.tool_path import SPEED_TOLERANCE
-from optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
+from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.tool_path import SPEED_TOLERANCE
+from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
 
 # pieces into which the course is divided, its corners kept
 PIECES = (1, 2, 4, 8, 16, 32)

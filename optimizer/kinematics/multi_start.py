@@ -13,17 +13,17 @@ from functools import lru_cache
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array, Limits
-from optimizer.deadline import checkpoint
-from optimizer.exceptions import SingularPose
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.isolated import SINGULAR_VALUE, distinct, lies_on_a_curve
-from optimizer.kinematics.named_branches import in_order, numbered
-from optimizer.kinematics.newton import solved
-from optimizer.kinematics.reach import REACH
-from optimizer.kinematics.self_motion import SelfMotion
-from optimizer.problem.branches import BranchLabel, NumberedBranch
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.exceptions import SingularPose
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.isolated import SINGULAR_VALUE, distinct, lies_on_a_curve
+from joulepath.optimizer.kinematics.named_branches import in_order, numbered
+from joulepath.optimizer.kinematics.newton import solved
+from joulepath.optimizer.kinematics.reach import REACH
+from joulepath.optimizer.kinematics.self_motion import SelfMotion
+from joulepath.optimizer.problem.branches import BranchLabel, NumberedBranch
 
 JOINTS, MOST_BRANCHES = 6, 16
 # starts of a round; rounds at most, and rounds without anything new that end the search

@@ -6,9 +6,9 @@ from typing import Protocol
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.kinematics.angles import wrapped
-from optimizer.problem.branches import Label, NumberedBranch
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.problem.branches import Label, NumberedBranch
 
 # digits of joint positions [rad] that order branches
 DIGITS = 6

@@ -11,12 +11,12 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.joint_axes import JointAxes
-from optimizer.kinematics.nearby_loops import Loops, loops
-from optimizer.kinematics.redundant_pose import RedundantPose
-from optimizer.kinematics.spherical_shoulder import SphericalShoulder
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.joint_axes import JointAxes
+from joulepath.optimizer.kinematics.nearby_loops import Loops, loops
+from joulepath.optimizer.kinematics.redundant_pose import RedundantPose
+from joulepath.optimizer.kinematics.spherical_shoulder import SphericalShoulder
 
 # distances [m] of poses beside one that is beyond the reach of the arm nearby, if only by what the two arms differ
 BESIDE = (1e-3, 2e-3)

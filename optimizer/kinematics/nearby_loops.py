@@ -14,14 +14,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from models.robot import Array, Mask
-from optimizer.kinematics.across_curve import step_across
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.curve_tracing import LONGEST, turns
-from optimizer.kinematics.redundant_curve import CurveStack
-from optimizer.kinematics.redundant_pose import RedundantPose
-from optimizer.kinematics.traced_stack import TracedStack
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.kinematics.across_curve import step_across
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.curve_tracing import LONGEST, turns
+from joulepath.optimizer.kinematics.redundant_curve import CurveStack
+from joulepath.optimizer.kinematics.redundant_pose import RedundantPose
+from joulepath.optimizer.kinematics.traced_stack import TracedStack
 
 # steps along each curve of the arm nearby, twice as many once around, and starts on so many: two of these make a loop
 STEPS, STARTS = 12, 3

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.kinematics.chain import Chain, miss, pose_error
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.chain import Chain, miss, pose_error
 
 # error [m, rad] below which a step tells nothing but rounding
 EXACT = 2e-15

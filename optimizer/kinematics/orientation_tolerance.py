@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.models.robot import Array
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 
 # sine of the angle between two axes below which they count as parallel: any common normal will do
 PARALLEL = 1e-12

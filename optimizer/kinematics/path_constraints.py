@@ -12,12 +12,12 @@ from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.kinematics.forward import joint_placements, link_frames
-from optimizer.kinematics.jacobians import direction_jacobian, point_jacobian, velocity_gradient
-from optimizer.kinematics.tcp import T_last_tcp
-from optimizer.problem.arm import Arm
-from optimizer.problem.tool_cone import ToolCone
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
+from joulepath.optimizer.kinematics.jacobians import direction_jacobian, point_jacobian, velocity_gradient
+from joulepath.optimizer.kinematics.tcp import T_last_tcp
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.tool_cone import ToolCone
 
 # angle [rad] or speed [m/s] below which the gradient is replaced by a finite one: both have a kink at zero
 AT_REST = 1e-9

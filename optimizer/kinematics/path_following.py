@@ -16,14 +16,14 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
-from optimizer.deadline import NEVER, Deadline
-from optimizer.exceptions import DeadlineExceeded, InvalidProblem
-from optimizer.kinematics.angles import nearest_turn
-from optimizer.kinematics.tcp import T_last_tcp
-from optimizer.problem.arm import Arm
-from optimizer.problem.arrays import frozen
-from optimizer.problem.pose import Pose
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import NEVER, Deadline
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
+from joulepath.optimizer.kinematics.angles import nearest_turn
+from joulepath.optimizer.kinematics.tcp import T_last_tcp
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.arrays import frozen
+from joulepath.optimizer.problem.pose import Pose
 
 MOST_ITERATIONS = 200
 # error [m, rad] at which the search for a point has converged: a ten-thousandth of the finest tolerance

@@ -19,13 +19,13 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.kinematics.forward import joint_placements, link_frames
-from optimizer.kinematics.rigid_body_model import rigid_body_model
-from optimizer.kinematics.tcp import T_last_tcp
-from optimizer.kinematics.wrist_geometry import potential_rates
-from optimizer.problem.arm import Arm
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
+from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.kinematics.tcp import T_last_tcp
+from joulepath.optimizer.kinematics.wrist_geometry import potential_rates
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 
 # what intervals are widened by, for rounding [rad]
 ROUNDING = 1e-9

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.exceptions import SingularPose, UnreachablePose
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.newton import solved
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.newton import solved
 
 
 @dataclass(frozen=True)

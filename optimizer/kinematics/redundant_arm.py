@@ -12,12 +12,12 @@ import numpy as np
 import pinocchio as pin
 from scipy.optimize import minimize
 
-from models.robot import Array, Limits
-from optimizer.kinematics.free_turn import FreeTurn, crossing, stretched
-from optimizer.kinematics.redundant_curve import RedundantCurve, within
-from optimizer.kinematics.redundant_pose import RedundantPose
-from optimizer.kinematics.spherical_shoulder import SphericalShoulder
-from optimizer.problem.branches import Label
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.kinematics.free_turn import FreeTurn, crossing, stretched
+from joulepath.optimizer.kinematics.redundant_curve import RedundantCurve, within
+from joulepath.optimizer.kinematics.redundant_pose import RedundantPose
+from joulepath.optimizer.kinematics.spherical_shoulder import SphericalShoulder
+from joulepath.optimizer.problem.branches import Label
 
 # a part of the label is singular where the sine of its angle is below this
 SINGULAR = 1e-6

@@ -25,9 +25,9 @@ from math import cos, hypot, sin
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.kinematics.redundant_pose import RedundantPose, angle_waves
-from optimizer.kinematics.spinors import Complex
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.kinematics.redundant_pose import RedundantPose, angle_waves
+from joulepath.optimizer.kinematics.spinors import Complex
 
 # what cosines [1] and half sides [rad] are widened by, for rounding; the former is a root's
 COSINE, ROUNDING = 1e-14, 1e-9

@@ -13,11 +13,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from models.robot import Array, Mask
-from optimizer.kinematics.angles import nearest_turn, wrapped
-from optimizer.kinematics.redundant_boxes import Cells, boxes_of
-from optimizer.kinematics.redundant_pose import RedundantPose
-from optimizer.problem.branches import Label
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
+from joulepath.optimizer.kinematics.redundant_boxes import Cells, boxes_of
+from joulepath.optimizer.kinematics.redundant_pose import RedundantPose
+from joulepath.optimizer.problem.branches import Label
 
 # parts that a curve is cut into to find where it is within the limits, then parts of what is not decided, and again
 PARTS = (40, 8)

@@ -12,10 +12,10 @@ from math import acos, atan2, hypot, remainder, tau
 
 import numpy as np
 
-from models.robot import Array, Limits
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.spherical_shoulder import SphericalShoulder, wave_parts
-from optimizer.kinematics.spinors import Complex, unitary
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.spherical_shoulder import SphericalShoulder, wave_parts
+from joulepath.optimizer.kinematics.spinors import Complex, unitary
 
 # zeros of the polynomial this near the unit circle may be angles; nearer to each other than APART [rad] they are one
 NEAR_CIRCLE, APART = 1e-4, 1e-9

@@ -7,7 +7,7 @@ import threading
 import pinocchio as pin
 from cachetools import LRUCache, cached
 
-from optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.arm import Arm
 
 # arms whose models are kept: an answer asks for its arm's several times, and a copy takes a third of a millisecond
 _MOST_KEPT = 4

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from models.robot import Array
-from optimizer.kinematics.angles import nearest_turn
-from optimizer.kinematics.chain import Chain
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.angles import nearest_turn
+from joulepath.optimizer.kinematics.chain import Chain
 
 # configurations in the table, and of those how many are placed at a time
 SIZE, AT_A_TIME = 16384, 1024

@@ -12,9 +12,9 @@ from typing import Protocol
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.kinematics.angles import nearest_turn, wrapped
-from optimizer.problem.branches import BranchLabel, Label
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
+from joulepath.optimizer.problem.branches import BranchLabel, Label
 
 # distance [m] beyond the reach at which the fourth axis may lie by rounding alone
 ROUNDING = 1e-10

@@ -27,9 +27,9 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.spinors import Complex, unitary
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.spinors import Complex, unitary
 
 # greatest distance [m] of axes that meet, and cosine of axes at right angles
 EQUAL = 1e-9

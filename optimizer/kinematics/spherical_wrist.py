@@ -17,10 +17,10 @@ from typing import get_args
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.joint_axes import MEETING, PARALLEL, JointAxes, meeting_point
-from optimizer.problem.branches import Elbow, Label, Shoulder, Wrist
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.joint_axes import MEETING, PARALLEL, JointAxes, meeting_point
+from joulepath.optimizer.problem.branches import Elbow, Label, Shoulder, Wrist
 
 # sine of the wrist angle below which the wrist counts as aligned: then every member of its self-motion reaches the pose
 # to half of what is promised of a solution

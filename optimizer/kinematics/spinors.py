@@ -13,7 +13,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 Complex = NDArray[np.complex128]
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from models.robot import Array
-from optimizer.kinematics.forward import joint_placements, link_frames
-from optimizer.kinematics.jacobians import geometric_jacobian
-from optimizer.problem.arm import Arm
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
+from joulepath.optimizer.kinematics.jacobians import geometric_jacobian
+from joulepath.optimizer.problem.arm import Arm
 
 
 def T_last_tcp(arm: Arm) -> Array:

@@ -9,14 +9,14 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem
-from optimizer.kinematics.course_matching import matched
-from optimizer.kinematics.course_shapes import Shape, shape_of
-from optimizer.kinematics.orientation_tolerance import nearest_orientation
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.targets import Side
-from optimizer.problem.tool_path import SAME_POSE, TURNING, ToolPath
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.kinematics.course_matching import matched
+from joulepath.optimizer.kinematics.course_shapes import Shape, shape_of
+from joulepath.optimizer.kinematics.orientation_tolerance import nearest_orientation
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.targets import Side
+from joulepath.optimizer.problem.tool_path import SAME_POSE, TURNING, ToolPath
 
 # poses of the course that a motion is compared with, on each piece of its shape at least, and the way between two [m]
 # at most

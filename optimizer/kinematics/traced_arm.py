@@ -14,20 +14,20 @@ from functools import lru_cache
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array, Limits
-from optimizer.deadline import checkpoint
-from optimizer.exceptions import SingularPose
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.curve_tracing import TracedPath, traced
-from optimizer.kinematics.nearby_arm import NearbyArm
-from optimizer.kinematics.nearby_loops import followed, spread_over
-from optimizer.kinematics.newton import solved
-from optimizer.kinematics.seed_table import SeedTable
-from optimizer.kinematics.traced_curve import TracedCurve
-from optimizer.kinematics.traced_limits import within
-from optimizer.kinematics.traced_stack import TracedStack
-from optimizer.problem.branches import BranchLabel, NumberedBranch
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.exceptions import SingularPose
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.curve_tracing import TracedPath, traced
+from joulepath.optimizer.kinematics.nearby_arm import NearbyArm
+from joulepath.optimizer.kinematics.nearby_loops import followed, spread_over
+from joulepath.optimizer.kinematics.newton import solved
+from joulepath.optimizer.kinematics.seed_table import SeedTable
+from joulepath.optimizer.kinematics.traced_curve import TracedCurve
+from joulepath.optimizer.kinematics.traced_limits import within
+from joulepath.optimizer.kinematics.traced_stack import TracedStack
+from joulepath.optimizer.problem.branches import BranchLabel, NumberedBranch
 
 JOINTS = 7
 # Newton steps of a start, and its error [m, rad] from which on it is on a curve; if none is, few starts get more steps

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.kinematics.across_curve import onto
-from optimizer.kinematics.angles import nearest_turn, wrapped
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.curve_tracing import TracedPath
-from optimizer.kinematics.traced_stack import Rows, TracedStack
-from optimizer.problem.branches import BranchLabel
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.across_curve import onto
+from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.curve_tracing import TracedPath
+from joulepath.optimizer.kinematics.traced_stack import Rows, TracedStack
+from joulepath.optimizer.problem.branches import BranchLabel
 
 # distance [rad] from the cubics within which a member is, and from the curve at which a configuration is one
 BESIDE, SAME = 0.05, 1e-5

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.kinematics.across_curve import LEFT, led
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.hermite import hermite_weights
-from optimizer.kinematics.traced_curve import TracedCurve, on_curve
-from optimizer.kinematics.traced_stack import Rows, TracedStack
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.kinematics.across_curve import LEFT, led
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.hermite import hermite_weights
+from joulepath.optimizer.kinematics.traced_curve import TracedCurve, on_curve
+from joulepath.optimizer.kinematics.traced_stack import Rows, TracedStack
 
 # parts of a piece that may cross limits, between whose ends it is held against them
 PARTS = 8

@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from models.robot import Array, Mask
-from optimizer.kinematics.curve_tracing import TracedPath
-from optimizer.kinematics.hermite import hermite
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.kinematics.curve_tracing import TracedPath
+from joulepath.optimizer.kinematics.hermite import hermite
 
 # half the range of the parameter of a curve with two ends: no full turn, whose ends would be one
 OPEN = 3.0

@@ -31,13 +31,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from models.robot import Array, Mask
-from optimizer.kinematics.orientation_tolerance import sample_orientations
-from optimizer.kinematics.tcp import flange_pose
-from optimizer.kinematics.ur_closed_form import URClosedForm
-from optimizer.problem.arm import Arm
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.pose import Pose
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations
+from joulepath.optimizer.kinematics.tcp import flange_pose
+from joulepath.optimizer.kinematics.ur_closed_form import URClosedForm
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.pose import Pose
 
 # what intervals are widened by, for rounding: that of an arc cosine of nearly one [rad, m]
 ROUNDING = 2e-7

@@ -15,13 +15,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
-from models.robot import Array, Mask
-from optimizer.deadline import checkpoint
-from optimizer.kinematics import newton
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.tcp import flange_pose
-from optimizer.kinematics.tool_course import ToolCourse
-from optimizer.problem.arm import Arm
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.kinematics import newton
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.tcp import flange_pose
+from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.problem.arm import Arm
 
 # points along the way, unless given, and angles of the sheet
 STEPS, ANGLES = 48, 49

@@ -18,10 +18,10 @@ import numpy as np
 import pinocchio as pin
 from scipy.optimize import minimize_scalar
 
-from models.robot import Array, Limits
-from optimizer.kinematics.reach import REACH
-from optimizer.kinematics.self_motion import StretchedWrist, is_point
-from optimizer.problem.branches import Label
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.kinematics.reach import REACH
+from joulepath.optimizer.kinematics.self_motion import StretchedWrist, is_point
+from joulepath.optimizer.problem.branches import Label
 
 # distance [m, or sine of the wrist angle] beyond the reach at which a pose may lie by rounding alone
 ROUNDING = 1e-10

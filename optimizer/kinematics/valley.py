@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.newton import solved
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.newton import solved
 
 # step along the curve [rad], and steps to each side: more than a full turn of a joint
 STEP, STEPS = 0.15, 44

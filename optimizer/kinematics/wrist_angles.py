@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.kinematics.aligned_wrist import AlignedWrist
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.forward import link_frames
-from optimizer.kinematics.spherical_wrist import ALIGNED, SphericalWrist
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.aligned_wrist import AlignedWrist
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.forward import link_frames
+from joulepath.optimizer.kinematics.spherical_wrist import ALIGNED, SphericalWrist
 
 # Newton steps that correct an arm's place by some last digits, and singular values, relative to the largest, along
 # which they do not: where the elbow is stretched

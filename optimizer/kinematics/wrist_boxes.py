@@ -23,12 +23,12 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.forward import link_frames
-from optimizer.kinematics.tcp import T_last_tcp
-from optimizer.kinematics.wrist_geometry import WristGeometry
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.forward import link_frames
+from joulepath.optimizer.kinematics.tcp import T_last_tcp
+from joulepath.optimizer.kinematics.wrist_geometry import WristGeometry
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 
 CELLS = 16
 # a tool's axis nearer than this to the last joint's is held by its place [rad, nearly], else by its angle

@@ -13,12 +13,12 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
-from optimizer.kinematics.forward import joint_placements, link_frames
-from optimizer.kinematics.rigid_body_model import rigid_body_model
-from optimizer.kinematics.tcp import T_last_tcp
-from optimizer.problem.arm import Arm
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
+from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.kinematics.tcp import T_last_tcp
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 
 OUTER = 3
 # angles of each of the last two joints at which the distance from wrist to TCP is sampled; a margin covers the rest

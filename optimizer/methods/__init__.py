@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from models.robot import Array
-from optimizer.deadline import Deadline
-from optimizer.methods.duration_intervals import DurationInterval
-from optimizer.methods.free_spline import FreeSpline
-from optimizer.methods.lagrange import Lagrange
-from optimizer.methods.method import Method
-from optimizer.methods.passing_spline import PassingSpline
-from optimizer.methods.polynomial_ga import PolynomialGA
-from optimizer.methods.time_scaling import TimeScaling
-from optimizer.methods.tool_path_motion import ToolPathMotion
-from optimizer.methods.uniform_scaling import UniformScaling
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import MethodName, Problem
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.methods.duration_intervals import DurationInterval
+from joulepath.optimizer.methods.free_spline import FreeSpline
+from joulepath.optimizer.methods.lagrange import Lagrange
+from joulepath.optimizer.methods.method import Method
+from joulepath.optimizer.methods.passing_spline import PassingSpline
+from joulepath.optimizer.methods.polynomial_ga import PolynomialGA
+from joulepath.optimizer.methods.time_scaling import TimeScaling
+from joulepath.optimizer.methods.tool_path_motion import ToolPathMotion
+from joulepath.optimizer.methods.uniform_scaling import UniformScaling
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import MethodName, Problem
 
 METHODS: dict[MethodName, type[Method]] = {
     "bspline": FreeSpline,

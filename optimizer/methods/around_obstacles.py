@@ -7,14 +7,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.deadline import DeadlinePassed, watch
-from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
-from optimizer.methods.planned_paths import ALONG_PLANNED_PATH, PATIENCE, plan, smooth_path, to_goal, without_path
-from optimizer.methods.sqp_method import NO_BETTER, with_effort
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.solution import Clearance
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import DeadlinePassed, watch
+from joulepath.optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
+from joulepath.optimizer.methods.planned_paths import (
+    ALONG_PLANNED_PATH,
+    PATIENCE,
+    plan,
+    smooth_path,
+    to_goal,
+    without_path,
+)
+from joulepath.optimizer.methods.sqp_method import NO_BETTER, with_effort
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.solution import Clearance
+from joulepath.optimizer.trajectories.spline import Spline
 
 # the motion of a method along a smooth path, given as a motion of 1 s
 Law = Callable[[Spline], SolveResult]

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from models.robot import Array
-from optimizer.energy.dwell import LinearDwell, linear_dwells, waits
-from optimizer.energy.plant import WIDTH
-from optimizer.nlp.goal_holding import GoalHolding
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.cycle import Cycle
-from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.dwell import LinearDwell, linear_dwells, waits
+from joulepath.optimizer.energy.plant import WIDTH
+from joulepath.optimizer.nlp.goal_holding import GoalHolding
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 
 
 @dataclass(frozen=True)

@@ -14,16 +14,16 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from models.robot import Array
-from optimizer.deadline import checkpoint
-from optimizer.kinematics.least_speed import LeastSpeed
-from optimizer.methods.duration_intervals import DurationInterval
-from optimizer.methods.limit_repair import path_excess, repair_factors
-from optimizer.methods.method import CONVERGED, SolveResult, SolveStatus
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.tool_path import SPEED_TOLERANCE
-from optimizer.trajectories.bspline import DEGREE, clamped, fit
-from optimizer.trajectories.spline import Spline, sample
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.kinematics.least_speed import LeastSpeed
+from joulepath.optimizer.methods.duration_intervals import DurationInterval
+from joulepath.optimizer.methods.limit_repair import path_excess, repair_factors
+from joulepath.optimizer.methods.method import CONVERGED, SolveResult, SolveStatus
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.tool_path import SPEED_TOLERANCE
+from joulepath.optimizer.trajectories.bspline import DEGREE, clamped, fit
+from joulepath.optimizer.trajectories.spline import Spline, sample
 
 # samples of the path per control point, to measure along it
 SAMPLED = 16

@@ -16,17 +16,17 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.deadline import Deadline, DeadlinePassed, watch
-from optimizer.methods.duration_intervals import DurationInterval, fastest
-from optimizer.methods.method import Method, SolveResult, SolveStatus
-from optimizer.methods.time_scaling import TimeScaling
-from optimizer.methods.uniform_scaling import UniformScale
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
-from optimizer.trajectories.ruckig_motion import time_optimal_spline
-from optimizer.trajectories.seven_segment import shortest_duration
-from optimizer.trajectories.spline import Spline, least_time_scale, sampled
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
+from joulepath.optimizer.methods.duration_intervals import DurationInterval, fastest
+from joulepath.optimizer.methods.method import Method, SolveResult, SolveStatus
+from joulepath.optimizer.methods.time_scaling import TimeScaling
+from joulepath.optimizer.methods.uniform_scaling import UniformScale
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.trajectories.ruckig_motion import time_optimal_spline
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.optimizer.trajectories.spline import Spline, least_time_scale, sampled
 
 Attempt = Callable[[], SolveResult]
 

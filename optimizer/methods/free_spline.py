@@ -13,19 +13,19 @@ from typing import ClassVar
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.energy.plant import has_corners
-from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.methods.planned_paths import FROM_PLANNED_PATH
-from optimizer.methods.sqp_method import Guess, SqpMethod, above, with_effort
-from optimizer.nlp.sqp import PROGRESS
-from optimizer.problem.problem import LEAST_DURATION
-from optimizer.solution import BaselineName
-from optimizer.trajectories import bspline, seven_segment
-from optimizer.trajectories.bspline import Basis
-from optimizer.trajectories.ramp_knots import RampKnots
-from optimizer.trajectories.ruckig_motion import time_optimal, time_optimal_positions
-from optimizer.trajectories.spline import Spline, sampled, spline_of
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.plant import has_corners
+from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.methods.planned_paths import FROM_PLANNED_PATH
+from joulepath.optimizer.methods.sqp_method import Guess, SqpMethod, above, with_effort
+from joulepath.optimizer.nlp.sqp import PROGRESS
+from joulepath.optimizer.problem.problem import LEAST_DURATION
+from joulepath.optimizer.solution import BaselineName
+from joulepath.optimizer.trajectories import bspline, seven_segment
+from joulepath.optimizer.trajectories.bspline import Basis
+from joulepath.optimizer.trajectories.ramp_knots import RampKnots
+from joulepath.optimizer.trajectories.ruckig_motion import time_optimal, time_optimal_positions
+from joulepath.optimizer.trajectories.spline import Spline, sampled, spline_of
 
 # control points of the first attempt, with evenly spaced knots
 COARSE = 13

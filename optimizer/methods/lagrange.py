@@ -9,16 +9,16 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from models.robot import Array
-from optimizer.methods.limit_repair import sampled_overshoot
-from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.methods.planned_paths import no_polynomial_around
-from optimizer.methods.sqp_method import Guess, SqpMethod, with_effort
-from optimizer.solution import BaselineName
-from optimizer.trajectories.polynomial import polynomials
-from optimizer.trajectories.ruckig_motion import time_optimal
-from optimizer.trajectories.spline import Spline
-from optimizer.trajectories.time_scalings import quintic
+from joulepath.models.robot import Array
+from joulepath.optimizer.methods.limit_repair import sampled_overshoot
+from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.methods.planned_paths import no_polynomial_around
+from joulepath.optimizer.methods.sqp_method import Guess, SqpMethod, with_effort
+from joulepath.optimizer.solution import BaselineName
+from joulepath.optimizer.trajectories.polynomial import polynomials
+from joulepath.optimizer.trajectories.ruckig_motion import time_optimal
+from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.trajectories.time_scalings import quintic
 
 # degree 15. Two more nodes save a UR5e some 0.15 % of the energy and take a fifth more time, at all degrees from 9 to
 # 19; Bernstein's coefficients lose a digit with every three nodes

@@ -10,18 +10,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.robot import Array, Limits
-from optimizer.collision.bodies import Indices
-from optimizer.energy.limited_torque import limited_parts
-from optimizer.energy.torque_bound import SHARPNESS, TorqueSamples, torque_bounds
-from optimizer.kinematics.path_constraints import PathConstraints
-from optimizer.nlp.clearance_constraint import CLEARANCE, RESERVE, SCALE
-from optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.solution import Clearance
-from optimizer.trajectories.bspline import in_all_spans
-from optimizer.trajectories.quadrature import grid
-from optimizer.trajectories.spline import Spline, peak_rates, retimed, sample, time_scale
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.collision.bodies import Indices
+from joulepath.optimizer.energy.limited_torque import limited_parts
+from joulepath.optimizer.energy.torque_bound import SHARPNESS, TorqueSamples, torque_bounds
+from joulepath.optimizer.kinematics.path_constraints import PathConstraints
+from joulepath.optimizer.nlp.clearance_constraint import CLEARANCE, RESERVE, SCALE
+from joulepath.optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.solution import Clearance
+from joulepath.optimizer.trajectories.bspline import in_all_spans
+from joulepath.optimizer.trajectories.quadrature import grid
+from joulepath.optimizer.trajectories.spline import Spline, peak_rates, retimed, sample, time_scale
 
 # the NLP's limits are tighter than the problem's by this ratio, so that its tolerance stays within the problem's
 MARGIN = 2 * FEASIBILITY

@@ -11,10 +11,10 @@ import numpy as np
 from toppra.constraint import LinearConstraint
 from toppra.interpolator import AbstractGeometricPath
 
-from models.robot import Array
-from optimizer.energy.limited_torque import greatest_smooth_part, limited_parts
-from optimizer.nlp.coordinates import Coordinates
-from optimizer.prepared_problem import PreparedProblem
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.limited_torque import greatest_smooth_part, limited_parts
+from joulepath.optimizer.nlp.coordinates import Coordinates
+from joulepath.optimizer.prepared_problem import PreparedProblem
 
 
 class StraightLine(AbstractGeometricPath):  # type: ignore[misc]

@@ -10,12 +10,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from models.robot import Array, Limits
-from optimizer.deadline import Deadline
-from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.solution import BaselineName, Clearance
-from optimizer.trajectories.spline import Spline, sampled
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.methods.duration_intervals import DurationInterval, duration_intervals
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.solution import BaselineName, Clearance
+from joulepath.optimizer.trajectories.spline import Spline, sampled
 
 DEADLINE_PASSED = "the deadline passed"
 CONVERGED = "converged"

@@ -15,20 +15,20 @@ from typing import ClassVar
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from models.robot import Array
-from optimizer.methods.free_spline import FreeSpline
-from optimizer.methods.limit_repair import sampled_overshoot
-from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.methods.sqp_method import Guess, SqpMethod, with_effort
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
-from optimizer.trajectories import bspline
-from optimizer.trajectories.bspline import Basis
-from optimizer.trajectories.joined import joined
-from optimizer.trajectories.passing import pass_times
-from optimizer.trajectories.seven_segment import shortest_duration
-from optimizer.trajectories.spline import FIT_SAMPLES, Spline, lasting, sampled
-from optimizer.trajectories.through_samples import spline_through
+from joulepath.models.robot import Array
+from joulepath.optimizer.methods.free_spline import FreeSpline
+from joulepath.optimizer.methods.limit_repair import sampled_overshoot
+from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.methods.sqp_method import Guess, SqpMethod, with_effort
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.bspline import Basis
+from joulepath.optimizer.trajectories.joined import joined
+from joulepath.optimizer.trajectories.passing import pass_times
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.optimizer.trajectories.spline import FIT_SAMPLES, Spline, lasting, sampled
+from joulepath.optimizer.trajectories.through_samples import spline_through
 
 # control points of the first attempt: those of `bspline`, and so many for each pass
 COARSE, PER_PASS = 13, 3

@@ -22,10 +22,10 @@ import numpy as np
 from scipy.linalg import solve
 from scipy.optimize import Bounds, NonlinearConstraint, minimize
 
-from models.robot import Array, Limits
-from optimizer.deadline import checkpoint
-from optimizer.methods.duration_intervals import DurationInterval
-from optimizer.methods.limit_repair import (
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.methods.duration_intervals import DurationInterval
+from joulepath.optimizer.methods.limit_repair import (
     MARGIN,
     PATH_REPAIR,
     PATH_SAMPLES,
@@ -36,10 +36,10 @@ from optimizer.methods.limit_repair import (
     slightly_retimed,
     tightened,
 )
-from optimizer.methods.method import CONVERGED, SolveResult, SolveStatus, with_excess
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.trajectories import bspline
-from optimizer.trajectories.spline import Spline, lasting, least_time_scale, sample, spline_of
+from joulepath.optimizer.methods.method import CONVERGED, SolveResult, SolveStatus, with_excess
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.spline import Spline, lasting, least_time_scale, sample, spline_of
 
 # control values of the time scaling, and how many more control points than the path the motion has, up to a number
 SCALING_POINTS, MORE_POINTS, MOST_POINTS = 17, 12, 72

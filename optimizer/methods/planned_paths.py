@@ -6,12 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.collision.path_planner import MOST_STATES, USUAL, Effort, PlannedPaths, PlanningEnd, length, lengths
-from optimizer.methods.method import Method, SolveResult, SolveStatus
-from optimizer.prepared_problem import RATIO_ROUNDING, PreparedProblem
-from optimizer.trajectories import bspline
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.path_planner import (
+    MOST_STATES,
+    USUAL,
+    Effort,
+    PlannedPaths,
+    PlanningEnd,
+    length,
+    lengths,
+)
+from joulepath.optimizer.methods.method import Method, SolveResult, SolveStatus
+from joulepath.optimizer.prepared_problem import RATIO_ROUNDING, PreparedProblem
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.spline import Spline
 
 # a planning may take this fraction of the time left: the rest is for the solves. The first one to a goal, and all of
 # them once a motion is known, may check so many states

@@ -15,16 +15,22 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.collision.path_planner import along
-from optimizer.collision.state_validity import StateValidityChecker
-from optimizer.methods.limit_repair import torque_peaks
-from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
-from optimizer.methods.planned_paths import FROM_PLANNED_PATH, no_polynomial_around, plan, to_goal, without_path
-from optimizer.solution import BaselineName
-from optimizer.trajectories import quintic
-from optimizer.trajectories.polynomial import PolynomialBasis, polynomials
-from optimizer.trajectories.spline import least_time_scale, retimed, spline_of, time_scales
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.path_planner import along
+from joulepath.optimizer.collision.state_validity import StateValidityChecker
+from joulepath.optimizer.methods.limit_repair import torque_peaks
+from joulepath.optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
+from joulepath.optimizer.methods.planned_paths import (
+    FROM_PLANNED_PATH,
+    no_polynomial_around,
+    plan,
+    to_goal,
+    without_path,
+)
+from joulepath.optimizer.solution import BaselineName
+from joulepath.optimizer.trajectories import quintic
+from joulepath.optimizer.trajectories.polynomial import PolynomialBasis, polynomials
+from joulepath.optimizer.trajectories.spline import least_time_scale, retimed, spline_of, time_scales
 
 # degree 9: with more values a few seconds are too short for the search
 NODES = 4

@@ -6,15 +6,15 @@ from functools import lru_cache
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.energy.plant import SHARPER_WIDTHS
-from optimizer.methods.limit_repair import MARGIN, REPAIR_MARGIN, WITHIN, repair_factors
-from optimizer.methods.method import CONVERGED, SolveResult, SolveStatus
-from optimizer.methods.sqp_method import COSTLIER
-from optimizer.nlp.interior_point import Interior, InteriorPoint
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.trajectories import bspline
-from optimizer.trajectories.spline import Spline, span_peak_rates, spline_of
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.plant import SHARPER_WIDTHS
+from joulepath.optimizer.methods.limit_repair import MARGIN, REPAIR_MARGIN, WITHIN, repair_factors
+from joulepath.optimizer.methods.method import CONVERGED, SolveResult, SolveStatus
+from joulepath.optimizer.methods.sqp_method import COSTLIER
+from joulepath.optimizer.nlp.interior_point import Interior, InteriorPoint
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.spline import Spline, span_peak_rates, spline_of
 
 # solves, each with limits tightened where the motion before exceeds them between the points
 REPAIRS = 8

@@ -9,13 +9,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from models.robot import Array, Limits
-from optimizer.collision.bodies import Indices
-from optimizer.collision.path_planner import along, interpolation_is_free
-from optimizer.deadline import Deadline, DeadlinePassed, watch
-from optimizer.energy.plant import has_corners
-from optimizer.kinematics.held_pose import HeldPose
-from optimizer.methods.limit_repair import (
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.collision.bodies import Indices
+from joulepath.optimizer.collision.path_planner import along, interpolation_is_free
+from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
+from joulepath.optimizer.energy.plant import has_corners
+from joulepath.optimizer.kinematics.held_pose import HeldPose
+from joulepath.optimizer.methods.limit_repair import (
     MARGIN,
     LimitCheck,
     initial_bounds,
@@ -25,15 +25,15 @@ from optimizer.methods.limit_repair import (
     tightened,
     with_repaired_path,
 )
-from optimizer.methods.method import CONVERGED, DEADLINE_PASSED, Method, SolveResult, SolveStatus, with_excess
-from optimizer.methods.planned_paths import FROM_PLANNED_PATH, plan, to_goal, without_path
-from optimizer.nlp.coordinates import Coordinates
-from optimizer.nlp.nonlinear_program import NonlinearProgram
-from optimizer.nlp.sqp import PROGRESS, Result, SqpStatus, solve
-from optimizer.problem.problem import LONGEST_DURATION
-from optimizer.solution import Clearance
-from optimizer.trajectories.bspline import Basis
-from optimizer.trajectories.spline import Spline, sample, spline_of, time_scale
+from joulepath.optimizer.methods.method import CONVERGED, DEADLINE_PASSED, Method, SolveResult, SolveStatus, with_excess
+from joulepath.optimizer.methods.planned_paths import FROM_PLANNED_PATH, plan, to_goal, without_path
+from joulepath.optimizer.nlp.coordinates import Coordinates
+from joulepath.optimizer.nlp.nonlinear_program import NonlinearProgram
+from joulepath.optimizer.nlp.sqp import PROGRESS, Result, SqpStatus, solve
+from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.solution import Clearance
+from joulepath.optimizer.trajectories.bspline import Basis
+from joulepath.optimizer.trajectories.spline import Spline, sample, spline_of, time_scale
 
 # times that an NLP is solved with limits tightened after the solve before
 REPAIRS = 8

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.trajectories.bspline import greville
+from joulepath.models.robot import Array
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.trajectories.bspline import greville
 
 logging.getLogger("toppra").setLevel(logging.ERROR)
 
@@ -49,7 +49,7 @@ def time_optimal_on_line(prepared: PreparedProblem, q_start: Array, q_goal: Arra
     """
     from toppra.algorithm import TOPPRA  # see the top of this file
 
-    from optimizer.methods.line_in_toppra import LineLimits, StraightLine
+    from joulepath.optimizer.methods.line_in_toppra import LineLimits, StraightLine
 
     if not np.abs(q_goal - q_start).max() > 0:
         return TimeOptimalScaling(np.linspace(0.0, 1e-9, len(GRID)))

@@ -9,20 +9,20 @@ from __future__ import annotations
 from functools import cached_property
 from typing import ClassVar
 
-from models.robot import Array, Limits
-from optimizer.methods.around_obstacles import along_path, around_obstacles
-from optimizer.methods.free_spline import COARSE, EXACT, FreeSpline
-from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.methods.path_retiming import PathRetiming
-from optimizer.methods.sqp_method import Guess
-from optimizer.methods.time_optimal_scaling import time_optimal_on_line
-from optimizer.nlp.coordinates import Coordinates
-from optimizer.nlp.sqp import PROGRESS
-from optimizer.solution import BaselineName, Clearance
-from optimizer.trajectories import bspline, seven_segment
-from optimizer.trajectories.bspline import Basis
-from optimizer.trajectories.spline import Spline
-from optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.methods.around_obstacles import along_path, around_obstacles
+from joulepath.optimizer.methods.free_spline import COARSE, EXACT, FreeSpline
+from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.methods.path_retiming import PathRetiming
+from joulepath.optimizer.methods.sqp_method import Guess
+from joulepath.optimizer.methods.time_optimal_scaling import time_optimal_on_line
+from joulepath.optimizer.nlp.coordinates import Coordinates
+from joulepath.optimizer.nlp.sqp import PROGRESS
+from joulepath.optimizer.solution import BaselineName, Clearance
+from joulepath.optimizer.trajectories import bspline, seven_segment
+from joulepath.optimizer.trajectories.bspline import Basis
+from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 
 
 class TimeScaling(FreeSpline):

@@ -9,21 +9,21 @@ from operator import itemgetter
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from models.robot import Array
-from optimizer.deadline import DeadlinePassed, watch
-from optimizer.kinematics.course_tracing import Trace, path_ratios
-from optimizer.methods.duration_intervals import DurationInterval, fastest
-from optimizer.methods.end_angle import try_angles
-from optimizer.methods.even_speed import EvenSpeed
-from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
-from optimizer.methods.path_retiming import PathRetiming
-from optimizer.methods.sqp_method import with_effort
-from optimizer.methods.tool_turning import TurnedAtEnd, turned_paths
-from optimizer.problem.problem import LONGEST_DURATION
-from optimizer.problem.tool_path import ToolPath
-from optimizer.trajectories import quintic, ramped
-from optimizer.trajectories.bspline import DEGREE, Basis, clamped
-from optimizer.trajectories.spline import Spline, sample, sampled
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import DeadlinePassed, watch
+from joulepath.optimizer.kinematics.course_tracing import Trace, path_ratios
+from joulepath.optimizer.methods.duration_intervals import DurationInterval, fastest
+from joulepath.optimizer.methods.end_angle import try_angles
+from joulepath.optimizer.methods.even_speed import EvenSpeed
+from joulepath.optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
+from joulepath.optimizer.methods.path_retiming import PathRetiming
+from joulepath.optimizer.methods.sqp_method import with_effort
+from joulepath.optimizer.methods.tool_turning import TurnedAtEnd, turned_paths
+from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.trajectories import quintic, ramped
+from joulepath.optimizer.trajectories.bspline import DEGREE, Basis, clamped
+from joulepath.optimizer.trajectories.spline import Spline, sample, sampled
 
 # spans of the first time scaling, and more of them for each bend; how much finer the second one is, and its spans
 # at most

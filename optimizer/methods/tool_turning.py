@@ -14,19 +14,19 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize
 
-from models.robot import Array, Mask
-from optimizer.deadline import checkpoint
-from optimizer.energy.bus_flow import drawn_at
-from optimizer.energy.limited_torque import limited_torque
-from optimizer.energy.losses import power_flow
-from optimizer.kinematics import newton
-from optimizer.kinematics.course_tracing import Trace, chain_of, joint_path, traces, turned_start, within
-from optimizer.kinematics.tcp import flange_pose
-from optimizer.kinematics.turning_sheet import REACHED, TurningSheet, turning_of, turning_through, values_of
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.targets import Side
-from optimizer.trajectories.quadrature import simpson_weights
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.energy.bus_flow import drawn_at
+from joulepath.optimizer.energy.limited_torque import limited_torque
+from joulepath.optimizer.energy.losses import power_flow
+from joulepath.optimizer.kinematics import newton
+from joulepath.optimizer.kinematics.course_tracing import Trace, chain_of, joint_path, traces, turned_start, within
+from joulepath.optimizer.kinematics.tcp import flange_pose
+from joulepath.optimizer.kinematics.turning_sheet import REACHED, TurningSheet, turning_of, turning_through, values_of
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.targets import Side
+from joulepath.optimizer.trajectories.quadrature import simpson_weights
+from joulepath.optimizer.trajectories.spline import Spline
 
 # values of a smooth turning between and at the ends, and instants at which its cost is measured (an odd number)
 KNOTS, INSTANTS = 10, 81

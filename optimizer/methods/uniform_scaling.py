@@ -14,18 +14,18 @@ from typing import ClassVar
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from models.robot import Array
-from optimizer.energy.limited_torque import limited_torque
-from optimizer.methods.around_obstacles import around_obstacles
-from optimizer.methods.duration_intervals import fastest
-from optimizer.methods.limit_repair import torque_peaks
-from optimizer.methods.method import CONVERGED, DEADLINE_PASSED, Method, SolveResult, SolveStatus
-from optimizer.methods.path_retiming import PathRetiming
-from optimizer.methods.sqp_method import with_effort
-from optimizer.solution import BaselineName
-from optimizer.trajectories.quadrature import grid
-from optimizer.trajectories.ruckig_motion import time_optimal_spline
-from optimizer.trajectories.spline import Spline, lasting, least_time_scale, sample
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.limited_torque import limited_torque
+from joulepath.optimizer.methods.around_obstacles import around_obstacles
+from joulepath.optimizer.methods.duration_intervals import fastest
+from joulepath.optimizer.methods.limit_repair import torque_peaks
+from joulepath.optimizer.methods.method import CONVERGED, DEADLINE_PASSED, Method, SolveResult, SolveStatus
+from joulepath.optimizer.methods.path_retiming import PathRetiming
+from joulepath.optimizer.methods.sqp_method import with_effort
+from joulepath.optimizer.solution import BaselineName
+from joulepath.optimizer.trajectories.quadrature import grid
+from joulepath.optimizer.trajectories.ruckig_motion import time_optimal_spline
+from joulepath.optimizer.trajectories.spline import Spline, lasting, least_time_scale, sample
 
 # ratio of successive factors, and the number of successive factors without a decrease that ends the search
 RATIO, PATIENCE = 1.12, 8

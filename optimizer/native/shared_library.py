@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from optimizer.native.library_cache import cache_directory, compile_library, compiler, is_intact, mark_used
+from joulepath.optimizer.native.library_cache import cache_directory, compile_library, compiler, is_intact, mark_used
 
 log = logging.getLogger(__name__)
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.robot import Array
-from optimizer.kinematics.path_constraints import ConstraintRatios, PathConstraints
-from optimizer.nlp.coordinates import Coordinates
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.path_constraints import ConstraintRatios, PathConstraints
+from joulepath.optimizer.nlp.coordinates import Coordinates
 
 Index = npt.NDArray[np.intp]
 # step of q [rad] and v [rad/s] for finite differences of the ratios' gradients

@@ -7,10 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.collision.bodies import Indices
-from optimizer.collision.model import CollisionModel, PairDistances
-from optimizer.kinematics.path_constraints import ConstraintRatios
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.collision.bodies import Indices
+from joulepath.optimizer.collision.model import CollisionModel, PairDistances
+from joulepath.optimizer.kinematics.path_constraints import ConstraintRatios
 
 CLEARANCE = "clearance"
 # distance kept beyond the margins [m]: twice the difference that the proof allows between proven and sampled clearance

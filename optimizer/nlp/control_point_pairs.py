@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.nlp.active_path_constraints import Index
-from optimizer.trajectories.bspline import DEGREE
+from joulepath.models.robot import Array
+from joulepath.optimizer.nlp.active_path_constraints import Index
+from joulepath.optimizer.trajectories.bspline import DEGREE
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg.blas import dsbmv, dsymv
 from scipy.linalg.lapack import dpbtrf, dpbtrs, dpotrf, dpotrs, dsyevr
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 # smallest eigenvalue, relative to a bound on the largest or to 1
 EIGENVALUE_FLOOR = 1e-7

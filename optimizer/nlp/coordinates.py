@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array, Limits
+from joulepath.models.robot import Array, Limits
 
 # least displacement of a joint [rad] by which its limits are divided on a straight line
 LEAST_DISPLACEMENT = 1e-12

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 # rad: step of the differences, wide enough that a joint's corner of power without load does not bend them
 STEP = 1e-2

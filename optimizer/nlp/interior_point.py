@@ -18,10 +18,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.deadline import checkpoint
-from optimizer.nlp.convex_quadratic import Convexity
-from optimizer.nlp.limited_motions import LimitedMotions
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.nlp.convex_quadratic import Convexity
+from joulepath.optimizer.nlp.limited_motions import LimitedMotions
 
 # first and last barrier, as ratios of the first cost, and the factors by which width and barrier fall
 BARRIERS, NARROWER, LOWER = (1e-4, 3e-7), 0.6, 0.3

@@ -6,8 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.nlp.timed_motions import TimedMotions
+from joulepath.models.robot import Array
+from joulepath.optimizer.nlp.timed_motions import TimedMotions
 
 # points per span at which speed, acceleration and jerk are limited
 RATE_POINTS = (2, 4, 12)

@@ -15,11 +15,11 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.deadline import checkpoint
-from optimizer.nlp.active_path_constraints import Index
-from optimizer.nlp.convex_quadratic import Convexity
-from optimizer.nlp.timed_motions import TimedMotions
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.nlp.active_path_constraints import Index
+from joulepath.optimizer.nlp.convex_quadratic import Convexity
+from joulepath.optimizer.nlp.timed_motions import TimedMotions
 
 # cost of the mean square of what exceeds a limit, as ratios of the limit and of the first cost
 PENALTY = 500.0

@@ -17,15 +17,15 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array, Limits
-from optimizer.energy.kernel import Kernel
-from optimizer.kinematics.held_pose import HeldPose
-from optimizer.kinematics.path_constraints import PathConstraints
-from optimizer.nlp.active_path_constraints import Index, PathConstraintRows
-from optimizer.nlp.clearance_constraint import CLEARANCE
-from optimizer.nlp.coordinates import Coordinates, GoalConstraints
-from optimizer.nlp.goal_holding import GoalHolding
-from optimizer.trajectories.bspline import Basis
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.energy.kernel import Kernel
+from joulepath.optimizer.kinematics.held_pose import HeldPose
+from joulepath.optimizer.kinematics.path_constraints import PathConstraints
+from joulepath.optimizer.nlp.active_path_constraints import Index, PathConstraintRows
+from joulepath.optimizer.nlp.clearance_constraint import CLEARANCE
+from joulepath.optimizer.nlp.coordinates import Coordinates, GoalConstraints
+from joulepath.optimizer.nlp.goal_holding import GoalHolding
+from joulepath.optimizer.trajectories.bspline import Basis
 
 # an NLP counts as feasible if no constraint exceeds its limit by more than this ratio
 FEASIBILITY = 1e-4

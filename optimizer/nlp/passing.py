@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline
 
-from models.robot import Array, Mask
-from optimizer.nlp.nonlinear_program import NonlinearProgram
-from optimizer.trajectories.bspline import DEGREE
-from optimizer.trajectories.passing import nearby, pass_times
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.nlp.nonlinear_program import NonlinearProgram
+from joulepath.optimizer.trajectories.bspline import DEGREE
+from joulepath.optimizer.trajectories.passing import nearby, pass_times
 
 # rad per duration: a curve that is slower at a pass rests there, and has no tangent along which the pass may slide
 RESTING = 1e-2

@@ -11,9 +11,9 @@ from typing import Any
 import daqp
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.deadline import watched_time_left
-from optimizer.nlp.active_path_constraints import Index
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.deadline import watched_time_left
+from joulepath.optimizer.nlp.active_path_constraints import Index
 
 # least time [s] that a QP gets: most take a millisecond
 LEAST_TIME = 0.05

@@ -14,8 +14,8 @@ from functools import partial
 import numpy as np
 from scipy.sparse import csr_array
 
-from models.robot import Array
-from optimizer.nlp.nonlinear_program import NonlinearProgram
+from joulepath.models.robot import Array
+from joulepath.optimizer.nlp.nonlinear_program import NonlinearProgram
 
 
 @dataclass(frozen=True)

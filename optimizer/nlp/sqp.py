@@ -11,14 +11,14 @@ from enum import Enum
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.deadline import NEVER, Deadline
-from optimizer.nlp.active_path_constraints import PathConstraintValues
-from optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
-from optimizer.nlp.passing import Passes, Passing
-from optimizer.nlp.sliding_ends import Slide, SlidingEnds
-from optimizer.nlp.whitening import whitened
-from optimizer.nlp.working_set_qp import MOST_ROUNDS, QP_ROUNDS, QPInputs, QPStep, WorkingSetQP
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import NEVER, Deadline
+from joulepath.optimizer.nlp.active_path_constraints import PathConstraintValues
+from joulepath.optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
+from joulepath.optimizer.nlp.passing import Passes, Passing
+from joulepath.optimizer.nlp.sliding_ends import Slide, SlidingEnds
+from joulepath.optimizer.nlp.whitening import whitened
+from joulepath.optimizer.nlp.working_set_qp import MOST_ROUNDS, QP_ROUNDS, QPInputs, QPStep, WorkingSetQP
 
 # relative decrease of the cost that a further step must promise
 PROGRESS = 5e-5

@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array, Limits
-from optimizer.energy.kernel import Kernel
-from optimizer.nlp.control_point_pairs import ControlPointPairs
-from optimizer.trajectories.bspline import Basis, basis_matrix
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.energy.kernel import Kernel
+from joulepath.optimizer.nlp.control_point_pairs import ControlPointPairs
+from joulepath.optimizer.trajectories.bspline import Basis, basis_matrix
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dtrtri
 
-from models.robot import Array
-from optimizer.nlp.convex_quadratic import EIGENVALUE_FLOOR, what_lacks
+from joulepath.models.robot import Array
+from joulepath.optimizer.nlp.convex_quadratic import EIGENVALUE_FLOOR, what_lacks
 
 # variables of a QP beyond which all eigenvalues are found faster than those that change
 MOST_IN_PART = 150

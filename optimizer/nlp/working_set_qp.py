@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.deadline import checkpoint
-from optimizer.nlp.active_path_constraints import Index, NearPathConstraints, PathConstraintValues
-from optimizer.nlp.nonlinear_program import FEASIBILITY, Linearisation, NonlinearProgram
-from optimizer.nlp.qp_rows import Places, QPRows
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.nlp.active_path_constraints import Index, NearPathConstraints, PathConstraintValues
+from joulepath.optimizer.nlp.nonlinear_program import FEASIBILITY, Linearisation, NonlinearProgram
+from joulepath.optimizer.nlp.qp_rows import Places, QPRows
 
 # a rate enters the first QP above this ratio of its limit, and a later one above the second: there, limits that were
 # active in the QP before enter, too. With a fifth fewer rows, steps are as few and as good

@@ -8,13 +8,13 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array, Drives, FrictionLaw, Limits, Robot
-from optimizer.exceptions import InvalidProblem, OutsideLimits
-from optimizer.problem.arrays import frozen, per_joint, rigid_transform
-from optimizer.problem.bus import Bus
-from optimizer.problem.names import first_among
-from optimizer.problem.scene import Attachment, Scene
-from optimizer.problem.tool_cone import ToolCone
+from joulepath.models.robot import Array, Drives, FrictionLaw, Limits, Robot
+from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
+from joulepath.optimizer.problem.arrays import frozen, per_joint, rigid_transform
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.names import first_among
+from joulepath.optimizer.problem.scene import Attachment, Scene
+from joulepath.optimizer.problem.tool_cone import ToolCone
 
 # least speed limit [m/s] of a point: below it, motions would last longer than any answer may
 LEAST_SPEED = 1e-3

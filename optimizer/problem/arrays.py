@@ -7,10 +7,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from models.arrays import read_only
-from models.robot import Array
-from models.shape_sizes import SIZES, WrongSize, check_lengths
-from optimizer.exceptions import InvalidProblem
+from joulepath.models.arrays import read_only
+from joulepath.models.robot import Array
+from joulepath.models.shape_sizes import SIZES, WrongSize, check_lengths
+from joulepath.optimizer.exceptions import InvalidProblem
 
 Checked = TypeVar("Checked")
 

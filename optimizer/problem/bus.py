@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.exceptions import InvalidProblem
 
 BusMode = Literal["shared", "isolated", "recuperating", "storage"]
 

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.robot import Array
-from models.shape_sizes import SIZES, check_extent
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.arrays import check_sizes, frozen, sized
+from joulepath.models.robot import Array
+from joulepath.models.shape_sizes import SIZES, check_extent
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.arrays import check_sizes, frozen, sized
 
 # most points, occupied voxels and triangles of an obstacle, and of all obstacles of a scene together: they bound the
 # memory and the time of a request

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.arrays import frozen, unit_vector
-from optimizer.problem.pose import Pose
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.arrays import frozen, unit_vector
+from joulepath.optimizer.problem.pose import Pose
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from optimizer.exceptions import ContradictoryOrder, InvalidProblem
-from optimizer.problem.arm import Payload
-from optimizer.problem.stops import Stop
+from joulepath.optimizer.exceptions import ContradictoryOrder, InvalidProblem
+from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.stops import Stop
 
 # stops of a round with a free order: the search visits every subset of them
 MOST_FREE_STOPS = 12

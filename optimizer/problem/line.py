@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.arrays import frozen
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.arrays import frozen
 
 LineFrame = Literal["tcp", "base"]
 # m: least and greatest length of a line

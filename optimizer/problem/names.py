@@ -5,7 +5,7 @@ from __future__ import annotations
 import unicodedata
 from collections.abc import Collection, Sequence
 
-from optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.exceptions import InvalidProblem
 
 # most characters of an obstacle's name
 LONGEST_NAME = 64

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.arrays import frozen, rigid_transform
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.arrays import frozen, rigid_transform
 
 # how far the norm of a quaternion may be from 1: rounded to three decimals it is that near
 QUATERNION_TOLERANCE = 1e-3

@@ -8,15 +8,15 @@ from typing import Literal
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.cycle import Cycle
-from optimizer.problem.targets import AnyOf, Target, members, validated
-from optimizer.problem.tool_path import ToolPath
-from optimizer.solution import Objective
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.targets import AnyOf, Target, members, validated
+from joulepath.optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.solution import Objective
 
 MethodName = Literal["bspline", "time_scaling", "lagrange", "uniform_scaling", "polynomial_ga"]
 # effort for the lower bound of the answer

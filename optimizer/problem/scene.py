@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from models.robot import Array
-from models.shape_sizes import SIZES, hull_of_body
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.arrays import check_sizes, frozen, placement, sized
-from optimizer.problem.clouds import MOST_PARTS_IN_SCENE, Cloud, parts_of
-from optimizer.problem.names import check_name, first_repeated
+from joulepath.models.robot import Array
+from joulepath.models.shape_sizes import SIZES, hull_of_body
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.arrays import check_sizes, frozen, placement, sized
+from joulepath.optimizer.problem.clouds import MOST_PARTS_IN_SCENE, Cloud, parts_of
+from joulepath.optimizer.problem.names import check_name, first_repeated
 
 # most obstacles in a scene, and most vertices of a mesh: they bound the work of a request
 MOST_OBSTACLES, MOST_VERTICES = 64, 256
@@ -92,7 +92,7 @@ Shape = Sphere | Capsule | Cylinder | Box | HalfSpace | Mesh | Cloud
 class Obstacle:
     """A shape at `T_base_shape` (4, 4) in the base frame; its clearance from the arm must be at least `margin` [m].
 
-    Answers call it `name`: see `optimizer.problem.names`. Raises InvalidProblem, with the field named.
+    Answers call it `name`: see `joulepath.optimizer.problem.names`. Raises InvalidProblem, with the field named.
     """
 
     name: str

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.pose import Pose
-from optimizer.problem.targets import PosesAround, Target, members
-from optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.targets import PosesAround, Target, members
+from joulepath.optimizer.problem.tool_path import ToolPath
 
 STRAIGHT = ToolPath()
 

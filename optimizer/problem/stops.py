@@ -10,15 +10,15 @@ from typing import Literal
 
 import numpy as np
 
-from models.robot import Limits
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.line import Line
-from optimizer.problem.scene import Scene
-from optimizer.problem.stop_path import STRAIGHT, StopPath
-from optimizer.problem.targets import Target
-from optimizer.problem.tool_path import ToolPath
+from joulepath.models.robot import Limits
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.line import Line
+from joulepath.optimizer.problem.scene import Scene
+from joulepath.optimizer.problem.stop_path import STRAIGHT, StopPath
+from joulepath.optimizer.problem.targets import Target
+from joulepath.optimizer.problem.tool_path import ToolPath
 
 MoveKind = Literal["move", "line", "path"]
 # what follows the name of a stop in those of the outer ends of its lines, and of the start of its path

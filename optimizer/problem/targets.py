@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.arrays import frozen
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.pose import Pose
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.arrays import frozen
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.pose import Pose
 
 # targets of one `AnyOf`
 MOST_TARGETS = 64

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.arrays import unit_vector
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.arrays import unit_vector
 
 # a narrower cone [rad] cannot be kept in double precision
 LEAST_HALF_ANGLE = 1e-3

@@ -8,10 +8,10 @@ from typing import Literal
 
 import numpy as np
 
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.arrays import unit_vector
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.pose import Pose
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.arrays import unit_vector
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.pose import Pose
 
 PathShape = Literal["lines", "curve", "arc"]
 # poses between start and goal at most

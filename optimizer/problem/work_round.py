@@ -8,18 +8,18 @@ from functools import cached_property
 
 import numpy as np
 
-from optimizer.exceptions import InvalidProblem, OutsideLimits
-from optimizer.problem.arm import Arm
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.cycle import Cycle, Hold
-from optimizer.problem.free_order import FreeOrder, check_order
-from optimizer.problem.names import check_name, first_repeated
-from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, MethodName
-from optimizer.problem.stop_path import StopPath, at_stop
-from optimizer.problem.stops import APPROACH, ENTRY, RETREAT, PlannedMove, Stop, moves_over, passing
-from optimizer.problem.targets import AnyOf, Target, validated
-from optimizer.solution import Objective
+from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.cycle import Cycle, Hold
+from joulepath.optimizer.problem.free_order import FreeOrder, check_order
+from joulepath.optimizer.problem.names import check_name, first_repeated
+from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, MethodName
+from joulepath.optimizer.problem.stop_path import StopPath, at_stop
+from joulepath.optimizer.problem.stops import APPROACH, ENTRY, RETREAT, PlannedMove, Stop, moves_over, passing
+from joulepath.optimizer.problem.targets import AnyOf, Target, validated
+from joulepath.optimizer.solution import Objective
 
 MOST_STOPS = 256
 # stops that one motion passes through: the effort of its nonlinear program grows with their square and more

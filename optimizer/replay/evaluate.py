@@ -14,24 +14,24 @@ from itertools import pairwise
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
-from optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
-from optimizer.energy.bus_flow import charges
-from optimizer.energy.interval import arm_spread, with_interval
-from optimizer.energy.losses import breakdown, power_flow
-from optimizer.energy.plant import Plant
-from optimizer.energy.sensitivity import energy_sensitivity
-from optimizer.exceptions import DeadlineExceeded
-from optimizer.linear_algebra import one_thread
-from optimizer.problem.arm import Arm
-from optimizer.replay.interval_energy import IntervalEnergy, joined
-from optimizer.replay.limit_report import LimitMonitor, LimitReport
-from optimizer.replay.nearest_contact import ClearanceMonitor, LeastClearance
-from optimizer.replay.piecewise_motion import Indices, PiecewiseMotion, piecewise_motion
-from optimizer.replay.recording import BLOCK, Log, Waypoints
-from optimizer.replay.sampler import Sampler, Samples
-from optimizer.solution import Clearance, Energy, Sensitivity
-from optimizer.trajectories.quadrature import lobatto_panels
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
+from joulepath.optimizer.energy.bus_flow import charges
+from joulepath.optimizer.energy.interval import arm_spread, with_interval
+from joulepath.optimizer.energy.losses import breakdown, power_flow
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.energy.sensitivity import energy_sensitivity
+from joulepath.optimizer.exceptions import DeadlineExceeded
+from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.replay.interval_energy import IntervalEnergy, joined
+from joulepath.optimizer.replay.limit_report import LimitMonitor, LimitReport
+from joulepath.optimizer.replay.nearest_contact import ClearanceMonitor, LeastClearance
+from joulepath.optimizer.replay.piecewise_motion import Indices, PiecewiseMotion, piecewise_motion
+from joulepath.optimizer.replay.recording import BLOCK, Log, Waypoints
+from joulepath.optimizer.replay.sampler import Sampler, Samples
+from joulepath.optimizer.solution import Clearance, Energy, Sensitivity
+from joulepath.optimizer.trajectories.quadrature import lobatto_panels
 
 # quadrature panels: their greatest length [s], unless a polynomial piece would have more than MOST_PANELS of them
 LONGEST_PANEL, MOST_PANELS = 0.2, 256

@@ -7,8 +7,8 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import reduce
 from typing import TypeVar
 
-from optimizer.energy.losses import relative_error
-from optimizer.solution import Energy, StorageUse
+from joulepath.optimizer.energy.losses import relative_error
+from joulepath.optimizer.solution import Energy, StorageUse
 
 Sum = TypeVar("Sum")
 

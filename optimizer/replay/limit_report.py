@@ -7,12 +7,12 @@ from typing import Literal
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.energy.limited_torque import limited_torque
-from optimizer.kinematics.path_constraints import path_constraints_of
-from optimizer.problem.arm import Arm
-from optimizer.replay.piecewise_motion import Indices, PiecewiseMotion
-from optimizer.trajectories.limit_ratios import RATIO_TOLERANCE, ratios
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.energy.limited_torque import limited_torque
+from joulepath.optimizer.kinematics.path_constraints import path_constraints_of
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.replay.piecewise_motion import Indices, PiecewiseMotion
+from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE, ratios
 
 LimitName = Literal["position", "velocity", "acceleration", "jerk", "torque", "tool_cone", "tcp_speed", "elbow_speed"]
 

@@ -7,14 +7,14 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.collision.close_pass import CLOSE, model_without_margins
-from optimizer.collision.model import ClosestPair, CollisionModel, collision_model
-from optimizer.collision.stand_ins import StandIns
-from optimizer.deadline import checkpoint
-from optimizer.problem.arm import Arm
-from optimizer.replay.piecewise_motion import PiecewiseMotion
-from optimizer.solution import Clearance
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.close_pass import CLOSE, model_without_margins
+from joulepath.optimizer.collision.model import ClosestPair, CollisionModel, collision_model
+from joulepath.optimizer.collision.stand_ins import StandIns
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.replay.piecewise_motion import PiecewiseMotion
+from joulepath.optimizer.solution import Clearance
 
 # greatest time between samples [s], unless a block would have more than MOST_INTERVALS of them
 PERIOD, MOST_INTERVALS = 0.01, 16384

@@ -20,11 +20,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline, PPoly, make_interp_spline
 
-from models.robot import Array, Limits
-from optimizer.problem.arm import Arm
-from optimizer.replay.recording import BLOCK, Log, LogBlock, Waypoints
-from optimizer.trajectories import quintic
-from optimizer.trajectories.time_scalings import blend_time
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.replay.recording import BLOCK, Log, LogBlock, Waypoints
+from joulepath.optimizer.trajectories import quintic
+from joulepath.optimizer.trajectories.time_scalings import blend_time
 
 Indices = npt.NDArray[np.int64]
 

@@ -9,10 +9,10 @@ from typing import Literal
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem, InvalidTable
-from optimizer.problem.arm import Arm
-from optimizer.problem.arrays import frozen
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.arrays import frozen
 
 Interpolation = Literal["linear", "trapezoid", "quintic", "spline"]
 

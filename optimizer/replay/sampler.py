@@ -7,12 +7,12 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.energy.bus_flow import drawn_at
-from optimizer.energy.losses import power_flow
-from optimizer.energy.plant import Plant
-from optimizer.exceptions import InvalidProblem
-from optimizer.replay.piecewise_motion import PiecewiseMotion
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.bus_flow import drawn_at
+from joulepath.optimizer.energy.losses import power_flow
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.replay.piecewise_motion import PiecewiseMotion
 
 MOST_SAMPLES = 20_000
 """Most samples that are returned: some 13 MB of JSON for six joints."""

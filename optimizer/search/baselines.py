@@ -18,17 +18,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.energy.dwell import dwell_energy, holding_power, waits
-from optimizer.energy.interval import Known, arm_spread, saving_intervals
-from optimizer.energy.limited_torque import limited_torque
-from optimizer.energy.losses import breakdown, friction_torque
-from optimizer.energy.sensitivity import energy_sensitivity, waiting_sensitivity
-from optimizer.problem.problem import Problem
-from optimizer.solution import Baseline, BaselineName, Energy
-from optimizer.trajectories.limit_ratios import RATIO_TOLERANCE, limit_ratios, too_much
-from optimizer.trajectories.ruckig_motion import time_optimal
-from optimizer.trajectories.time_scalings import SampledMotion, controller_default, quintic, trapezoid
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.dwell import dwell_energy, holding_power, waits
+from joulepath.optimizer.energy.interval import Known, arm_spread, saving_intervals
+from joulepath.optimizer.energy.limited_torque import limited_torque
+from joulepath.optimizer.energy.losses import breakdown, friction_torque
+from joulepath.optimizer.energy.sensitivity import energy_sensitivity, waiting_sensitivity
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.solution import Baseline, BaselineName, Energy
+from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE, limit_ratios, too_much
+from joulepath.optimizer.trajectories.ruckig_motion import time_optimal
+from joulepath.optimizer.trajectories.time_scalings import SampledMotion, controller_default, quintic, trapezoid
 
 Torques = Callable[[Array, Array, Array], Array]
 Broken = Callable[[Sequence[Array], Sequence[Array]], list[list[str]]]

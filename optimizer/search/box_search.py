@@ -8,9 +8,9 @@ from typing import Generic, Self, TypeVar
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.collision.bodies import Indices
-from optimizer.deadline import Deadline
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.bodies import Indices
+from joulepath.optimizer.deadline import Deadline
 
 # boxes split in a round, rounds, and rounds of a tight bound
 SPLIT, ROUNDS, TIGHT_ROUNDS = 400, 80, 200

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from optimizer.deadline import Deadline
-from optimizer.methods import method_of
-from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.search.candidates import Candidate, Reason
-from optimizer.solution import CandidateStatus
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.methods import method_of
+from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.search.candidates import Candidate, Reason
+from joulepath.optimizer.solution import CandidateStatus
 
 
 def explore(

@@ -12,19 +12,19 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from models.robot import Array, Mask
-from optimizer.deadline import checkpoint
-from optimizer.exceptions import InvalidProblem
-from optimizer.methods.method import SolveResult
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.targets import AnyOf, Side
-from optimizer.search.end_feasibility import check_configurations, raise_if_none_is_left
-from optimizer.search.ends import SIDES, EndConfiguration
-from optimizer.search.lower_bound import lower_bounds
-from optimizer.search.mechanical_bound import mechanical_bounds
-from optimizer.search.passing import bound_through
-from optimizer.solution import CandidateReport, CandidateStatus
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.methods.method import SolveResult
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.targets import AnyOf, Side
+from joulepath.optimizer.search.end_feasibility import check_configurations, raise_if_none_is_left
+from joulepath.optimizer.search.ends import SIDES, EndConfiguration
+from joulepath.optimizer.search.lower_bound import lower_bounds
+from joulepath.optimizer.search.mechanical_bound import mechanical_bounds
+from joulepath.optimizer.search.passing import bound_through
+from joulepath.optimizer.solution import CandidateReport, CandidateStatus
+from joulepath.optimizer.trajectories.spline import Spline
 
 FULL_TURN = 2 * np.pi
 # 64 poses from a given start make 16384, two poses 2048; each is named in the answer with some 400 bytes

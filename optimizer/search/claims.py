@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from optimizer.solution import Objective
+from joulepath.optimizer.solution import Objective
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from models.robot import Array
-from optimizer.problem.arm import Arm
+from joulepath.models.robot import Array
+from joulepath.optimizer.problem.arm import Arm
 
 TINY = 1e-300
 """What a quotient's denominator is at least."""

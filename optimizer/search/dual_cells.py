@@ -16,23 +16,23 @@ from itertools import product
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.bounds.chain_derivatives import ChainDerivatives
-from optimizer.bounds.dual_bound import CellBounds, DualBound, multiplier_rates
-from optimizer.bounds.friction_conjugate import FrictionConjugate
-from optimizer.bounds.grid_cells import Spacing
-from optimizer.bounds.path_terms import path_terms
-from optimizer.bounds.reference import Reference, half_sides
-from optimizer.bounds.weights import Weights
-from optimizer.deadline import Deadline
-from optimizer.energy.dwell import LinearDwell
-from optimizer.native.shared_library import shared_library
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.search.candidates import Candidate
-from optimizer.search.cruise import TINY, copper_loss
-from optimizer.search.lower_bound import copper_multiplier, electrical
-from optimizer.trajectories.spline import sample
-from optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
+from joulepath.optimizer.bounds.dual_bound import CellBounds, DualBound, multiplier_rates
+from joulepath.optimizer.bounds.friction_conjugate import FrictionConjugate
+from joulepath.optimizer.bounds.grid_cells import Spacing
+from joulepath.optimizer.bounds.path_terms import path_terms
+from joulepath.optimizer.bounds.reference import Reference, half_sides
+from joulepath.optimizer.bounds.weights import Weights
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.energy.dwell import LinearDwell
+from joulepath.optimizer.native.shared_library import shared_library
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.cruise import TINY, copper_loss
+from joulepath.optimizer.search.lower_bound import copper_multiplier, electrical
+from joulepath.optimizer.trajectories.spline import sample
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 
 # at how many points of the straight line gravity is compared
 LINE_POINTS = 17

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.collision.model import ClosestPair
-from optimizer.exceptions import CollidingBranch, InvalidProblem, TorqueInfeasible, in_collision
-from optimizer.kinematics.forward import joint_placements, link_frames
-from optimizer.kinematics.path_constraints import ToolConeConstraint
-from optimizer.nlp.clearance_constraint import RESERVE
-from optimizer.prepared_problem import PreparedProblem
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.model import ClosestPair
+from joulepath.optimizer.exceptions import CollidingBranch, InvalidProblem, TorqueInfeasible, in_collision
+from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
+from joulepath.optimizer.kinematics.path_constraints import ToolConeConstraint
+from joulepath.optimizer.nlp.clearance_constraint import RESERVE
+from joulepath.optimizer.prepared_problem import PreparedProblem
 
 # rounding of the angle in a cone, relative to its half angle
 EDGE = 1e-9

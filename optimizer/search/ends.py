@@ -6,21 +6,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.robot import Array, Robot
-from optimizer.deadline import checkpoint
-from optimizer.exceptions import NoReachableTarget, OutsideLimits, SingularPose, UnreachablePose
-from optimizer.kinematics.full_turns import full_turn_alternatives
-from optimizer.kinematics.inverse import (
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.exceptions import NoReachableTarget, OutsideLimits, SingularPose, UnreachablePose
+from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives
+from joulepath.optimizer.kinematics.inverse import (
     inverse_kinematics_for,
     required_inverse_kinematics,
 )
-from optimizer.kinematics.orientation_tolerance import sample_orientations
-from optimizer.kinematics.self_motion import SelfMotion
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.pose import Pose
-from optimizer.problem.targets import AnyOf, Side, Single, Target
-from optimizer.solution import UnreachableTarget
+from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations
+from joulepath.optimizer.kinematics.self_motion import SelfMotion
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.targets import AnyOf, Side, Single, Target
+from joulepath.optimizer.solution import UnreachableTarget
 
 SIDES: tuple[Side, ...] = ("start", "goal")
 # orientations sampled of a pose that leaves it free, and of each of several such poses at least

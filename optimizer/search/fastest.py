@@ -8,20 +8,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optimizer.deadline import Deadline, DeadlinePassed, watch
-from optimizer.exceptions import DurationTooShort
-from optimizer.methods.duration_intervals import DurationInterval
-from optimizer.methods.fastest_motion import FastestMotion, FastestSettings
-from optimizer.methods.method import Method, SolveResult, SolveStatus
-from optimizer.search.attempts import solve_from, solver_of
-from optimizer.search.candidates import Candidate, Reason
-from optimizer.search.incumbent import Incumbent
-from optimizer.search.missed_branches import all_known
-from optimizer.search.outer_turns import families_of
-from optimizer.search.quicker_ends import with_quicker_ends
-from optimizer.search.sampled_ends import fastest_samples
-from optimizer.solution import CandidateStatus, Energy
-from optimizer.trajectories.spline import Spline, lasting, sampled
+from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
+from joulepath.optimizer.exceptions import DurationTooShort
+from joulepath.optimizer.methods.duration_intervals import DurationInterval
+from joulepath.optimizer.methods.fastest_motion import FastestMotion, FastestSettings
+from joulepath.optimizer.methods.method import Method, SolveResult, SolveStatus
+from joulepath.optimizer.search.attempts import solve_from, solver_of
+from joulepath.optimizer.search.candidates import Candidate, Reason
+from joulepath.optimizer.search.incumbent import Incumbent
+from joulepath.optimizer.search.missed_branches import all_known
+from joulepath.optimizer.search.outer_turns import families_of
+from joulepath.optimizer.search.quicker_ends import with_quicker_ends
+from joulepath.optimizer.search.sampled_ends import fastest_samples
+from joulepath.optimizer.solution import CandidateStatus, Energy
+from joulepath.optimizer.trajectories.spline import Spline, lasting, sampled
 
 # motions that obstacles stop are not too slow if so many times the shortest duration is allowed
 AMPLE = 20.0

@@ -10,27 +10,27 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.deadline import DeadlinePassed, watch
-from optimizer.kinematics.orientation_tolerance import tilt
-from optimizer.kinematics.tcp import tcp_jacobian, tcp_pose
-from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
-from optimizer.methods.free_spline import COARSE, FreeSpline
-from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.methods.sqp_method import Guess
-from optimizer.nlp.coordinates import Coordinates, GoalConstraints
-from optimizer.nlp.nonlinear_program import NonlinearProgram
-from optimizer.nlp.sqp import solve
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.search.attempts import settled, solver_of
-from optimizer.search.candidates import Candidate
-from optimizer.search.ends import EndConfiguration
-from optimizer.search.incumbent import Incumbent
-from optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
-from optimizer.trajectories import bspline
-from optimizer.trajectories.bspline import REST_POINTS
-from optimizer.trajectories.spline import sample
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import DeadlinePassed, watch
+from joulepath.optimizer.kinematics.orientation_tolerance import tilt
+from joulepath.optimizer.kinematics.tcp import tcp_jacobian, tcp_pose
+from joulepath.optimizer.methods.duration_intervals import DurationInterval, duration_intervals
+from joulepath.optimizer.methods.free_spline import COARSE, FreeSpline
+from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.methods.sqp_method import Guess
+from joulepath.optimizer.nlp.coordinates import Coordinates, GoalConstraints
+from joulepath.optimizer.nlp.nonlinear_program import NonlinearProgram
+from joulepath.optimizer.nlp.sqp import solve
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.search.attempts import settled, solver_of
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.ends import EndConfiguration
+from joulepath.optimizer.search.incumbent import Incumbent
+from joulepath.optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.bspline import REST_POINTS
+from joulepath.optimizer.trajectories.spline import sample
 
 # rounds of refinement, the trust region of a goal joint in one of them [rad], and the least one
 ROUNDS, RADIUS, LEAST_RADIUS = 8, 0.6, 0.01

@@ -18,21 +18,21 @@ from itertools import product
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.collision.bodies import Indices
-from optimizer.deadline import NEVER, Deadline
-from optimizer.kinematics.pose_boxes import PoseBoxes
-from optimizer.kinematics.wrist_boxes import WristBoxes
-from optimizer.kinematics.wrist_geometry import OUTER, Shell, WristBody, WristGeometry, potential_rates
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.targets import AnyOf
-from optimizer.search.box_search import NEARLY, ROUNDS, TIGHT_ROUNDS, Boxes, BoxSearch
-from optimizer.search.candidates import Candidate
-from optimizer.search.ends import within_cone
-from optimizer.search.least_displacement import least_displacement
-from optimizer.search.lower_bound import LeastBound
-from optimizer.search.self_motion_bound import EndCurves
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.collision.bodies import Indices
+from joulepath.optimizer.deadline import NEVER, Deadline
+from joulepath.optimizer.kinematics.pose_boxes import PoseBoxes
+from joulepath.optimizer.kinematics.wrist_boxes import WristBoxes
+from joulepath.optimizer.kinematics.wrist_geometry import OUTER, Shell, WristBody, WristGeometry, potential_rates
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.search.box_search import NEARLY, ROUNDS, TIGHT_ROUNDS, Boxes, BoxSearch
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.ends import within_cone
+from joulepath.optimizer.search.least_displacement import least_displacement
+from joulepath.optimizer.search.lower_bound import LeastBound
+from joulepath.optimizer.search.self_motion_bound import EndCurves
 
 # boxes along each inner joint at first, but for so many starts that there would be more than MOST_FIRST in all
 FIRST_BOXES, MOST_FIRST = (4, 2, 1), 4096

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from optimizer.methods.free_spline import FreeSpline
-from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.search.attempts import solve, solve_from
-from optimizer.search.candidates import Candidate
-from optimizer.search.incumbent import Incumbent
-from optimizer.search.refinement import refine
-from optimizer.trajectories.spline import lasting, sampled
+from joulepath.optimizer.methods.free_spline import FreeSpline
+from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.search.attempts import solve, solve_from
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.incumbent import Incumbent
+from joulepath.optimizer.search.refinement import refine
+from joulepath.optimizer.trajectories.spline import lasting, sampled
 
 # greatest ratio of the two durations, and of the two energies, at which the free motion may lead to a better one
 NEAR, PROMISING = 1.15, 1.01

@@ -11,17 +11,17 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.bounds.chain_derivatives import ChainDerivatives
-from optimizer.bounds.holding import HoldingBound, Planes
-from optimizer.bounds.straight_line import Line
-from optimizer.collision.bodies import Indices
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
-from optimizer.search.cruise import TINY, copper_loss
-from optimizer.search.least_displacement import turned
-from optimizer.search.lower_bound import LeastBound, NetEnergy
-from optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
+from joulepath.optimizer.bounds.holding import HoldingBound, Planes
+from joulepath.optimizer.bounds.straight_line import Line
+from joulepath.optimizer.collision.bodies import Indices
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.search.cruise import TINY, copper_loss
+from joulepath.optimizer.search.least_displacement import turned
+from joulepath.optimizer.search.lower_bound import LeastBound, NetEnergy
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 
 # the bound is raised by this share of the plain one at most; durations at which that is compared, and cells
 MOST, PROBES, CELLS = 0.3, 24, 12

@@ -7,17 +7,17 @@ from typing import Literal
 
 import numpy as np
 
-from optimizer.certificate import certify
-from optimizer.deadline import Deadline, DeadlinePassed, watch
-from optimizer.methods import method_of
-from optimizer.methods.method import Method, SolveResult
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import LEAST_DURATION, Problem, narrowed
-from optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, nobody
-from optimizer.search.candidates import Candidate, Reason
-from optimizer.search.reserve import reserve
-from optimizer.solution import CandidateStatus, Certificate, Energy
-from optimizer.trajectories.spline import Spline, lasting
+from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
+from joulepath.optimizer.methods import method_of
+from joulepath.optimizer.methods.method import Method, SolveResult
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import LEAST_DURATION, Problem, narrowed
+from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, nobody
+from joulepath.optimizer.search.candidates import Candidate, Reason
+from joulepath.optimizer.search.reserve import reserve
+from joulepath.optimizer.solution import CandidateStatus, Certificate, Energy
+from joulepath.optimizer.trajectories.spline import Spline, lasting
 
 # a baseline counts as better only beyond this share, the error of the quadratures that are compared
 SLACK = 1e-6

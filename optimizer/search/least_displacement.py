@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array, Limits, Mask
+from joulepath.models.robot import Array, Limits, Mask
 
 # what position limits are widened by, for rounding [rad]
 ROUNDING = 1e-9

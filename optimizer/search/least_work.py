@@ -16,21 +16,21 @@ from functools import partial
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.deadline import DeadlinePassed, watch
-from optimizer.energy.plant import SHARPER_WIDTHS, WIDTH
-from optimizer.methods.duration_intervals import duration_intervals
-from optimizer.methods.free_spline import TIGHT, FreeSpline
-from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.methods.sharp_motion import sharp_motion
-from optimizer.methods.sqp_method import above
-from optimizer.search.attempts import in_time, solver_of
-from optimizer.search.candidates import Candidate, Reason
-from optimizer.search.incumbent import Incumbent
-from optimizer.search.outer_turns import FAMILIES, MEMBERS, NEAR, families_of, leave
-from optimizer.search.rough_work import COARSE, Rough, RoughWork, best_of_each
-from optimizer.search.sharpening import DENSE, LAST_PROGRESS, LEAST_FREEDOM, MIDDLE, PROGRESS, follow_in_time
-from optimizer.solution import CandidateStatus
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import DeadlinePassed, watch
+from joulepath.optimizer.energy.plant import SHARPER_WIDTHS, WIDTH
+from joulepath.optimizer.methods.duration_intervals import duration_intervals
+from joulepath.optimizer.methods.free_spline import TIGHT, FreeSpline
+from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.methods.sharp_motion import sharp_motion
+from joulepath.optimizer.methods.sqp_method import above
+from joulepath.optimizer.search.attempts import in_time, solver_of
+from joulepath.optimizer.search.candidates import Candidate, Reason
+from joulepath.optimizer.search.incumbent import Incumbent
+from joulepath.optimizer.search.outer_turns import FAMILIES, MEMBERS, NEAR, families_of, leave
+from joulepath.optimizer.search.rough_work import COARSE, Rough, RoughWork, best_of_each
+from joulepath.optimizer.search.sharpening import DENSE, LAST_PROGRESS, LEAST_FREEDOM, MIDDLE, PROGRESS, follow_in_time
+from joulepath.optimizer.solution import CandidateStatus
 
 # time [s] that the search needs to be sure of a motion
 LEAST_TIME = 3.0

@@ -11,13 +11,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from models.robot import Array
-from optimizer.energy.dwell import holding_power, linear_dwells
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
-from optimizer.search.cruise import TINY, Cruise, EvenTravel, copper_loss
-from optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.dwell import holding_power, linear_dwells
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.search.cruise import TINY, Cruise, EvenTravel, copper_loss
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 
 # max over x ≥ 0 of x - x² / sqrt(x² + 1), rounded up: what spreading Coulomb friction's jump takes from |v|, in knees
 _KNEE_DEFICIT = 0.3003
@@ -38,7 +38,8 @@ def lower_bounds(
     the longest allowed one has the bound inf. Along a tool path no motion is shorter than the path leaves it time for
     (`kinematics.least_time`).
 
-    Waiting draws constant - power · T on each of its linear pieces (see `optimizer.energy.dwell`): there it is a
+    Waiting draws constant - power · T on each of its linear pieces (see `joulepath.optimizer.energy.dwell`): there
+    it is a
     constant and a power less for every second of the motion, and the least over the pieces is a bound for all
     durations.
     """

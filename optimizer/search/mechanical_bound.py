@@ -50,9 +50,9 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import LONGEST_DURATION
+from joulepath.models.robot import Array
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import LONGEST_DURATION
 
 # cells of the integral in (3), and halvings of the interval that holds its energy
 CELLS, BISECTIONS = 32, 30

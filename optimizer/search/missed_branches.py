@@ -6,22 +6,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.deadline import NEVER, Deadline
-from optimizer.kinematics.covering_sheets import CoveringSheet, covering_sheets
-from optimizer.kinematics.inverse import inverse_kinematics_for
-from optimizer.kinematics.tcp import flange_pose
-from optimizer.kinematics.wrist_geometry import potential_rates
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.targets import Side, Target, members
-from optimizer.search.box_search import FEW, TIGHT_ROUNDS
-from optimizer.search.candidates import Candidate
-from optimizer.search.free_goal_bound import family_bound
-from optimizer.search.lower_bound import LeastBound
-from optimizer.search.self_motion_bound import EndCurves, bound_between, self_motion_bound
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import NEVER, Deadline
+from joulepath.optimizer.kinematics.covering_sheets import CoveringSheet, covering_sheets
+from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
+from joulepath.optimizer.kinematics.tcp import flange_pose
+from joulepath.optimizer.kinematics.wrist_geometry import potential_rates
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.targets import Side, Target, members
+from joulepath.optimizer.search.box_search import FEW, TIGHT_ROUNDS
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.free_goal_bound import family_bound
+from joulepath.optimizer.search.lower_bound import LeastBound
+from joulepath.optimizer.search.self_motion_bound import EndCurves, bound_between, self_motion_bound
 
 
 def all_known(problem: Problem) -> bool:

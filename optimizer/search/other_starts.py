@@ -9,20 +9,20 @@ from __future__ import annotations
 
 from functools import partial
 
-from optimizer.energy.plant import has_corners
-from optimizer.kinematics.held_pose import HeldPose
-from optimizer.methods.duration_intervals import duration_intervals
-from optimizer.methods.free_spline import COARSE, FreeSpline
-from optimizer.methods.method import Method, SolveResult
-from optimizer.methods.sqp_method import above
-from optimizer.nlp.sqp import PROGRESS
-from optimizer.search.attempts import improve, in_time, settled, solver_of
-from optimizer.search.candidates import Candidate
-from optimizer.search.ends import SIDES
-from optimizer.search.incumbent import Incumbent
-from optimizer.search.sampled_ends import with_ends
-from optimizer.search.sliding import slides
-from optimizer.trajectories.spline import sampled
+from joulepath.optimizer.energy.plant import has_corners
+from joulepath.optimizer.kinematics.held_pose import HeldPose
+from joulepath.optimizer.methods.duration_intervals import duration_intervals
+from joulepath.optimizer.methods.free_spline import COARSE, FreeSpline
+from joulepath.optimizer.methods.method import Method, SolveResult
+from joulepath.optimizer.methods.sqp_method import above
+from joulepath.optimizer.nlp.sqp import PROGRESS
+from joulepath.optimizer.search.attempts import improve, in_time, settled, solver_of
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.ends import SIDES
+from joulepath.optimizer.search.incumbent import Incumbent
+from joulepath.optimizer.search.sampled_ends import with_ends
+from joulepath.optimizer.search.sliding import slides
+from joulepath.optimizer.trajectories.spline import sampled
 
 # length of the step along a curve [rad]
 STEP = 0.15

@@ -9,14 +9,14 @@ from operator import add
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
-from optimizer.search.baselines import baselines, saving
-from optimizer.search.lower_bound import travel_bounds
-from optimizer.solution import Baseline
-from optimizer.trajectories.passing import pass_times
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
+from joulepath.optimizer.search.baselines import baselines, saving
+from joulepath.optimizer.search.lower_bound import travel_bounds
+from joulepath.optimizer.solution import Baseline
+from joulepath.optimizer.trajectories.passing import pass_times
+from joulepath.optimizer.trajectories.spline import Spline
 
 
 def bound_through(prepared: PreparedProblem, q_start: Array, q_goal: Array) -> float:

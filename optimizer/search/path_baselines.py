@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from optimizer.search.baselines import compared
-from optimizer.search.candidates import Candidate
-from optimizer.search.incumbent import Incumbent
-from optimizer.solution import Baseline
-from optimizer.trajectories.spline import Spline
-from optimizer.trajectories.time_scalings import SampledMotion, even_speed
+from joulepath.optimizer.search.baselines import compared
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.incumbent import Incumbent
+from joulepath.optimizer.solution import Baseline
+from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.trajectories.time_scalings import SampledMotion, even_speed
 
 
 def path_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseline]:

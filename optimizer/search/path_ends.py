@@ -6,21 +6,21 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.robot import Array, Limits
-from optimizer.deadline import Deadline
-from optimizer.exceptions import PathAttempt, PathInfeasible
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.course_tracing import Trace, traces, turned, with_turning, within
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.problem import Problem
-from optimizer.problem.targets import Target
-from optimizer.search.candidates import Candidate, Reason, bound, pairs
-from optimizer.search.ends import EndConfiguration, ends, ends_of, label_of
-from optimizer.search.free_ends_bound import backwards, bound_between
-from optimizer.search.free_goal_bound import family_bound_of
-from optimizer.search.missed_branches import bound_of_others
-from optimizer.solution import CandidateStatus
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.exceptions import PathAttempt, PathInfeasible
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.course_tracing import Trace, traces, turned, with_turning, within
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.targets import Target
+from joulepath.optimizer.search.candidates import Candidate, Reason, bound, pairs
+from joulepath.optimizer.search.ends import EndConfiguration, ends, ends_of, label_of
+from joulepath.optimizer.search.free_ends_bound import backwards, bound_between
+from joulepath.optimizer.search.free_goal_bound import family_bound_of
+from joulepath.optimizer.search.missed_branches import bound_of_others
+from joulepath.optimizer.solution import CandidateStatus
 
 # rad: where a path leads, and joint positions that are given for its end
 SAME = 1e-6

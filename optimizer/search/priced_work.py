@@ -14,11 +14,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from models.robot import Array
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import LEAST_DURATION
-from optimizer.search.mechanical_bound import EnergyRange, Swing, most_travel
-from optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.models.robot import Array
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import LEAST_DURATION
+from joulepath.optimizer.search.mechanical_bound import EnergyRange, Swing, most_travel
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 
 # cells of the durations, and works of the table, from this share of the greatest one on
 CELLS, WORKS, LEAST_WORK = 40, 96, 1e-3

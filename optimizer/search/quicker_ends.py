@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.deadline import checkpoint
-from optimizer.kinematics.angles import nearest_turn
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.search.candidates import Candidate
-from optimizer.search.ends import EndConfiguration
-from optimizer.search.sampled_ends import nearest_configuration, with_ends
-from optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.kinematics.angles import nearest_turn
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.ends import EndConfiguration
+from joulepath.optimizer.search.sampled_ends import nearest_configuration, with_ends
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 
 
 @dataclass(frozen=True)

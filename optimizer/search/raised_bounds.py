@@ -14,14 +14,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from optimizer.bounds.grid_cells import Spacing
-from optimizer.deadline import Deadline
-from optimizer.energy.dwell import LinearDwell, linear_dwells
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
-from optimizer.search.candidates import Candidate
-from optimizer.search.dual_cells import DurationCells, Effort, PairBounds
-from optimizer.search.turns_left_out import bound_of_turns_left_out
+from joulepath.optimizer.bounds.grid_cells import Spacing
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.energy.dwell import LinearDwell, linear_dwells
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.dual_cells import DurationCells, Effort, PairBounds
+from joulepath.optimizer.search.turns_left_out import bound_of_turns_left_out
 
 # pairs that a stage raises at most without "tight", and the gap that a bound is raised to at most
 MOST_RAISED, LEAST_GAP = 16, 0.03

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from models.robot import Array, Limits
+from joulepath.models.robot import Array, Limits
 
 # half waves, least and largest standard deviation of their amplitudes [rad]: the motions of least work swing far
 WAVES, AMPLITUDES = 3, (1.0, 5.0)

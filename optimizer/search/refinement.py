@@ -7,23 +7,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from optimizer.deadline import DeadlinePassed, watch
-from optimizer.methods.free_spline import EXACT_BELOW, TIGHT
-from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.search.attempts import improve, solve_from
-from optimizer.search.baselines import baselines, guesses, nearest
-from optimizer.search.candidates import Candidate
-from optimizer.search.incumbent import SLACK, Incumbent
-from optimizer.search.passing import stopping_baselines
-from optimizer.search.path_baselines import path_baselines
-from optimizer.search.regrading import grade
-from optimizer.search.sharpening import sharpen
-from optimizer.search.sliding import slides
-from optimizer.solution import Baseline, BaselineName
-from optimizer.trajectories.ruckig_motion import time_optimal_spline
-from optimizer.trajectories.seven_segment import shortest_duration
-from optimizer.trajectories.spline import Spline, least_time_scale, retimed, sampled
-from optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.optimizer.deadline import DeadlinePassed, watch
+from joulepath.optimizer.methods.free_spline import EXACT_BELOW, TIGHT
+from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.search.attempts import improve, solve_from
+from joulepath.optimizer.search.baselines import baselines, guesses, nearest
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.incumbent import SLACK, Incumbent
+from joulepath.optimizer.search.passing import stopping_baselines
+from joulepath.optimizer.search.path_baselines import path_baselines
+from joulepath.optimizer.search.regrading import grade
+from joulepath.optimizer.search.sharpening import sharpen
+from joulepath.optimizer.search.sliding import slides
+from joulepath.optimizer.solution import Baseline, BaselineName
+from joulepath.optimizer.trajectories.ruckig_motion import time_optimal_spline
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.optimizer.trajectories.spline import Spline, least_time_scale, retimed, sampled
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 
 # assumed values of a joule of surplus if the storage cannot take all of it: shares of the way from what the supply
 # pays for it to what the storage gives back

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from optimizer.exceptions import NoCollisionFreeTrajectory, NoTrajectory
-from optimizer.search.candidates import Candidate
+from joulepath.optimizer.exceptions import NoCollisionFreeTrajectory, NoTrajectory
+from joulepath.optimizer.search.candidates import Candidate
 
 
 def no_trajectory(candidates: Sequence[Candidate]) -> NoTrajectory:

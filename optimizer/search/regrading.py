@@ -6,12 +6,12 @@ begins from its motion, with the knots at the switches of the motion to the post
 
 from __future__ import annotations
 
-from optimizer.methods.free_spline import FreeSpline
-from optimizer.methods.method import Method, SolveResult
-from optimizer.search.attempts import improve
-from optimizer.search.candidates import Candidate
-from optimizer.search.incumbent import Incumbent
-from optimizer.trajectories.spline import Spline, sampled
+from joulepath.optimizer.methods.free_spline import FreeSpline
+from joulepath.optimizer.methods.method import Method, SolveResult
+from joulepath.optimizer.search.attempts import improve
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.incumbent import Incumbent
+from joulepath.optimizer.trajectories.spline import Spline, sampled
 
 # relative decrease of the cost that a further step of the first solve must promise
 FIRST_PROGRESS = 1e-3

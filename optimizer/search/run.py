@@ -8,38 +8,38 @@ from dataclasses import replace
 
 import numpy as np
 
-from optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
-from optimizer.energy.interval import Known, with_interval
-from optimizer.exceptions import DeadlineExceeded, DurationTooShort, NoTrajectory
-from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.bus import Bus
-from optimizer.problem.problem import Problem
-from optimizer.progress import Improved, Tell, nobody
-from optimizer.search import free_goal, self_motions
-from optimizer.search.attempts import solve, solve_from
-from optimizer.search.baselines import with_saving_intervals
-from optimizer.search.branch_and_bound import explore
-from optimizer.search.candidates import Candidate, Reason, bound, pairs
-from optimizer.search.claims import may_be_optimal
-from optimizer.search.ends import ends
-from optimizer.search.fastest import explore_or_find_fastest, find_fastest
-from optimizer.search.freed_duration import start_from_free_duration
-from optimizer.search.incumbent import Incumbent
-from optimizer.search.least_work import explore_least_work
-from optimizer.search.missed_branches import all_known
-from optimizer.search.near_goals import activate_near_goals
-from optimizer.search.other_starts import start_beside
-from optimizer.search.outer_turns import explore_families
-from optimizer.search.path_ends import path_candidates
-from optimizer.search.refinement import baselines_of, compare_with_baselines, refine
-from optimizer.search.refusals import no_trajectory
-from optimizer.search.ruled_out import ruled_out
-from optimizer.search.sampled_ends import activate_deferred, between
-from optimizer.search.second_attempt import reject
-from optimizer.search.seeds import activate_seeds
-from optimizer.search.sliding import slides
-from optimizer.solution import (
+from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
+from joulepath.optimizer.energy.interval import Known, with_interval
+from joulepath.optimizer.exceptions import DeadlineExceeded, DurationTooShort, NoTrajectory
+from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.progress import Improved, Tell, nobody
+from joulepath.optimizer.search import free_goal, self_motions
+from joulepath.optimizer.search.attempts import solve, solve_from
+from joulepath.optimizer.search.baselines import with_saving_intervals
+from joulepath.optimizer.search.branch_and_bound import explore
+from joulepath.optimizer.search.candidates import Candidate, Reason, bound, pairs
+from joulepath.optimizer.search.claims import may_be_optimal
+from joulepath.optimizer.search.ends import ends
+from joulepath.optimizer.search.fastest import explore_or_find_fastest, find_fastest
+from joulepath.optimizer.search.freed_duration import start_from_free_duration
+from joulepath.optimizer.search.incumbent import Incumbent
+from joulepath.optimizer.search.least_work import explore_least_work
+from joulepath.optimizer.search.missed_branches import all_known
+from joulepath.optimizer.search.near_goals import activate_near_goals
+from joulepath.optimizer.search.other_starts import start_beside
+from joulepath.optimizer.search.outer_turns import explore_families
+from joulepath.optimizer.search.path_ends import path_candidates
+from joulepath.optimizer.search.refinement import baselines_of, compare_with_baselines, refine
+from joulepath.optimizer.search.refusals import no_trajectory
+from joulepath.optimizer.search.ruled_out import ruled_out
+from joulepath.optimizer.search.sampled_ends import activate_deferred, between
+from joulepath.optimizer.search.second_attempt import reject
+from joulepath.optimizer.search.seeds import activate_seeds
+from joulepath.optimizer.search.sliding import slides
+from joulepath.optimizer.solution import (
     Baseline,
     Branch,
     CandidateStatus,
@@ -49,7 +49,7 @@ from optimizer.solution import (
     SolverReport,
     UnreachableTarget,
 )
-from optimizer.trajectories.spline import Spline, lasting, sampled
+from joulepath.optimizer.trajectories.spline import Spline, lasting, sampled
 
 # time after the deadline [s] at which a certificate is given up: better a little late than no answer
 OVERTIME = 0.1

@@ -12,16 +12,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.exceptions import JoulepathError
-from optimizer.kinematics.angles import nearest_turn
-from optimizer.kinematics.goal_manifold import GoalManifold
-from optimizer.kinematics.inverse import required_inverse_kinematics
-from optimizer.methods.sqp_method import above
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.search.candidates import Candidate, Reason, bound
-from optimizer.search.ends import SIDES, EndConfiguration, label_of
-from optimizer.solution import CandidateStatus
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.kinematics.angles import nearest_turn
+from joulepath.optimizer.kinematics.goal_manifold import GoalManifold
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.methods.sqp_method import above
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.search.candidates import Candidate, Reason, bound
+from joulepath.optimizer.search.ends import SIDES, EndConfiguration, label_of
+from joulepath.optimizer.solution import CandidateStatus
 
 # samples solved before any is refined: in all, and of one pair of branches
 BATCH, ALIKE = 12, 2

@@ -13,16 +13,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.energy.dwell import brake_power, waits
-from optimizer.methods.sqp_method import above
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
-from optimizer.search.candidates import Candidate, Reason
-from optimizer.search.ends import EndConfiguration
-from optimizer.solution import CandidateStatus
-from optimizer.trajectories import quintic
-from optimizer.trajectories.quadrature import quadrature
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.energy.dwell import brake_power, waits
+from joulepath.optimizer.methods.sqp_method import above
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
+from joulepath.optimizer.search.candidates import Candidate, Reason
+from joulepath.optimizer.search.ends import EndConfiguration
+from joulepath.optimizer.solution import CandidateStatus
+from joulepath.optimizer.trajectories import quintic
+from joulepath.optimizer.trajectories.quadrature import quadrature
 
 # durations of the quintic, in multiples of the shortest one, and the panels and points of its quadrature
 TIME_SCALES, PANELS, POINTS = (1.15, 1.5, 2.2), 4, 3

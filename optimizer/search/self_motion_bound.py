@@ -18,19 +18,19 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from models.robot import Array, Mask
-from optimizer.deadline import NEVER, Deadline
-from optimizer.kinematics.covering_sheets import CoveringSheet, boxes_on
-from optimizer.kinematics.redundant_curve import CurveStack, RedundantCurve
-from optimizer.kinematics.self_motion import SelfMotion
-from optimizer.kinematics.wrist_geometry import potential_rates
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.search.box_search import NEARLY
-from optimizer.search.candidates import Candidate
-from optimizer.search.ends import EndConfiguration
-from optimizer.search.holding_cells import HoldingCells
-from optimizer.search.least_displacement import least_displacement
-from optimizer.search.lower_bound import LeastBound
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.deadline import NEVER, Deadline
+from joulepath.optimizer.kinematics.covering_sheets import CoveringSheet, boxes_on
+from joulepath.optimizer.kinematics.redundant_curve import CurveStack, RedundantCurve
+from joulepath.optimizer.kinematics.self_motion import SelfMotion
+from joulepath.optimizer.kinematics.wrist_geometry import potential_rates
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.search.box_search import NEARLY
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.ends import EndConfiguration
+from joulepath.optimizer.search.holding_cells import HoldingCells
+from joulepath.optimizer.search.least_displacement import least_displacement
+from joulepath.optimizer.search.lower_bound import LeastBound
 
 # half side of the first cells, and of cells that are not halved again [rad]; most pairs halved in a round, rounds
 FIRST_HALF, LAST_HALF, SPLIT, ROUNDS = np.pi / 24, 1e-4, 256, 60

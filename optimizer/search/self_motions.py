@@ -11,16 +11,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from optimizer.kinematics.angles import nearest_turn
-from optimizer.methods.free_spline import FreeSpline
-from optimizer.problem.targets import Side
-from optimizer.search.attempts import settled, solve
-from optimizer.search.candidates import Candidate
-from optimizer.search.ends import MEMBERS
-from optimizer.search.free_goal import REFINED, refine_goal
-from optimizer.search.incumbent import Incumbent
-from optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
-from optimizer.search.sliding import slides
+from joulepath.optimizer.kinematics.angles import nearest_turn
+from joulepath.optimizer.methods.free_spline import FreeSpline
+from joulepath.optimizer.problem.targets import Side
+from joulepath.optimizer.search.attempts import settled, solve
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.ends import MEMBERS
+from joulepath.optimizer.search.free_goal import REFINED, refine_goal
+from joulepath.optimizer.search.incumbent import Incumbent
+from joulepath.optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
+from joulepath.optimizer.search.sliding import slides
 
 # first step of a parameter, half the way between two samples on a whole circle, and the least one [rad]
 FIRST_STEP, LEAST_STEP = np.pi / MEMBERS, 2e-3

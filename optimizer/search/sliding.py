@@ -8,18 +8,18 @@ from operator import itemgetter
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.held_pose import HeldPose
-from optimizer.methods import method_of
-from optimizer.methods.free_spline import FreeSpline
-from optimizer.methods.method import Method
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.targets import Side
-from optimizer.search.candidates import Candidate
-from optimizer.search.ends import EndConfiguration
-from optimizer.search.sampled_ends import with_ends
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.held_pose import HeldPose
+from joulepath.optimizer.methods import method_of
+from joulepath.optimizer.methods.free_spline import FreeSpline
+from joulepath.optimizer.methods.method import Method
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.targets import Side
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.ends import EndConfiguration
+from joulepath.optimizer.search.sampled_ends import with_ends
+from joulepath.optimizer.trajectories.spline import Spline
 
 # joints that a pose fixes
 FIXED = 6

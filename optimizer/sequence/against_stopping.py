@@ -7,17 +7,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.energy.interval import Known
-from optimizer.problem.work_round import WorkRound
-from optimizer.sequence.layers import Layer
-from optimizer.sequence.moves import Wait
-from optimizer.sequence.passing_leg import PassingLeg
-from optimizer.sequence.round_baselines import compared
-from optimizer.sequence.round_search import RoundSearch
-from optimizer.sequence.round_solution import Move, Needed, RoundBaseline, RoundSolution
-from optimizer.solution import Solution
-from optimizer.trajectories.joined import joined
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.interval import Known
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.sequence.layers import Layer
+from joulepath.optimizer.sequence.moves import Wait
+from joulepath.optimizer.sequence.passing_leg import PassingLeg
+from joulepath.optimizer.sequence.round_baselines import compared
+from joulepath.optimizer.sequence.round_search import RoundSearch
+from joulepath.optimizer.sequence.round_solution import Move, Needed, RoundBaseline, RoundSolution
+from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.trajectories.joined import joined
 
 # share of the deadline that the round with rests may take
 SHARE = 0.4

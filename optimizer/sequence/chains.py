@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 
 class LeastChain:

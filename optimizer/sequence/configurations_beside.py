@@ -12,14 +12,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.kinematics.goal_manifold import GoalManifold
-from optimizer.kinematics.tcp import tcp_jacobian, tcp_pose
-from optimizer.problem.arm import Arm
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.targets import AnyOf
-from optimizer.problem.work_round import START, WorkRound
-from optimizer.sequence.round_solution import RoundSolution
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.goal_manifold import GoalManifold
+from joulepath.optimizer.kinematics.tcp import tcp_jacobian, tcp_pose
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.problem.work_round import START, WorkRound
+from joulepath.optimizer.sequence.round_solution import RoundSolution
 
 # singular values below this share of the largest do not count: next to a singularity, steps stay short
 SINGULAR = 1e-2

@@ -13,21 +13,21 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from models.robot import Array, Limits, Mask
-from optimizer.exceptions import PathInfeasible
-from optimizer.kinematics.tool_course import ToolCourse
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.free_order import FreeOrder
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.stops import Stop
-from optimizer.problem.tool_path import Section
-from optimizer.problem.work_round import WorkRound
-from optimizer.search.end_feasibility import check_configurations
-from optimizer.search.lower_bound import lower_bounds
-from optimizer.sequence.layers import arms_at
-from optimizer.sequence.strands import Strand, strands_of
-from optimizer.sequence.ways import layers_of_stop
+from joulepath.models.robot import Array, Limits, Mask
+from joulepath.optimizer.exceptions import PathInfeasible
+from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.free_order import FreeOrder
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.tool_path import Section
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.search.end_feasibility import check_configurations
+from joulepath.optimizer.search.lower_bound import lower_bounds
+from joulepath.optimizer.sequence.layers import arms_at
+from joulepath.optimizer.sequence.strands import Strand, strands_of
+from joulepath.optimizer.sequence.ways import layers_of_stop
 
 # places at which a path may be divided: even fractions of it
 PLACES = np.linspace(0.0, 1.0, 129)

@@ -20,20 +20,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.collision.bodies import Indices
-from optimizer.deadline import Deadline
-from optimizer.kinematics.angles import wrapped
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.work_round import WorkRound
-from optimizer.search.least_displacement import ROUNDING
-from optimizer.search.lower_bound import LeastBound
-from optimizer.sequence.chains import LeastChain
-from optimizer.sequence.covered_layer import CoveredLayer
-from optimizer.sequence.layers import Layer
-from optimizer.sequence.legs import Leg
-from optimizer.sequence.rests import least_holding_power, rest_energy
-from optimizer.sequence.single_joint_bound import Boxes, SingleJointBound
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.bodies import Indices
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.search.least_displacement import ROUNDING
+from joulepath.optimizer.search.lower_bound import LeastBound
+from joulepath.optimizer.sequence.chains import LeastChain
+from joulepath.optimizer.sequence.covered_layer import CoveredLayer
+from joulepath.optimizer.sequence.layers import Layer
+from joulepath.optimizer.sequence.legs import Leg
+from joulepath.optimizer.sequence.rests import least_holding_power, rest_energy
+from joulepath.optimizer.sequence.single_joint_bound import Boxes, SingleJointBound
 
 # cells of a layer that are split in a round; pairs of two layers of cells that are bounded at once, and how often in a
 # round; rounds; the share of the least known chain that will do

@@ -19,9 +19,9 @@ from itertools import product
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
-from optimizer.deadline import Clock, Deadline
-from optimizer.exceptions import (
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import Clock, Deadline
+from joulepath.optimizer.exceptions import (
     DeadlineExceeded,
     InvalidProblem,
     JoulepathError,
@@ -30,18 +30,18 @@ from optimizer.exceptions import (
     NoTrajectory,
     UnreachablePose,
 )
-from optimizer.kinematics.orientation_tolerance import nearest_orientation, sample_orientations
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.pose import Pose
-from optimizer.problem.stops import Stop
-from optimizer.problem.targets import PosesAround
-from optimizer.problem.work_round import WorkRound
-from optimizer.sequence.configurations_beside import beside
-from optimizer.sequence.known_motions import knowing, known_motions
-from optimizer.sequence.move_problem import LEAST_TIME
-from optimizer.sequence.round_baselines import compared_again
-from optimizer.sequence.round_solution import Move, RoundBaseline, RoundSolution
-from optimizer.sequence.successive_moves import successively_chosen
+from joulepath.optimizer.kinematics.orientation_tolerance import nearest_orientation, sample_orientations
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.targets import PosesAround
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.sequence.configurations_beside import beside
+from joulepath.optimizer.sequence.known_motions import knowing, known_motions
+from joulepath.optimizer.sequence.move_problem import LEAST_TIME
+from joulepath.optimizer.sequence.round_baselines import compared_again
+from joulepath.optimizer.sequence.round_solution import Move, RoundBaseline, RoundSolution
+from joulepath.optimizer.sequence.successive_moves import successively_chosen
 
 # angles [rad] about an axis at first, and orientations that are free otherwise
 ALL_AROUND, SPREAD = tuple(np.arange(12) * (np.pi / 6)), 24

@@ -18,10 +18,10 @@ from typing import Any, Literal
 import numpy as np
 import pinocchio as pin
 
-from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.problem.arm import Arm
-from optimizer.problem.problem import Problem
-from optimizer.trajectories.spline import Spline
+from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.trajectories.spline import Spline
 
 # how a motion was looked for: as the search of a round tries it, to the end, at a price of time, or for its duration
 Stage = Literal["tried", "finished", "priced", "fastest"]

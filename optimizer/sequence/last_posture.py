@@ -9,16 +9,16 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import replace
 
-from optimizer.deadline import Clock, Deadline
-from optimizer.exceptions import JoulepathError
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.work_round import WorkRound
-from optimizer.search.run import Run
-from optimizer.search.sliding import FIXED
-from optimizer.sequence.move_problem import LEAST_TIME
-from optimizer.sequence.round_baselines import compared_again
-from optimizer.sequence.round_solution import RoundSolution
+from joulepath.optimizer.deadline import Clock, Deadline
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.search.sliding import FIXED
+from joulepath.optimizer.sequence.move_problem import LEAST_TIME
+from joulepath.optimizer.sequence.round_baselines import compared_again
+from joulepath.optimizer.sequence.round_solution import RoundSolution
 
 
 def with_last_posture(asked: WorkRound, found: RoundSolution, end: Deadline, clock: Clock) -> RoundSolution:

@@ -8,20 +8,20 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem
-from optimizer.kinematics.course_tracing import Trace
-from optimizer.kinematics.inverse import inverse_kinematics_for
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.targets import Target, members
-from optimizer.problem.work_round import START, WorkRound
-from optimizer.search.end_feasibility import check_configurations, raise_if_none_is_left
-from optimizer.search.ends import EndConfiguration, ends_of
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.kinematics.course_tracing import Trace
+from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.targets import Target, members
+from joulepath.optimizer.problem.work_round import START, WorkRound
+from joulepath.optimizer.search.end_feasibility import check_configurations, raise_if_none_is_left
+from joulepath.optimizer.search.ends import EndConfiguration, ends_of
 
 # configurations of one layer, full turns included: 64 poses of a UR arm with all of theirs
 MOST_NODES = 20_000

@@ -12,11 +12,11 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from optimizer.deadline import Deadline
-from optimizer.exceptions import DeadlineExceeded, JoulepathError, NoSequence
-from optimizer.sequence.chains import LeastChain
-from optimizer.sequence.legs import Leg
-from optimizer.trajectories.spline import Spline
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError, NoSequence
+from joulepath.optimizer.sequence.chains import LeastChain
+from joulepath.optimizer.sequence.legs import Leg
+from joulepath.optimizer.trajectories.spline import Spline
 
 # share of the search's time left that one leg may take: among obstacles, one without a way would take all of it
 SHARE_OF_A_LEG = 1 / 8

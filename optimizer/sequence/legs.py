@@ -14,17 +14,17 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from models.robot import Array, Mask
-from optimizer.deadline import checkpoint
-from optimizer.exceptions import InvalidProblem
-from optimizer.kinematics.course_tracing import Trace
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import LONGEST_DURATION, Problem
-from optimizer.problem.stops import PlannedMove
-from optimizer.search.lower_bound import priced_bounds
-from optimizer.search.priced_work import priced_work_bounds
-from optimizer.sequence.layers import Layer
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.kinematics.course_tracing import Trace
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import LONGEST_DURATION, Problem
+from joulepath.optimizer.problem.stops import PlannedMove
+from joulepath.optimizer.search.lower_bound import priced_bounds
+from joulepath.optimizer.search.priced_work import priced_work_bounds
+from joulepath.optimizer.sequence.layers import Layer
+from joulepath.optimizer.trajectories.spline import Spline
 
 # pairs of configurations of one leg: a matrix of this size takes some 30 MB
 MOST_PAIRS = 4_000_000

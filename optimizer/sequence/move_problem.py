@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from models.robot import Array
-from optimizer.problem.problem import Problem
-from optimizer.problem.stops import PlannedMove
-from optimizer.problem.work_round import WorkRound
+from joulepath.models.robot import Array
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.stops import PlannedMove
+from joulepath.optimizer.problem.work_round import WorkRound
 
 # least time [s] for a motion
 LEAST_TIME = 1e-3

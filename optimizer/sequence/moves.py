@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from optimizer.sequence.layers import Layer
-from optimizer.sequence.passing_leg import passes_of
-from optimizer.sequence.rests import dwell_energies, rest_sensitivity
-from optimizer.sequence.round_search import RoundSearch
-from optimizer.sequence.round_solution import Move
-from optimizer.solution import Branch, Solution
+from joulepath.optimizer.sequence.layers import Layer
+from joulepath.optimizer.sequence.passing_leg import passes_of
+from joulepath.optimizer.sequence.rests import dwell_energies, rest_sensitivity
+from joulepath.optimizer.sequence.round_search import RoundSearch
+from joulepath.optimizer.sequence.round_solution import Move
+from joulepath.optimizer.solution import Branch, Solution
 
 # length [s] and energy [J] of a wait
 Wait = tuple[float, float]

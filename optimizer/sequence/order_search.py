@@ -16,18 +16,18 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from models.robot import Array
-from optimizer.deadline import Clock, DeadlinePassed, checkpoint, watch
-from optimizer.exceptions import DeadlineExceeded, NoTrajectory
-from optimizer.problem.free_order import earlier_groups, groups_of
-from optimizer.problem.stops import PlannedMove, Stop, moves_over
-from optimizer.problem.work_round import START, WorkRound
-from optimizer.progress import Tell, nobody
-from optimizer.sequence.chains import LeastChain
-from optimizer.sequence.layers import Layer
-from optimizer.sequence.proven_bound import bounded_costs
-from optimizer.sequence.round_search import RoundSearch
-from optimizer.sequence.tours import Tours
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import Clock, DeadlinePassed, checkpoint, watch
+from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
+from joulepath.optimizer.problem.free_order import earlier_groups, groups_of
+from joulepath.optimizer.problem.stops import PlannedMove, Stop, moves_over
+from joulepath.optimizer.problem.work_round import START, WorkRound
+from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.sequence.chains import LeastChain
+from joulepath.optimizer.sequence.layers import Layer
+from joulepath.optimizer.sequence.proven_bound import bounded_costs
+from joulepath.optimizer.sequence.round_search import RoundSearch
+from joulepath.optimizer.sequence.tours import Tours
 
 # share of the deadline that the search for the order may take
 SHARE = 0.7

@@ -14,18 +14,18 @@ from itertools import pairwise
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.deadline import checkpoint
-from optimizer.exceptions import InvalidProblem
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import LONGEST_DURATION
-from optimizer.search.lower_bound import travel_bounds
-from optimizer.sequence.layers import Layer
-from optimizer.sequence.legs import Leg, between, bounds_of, kinds_of
-from optimizer.sequence.round_solution import Pass
-from optimizer.solution import Branch
-from optimizer.trajectories.passing import pass_times
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.search.lower_bound import travel_bounds
+from joulepath.optimizer.sequence.layers import Layer
+from joulepath.optimizer.sequence.legs import Leg, between, bounds_of, kinds_of
+from joulepath.optimizer.sequence.round_solution import Pass
+from joulepath.optimizer.solution import Branch
+from joulepath.optimizer.trajectories.passing import pass_times
+from joulepath.optimizer.trajectories.spline import Spline
 
 # pairs of ends of one leg, each of which has routes of its own
 MOST_PASSING_PAIRS = 500_000

@@ -7,18 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from optimizer.certificate import certify
-from optimizer.deadline import Deadline, DeadlinePassed, watch
-from optimizer.exceptions import DeadlineExceeded, NoTrajectory
-from optimizer.methods import solver_for
-from optimizer.methods.duration_intervals import DurationInterval
-from optimizer.methods.fastest_motion import FastestMotion
-from optimizer.methods.method import Method, SolveResult
-from optimizer.problem.problem import LEAST_DURATION
-from optimizer.sequence.known_motions import KnownMotion, known_motions
-from optimizer.sequence.lazy_search import SHARE_OF_A_LEG, LazySearch
-from optimizer.sequence.legs import Leg
-from optimizer.trajectories.spline import Spline, sampled
+from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
+from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
+from joulepath.optimizer.methods import solver_for
+from joulepath.optimizer.methods.duration_intervals import DurationInterval
+from joulepath.optimizer.methods.fastest_motion import FastestMotion
+from joulepath.optimizer.methods.method import Method, SolveResult
+from joulepath.optimizer.problem.problem import LEAST_DURATION
+from joulepath.optimizer.sequence.known_motions import KnownMotion, known_motions
+from joulepath.optimizer.sequence.lazy_search import SHARE_OF_A_LEG, LazySearch
+from joulepath.optimizer.sequence.legs import Leg
+from joulepath.optimizer.trajectories.spline import Spline, sampled
 
 
 @dataclass(frozen=True)

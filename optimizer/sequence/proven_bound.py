@@ -7,23 +7,23 @@ from itertools import product
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.deadline import Deadline
-from optimizer.kinematics.wrist_geometry import potential_rates
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.stops import PlannedMove
-from optimizer.problem.work_round import WorkRound
-from optimizer.search.candidates import Candidate
-from optimizer.search.free_ends_bound import backwards, bound_between
-from optimizer.search.free_goal_bound import family_bound
-from optimizer.search.lower_bound import LeastBound
-from optimizer.search.self_motion_bound import self_motion_bound
-from optimizer.sequence.chains import LeastChain
-from optimizer.sequence.free_ends_chain import FreeEndsChain
-from optimizer.sequence.layers import Layer
-from optimizer.sequence.legs import Leg
-from optimizer.sequence.passing_leg import PassingLeg
-from optimizer.sequence.rests import least_holding_power, rest_energy
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.kinematics.wrist_geometry import potential_rates
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.stops import PlannedMove
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.free_ends_bound import backwards, bound_between
+from joulepath.optimizer.search.free_goal_bound import family_bound
+from joulepath.optimizer.search.lower_bound import LeastBound
+from joulepath.optimizer.search.self_motion_bound import self_motion_bound
+from joulepath.optimizer.sequence.chains import LeastChain
+from joulepath.optimizer.sequence.free_ends_chain import FreeEndsChain
+from joulepath.optimizer.sequence.layers import Layer
+from joulepath.optimizer.sequence.legs import Leg
+from joulepath.optimizer.sequence.passing_leg import PassingLeg
+from joulepath.optimizer.sequence.rests import least_holding_power, rest_energy
 
 
 def proven_bound(asked: WorkRound, legs: Sequence[Leg], deadline: Deadline) -> float:

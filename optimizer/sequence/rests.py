@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.energy.dwell import brake_power, dwell_energy, holding_power, waits
-from optimizer.energy.interval import arm_spread
-from optimizer.energy.plant import Plant
-from optimizer.energy.sensitivity import waiting_sensitivity
-from optimizer.problem.stops import PlannedMove
-from optimizer.problem.work_round import WorkRound
-from optimizer.sequence.layers import Layer
-from optimizer.solution import Sensitivity
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.dwell import brake_power, dwell_energy, holding_power, waits
+from joulepath.optimizer.energy.interval import arm_spread
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.energy.sensitivity import waiting_sensitivity
+from joulepath.optimizer.problem.stops import PlannedMove
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.sequence.layers import Layer
+from joulepath.optimizer.solution import Sensitivity
 
 
 def holding_powers(move: PlannedMove, goal: Layer) -> Array:

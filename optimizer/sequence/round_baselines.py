@@ -9,17 +9,17 @@ from operator import add
 
 import numpy as np
 
-from optimizer.deadline import Clock
-from optimizer.energy.interval import Known, saving_interval
-from optimizer.exceptions import DeadlineExceeded, JoulepathError
-from optimizer.problem.free_order import is_given_order_allowed
-from optimizer.problem.work_round import WorkRound
-from optimizer.search.baselines import baselines, nearest, saving
-from optimizer.sequence.moves import moves_of
-from optimizer.sequence.rests import dwell_energies, rest_sensitivity
-from optimizer.sequence.round_search import RoundSearch
-from optimizer.sequence.round_solution import Needed, RoundBaseline, RoundBaselineName, RoundSolution
-from optimizer.solution import Baseline, Sensitivity, Solution
+from joulepath.optimizer.deadline import Clock
+from joulepath.optimizer.energy.interval import Known, saving_interval
+from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
+from joulepath.optimizer.problem.free_order import is_given_order_allowed
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.search.baselines import baselines, nearest, saving
+from joulepath.optimizer.sequence.moves import moves_of
+from joulepath.optimizer.sequence.rests import dwell_energies, rest_sensitivity
+from joulepath.optimizer.sequence.round_search import RoundSearch
+from joulepath.optimizer.sequence.round_solution import Needed, RoundBaseline, RoundBaselineName, RoundSolution
+from joulepath.optimizer.solution import Baseline, Sensitivity, Solution
 
 
 def move_by_move(search: RoundSearch) -> list[int] | None:

@@ -10,28 +10,28 @@ from itertools import accumulate, chain
 
 import numpy as np
 
-from optimizer.certificate import certify
-from optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
-from optimizer.exceptions import DeadlineExceeded, JoulepathError, NoTrajectory
-from optimizer.methods.method import SolveStatus
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import Problem
-from optimizer.problem.stops import PlannedMove
-from optimizer.problem.work_round import WorkRound
-from optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, nobody
-from optimizer.search.attempts import settled, solve
-from optimizer.search.run import Run
-from optimizer.sequence.chains import LeastChain
-from optimizer.sequence.known_motions import KnownMotion, known_motions
-from optimizer.sequence.layers import Layer
-from optimizer.sequence.lazy_search import SAME, SHARE_OF_A_LEG, LazySearch
-from optimizer.sequence.legs import Leg, check_size
-from optimizer.sequence.move_problem import problem_of
-from optimizer.sequence.passing_leg import LIKELY, PassingLeg, Route
-from optimizer.sequence.rests import dwell_costs
-from optimizer.sequence.ways import layers_of
-from optimizer.solution import CandidateStatus, Solution
-from optimizer.trajectories.spline import Spline
+from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
+from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError, NoTrajectory
+from joulepath.optimizer.methods.method import SolveStatus
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.stops import PlannedMove
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, nobody
+from joulepath.optimizer.search.attempts import settled, solve
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.sequence.chains import LeastChain
+from joulepath.optimizer.sequence.known_motions import KnownMotion, known_motions
+from joulepath.optimizer.sequence.layers import Layer
+from joulepath.optimizer.sequence.lazy_search import SAME, SHARE_OF_A_LEG, LazySearch
+from joulepath.optimizer.sequence.legs import Leg, check_size
+from joulepath.optimizer.sequence.move_problem import problem_of
+from joulepath.optimizer.sequence.passing_leg import LIKELY, PassingLeg, Route
+from joulepath.optimizer.sequence.rests import dwell_costs
+from joulepath.optimizer.sequence.ways import layers_of
+from joulepath.optimizer.solution import CandidateStatus, Solution
+from joulepath.optimizer.trajectories.spline import Spline
 
 # shares of the deadline that the search leaves to the motions of its answer, and these to certify a simpler round that
 # needs less

@@ -11,9 +11,9 @@ from typing import Literal
 
 import numpy as np
 
-from optimizer.energy.interval import Known, with_interval
-from optimizer.problem.stops import PlannedMove
-from optimizer.solution import (
+from joulepath.optimizer.energy.interval import Known, with_interval
+from joulepath.optimizer.problem.stops import PlannedMove
+from joulepath.optimizer.solution import (
     Branch,
     ElectricalEnergy,
     Energy,

@@ -11,17 +11,17 @@ from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from operator import add
 
-from optimizer.deadline import DeadlinePassed, watch
-from optimizer.energy.interval import Known
-from optimizer.exceptions import DeadlineExceeded, NoTrajectory
-from optimizer.search.incumbent import SLACK
-from optimizer.sequence.round_baselines import compared, dwells_of, resting
-from optimizer.sequence.round_search import RoundSearch
-from optimizer.sequence.round_solution import Needed, RoundBaseline, RoundBaselineName
-from optimizer.sequence.time_sharing import duration_of
-from optimizer.sequence.timed_round import Pair, Timed, TimedSearch
-from optimizer.solution import Solution
-from optimizer.trajectories.spline import Spline, lasting, retimed
+from joulepath.optimizer.deadline import DeadlinePassed, watch
+from joulepath.optimizer.energy.interval import Known
+from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
+from joulepath.optimizer.search.incumbent import SLACK
+from joulepath.optimizer.sequence.round_baselines import compared, dwells_of, resting
+from joulepath.optimizer.sequence.round_search import RoundSearch
+from joulepath.optimizer.sequence.round_solution import Needed, RoundBaseline, RoundBaselineName
+from joulepath.optimizer.sequence.time_sharing import duration_of
+from joulepath.optimizer.sequence.timed_round import Pair, Timed, TimedSearch
+from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.trajectories.spline import Spline, lasting, retimed
 
 # share of a duration by which moves are slowed to see what a second more saves
 SLOWER = 1e-3

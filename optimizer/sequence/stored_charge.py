@@ -12,15 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.energy.bus_flow import BusFlow, charge_steps, charges, pooled
-from optimizer.energy.dwell import brake_power, holding_power, waits
-from optimizer.energy.plant import Plant
-from optimizer.problem.arm import Arm
-from optimizer.problem.bus import Bus
-from optimizer.problem.stops import PlannedMove
-from optimizer.problem.work_round import WorkRound
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.bus_flow import BusFlow, charge_steps, charges, pooled
+from joulepath.optimizer.energy.dwell import brake_power, holding_power, waits
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.stops import PlannedMove
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.trajectories.spline import Spline
 
 
 @dataclass(frozen=True)

@@ -13,21 +13,28 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
-from optimizer.deadline import Clock, Deadline
-from optimizer.energy.plant import Plant
-from optimizer.exceptions import DeadlineExceeded, JoulepathError
-from optimizer.problem.bus import Bus
-from optimizer.problem.problem import Problem
-from optimizer.problem.stops import PlannedMove
-from optimizer.problem.work_round import WorkRound
-from optimizer.search.run import Run
-from optimizer.sequence.move_problem import LEAST_TIME, problem_of
-from optimizer.sequence.rests import rest_sensitivity
-from optimizer.sequence.round_baselines import compared
-from optimizer.sequence.round_solution import Move, Needed, RoundBaseline, RoundBaselineName, RoundSolution, needed_by
-from optimizer.sequence.stored_charge import Demand, charges_of, drawn, flows
-from optimizer.solution import StorageUse
-from optimizer.trajectories.spline import Spline
+from joulepath.optimizer.deadline import Clock, Deadline
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.stops import PlannedMove
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.sequence.move_problem import LEAST_TIME, problem_of
+from joulepath.optimizer.sequence.rests import rest_sensitivity
+from joulepath.optimizer.sequence.round_baselines import compared
+from joulepath.optimizer.sequence.round_solution import (
+    Move,
+    Needed,
+    RoundBaseline,
+    RoundBaselineName,
+    RoundSolution,
+    needed_by,
+)
+from joulepath.optimizer.sequence.stored_charge import Demand, charges_of, drawn, flows
+from joulepath.optimizer.solution import StorageUse
+from joulepath.optimizer.trajectories.spline import Spline
 
 # shares of the deadline for the first search, and of what is left for the second one and for the moves
 FIRST, SECOND, REFINED = 0.5, 0.5, 0.5

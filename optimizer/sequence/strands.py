@@ -10,16 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array, Limits, Mask
-from optimizer.deadline import checkpoint
-from optimizer.exceptions import SingularPose, UnreachablePose
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.course_tracing import traces
-from optimizer.kinematics.full_turns import full_turn_alternatives
-from optimizer.kinematics.inverse import required_inverse_kinematics
-from optimizer.kinematics.tool_course import ToolCourse
-from optimizer.problem.arm import Arm
-from optimizer.problem.branches import BranchFilter
+from joulepath.models.robot import Array, Limits, Mask
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.course_tracing import traces
+from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.branches import BranchFilter
 
 # fractions of the path at which strands are looked for
 SEEDS = np.linspace(0.0, 1.0, 17)

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from optimizer.deadline import Clock, Deadline
-from optimizer.exceptions import JoulepathError
-from optimizer.problem.problem import Problem
-from optimizer.problem.stops import Stop
-from optimizer.problem.work_round import WorkRound
-from optimizer.search.run import Run
+from joulepath.optimizer.deadline import Clock, Deadline
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.search.run import Run
 
 
 def successively_chosen(asked: WorkRound, end: Deadline, clock: Clock) -> WorkRound | None:

@@ -14,14 +14,14 @@ from operator import attrgetter
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.exceptions import DeadlineExceeded, NoSequence, NoTrajectory, RoundTooShort
-from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
-from optimizer.sequence.chains import LeastChain
-from optimizer.sequence.priced_search import MoveOfALeg, PricedMotion, PricedSearch, fastest_motion
-from optimizer.sequence.rests import holding_powers, long_wait_powers, rest_energy
-from optimizer.sequence.round_search import RoundSearch
-from optimizer.sequence.time_sharing import PRICES, Shared, TimeSharing, duration_of
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import DeadlineExceeded, NoSequence, NoTrajectory, RoundTooShort
+from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.sequence.chains import LeastChain
+from joulepath.optimizer.sequence.priced_search import MoveOfALeg, PricedMotion, PricedSearch, fastest_motion
+from joulepath.optimizer.sequence.rests import holding_powers, long_wait_powers, rest_energy
+from joulepath.optimizer.sequence.round_search import RoundSearch
+from joulepath.optimizer.sequence.time_sharing import PRICES, Shared, TimeSharing, duration_of
 
 # chains that are tried, each better than the one before at the price of time that shares this one's
 MOST_CHAINS = 5

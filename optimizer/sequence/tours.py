@@ -14,8 +14,8 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from models.robot import Array
-from optimizer.deadline import checkpoint
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import checkpoint
 
 # how far above its lower bound a tour is looked for first, then next, as shares of the bound
 BEYOND = (0.01, 0.04, 0.16, np.inf)

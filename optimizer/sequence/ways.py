@@ -11,27 +11,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.exceptions import InvalidProblem, PathAttempt, PathInfeasible
-from optimizer.kinematics.course_tracing import Trace, traces_of_each
-from optimizer.kinematics.orientation_tolerance import sample_orientations
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.kinematics.tool_course import ToolCourse
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.line import Line
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.stop_path import StopPath, at_stop
-from optimizer.problem.stops import APPROACH, RETREAT, Stop
-from optimizer.problem.targets import PosesAround, Target
-from optimizer.problem.tool_path import ToolPath
-from optimizer.problem.work_round import START, WorkRound
-from optimizer.search.end_feasibility import check_configurations
-from optimizer.search.ends import EndConfiguration, label_of
-from optimizer.search.path_ends import attempt_of
-from optimizer.sequence.layers import Layer, arms_at, layer_of
-from optimizer.sequence.legs import MOST_ON_WAY
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.exceptions import InvalidProblem, PathAttempt, PathInfeasible
+from joulepath.optimizer.kinematics.course_tracing import Trace, traces_of_each
+from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.line import Line
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.stop_path import StopPath, at_stop
+from joulepath.optimizer.problem.stops import APPROACH, RETREAT, Stop
+from joulepath.optimizer.problem.targets import PosesAround, Target
+from joulepath.optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.problem.work_round import START, WorkRound
+from joulepath.optimizer.search.end_feasibility import check_configurations
+from joulepath.optimizer.search.ends import EndConfiguration, label_of
+from joulepath.optimizer.search.path_ends import attempt_of
+from joulepath.optimizer.sequence.layers import Layer, arms_at, layer_of
+from joulepath.optimizer.sequence.legs import MOST_ON_WAY
 
 # sine of the angle between two directions that count as one: that of their rounding
 ALONG = 1e-12

@@ -7,20 +7,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.deadline import checkpoint
-from optimizer.energy.losses import breakdown
-from optimizer.energy.plant import Plant
-from optimizer.exceptions import SingularPose, UnreachablePose
-from optimizer.kinematics.inverse import inverse_kinematics_for
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.problem.arm import Arm
-from optimizer.simulation.planned import PlannedBaseline
-from optimizer.simulation.reference import Course, course_of, reference
-from optimizer.solution import BaselineName
-from optimizer.trajectories.ruckig_motion import time_optimal_spline
-from optimizer.trajectories.spline import lasting
-from optimizer.trajectories.time_scalings import blend_time, default_times, quintic_spline, trapezoid_law
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.energy.losses import breakdown
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
+from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.simulation.planned import PlannedBaseline
+from joulepath.optimizer.simulation.reference import Course, course_of, reference
+from joulepath.optimizer.solution import BaselineName
+from joulepath.optimizer.trajectories.ruckig_motion import time_optimal_spline
+from joulepath.optimizer.trajectories.spline import lasting
+from joulepath.optimizer.trajectories.time_scalings import blend_time, default_times, quintic_spline, trapezoid_law
 
 # relative differences of a reported duration, which is exact, and of a mechanical work, which two quadratures give
 SAME_DURATION, SAME_WORK = 1e-6, 1e-3

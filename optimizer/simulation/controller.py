@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
-from optimizer.energy.losses import friction_torque
-from optimizer.energy.plant import Plant
-from optimizer.simulation.reference import Reference
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.losses import friction_torque
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.simulation.reference import Reference
 
 ControlName = Literal["feed_forward", "pd"]
 # error [rad] at which the loop asks for the whole torque of a joint, and the time [s] over which it looks ahead: some

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.energy.limited_torque import limited_torque
-from optimizer.energy.losses import breakdown, friction_torque
-from optimizer.energy.plant import Plant
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.problem.arm import Arm
-from optimizer.simulation.play import Contact, Played
-from optimizer.simulation.reference import Reference
-from optimizer.solution import Energy
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.limited_torque import limited_torque
+from joulepath.optimizer.energy.losses import breakdown, friction_torque
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.simulation.play import Contact, Played
+from joulepath.optimizer.simulation.reference import Reference
+from joulepath.optimizer.solution import Energy
 
 # depth [m] of a contact that no good tracking explains: motions may be planned closer than any controller follows them
 TOUCH = 2.5e-4

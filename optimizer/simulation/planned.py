@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from models.robot import Array
-from optimizer.problem.arm import Arm
-from optimizer.simulation.reference import Course
-from optimizer.solution import BaselineName, Objective
+from joulepath.models.robot import Array
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.simulation.reference import Course
+from joulepath.optimizer.solution import BaselineName, Objective
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.deadline import checkpoint
-from optimizer.simulation.controller import Command
-from optimizer.simulation.reference import Reference
-from optimizer.simulation.simulated_arm import SimulatedArm
-from optimizer.simulation.simulator import mujoco
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.simulation.controller import Command
+from joulepath.optimizer.simulation.reference import Reference
+from joulepath.optimizer.simulation.simulated_arm import SimulatedArm
+from joulepath.optimizer.simulation.simulator import mujoco
 
 # steps between two looks at the deadline: some ten milliseconds
 STEPS_PER_CHECK = 512

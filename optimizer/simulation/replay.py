@@ -9,19 +9,19 @@ from typing import Literal
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
-from optimizer.energy.plant import Plant
-from optimizer.exceptions import DeadlineExceeded
-from optimizer.linear_algebra import one_thread
-from optimizer.search.baselines import saving
-from optimizer.simulation.controller import ControlName, command, gains
-from optimizer.simulation.outcome import Outcome, outcome
-from optimizer.simulation.planned import PlannedMotion
-from optimizer.simulation.play import play
-from optimizer.simulation.reference import Reference, reference
-from optimizer.simulation.simulated_arm import SimulatedArm, with_changes
-from optimizer.solution import BaselineName
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.exceptions import DeadlineExceeded
+from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.search.baselines import saving
+from joulepath.optimizer.simulation.controller import ControlName, command, gains
+from joulepath.optimizer.simulation.outcome import Outcome, outcome
+from joulepath.optimizer.simulation.planned import PlannedMotion
+from joulepath.optimizer.simulation.play import play
+from joulepath.optimizer.simulation.reference import Reference, reference
+from joulepath.optimizer.simulation.simulated_arm import SimulatedArm, with_changes
+from joulepath.optimizer.solution import BaselineName
 
 Quantity = Literal["payload", "friction"]
 

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from models.robot import Array
-from optimizer.collision.bodies import Body
-from optimizer.collision.model import CollisionModel, collision_model
-from optimizer.problem.arm import Arm
-from optimizer.problem.clouds import Cloud
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.bodies import Body
+from joulepath.optimizer.collision.model import CollisionModel, collision_model
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.clouds import Cloud
 
 
 def unsimulated(arm: Arm) -> list[str]:

@@ -10,11 +10,11 @@ from typing import Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from models.robot import Array
-from optimizer.kinematics.rigid_body_model import rigid_body_model
-from optimizer.problem.arm import Arm
-from optimizer.simulation.shapes import add_shapes, pose
-from optimizer.simulation.simulator import mujoco
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.simulation.shapes import add_shapes, pose
+from joulepath.optimizer.simulation.simulator import mujoco
 
 # speed [rad/s] below which the slope of friction is that at rest
 AT_REST = 1e-9

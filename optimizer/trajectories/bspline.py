@@ -12,9 +12,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import BSpline, make_interp_spline
 
-from models.robot import Array, Mask
-from optimizer.trajectories import quintic
-from optimizer.trajectories.quadrature import quadrature
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.trajectories import quintic
+from joulepath.optimizer.trajectories.quadrature import quadrature
 
 DEGREE = 5
 # at rest (v = a = 0) at both ends, the first three control points coincide, and the last three

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.trajectories import bspline
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.spline import Spline
 
 # how much the jerk of a joint changes where it has none, beside where it has the greatest
 ELSEWHERE = 1e-3

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from optimizer.trajectories.bspline import DEGREE, REST_POINTS
-from optimizer.trajectories.spline import Spline
+from joulepath.optimizer.trajectories.bspline import DEGREE, REST_POINTS
+from joulepath.optimizer.trajectories.spline import Spline
 
 
 def joined(motions: Sequence[Spline]) -> Spline:

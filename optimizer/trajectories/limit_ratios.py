@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array, Limits
+from joulepath.models.robot import Array, Limits
 
 # a limit counts as exceeded only beyond this ratio of it: rounding, in the certificate and wherever ratios are judged
 RATIO_TOLERANCE = 1e-6

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import BSpline
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 # instants among which the nearest ones are looked for first, at least and per pass; steps that refine them
 LEAST_INSTANTS, INSTANTS_PER_PASS, REFINEMENTS = 401, 200, 8

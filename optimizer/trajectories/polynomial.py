@@ -14,9 +14,9 @@ from typing import ClassVar
 import numpy as np
 from scipy.interpolate import BSpline
 
-from models.robot import Array
-from optimizer.trajectories.bspline import GRID_POINTS, REST_POINTS, Basis
-from optimizer.trajectories.quadrature import quadrature
+from joulepath.models.robot import Array
+from joulepath.optimizer.trajectories.bspline import GRID_POINTS, REST_POINTS, Basis
+from joulepath.optimizer.trajectories.quadrature import quadrature
 
 # quadrature panels of the span: the cost has corners at reversals of a joint
 PANELS, PER_PANEL = 8, 5

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 Indices = npt.NDArray[np.int64]
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 # greatest |s'|, |s''| and |s'''| by τ on [0, 1]
 PEAKS = np.array([15 / 8, 10 / math.sqrt(3), 60.0])

@@ -13,9 +13,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.trajectories.bspline import DEGREE, Basis, clamped, graded
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.trajectories.bspline import DEGREE, Basis, clamped, graded
+from joulepath.optimizer.trajectories.spline import Spline
 
 
 @dataclass(frozen=True)

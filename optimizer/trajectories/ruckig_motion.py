@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import ruckig
 
-from models.robot import Array, Limits
-from optimizer.trajectories import bspline
-from optimizer.trajectories.jerk_phases import spline_of_phases
-from optimizer.trajectories.quadrature import lobatto_nodes
-from optimizer.trajectories.spline import Spline, least_time_scale
-from optimizer.trajectories.time_scalings import SampledMotion, standstill
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.jerk_phases import spline_of_phases
+from joulepath.optimizer.trajectories.quadrature import lobatto_nodes
+from joulepath.optimizer.trajectories.spline import Spline, least_time_scale
+from joulepath.optimizer.trajectories.time_scalings import SampledMotion, standstill
 
 # shares of the jerk limits with which a motion is asked for in turn: where a joint just reaches its greatest
 # acceleration, Ruckig may find the lengths of its phases negative by rounding

@@ -11,7 +11,7 @@ import functools
 import numpy as np
 from scipy.optimize import brentq
 
-from models.robot import Array, Limits
+from joulepath.models.robot import Array, Limits
 
 # switches closer than this fraction of the duration count as one
 CLOSEST = 1e-3

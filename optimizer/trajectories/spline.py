@@ -9,9 +9,9 @@ from functools import cache
 import numpy as np
 from scipy.interpolate import BSpline
 
-from models.robot import Array
-from optimizer.trajectories import bspline
-from optimizer.trajectories.quadrature import quadrature
+from joulepath.models.robot import Array
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.quadrature import quadrature
 
 # quadrature panels: their greatest length [s], and their least and greatest number unless knot spans ask for more
 LONGEST_PANEL, LEAST_PANELS, MOST_PANELS = 0.2, 64, 2000

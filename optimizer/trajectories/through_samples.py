@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.trajectories.bspline import DEGREE
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.trajectories.bspline import DEGREE
+from joulepath.optimizer.trajectories.spline import Spline
 
 
 def spline_through(t: Array, q: Array, v: Array, a: Array) -> Spline:

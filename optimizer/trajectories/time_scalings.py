@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.robot import Array, DefaultMotion, Limits
-from optimizer.trajectories import bspline
-from optimizer.trajectories.quadrature import LOBATTO, lobatto_nodes
-from optimizer.trajectories.quintic import PEAKS, derivatives
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array, DefaultMotion, Limits
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.quadrature import LOBATTO, lobatto_nodes
+from joulepath.optimizer.trajectories.quintic import PEAKS, derivatives
+from joulepath.optimizer.trajectories.spline import Spline
 
 
 @dataclass(frozen=True)

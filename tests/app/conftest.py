@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import pytest
 from starlette.testclient import TestClient
 
-from app.main import create_app
-from app.settings import Settings
+from joulepath.app.main import create_app
+from joulepath.app.settings import Settings
 from tests.app.live import COMPUTED, GRACE, LOCAL, WARM_UP, Server, serving
 
 
@@ -39,6 +39,6 @@ def client() -> Iterator[TestClient]:
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[Server]:
-    """`python -m app` in a process of its own, warm."""
+    """`python -m joulepath.app` in a process of its own, warm."""
     with serving(workers=2, queue_size=4, deadline_grace=GRACE, stop_grace=GRACE) as server:
         yield server

@@ -14,7 +14,7 @@ from typing import Any
 
 import httpx2
 
-from app.schemas.jobs import Job, JobDetail
+from joulepath.app.schemas.jobs import Job, JobDetail
 from tests.app.live import CLIENT, Server, serving, until
 from tests.app.requests import HOME, NEAR, move
 

@@ -1,4 +1,4 @@
-"""`python -m app` as a subprocess, talked to over a real socket."""
+"""`python -m joulepath.app` as a subprocess, talked to over a real socket."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ def serving(warm: bool = True, **settings: Any) -> Iterator[Server]:
         environment |= {"JOULEPATH_LOG_LEVEL": "debug", "PORT": str(port)}
         with log.open("ab") as appended:
             process = subprocess.Popen(
-                [sys.executable, "-m", "app"], cwd=ROOT, env=os.environ | environment, stderr=appended
+                [sys.executable, "-m", "joulepath.app"], cwd=ROOT, env=os.environ | environment, stderr=appended
             )
         server = Server(process, f"http://127.0.0.1:{port}", log)
         try:

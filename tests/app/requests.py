@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from app.schemas.examples.optimize import OPTIMIZE_EXAMPLES
+from joulepath.app.schemas.examples.optimize import OPTIMIZE_EXAMPLES
 
 HOME = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
 NEAR = [0.3, -1.4, 1.4, -1.5, -1.57, 0.2]

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import pytest
 
-from app.schemas.cluster import ClusterState
-from app.schemas.errors import ClusterUnavailable
+from joulepath.app.schemas.cluster import ClusterState
+from joulepath.app.schemas.errors import ClusterUnavailable
 from tests.app.job_clients import ended, evaluation, over, sent, shown
 from tests.app.live import EXIT, GRACE, ROOT, Server, alive, processor_time, serving, until
 from tests.app.requests import long_search, move
@@ -72,7 +72,9 @@ def test_what_is_killed_loses_and_doubles_nothing(tmp_path: Path) -> None:
         logs = [tmp_path / f"machine-{k}.log" for k in range(2)]
         patient = {"JOULEPATH_STOP_GRACE": str(GRACE)}
         started = [
-            stack.enter_context(process(log, "app.cli", "cluster-worker", address, JOULEPATH_WORKERS="1", **patient))
+            stack.enter_context(
+                process(log, "joulepath.app.cli", "cluster-worker", address, JOULEPATH_WORKERS="1", **patient)
+            )
             for log in logs
         ]
         shared = {"database_url": f"sqlite:///{tmp_path}/joulepath.db", "cluster": address, "workers": 1}

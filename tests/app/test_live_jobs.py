@@ -1,4 +1,5 @@
-"""Jobs in `python -m app` over a real socket: killed services and workers, several services, cancelling, callers."""
+"""Jobs in `python -m joulepath.app` over a real socket: killed services and workers, several services, cancelling,
+callers."""
 
 from __future__ import annotations
 
@@ -15,8 +16,8 @@ import httpx2
 import pytest
 from sqlalchemy import text
 
-from app.schemas.errors import WorkerDied
-from app.store.database import create_database_engine
+from joulepath.app.schemas.errors import WorkerDied
+from joulepath.app.store.database import create_database_engine
 from tests.app.databases import postgres, why_no_postgres
 from tests.app.job_clients import Event, KilledService, ended, evaluation, events, optimization, over, sent, shown
 from tests.app.live import GRACE, Server, processor_time, serving, until

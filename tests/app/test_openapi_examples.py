@@ -12,10 +12,10 @@ import jsonschema_rs
 import pytest
 from starlette.testclient import TestClient
 
-from app.main import create_app
-from app.schemas.common import KEY_HEADER
-from app.schemas.examples.figures import FIGURES, FIGURES_ID
-from app.schemas.examples.own_arm import PUT_EXAMPLES
+from joulepath.app.main import create_app
+from joulepath.app.schemas.common import KEY_HEADER
+from joulepath.app.schemas.examples.figures import FIGURES, FIGURES_ID
+from joulepath.app.schemas.examples.own_arm import PUT_EXAMPLES
 from tests.app.live import LOCAL
 from tests.app.requests import HOME, NEAR
 

@@ -1,4 +1,4 @@
-"""`python -m app` over a real socket: concurrency, overload, crashes, hang-ups, logs and shutdown."""
+"""`python -m joulepath.app` over a real socket: concurrency, overload, crashes, hang-ups, logs and shutdown."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from typing import Any, TypeVar
 import httpx2
 import pytest
 
-from app.schemas.errors import BodyTooLarge, Busy, DeadlineExceeded, MalformedHttp, ShuttingDown
-from app.schemas.replay import ReplayResponse
-from app.schemas.response import OptimizeResponse
+from joulepath.app.schemas.errors import BodyTooLarge, Busy, DeadlineExceeded, MalformedHttp, ShuttingDown
+from joulepath.app.schemas.replay import ReplayResponse
+from joulepath.app.schemas.response import OptimizeResponse
 from tests.app.live import CLIENT, EXIT, ROOT, WARM_UP, Server, alive, processor_time, serving, until
 from tests.app.requests import EXAMPLES, long_search, move
 

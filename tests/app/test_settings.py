@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from pydantic import ValidationError
 
-from app.settings import Settings, WrongSettings, read_settings
-from models.registry import robot_names
+from joulepath.app.settings import Settings, WrongSettings, read_settings
+from joulepath.models.registry import robot_names
 
 
 def test_robots_are_names_separated_by_commas(monkeypatch: pytest.MonkeyPatch) -> None:

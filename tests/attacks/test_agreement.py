@@ -10,17 +10,17 @@ import numpy as np
 import orjson
 import pytest
 
-from app.convert.request import to_problem
-from app.schemas.request import OptimizeRequest
 from benchmarks.agreement import request
 from benchmarks.tasks import as_pose, flange
-from models.registry import load_robot
-from optimizer.exceptions import DeadlineExceeded, NoTrajectory
-from optimizer.methods import sqp_method
-from optimizer.optimize import optimize
-from optimizer.pareto import pareto
-from optimizer.search.second_attempt import WITHIN_TIGHTER
-from optimizer.solution import Solution
+from joulepath.app.convert.request import to_problem
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
+from joulepath.optimizer.methods import sqp_method
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.pareto import pareto
+from joulepath.optimizer.search.second_attempt import WITHIN_TIGHTER
+from joulepath.optimizer.solution import Solution
 
 Json = dict[str, Any]
 
@@ -107,7 +107,7 @@ def test_a_motion_that_the_certificate_rejects_is_solved_again_within_tighter_li
 
 def test_what_is_rejected_twice_is_not_answered(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sqp_method, "path_excess", lambda *_: np.zeros(2))
-    monkeypatch.setattr("optimizer.search.second_attempt.BEYOND", -0.02)
+    monkeypatch.setattr("joulepath.optimizer.search.second_attempt.BEYOND", -0.02)
     try:
         answer = solved(SLOW_TOOL)
     except (NoTrajectory, DeadlineExceeded):

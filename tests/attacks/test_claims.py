@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.exceptions import UnreachablePose
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.inverse import required_inverse_kinematics
-from optimizer.kinematics.reach import REACH
-from optimizer.optimize import optimize
-from optimizer.problem.pose import Pose
-from optimizer.search.claims import CLAIMS
-from optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import UnreachablePose
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.kinematics.reach import REACH
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.search.claims import CLAIMS
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 from tests.optimizer.moves import ROBOT, problem
 
 # m; an end's error that the certificate allows

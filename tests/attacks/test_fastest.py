@@ -9,20 +9,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.convert.request import to_problem
-from app.schemas.request import OptimizeRequest
-from models.registry import load_robot
-from models.robot import Robot
-from optimizer.exceptions import DurationTooShort, RoundTooShort
-from optimizer.methods.fastest_motion import FastestSettings
-from optimizer.optimize import optimize
-from optimizer.optimize_round import optimize_round
-from optimizer.pareto import pareto
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.bus import Bus
-from optimizer.problem.problem import LEAST_DURATION, MethodName, Problem
-from optimizer.problem.stops import Stop
-from optimizer.problem.work_round import WorkRound
+from joulepath.app.convert.request import to_problem
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Robot
+from joulepath.optimizer.exceptions import DurationTooShort, RoundTooShort
+from joulepath.optimizer.methods.fastest_motion import FastestSettings
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.pareto import pareto
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.problem import LEAST_DURATION, MethodName, Problem
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.work_round import WorkRound
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import CEILING, GOAL, PAYLOAD, ROBOT, START, fixed, limits, problem, tcp_pose
 from tests.selection import long_but

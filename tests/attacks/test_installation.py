@@ -24,10 +24,10 @@ from urllib.parse import urljoin
 
 import pytest
 
-from app.cli.answer import compile_kernel_of
-from app.schemas import errors as problems
-from optimizer.native import library_cache
-from optimizer.native.library_cache import Patience
+from joulepath.app.cli.answer import compile_kernel_of
+from joulepath.app.schemas import errors as problems
+from joulepath.optimizer.native import library_cache
+from joulepath.optimizer.native.library_cache import Patience
 from tests.app.cluster.test_link import scheduler_process
 from tests.app.job_clients import ended, evaluation, over, sent, shown
 from tests.app.live import ROOT, WARM_UP, serving, until
@@ -148,7 +148,7 @@ def test_the_wheel_of_a_clean_clone_shows_the_studio(clone: Path, tmp_path: Path
         "PYTHONPATH": str(target), "PORT": str(port), "JOULEPATH_WORKERS": "1",
         "JOULEPATH_DATABASE_URL": f"sqlite:///{tmp_path}/joulepath.db",
     }  # fmt: skip
-    with started([sys.executable, "-m", "app"], tmp_path / "log", environment, port) as url:
+    with started([sys.executable, "-m", "joulepath.app"], tmp_path / "log", environment, port) as url:
         check_studio(url)
 
 
@@ -258,7 +258,7 @@ def test_a_busy_port_is_told_with_its_remedy(tmp_path: Path, host: str) -> None:
             "JOULEPATH_DATABASE_URL": f"sqlite:///{tmp_path}/joulepath.db",
         }  # fmt: skip
         done = subprocess.run(
-            [sys.executable, "-m", "app"],
+            [sys.executable, "-m", "joulepath.app"],
             cwd=ROOT, env=os.environ | settings, capture_output=True, text=True, timeout=WARM_UP,
         )  # fmt: skip
     assert done.returncode == 1
@@ -270,8 +270,8 @@ def test_a_busy_port_is_told_with_its_remedy(tmp_path: Path, host: str) -> None:
 def test_a_request_under_a_locale_without_unicode(tmp_path: Path) -> None:
     """`LC_ALL=C PYTHONUTF8=0`: Python reads files without a named encoding as ASCII."""
     code = (
-        "from tests.optimizer.moves import problem; from optimizer import optimize\n"
-        "from optimizer.native.shared_library import compile_shared\n"
+        "from tests.optimizer.moves import problem; from joulepath import optimize\n"
+        "from joulepath.optimizer.native.shared_library import compile_shared\n"
         "compile_shared(); print(optimize(problem()).certificate.valid)\n"
     )
     environment = {
@@ -325,7 +325,7 @@ def test_a_scheduler_without_the_package_fails_no_job(tmp_path: Path) -> None:
     with ExitStack() as stack:
         empty = stack.enter_context(ExitStack())
         _, address = empty.enter_context(scheduler_process(tmp_path))
-        stack.enter_context(process(tmp_path / "machine.log", "app.cli", "cluster-worker", address))
+        stack.enter_context(process(tmp_path / "machine.log", "joulepath.app.cli", "cluster-worker", address))
         database = f"sqlite:///{tmp_path}/joulepath.db"
         server = stack.enter_context(serving(database_url=database, cluster=address, workers=1))
         until(lambda: "cannot import this package" in server.log.read_text())

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from app.engine.fair_queue import FairQueue
+from joulepath.app.engine.fair_queue import FairQueue
 from tests.app.live import CLIENT, GRACE, Server, serving, until
 from tests.app.requests import long_search, move
 

@@ -15,29 +15,29 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.energy.dwell import holding_power
-from optimizer.energy.plant import Plant
-from optimizer.exceptions import DeadlineExceeded, RoundTooShort
-from optimizer.optimize import optimize
-from optimizer.optimize_round import optimize_round
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.free_order import FreeOrder
-from optimizer.problem.problem import Problem
-from optimizer.problem.stops import Stop
-from optimizer.problem.work_round import WorkRound
-from optimizer.sequence.order_search import OrderSearch
-from optimizer.sequence.round_search import RoundSearch
-from optimizer.sequence.round_solution import RoundSolution
-from optimizer.sequence.rounds_in_hand import simple_rounds
-from optimizer.sequence.timed_round import TimedSearch
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.dwell import holding_power
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.exceptions import DeadlineExceeded, RoundTooShort
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.free_order import FreeOrder
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.sequence.order_search import OrderSearch
+from joulepath.optimizer.sequence.round_search import RoundSearch
+from joulepath.optimizer.sequence.round_solution import RoundSolution
+from joulepath.optimizer.sequence.rounds_in_hand import simple_rounds
+from joulepath.optimizer.sequence.timed_round import TimedSearch
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import AMPLE, ROBOT, fixed
 from tests.optimizer.sequence.rounds import pick_and_place
 from tests.selection import long_but
 
 # the module, which the function of the same name hides
-ENTRY = import_module("optimizer.optimize_round")
+ENTRY = import_module("joulepath.optimizer.optimize_round")
 # relative: sums of the same energies in another order
 ROUNDING = 1e-9
 # relative: an optimum found from another guess

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.convert.arm import to_arm
-from app.convert.own_robots import own_robot_of
-from app.schemas.arm import ArmRequest
-from app.schemas.examples.own_arm import URDF
-from models.own_arm.description import Collision, InvalidArm
-from models.own_arm.figures import own_figures
-from models.own_arm.upright import turn_onto
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.scene import Mesh
+from joulepath.app.convert.arm import to_arm
+from joulepath.app.convert.own_robots import own_robot_of
+from joulepath.app.schemas.arm import ArmRequest
+from joulepath.app.schemas.examples.own_arm import URDF
+from joulepath.models.own_arm.description import Collision, InvalidArm
+from joulepath.models.own_arm.figures import own_figures
+from joulepath.models.own_arm.upright import turn_onto
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.scene import Mesh
 from tests.models.own_arm.arms import BLOCK, PLAIN, SHAPE, changed, meshed, obj
 
 

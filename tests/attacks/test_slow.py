@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from benchmarks.slow_moves import MOST_EXCESS, NEAR, compare, other_searches, slow_problem
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.energy import kernel
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.optimize import optimize
-from optimizer.problem.bus import Bus
-from optimizer.problem.cycle import Cycle
-from optimizer.problem.problem import Problem
-from optimizer.solution import Solution
-from optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy import kernel
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, fixed, limits, problem
 
 # a move of which joint 6 is limited to so many rad/s, and the least energies [J] that are known of it. These and those

@@ -16,26 +16,26 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.convert.mesh_file import mesh_from_file
-from app.convert.request import to_problem
-from app.schemas import errors as problems
-from app.schemas.examples.own_arm import ARM, URDF
-from app.schemas.identifications import IdentifyRequest
-from app.schemas.ik import IKRequest
-from app.schemas.logs import LogSettings
-from app.schemas.own_arm import OwnArm
-from app.schemas.request import OptimizeRequest
-from app.tasks.evaluate import EvaluateTask
-from app.tasks.identify import IdentifyTask
-from app.tasks.ik import IKTask
-from app.tasks.own_robot import OwnRobotTask
-from app.tasks.read_log import ReadLogTask
-from models.own_arm.description import InvalidArm
-from models.own_arm.figures import own_figures
-from models.registry import load_robot
-from models.uploads.limits import LIMITS
-from optimizer.deadline import Deadline, DeadlinePassed, watch
-from optimizer.exceptions import DeadlineExceeded, InvalidProblem
+from joulepath.app.convert.mesh_file import mesh_from_file
+from joulepath.app.convert.request import to_problem
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.examples.own_arm import ARM, URDF
+from joulepath.app.schemas.identifications import IdentifyRequest
+from joulepath.app.schemas.ik import IKRequest
+from joulepath.app.schemas.logs import LogSettings
+from joulepath.app.schemas.own_arm import OwnArm
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.app.tasks.evaluate import EvaluateTask
+from joulepath.app.tasks.identify import IdentifyTask
+from joulepath.app.tasks.ik import IKTask
+from joulepath.app.tasks.own_robot import OwnRobotTask
+from joulepath.app.tasks.read_log import ReadLogTask
+from joulepath.models.own_arm.description import InvalidArm
+from joulepath.models.own_arm.figures import own_figures
+from joulepath.models.registry import load_robot
+from joulepath.models.uploads.limits import LIMITS
+from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from tests.app.routes.test_problems import refused
 from tests.identification_logs import csv_of, recorded, truth_of
 from tests.models.own_arm.arms import BLOCK, PLAIN, SHAPE, changed, meshed, obj
@@ -253,7 +253,7 @@ def test_what_is_read_ends_at_its_deadline(clock: CountingClock, log_file: bytes
 
 @pytest.mark.parametrize("content", [gzip.compress(b"") * 10_000, gzip.compress(b"t,q1\n" + b"#\n" * 100_000)])
 def test_gzip_that_yields_nothing_ends_at_the_deadline(content: bytes) -> None:
-    from optimizer.identification.logs.reading import read_log
+    from joulepath.optimizer.identification.logs.reading import read_log
 
     with pytest.raises(DeadlinePassed), watch(Deadline(LATE, CountingClock())):
         read_log(content, load_robot("ur5e"))

@@ -3,7 +3,7 @@ import pytest
 
 from benchmarks.cells import CELLS, cell_task
 from benchmarks.scenes import KINDS, failed_requirements, run, summary
-from optimizer.collision.model import CollisionModel
+from joulepath.optimizer.collision.model import CollisionModel
 
 
 @pytest.mark.parametrize("index", range(len(CELLS)))

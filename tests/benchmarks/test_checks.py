@@ -9,15 +9,15 @@ import numpy as np
 import orjson
 import pytest
 
-from app.convert.arm_fields import arm_fields
-from app.convert.request import to_problem
-from app.convert.solution import to_optimize_response
-from app.schemas.request import OptimizeRequest
 from benchmarks.checks import allowed, beats, errors_found, refusal_errors
 from benchmarks.motion import SplineMotion, replay
 from benchmarks.tasks import RequestTask, request_task
-from models.registry import load_robot
-from optimizer.optimize import optimize
+from joulepath.app.convert.arm_fields import arm_fields
+from joulepath.app.convert.request import to_problem
+from joulepath.app.convert.solution import to_optimize_response
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.optimize import optimize
 
 Json = dict[str, Any]
 ENERGY_ERROR = 1e-4  # relative, between Simpson's rule on 1 ms and the optimiser's quadrature

@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.cells import cell_task
 from benchmarks.path_existence import path_exists
-from optimizer.problem.scene import Obstacle, Scene, Sphere
+from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
 
 # s: far more than a path on a table takes, and little where there is none
 AMPLE, SHORT = 60.0, 0.2

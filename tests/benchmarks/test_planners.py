@@ -12,8 +12,8 @@ from benchmarks.planners.__main__ import PLANNERS, planner_of
 from benchmarks.planners.casadi_opti import derivative_points
 from benchmarks.planners.planner import versions
 from benchmarks.tasks import move
-from models.registry import load_robot
-from optimizer.trajectories.bspline import DEGREE, uniform
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.trajectories.bspline import DEGREE, uniform
 from tests.optimizer.moves import problem_with
 from tests.selection import long_but
 

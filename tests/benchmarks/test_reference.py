@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from benchmarks.reference import FILES, fingerprint, load
-from models.registry import load_robot
-from optimizer.problem.problem import Objective
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.problem.problem import Objective
 
 
 @pytest.mark.parametrize("objective", FILES)

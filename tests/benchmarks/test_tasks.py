@@ -4,18 +4,18 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from app.convert.request import to_problem
-from app.schemas.request import OptimizeRequest
 from benchmarks.chains import chain
 from benchmarks.statistics import Spread, exponent
 from benchmarks.tasks import KINDS, flange, move, moves, request_task, request_tasks
-from models.registry import load_robot
-from models.robot import Robot
-from optimizer.energy.kernel import Kernel
-from optimizer.energy.kernel_expressions import build
-from optimizer.energy.kernel_functions import Interpreted
-from optimizer.kinematics.inverse import inverse_kinematics_for
-from optimizer.prepared_problem import PreparedProblem
+from joulepath.app.convert.request import to_problem
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Robot
+from joulepath.optimizer.energy.kernel import Kernel
+from joulepath.optimizer.energy.kernel_expressions import build
+from joulepath.optimizer.energy.kernel_functions import Interpreted
+from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
+from joulepath.optimizer.prepared_problem import PreparedProblem
 from tests.optimizer.moves import problem_with
 
 POSE_ERROR = 1e-12  # rounding of a few products of rotations

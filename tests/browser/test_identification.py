@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from models.registry import load_robot
+from joulepath.models.registry import load_robot
 from tests.app.live import ANSWER, CLIENT, Server
 from tests.browser.pages import SHOWN, ask, opened, show, state, until
 from tests.browser.test_reading import CONTRASTS, LEAST

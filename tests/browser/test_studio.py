@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, Route, expect
 
-from models.registry import load_robot
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.problem.arm import Arm
-from optimizer.problem.pose import Pose
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.pose import Pose
 from tests.app.live import ROOT, Server
 from tests.app.requests import NEAR, move
 from tests.browser.pages import FIRST, MESHES, SHOWN, ask, opened, state, until

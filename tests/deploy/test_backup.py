@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from app.store import studies
-from app.store.store import Store
+from joulepath.app.store import studies
+from joulepath.app.store.store import Store
 from tests.app.databases import postgres, why_no_postgres
 from tests.app.live import ROOT, Server, serving
 from tests.app.store.test_store import with_store

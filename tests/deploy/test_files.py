@@ -13,8 +13,8 @@ import crossplane
 import pytest
 import yaml
 
-from app.cli.cluster_worker import cluster_worker
-from app.settings import Settings
+from joulepath.app.cli.cluster_worker import cluster_worker
+from joulepath.app.settings import Settings
 from tests.app.live import ROOT
 
 DEPLOY = ROOT / "deploy"
@@ -101,7 +101,7 @@ def test_compose_keeps_the_cluster_apart(compose: dict[str, Any]) -> None:
     assert set(members) == {"joulepath-1", "joulepath-2", "scheduler", "machine-1", "machine-2"}
     for name, member in members.items():
         if name.startswith("machine"):
-            assert member["command"][:4] == ["python", "-m", "app.cli", cluster_worker.name]
+            assert member["command"][:4] == ["python", "-m", "joulepath.app.cli", cluster_worker.name]
             assert member["command"][4] == members["joulepath-1"]["environment"]["JOULEPATH_CLUSTER"]
             assert member["networks"] == ["cluster"]
         assert (ROOT / member["build"]["args"]["LOCK"]).exists()

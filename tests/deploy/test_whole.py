@@ -20,7 +20,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from app.schemas import errors as problems
+from joulepath.app.schemas import errors as problems
 from tests.app.access.test_key_file import add
 from tests.app.databases import postgres, why_no_postgres
 from tests.app.live import ANSWER, ROOT, Server, serving, until

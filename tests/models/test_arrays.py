@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.arrays import read_only
+from joulepath.models.arrays import read_only
 
 
 def test_an_array_is_a_read_only_copy() -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.capsule_cover import SMALLEST, not_held, outside
-from models.meshes import KINDS, link_surfaces, sampled
-from models.registry import load_robot
-from models.robot import Array, LinkCapsule, Robot
+from joulepath.models.capsule_cover import SMALLEST, not_held, outside
+from joulepath.models.meshes import KINDS, link_surfaces, sampled
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, LinkCapsule, Robot
 from tests.mesh_folders import FOUND, meshes
 from tests.selection import long_but
 

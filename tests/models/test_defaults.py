@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.capsule_cover import outside
-from models.meshes import link_surfaces
-from models.registry import load_robot, robot_names
-from models.robot import Array, Robot
+from joulepath.models.capsule_cover import outside
+from joulepath.models.meshes import link_surfaces
+from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.robot import Array, Robot
 from tests.mesh_folders import FOUND, meshes
 
 # relative; the figures have two or three digits

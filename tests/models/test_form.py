@@ -6,9 +6,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.form import link_bodies
-from models.registry import load_robot, robot_names
-from models.robot import Array
+from joulepath.models.form import link_bodies
+from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.robot import Array
 
 # m; sums of some ten products in double precision
 ROUNDING = 1e-9

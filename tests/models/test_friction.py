@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.fit_friction import fit
-from models.registry import load_robot
-from models.robot import Array, FrictionLaw, Robot
+from joulepath.models.fit_friction import fit
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, FrictionLaw, Robot
 
 # worst relative error over the table that a user may rely on
 WORST_ERROR = {"curved": 0.05, "coulomb_viscous": 0.18}

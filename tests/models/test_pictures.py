@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from models.capsule_cover import outside
-from models.meshes import link_surfaces
-from models.pictures import FACES, KIND, picture, picture_sources
-from models.registry import load_robot
+from joulepath.models.capsule_cover import outside
+from joulepath.models.meshes import link_surfaces
+from joulepath.models.pictures import FACES, KIND, picture, picture_sources
+from joulepath.models.registry import load_robot
 from tests.mesh_folders import SHIPPED, meshes
 from tests.selection import long_but
 
@@ -49,5 +49,5 @@ def test_every_link_stands_in_its_capsules(name: str) -> None:
 def test_a_robot_without_meshes_has_no_picture(monkeypatch: pytest.MonkeyPatch) -> None:
     assert picture_sources("panda") is picture_sources("../ur5e") is None
     assert picture_sources("ur5e")
-    monkeypatch.setattr("models.pictures.find_spec", lambda name: None)
+    monkeypatch.setattr("joulepath.models.pictures.find_spec", lambda name: None)
     assert picture_sources("ur5e") is None

@@ -13,11 +13,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models import registry
-from models.registry import load_figures, load_robot, robot_names
-from models.robot import Array, Robot
-from models.trust import energy_trust
-from models.urdf import urdf_of
+from joulepath.models import registry
+from joulepath.models.registry import load_figures, load_robot, robot_names
+from joulepath.models.robot import Array, Robot
+from joulepath.models.trust import energy_trust
+from joulepath.models.urdf import urdf_of
 from tests.mesh_folders import SHIPPED
 from tests.mesh_folders import meshes as arm_folder
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from models.registry import load_figures, load_robot, robot_names
-from models.trust import worst_letter
+from joulepath.models.registry import load_figures, load_robot, robot_names
+from joulepath.models.trust import worst_letter
 
 PAGE = Path(__file__).parents[2] / "docs" / "robots.md"
 

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.optimize import optimize
-from optimizer.problem.arm import Payload
-from optimizer.problem.problem import Problem
-from optimizer.search.baselines import saving
-from optimizer.solution import Solution
-from optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.models.robot import Array
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.search.baselines import saving
+from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 from tests.optimizer.moves import (
     CEILING,
     GOAL,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.scene import (
+from joulepath.models.robot import Array
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.scene import (
     Attachment,
     Box,
     Capsule,
@@ -20,7 +20,7 @@ from optimizer.problem.scene import (
     Sphere,
     capsule_between,
 )
-from optimizer.trajectories.spline import Spline
+from joulepath.optimizer.trajectories.spline import Spline
 from tests.optimizer.moves import ROBOT
 
 LOADS: tuple[Shape, ...] = (

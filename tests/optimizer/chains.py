@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from models.robot import (
+from joulepath.models.robot import (
     Array,
     DefaultMotion,
     Drives,

@@ -15,27 +15,36 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
-from models.robot import Array
-from optimizer.certificate import certify
-from optimizer.collision.model import collision_model
-from optimizer.energy.plant import Plant
-from optimizer.exceptions import JoulepathError
-from optimizer.kinematics.inverse import inverse_kinematics_for
-from optimizer.kinematics.path_following import follow
-from optimizer.optimize import optimize
-from optimizer.pareto import pareto
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.bus import Bus
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.cycle import Cycle
-from optimizer.problem.problem import Problem
-from optimizer.problem.scene import Attachment, Box, Cylinder, HalfSpace, Obstacle, Scene, Shape, capsule_between
-from optimizer.problem.targets import AnyOf
-from optimizer.problem.tool_cone import ToolCone
-from optimizer.replay.evaluate import evaluate
-from optimizer.replay.recording import Log, Waypoints, in_blocks
-from optimizer.whatif import whatif
+from joulepath.models.robot import Array
+from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.collision.model import collision_model
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
+from joulepath.optimizer.kinematics.path_following import follow
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.pareto import pareto
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.scene import (
+    Attachment,
+    Box,
+    Cylinder,
+    HalfSpace,
+    Obstacle,
+    Scene,
+    Shape,
+    capsule_between,
+)
+from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.problem.tool_cone import ToolCone
+from joulepath.optimizer.replay.evaluate import evaluate
+from joulepath.optimizer.replay.recording import Log, Waypoints, in_blocks
+from joulepath.optimizer.whatif import whatif
 from tests.optimizer.cells import arm_in_cell, at, wander
 from tests.optimizer.moves import CEILING, GOAL, PAYLOAD, ROBOT, START, TILTED, fixed, problem, random_moves, tcp_pose
 

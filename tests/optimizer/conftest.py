@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import pytest
 from threadpoolctl import threadpool_limits
 
-from models.registry import load_robot
-from optimizer.energy import kernel
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.native.library_cache import PATIENCE
-from optimizer.native.shared_library import shared_library
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.energy import kernel
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.native.library_cache import PATIENCE
+from joulepath.optimizer.native.shared_library import shared_library
 
 
 @pytest.fixture(scope="session", autouse=True)

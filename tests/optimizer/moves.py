@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from models.registry import load_robot
-from models.robot import Array, Limits
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
 
 ROBOT = load_robot("ur5e")
 START = np.array([0.3, -1.4, 1.6, -0.9, -1.2, 0.5])

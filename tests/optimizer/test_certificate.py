@@ -9,15 +9,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.certificate import certify
-from optimizer.energy.losses import breakdown
-from optimizer.problem.arm import Payload
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.solution import Certificate, Clearance, Energy
-from optimizer.trajectories.spline import Spline
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.energy.losses import breakdown
+from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.solution import Certificate, Clearance, Energy
+from joulepath.optimizer.trajectories.spline import Spline
 from tests.optimizer.moves import problem_with
 
 ROUNDING = 1e-9  # relative; values met exactly on the grid, up to double precision through a few thousand operations

@@ -13,10 +13,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from optimizer import optimize, pareto
-from optimizer.collision import coal_distance
-from optimizer.collision.model import CollisionModel
-from optimizer.deadline import (
+from joulepath import optimize, pareto
+from joulepath.optimizer.collision import coal_distance
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.deadline import (
     NEVER,
     Deadline,
     DeadlinePassed,
@@ -27,13 +27,13 @@ from optimizer.deadline import (
     watch,
     watched_time_left,
 )
-from optimizer.energy.kernel_functions import Evaluation
-from optimizer.exceptions import DeadlineExceeded
-from optimizer.problem.arm import Arm
-from optimizer.problem.problem import Problem
-from optimizer.problem.scene import Mesh, Obstacle, Scene
-from optimizer.search.reserve import reserve
-from optimizer.whatif import whatif
+from joulepath.optimizer.energy.kernel_functions import Evaluation
+from joulepath.optimizer.exceptions import DeadlineExceeded
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.scene import Mesh, Obstacle, Scene
+from joulepath.optimizer.search.reserve import reserve
+from joulepath.optimizer.whatif import whatif
 from tests.optimizer.cells import at
 from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.moves import GOAL, ROBOT, START, problem, tcp_pose

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from optimizer.certificate import certify
-from optimizer.exceptions import (
+from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.exceptions import (
     DeadlineExceeded,
     DurationTooShort,
     InvalidProblem,
@@ -19,11 +19,11 @@ from optimizer.exceptions import (
     TorqueInfeasible,
     UnreachablePose,
 )
-from optimizer.optimize import optimize
-from optimizer.problem.arm import Payload
-from optimizer.problem.pose import Pose
-from optimizer.search.reserve import RESERVE
-from optimizer.solution import Certificate
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.search.reserve import RESERVE
+from joulepath.optimizer.solution import Certificate
 from tests.optimizer.answers import CONDITIONS, CONVERGED, ROUNDING, assert_true, shortest, solved
 from tests.optimizer.clocks import LAST_READINGS, CountingClock
 from tests.optimizer.moves import (
@@ -170,7 +170,7 @@ def test_nothing_uncertified_is_returned(monkeypatch: pytest.MonkeyPatch, refuse
             return replace(honest, worst_ratio=honest.worst_ratio | {"torque": 1.01})
         return honest
 
-    monkeypatch.setattr("optimizer.search.incumbent.certify", judge)
+    monkeypatch.setattr("joulepath.optimizer.search.incumbent.certify", judge)
     task = problem(goal=tcp_pose(GOAL), windings=False)
     if refused == "the first":
         assert optimize(task).certificate.valid and len(judged) > 1

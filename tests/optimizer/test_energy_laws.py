@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.arm import Payload
 from tests.optimizer.answers import CONDITIONS, CONVERGED, ROUNDING, SYMMETRY, shortest, solved
 from tests.optimizer.moves import (
     GOAL,

@@ -6,13 +6,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.registry import load_robot, robot_names
-from models.robot import Array, Robot
-from optimizer import Arm, Pose, Problem, optimize
-from optimizer.collision.model import collision_model
-from optimizer.energy.plant import Plant
-from optimizer.kinematics.angles import nearest_turn
-from optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath import Arm, Pose, Problem, optimize
+from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.collision.model import collision_model
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.kinematics.angles import nearest_turn
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from tests.selection import long_but
 
 # m and rad: what an answer may miss its pose by, and a configuration itself

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from optimizer.certificate import certify
-from optimizer.exceptions import InvalidProblem, NoTrajectory
-from optimizer.optimize import optimize
-from optimizer.optimize_round import optimize_round
-from optimizer.problem.problem import Problem
-from optimizer.problem.stop_path import StopPath
-from optimizer.problem.stops import Stop
-from optimizer.problem.tool_path import SPEED_TOLERANCE, ToolPath
-from optimizer.problem.work_round import WorkRound
-from optimizer.solution import Solution
+from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.exceptions import InvalidProblem, NoTrajectory
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.stop_path import StopPath
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.tool_path import SPEED_TOLERANCE, ToolPath
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.solution import Solution
 from tests.optimizer.moves import AMPLE
 from tests.optimizer.test_tool_path import ARM, HOME, along, moved, poses_of
 from tests.selection import long_but

@@ -9,22 +9,22 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem, JoulepathError, PathInfeasible
-from optimizer.kinematics.course_tracing import chain_of
-from optimizer.kinematics.orientation_tolerance import excess_angle, nearest_orientation
-from optimizer.kinematics.tcp import tcp_pose as pose_of
-from optimizer.kinematics.turning_sheet import TurningSheet, shortest, turning_through
-from optimizer.methods.end_angle import try_angles
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.tool_path import ToolPath
-from optimizer.solution import Solution
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem, JoulepathError, PathInfeasible
+from joulepath.optimizer.kinematics.course_tracing import chain_of
+from joulepath.optimizer.kinematics.orientation_tolerance import excess_angle, nearest_orientation
+from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
+from joulepath.optimizer.kinematics.turning_sheet import TurningSheet, shortest, turning_through
+from joulepath.optimizer.methods.end_angle import try_angles
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.solution import Solution
 from tests.optimizer.moves import ROBOT, tcp_pose
 from tests.optimizer.test_turning_path import ARM, Z, down, over_the_base
 from tests.optimizer.tool_paths import HOME, along, moved

@@ -10,21 +10,21 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from optimizer.deadline import NEVER
-from optimizer.exceptions import InvalidProblem, JoulepathError, PathInfeasible, UnreachablePose
-from optimizer.kinematics.tcp import tcp_pose as pose_of
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.tool_path import ToolPath
-from optimizer.search.candidates import bound, pairs
-from optimizer.search.ends import ends_of
-from optimizer.search.free_ends_bound import bound_between
-from optimizer.search.path_ends import bound_beside, path_candidates
-from optimizer.search.run import Run
-from optimizer.solution import Solution
+from joulepath.optimizer.deadline import NEVER
+from joulepath.optimizer.exceptions import InvalidProblem, JoulepathError, PathInfeasible, UnreachablePose
+from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.search.candidates import bound, pairs
+from joulepath.optimizer.search.ends import ends_of
+from joulepath.optimizer.search.free_ends_bound import bound_between
+from joulepath.optimizer.search.path_ends import bound_beside, path_candidates
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.solution import Solution
 from tests.optimizer.moves import AMPLE, tcp_pose
 from tests.optimizer.test_free_end import WRONG, free
 from tests.optimizer.test_turning_path import ARM, Z, down, over_the_base

@@ -8,8 +8,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.registry import load_robot
-from optimizer import Payload, Pose, Problem, optimize
+from joulepath import Payload, Pose, Problem, optimize
+from joulepath.models.registry import load_robot
 from tests.optimizer.moves import problem_with
 from tests.selection import long_but
 

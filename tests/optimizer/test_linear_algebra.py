@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from optimizer.linear_algebra import one_thread
+from joulepath.optimizer.linear_algebra import one_thread
 
 FREE = 3
 

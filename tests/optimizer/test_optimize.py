@@ -13,14 +13,14 @@ import pinocchio as pin
 import pytest
 from scipy.interpolate import BSpline
 
-from optimizer.exceptions import (
+from joulepath.optimizer.exceptions import (
     DurationTooShort,
     JoulepathError,
     TorqueInfeasible,
 )
-from optimizer.problem.arm import Payload
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.problem import Problem
 from tests.optimizer.answers import CONDITIONS, CONVERGED, ONE_PERCENT, ROUNDING, shortest, solved, total
 from tests.optimizer.moves import (
     GOAL,

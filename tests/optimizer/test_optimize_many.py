@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import pytest
 
-from optimizer import DurationTooShort, Problem, optimize, optimize_many
-from optimizer.optimize_many import AHEAD
+from joulepath import DurationTooShort, Problem, optimize, optimize_many
+from joulepath.optimizer.optimize_many import AHEAD
 from tests.optimizer.moves import AMPLE, problem, random_moves
 
 MOVES = [problem(start, goal, deadline=AMPLE) for start, goal in random_moves(seed=0, count=3)]

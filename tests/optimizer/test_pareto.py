@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from optimizer.exceptions import DeadlineExceeded, DurationTooShort, InvalidProblem, JoulepathError
-from optimizer.optimize import optimize
-from optimizer.pareto import CONVERGED, Front, pareto
-from optimizer.problem.arm import Payload
-from optimizer.problem.bus import Bus
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.cycle import Cycle
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.search.run import Run
-from optimizer.solution import Solution
+from joulepath.optimizer.exceptions import DeadlineExceeded, DurationTooShort, InvalidProblem, JoulepathError
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.pareto import CONVERGED, Front, pareto
+from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.solution import Solution
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
 from tests.optimizer.moves import PAYLOAD, START, changed, fixed, limits, problem, tcp_pose
 from tests.selection import long_but

@@ -9,11 +9,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.robot import Array
-from optimizer.optimize import optimize
-from optimizer.problem.tool_cone import ToolCone
-from optimizer.solution import Solution
-from optimizer.trajectories.spline import sample
+from joulepath.models.robot import Array
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.tool_cone import ToolCone
+from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.trajectories.spline import sample
 from tests.optimizer.moves import problem_with
 from tests.selection import long_but
 

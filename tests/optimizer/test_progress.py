@@ -8,12 +8,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from optimizer.optimize import optimize
-from optimizer.optimize_round import optimize_round
-from optimizer.pareto import pareto
-from optimizer.problem.problem import Problem
-from optimizer.progress import CandidatesFound, CandidateTried, Event, Improved, forward, nobody
-from optimizer.search.candidates import Reason
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.pareto import pareto
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Event, Improved, forward, nobody
+from joulepath.optimizer.search.candidates import Reason
 from tests.optimizer.moves import GOAL, HOME, problem, tcp_pose
 from tests.optimizer.sequence.rounds import pick_and_place
 from tests.selection import long_but

@@ -11,22 +11,22 @@ import pinocchio as pin
 import pytest
 from scipy.interpolate import BSpline
 
-from models.robot import Array, Robot
-from optimizer.exceptions import InvalidProblem
-from optimizer.kinematics.inverse import ClosedFormInverseKinematics
-from optimizer.methods import METHODS
-from optimizer.optimize import optimize
-from optimizer.pareto import pareto
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.bus import Bus
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.cycle import Cycle
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import MethodName, Problem
-from optimizer.problem.targets import AnyOf
-from optimizer.problem.tool_cone import ToolCone
-from optimizer.solution import Solution
-from optimizer.whatif import whatif
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.kinematics.inverse import ClosedFormInverseKinematics
+from joulepath.optimizer.methods import METHODS
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.pareto import pareto
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import MethodName, Problem
+from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.problem.tool_cone import ToolCone
+from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.whatif import whatif
 from tests.optimizer import moves
 from tests.optimizer.chains import move, serial_chain
 from tests.selection import long_but

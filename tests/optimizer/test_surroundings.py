@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.collision.clearance_proof import GAP, proven_clearance
-from optimizer.collision.model import CollisionModel
-from optimizer.collision.path_planner import Effort, PlanningEnd
-from optimizer.deadline import Deadline
-from optimizer.problem.arm import Arm
-from optimizer.problem.scene import Box, Obstacle, Scene, Sphere
-from optimizer.surroundings import ACTIVE, Surroundings
-from optimizer.trajectories.spline import sample
-from optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.clearance_proof import GAP, proven_clearance
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.collision.path_planner import Effort, PlanningEnd
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
+from joulepath.optimizer.surroundings import ACTIVE, Surroundings
+from joulepath.optimizer.trajectories.spline import sample
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.cells import LOADS, arm_in_cell, at, cell
 from tests.optimizer.moves import ROBOT
 

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from optimizer.collision import path_planner
-from optimizer.deadline import Deadline
-from optimizer.methods import polynomial_ga
+from joulepath.optimizer.collision import path_planner
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.methods import polynomial_ga
 from tests.optimizer.concurrent_work import Work, all_work, behind_a_post, fingerprint
 
 THREADS = 8
@@ -119,7 +119,7 @@ def test_robots_are_loaded_once_by_threads_that_come_at_once() -> None:
     code = (
         "import threading\n"
         "from concurrent.futures import ThreadPoolExecutor\n"
-        "from models.registry import load_robot\n"
+        "from joulepath.models.registry import load_robot\n"
         "together = threading.Barrier(8)\n"
         "with ThreadPoolExecutor(8) as executor:\n"
         "    loaded = list(executor.map(lambda _: together.wait() < 8 and load_robot('ur5e'), range(8)))\n"

@@ -9,22 +9,22 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from models.registry import load_robot
-from optimizer.certificate import certify
-from optimizer.exceptions import InvalidProblem, NoCollisionFreeTrajectory, NoTrajectory, PathInfeasible
-from optimizer.kinematics.tcp import tcp_pose as pose_of
-from optimizer.kinematics.tool_course import ToolCourse
-from optimizer.methods.duration_intervals import duration_intervals
-from optimizer.methods.path_retiming import PathRetiming, RetimingProgram
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.scene import Box, Obstacle, Scene
-from optimizer.problem.targets import AnyOf
-from optimizer.problem.tool_path import ToolPath
-from optimizer.solution import Solution
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.exceptions import InvalidProblem, NoCollisionFreeTrajectory, NoTrajectory, PathInfeasible
+from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
+from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.methods.duration_intervals import duration_intervals
+from joulepath.optimizer.methods.path_retiming import PathRetiming, RetimingProgram
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
+from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.solution import Solution
 from tests.optimizer.moves import AMPLE, ROBOT, limits, tcp_pose
 from tests.optimizer.tool_paths import ARM, HOME, along, moved, poses_of
 from tests.selection import long_but

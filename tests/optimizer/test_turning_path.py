@@ -9,21 +9,21 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from models.robot import Array
-from optimizer.certificate import certify
-from optimizer.exceptions import InvalidProblem, PathInfeasible
-from optimizer.kinematics.course_tracing import chain_of
-from optimizer.kinematics.tcp import tcp_pose as pose_of
-from optimizer.kinematics.tool_course import ToolCourse
-from optimizer.kinematics.turning_sheet import TurningSheet, shortest
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.tool_path import ToolPath
-from optimizer.solution import Solution
+from joulepath.models.robot import Array
+from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.exceptions import InvalidProblem, PathInfeasible
+from joulepath.optimizer.kinematics.course_tracing import chain_of
+from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
+from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.kinematics.turning_sheet import TurningSheet, shortest
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.solution import Solution
 from tests.optimizer.moves import AMPLE, ROBOT
 from tests.optimizer.tool_paths import HOME, along, moved
 from tests.selection import long_but

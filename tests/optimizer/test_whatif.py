@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from optimizer.certificate import certify
-from optimizer.exceptions import DeadlineExceeded, TorqueInfeasible
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import Problem
-from optimizer.problem.scene import Obstacle, Scene, Sphere
-from optimizer.solution import Solution
-from optimizer.whatif import whatif
+from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.exceptions import DeadlineExceeded, TorqueInfeasible
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
+from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.whatif import whatif
 from tests.optimizer.cells import at
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import PAYLOAD, changed, limits, problem, tcp_pose

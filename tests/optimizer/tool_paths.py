@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from models.robot import Array
-from optimizer.problem.arm import Arm
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.tool_path import ToolPath
-from optimizer.solution import Solution
+from joulepath.models.robot import Array
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.solution import Solution
 from tests.optimizer.moves import AMPLE, ROBOT, tcp_pose
 
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from app.schemas.errors.figures import FiguresInUse, TooManyFigures, UnknownFigures
-from app.schemas.errors.identifications import (
+from joulepath.app.schemas.errors.figures import FiguresInUse, TooManyFigures, UnknownFigures
+from joulepath.app.schemas.errors.identifications import (
     NoPowerChannel,
     NotExcited,
     NothingHeldOut,
     PayloadUnknown,
     UnknownIdentification,
 )
-from app.schemas.errors.logs import EffortNotUsable, ExcitationInfeasible, LogTooLarge, TooManyLogs, UnknownLog
-from app.schemas.errors.motion import (
+from joulepath.app.schemas.errors.logs import (
+    EffortNotUsable,
+    ExcitationInfeasible,
+    LogTooLarge,
+    TooManyLogs,
+    UnknownLog,
+)
+from joulepath.app.schemas.errors.motion import (
     CollidingBranch,
     ContradictoryOrder,
     CycleTooShort,
@@ -35,8 +41,8 @@ from app.schemas.errors.motion import (
     UnreachablePose,
     UnreachableTargets,
 )
-from app.schemas.errors.problem_details import PREFIX, ProblemDetails
-from app.schemas.errors.service import (
+from joulepath.app.schemas.errors.problem_details import PREFIX, ProblemDetails
+from joulepath.app.schemas.errors.service import (
     AnswerInUse,
     BodyTooLarge,
     Busy,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from app.schemas.errors.problem_details import ProblemDetails, fixed
+from joulepath.app.schemas.errors.problem_details import ProblemDetails, fixed
 
 
 class UnknownFigures(ProblemDetails):

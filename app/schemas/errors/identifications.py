@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from app.schemas.common import described
-from app.schemas.errors.problem_details import ProblemDetails, fixed
+from joulepath.app.schemas.common import described
+from joulepath.app.schemas.errors.problem_details import ProblemDetails, fixed
 
 
 class NotExcited(ProblemDetails):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Literal
 
-from app.schemas.common import Response, described, part
-from app.schemas.errors.problem_details import ProblemDetails, fixed
-from app.schemas.examples.values import HOME, LABEL
-from app.schemas.response import BODIES, Candidate, CandidateCounts, UnreachableTarget
+from joulepath.app.schemas.common import Response, described, part
+from joulepath.app.schemas.errors.problem_details import ProblemDetails, fixed
+from joulepath.app.schemas.examples.values import HOME, LABEL
+from joulepath.app.schemas.response import BODIES, Candidate, CandidateCounts, UnreachableTarget
 
 
 class UnknownRobot(ProblemDetails):

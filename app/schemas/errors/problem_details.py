@@ -6,8 +6,8 @@ from typing import Any, ClassVar
 
 from pydantic import ConfigDict, Field
 
-from app.schemas.common import Response, described
-from app.schemas.examples.values import REQUEST_ID
+from joulepath.app.schemas.common import Response, described
+from joulepath.app.schemas.examples.values import REQUEST_ID
 
 PREFIX = "/problems/"
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from app.exceptions import StoreFault
-from app.schemas.common import Response, described, part
-from app.schemas.errors.problem_details import ProblemDetails, fixed
+from joulepath.app.exceptions import StoreFault
+from joulepath.app.schemas.common import Response, described, part
+from joulepath.app.schemas.errors.problem_details import ProblemDetails, fixed
 
 
 class FieldError(Response):

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from fastapi.openapi.models import Example
 
-from app.schemas.examples.compare import COMPARE_EXAMPLES
-from app.schemas.examples.cycle import CYCLE_EXAMPLES
-from app.schemas.examples.evaluate import CSV_EXAMPLES, EVALUATE_EXAMPLES
-from app.schemas.examples.excitation import EXCITATION_EXAMPLES
-from app.schemas.examples.export import EXPORT_EXAMPLES
-from app.schemas.examples.figures import FIGURES_EXAMPLES
-from app.schemas.examples.identifications import IDENTIFY_EXAMPLES
-from app.schemas.examples.ik import IK_EXAMPLES, IK_PATH_EXAMPLES
-from app.schemas.examples.jobs import NEW_JOB_EXAMPLES
-from app.schemas.examples.logs import LOG_EXAMPLES
-from app.schemas.examples.optimize import OPTIMIZE_EXAMPLES
-from app.schemas.examples.own_arm import NEW_ROBOT_EXAMPLES, PUT_EXAMPLES
-from app.schemas.examples.pareto import PARETO_EXAMPLES
-from app.schemas.examples.replay import REPLAY_EXAMPLES
-from app.schemas.examples.studies import ITERATION_EXAMPLES, STUDY_EXAMPLES
-from app.schemas.examples.whatif import WHATIF_EXAMPLES
+from joulepath.app.schemas.examples.compare import COMPARE_EXAMPLES
+from joulepath.app.schemas.examples.cycle import CYCLE_EXAMPLES
+from joulepath.app.schemas.examples.evaluate import CSV_EXAMPLES, EVALUATE_EXAMPLES
+from joulepath.app.schemas.examples.excitation import EXCITATION_EXAMPLES
+from joulepath.app.schemas.examples.export import EXPORT_EXAMPLES
+from joulepath.app.schemas.examples.figures import FIGURES_EXAMPLES
+from joulepath.app.schemas.examples.identifications import IDENTIFY_EXAMPLES
+from joulepath.app.schemas.examples.ik import IK_EXAMPLES, IK_PATH_EXAMPLES
+from joulepath.app.schemas.examples.jobs import NEW_JOB_EXAMPLES
+from joulepath.app.schemas.examples.logs import LOG_EXAMPLES
+from joulepath.app.schemas.examples.optimize import OPTIMIZE_EXAMPLES
+from joulepath.app.schemas.examples.own_arm import NEW_ROBOT_EXAMPLES, PUT_EXAMPLES
+from joulepath.app.schemas.examples.pareto import PARETO_EXAMPLES
+from joulepath.app.schemas.examples.replay import REPLAY_EXAMPLES
+from joulepath.app.schemas.examples.studies import ITERATION_EXAMPLES, STUDY_EXAMPLES
+from joulepath.app.schemas.examples.whatif import WHATIF_EXAMPLES
 
 JSON, CSV = "application/json", "text/csv"
 BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {

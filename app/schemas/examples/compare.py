@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi.openapi.models import Example
 
-from app.schemas.examples.values import HOME, OPTIMIZE
+from joulepath.app.schemas.examples.values import HOME, OPTIMIZE
 
 COMPARE_EXAMPLES: dict[str, Example] = {
     "all_methods": {

@@ -6,7 +6,7 @@ from typing import Any
 
 from fastapi.openapi.models import Example
 
-from app.schemas.examples.values import HOME, at
+from joulepath.app.schemas.examples.values import HOME, at
 
 PART = {"mass": 2.0, "com": [0.0, 0.0, 0.1]}
 """A part in the gripper."""

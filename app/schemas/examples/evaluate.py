@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi.openapi.models import Example
 
-from app.schemas.examples.values import PAPER_HOME, PAPER_POSE
+from joulepath.app.schemas.examples.values import PAPER_HOME, PAPER_POSE
 
 EVALUATE_EXAMPLES: dict[str, Example] = {
     "there_and_back": {

@@ -6,7 +6,7 @@ from typing import Any
 
 from fastapi.openapi.models import Example
 
-from app.schemas.examples.values import HOME, NEAR, STANDING_STILL
+from joulepath.app.schemas.examples.values import HOME, NEAR, STANDING_STILL
 
 _DURATION = 1.5
 ANSWER: dict[str, Any] = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi.openapi.models import Example
 
-from app.schemas.examples.values import LOG_ID, OTHER_LOG_ID
+from joulepath.app.schemas.examples.values import LOG_ID, OTHER_LOG_ID
 
 IDENTIFY_EXAMPLES: dict[str, Example] = {
     "friction_and_power": {

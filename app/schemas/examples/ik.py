@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi.openapi.models import Example
 
-from app.schemas.examples.values import TOOL, at
+from joulepath.app.schemas.examples.values import TOOL, at
 
 IK_EXAMPLES: dict[str, Example] = {
     "pose": {

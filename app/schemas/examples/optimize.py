@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi.openapi.models import Example
 
-from app.schemas.examples.values import HOME, MESH_FILE, OPTIMIZE, at
+from joulepath.app.schemas.examples.values import HOME, MESH_FILE, OPTIMIZE, at
 
 _DOWN = [0.0, 1.0, 0.0, 0.0]
 _TCP = {"position": [0.0, 0.0, 0.12], "quaternion": [0.0, 0.0, 0.0, 1.0]}

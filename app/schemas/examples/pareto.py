@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi.openapi.models import Example
 
-from app.schemas.examples.values import HOME, OPTIMIZE
+from joulepath.app.schemas.examples.values import HOME, OPTIMIZE
 
 PARETO_EXAMPLES: dict[str, Example] = {
     "lift": {

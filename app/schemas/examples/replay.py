@@ -6,7 +6,7 @@ from typing import Any
 
 from fastapi.openapi.models import Example
 
-from app.schemas.examples.export import ANSWER
+from joulepath.app.schemas.examples.export import ANSWER
 
 _ENERGY: dict[str, Any] = {"electrical": {"total": 70.40564079868456}, "mechanical": {"total": 11.614725877535061}}
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from fastapi.openapi.models import Example
 
-from app.schemas.examples.optimize import OPTIMIZE_EXAMPLES
-from app.schemas.examples.values import ANSWER_ID, HOME
+from joulepath.app.schemas.examples.optimize import OPTIMIZE_EXAMPLES
+from joulepath.app.schemas.examples.values import ANSWER_ID, HOME
 
 STUDY_EXAMPLES: dict[str, Example] = {
     "electrical": {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi.openapi.models import Example
 
-from app.schemas.examples.values import HOME
+from joulepath.app.schemas.examples.values import HOME
 
 _LOW = [0.5, -2.57, 2.57, -1.07, -1.07, 0.5]
 

@@ -1,13 +1,13 @@
-"""Alembic's environment: `app.store.database.migrate` passes a connection, `alembic revision` does not."""
+"""Alembic's environment: `joulepath.app.store.database.migrate` passes a connection, `alembic revision` does not."""
 
 from __future__ import annotations
 
 from alembic import context
 from sqlalchemy import Connection
 
-from app.settings import Settings
-from app.store.database import create_database_engine
-from app.store.tables import Table
+from joulepath.app.settings import Settings
+from joulepath.app.store.database import create_database_engine
+from joulepath.app.store.tables import Table
 
 
 def _run(connection: Connection) -> None:

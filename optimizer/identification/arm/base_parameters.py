@@ -13,8 +13,8 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg import qr, solve_triangular
 
-from models.robot import Array
-from optimizer.energy.link_regressor import rigid_regressor
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.link_regressor import rigid_regressor
 
 # of the largest diagonal entry of R; between independent and dependent columns lie many orders of magnitude
 TOLERANCE = 1e-8

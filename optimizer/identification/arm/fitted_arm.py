@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.robot import Array, Robot
-from optimizer.identification.arm.friction_columns import COUPLED, column
-from optimizer.identification.arm.power_model import Electrics, Motion, friction, power
-from optimizer.identification.estimates.estimate import Name
-from optimizer.identification.options import Coupling
-from optimizer.identification.rows.fit_rows import Rows
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.identification.arm.friction_columns import COUPLED, column
+from joulepath.optimizer.identification.arm.power_model import Electrics, Motion, friction, power
+from joulepath.optimizer.identification.estimates.estimate import Name
+from joulepath.optimizer.identification.options import Coupling
+from joulepath.optimizer.identification.rows.fit_rows import Rows
 
 FRICTION_TERMS = ("coulomb", "viscous", "load", "curved", "offset")
 

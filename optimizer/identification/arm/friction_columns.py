@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 COUPLED = "coupling."
 """Before the name of a term of a coupling, whose number takes the place of the joint's."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.identification.estimates.grouped import jackknife
+from joulepath.models.robot import Array
+from joulepath.optimizer.identification.estimates.grouped import jackknife
 
 Name = tuple[str, int | None]
 """A figure, and the number of the joint from 0; None for a figure of the whole arm."""

@@ -16,9 +16,9 @@ import numpy.typing as npt
 from scipy.optimize import lsq_linear
 from scipy.special import stdtrit
 
-from models.robot import Array, Mask
-from models.uncertainty.ranges import P95
-from optimizer.deadline import checkpoint
+from joulepath.models.robot import Array, Mask
+from joulepath.models.uncertainty.ranges import P95
+from joulepath.optimizer.deadline import checkpoint
 
 Numbers = npt.NDArray[np.int64]
 

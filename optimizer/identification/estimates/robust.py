@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 Numbers = npt.NDArray[np.int64]
 

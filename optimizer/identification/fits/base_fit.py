@@ -9,16 +9,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array, Robot
-from optimizer.energy.link_regressor import BODY
-from optimizer.identification.arm.base_parameters import base_parameters
-from optimizer.identification.estimates.estimate import Name
-from optimizer.identification.estimates.grouped import Grouped, jackknife, left_out, solve
-from optimizer.identification.estimates.robust import weights_of
-from optimizer.identification.fits.whole_arm import WholeArm, whole_arm
-from optimizer.identification.options import Options
-from optimizer.identification.rows.clusters import Clusters
-from optimizer.identification.rows.fit_rows import Rows
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.energy.link_regressor import BODY
+from joulepath.optimizer.identification.arm.base_parameters import base_parameters
+from joulepath.optimizer.identification.estimates.estimate import Name
+from joulepath.optimizer.identification.estimates.grouped import Grouped, jackknife, left_out, solve
+from joulepath.optimizer.identification.estimates.robust import weights_of
+from joulepath.optimizer.identification.fits.whole_arm import WholeArm, whole_arm
+from joulepath.optimizer.identification.options import Options
+from joulepath.optimizer.identification.rows.clusters import Clusters
+from joulepath.optimizer.identification.rows.fit_rows import Rows
 
 PASSES = {"ols": 1, "wls": 3, "irls": 8}
 ROTOR = "rotor_inertia"

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
-from optimizer.deadline import checkpoint
-from optimizer.energy.link_regressor import BODY
-from optimizer.identification.arm.base_parameters import independent_columns
-from optimizer.identification.estimates.grouped import Grouped, jackknife, left_out, solve
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.energy.link_regressor import BODY
+from joulepath.optimizer.identification.arm.base_parameters import independent_columns
+from joulepath.optimizer.identification.estimates.grouped import Grouped, jackknife, left_out, solve
 
 STATES = 60
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.robot import Array, Mask, Robot
-from optimizer.identification.arm.friction_columns import COUPLED, column, lower_bounds
-from optimizer.identification.estimates.estimate import Name
-from optimizer.identification.options import Coupling, Options
-from optimizer.identification.rows.clusters import Clusters
-from optimizer.identification.rows.fit_rows import Rows
+from joulepath.models.robot import Array, Mask, Robot
+from joulepath.optimizer.identification.arm.friction_columns import COUPLED, column, lower_bounds
+from joulepath.optimizer.identification.estimates.estimate import Name
+from joulepath.optimizer.identification.options import Coupling, Options
+from joulepath.optimizer.identification.rows.clusters import Clusters
+from joulepath.optimizer.identification.rows.fit_rows import Rows
 
 Numbers = npt.NDArray[np.int64]
 SCALE = "scale"

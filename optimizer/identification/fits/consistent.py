@@ -10,9 +10,9 @@ import clarabel
 import numpy as np
 from scipy import sparse
 
-from models.robot import Array
-from optimizer.energy.link_regressor import BODY
-from optimizer.identification.arm.pseudo_inertia import BASIS
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.link_regressor import BODY
+from joulepath.optimizer.identification.arm.pseudo_inertia import BASIS
 
 # of the mass: a body's least eigenvalue, in m² for its extent, so that no body has none
 LEAST = 1e-9

@@ -7,17 +7,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.robot import Array, Robot
-from optimizer.energy.link_regressor import body_parameters
-from optimizer.identification.arm.fitted_arm import FittedArm, own_arm, with_torques
-from optimizer.identification.arm.power_model import Electrics, packed_size
-from optimizer.identification.estimates.estimate import Estimate, Name, joined
-from optimizer.identification.fits.power_fit import Prior, fit_power, prior_of
-from optimizer.identification.fits.torque_fit import fit_torques
-from optimizer.identification.fits.whole_fit import fit_whole
-from optimizer.identification.options import Options
-from optimizer.identification.rows.clusters import Clusters, clusters_of
-from optimizer.identification.rows.fit_rows import Rows
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.energy.link_regressor import body_parameters
+from joulepath.optimizer.identification.arm.fitted_arm import FittedArm, own_arm, with_torques
+from joulepath.optimizer.identification.arm.power_model import Electrics, packed_size
+from joulepath.optimizer.identification.estimates.estimate import Estimate, Name, joined
+from joulepath.optimizer.identification.fits.power_fit import Prior, fit_power, prior_of
+from joulepath.optimizer.identification.fits.torque_fit import fit_torques
+from joulepath.optimizer.identification.fits.whole_fit import fit_whole
+from joulepath.optimizer.identification.options import Options
+from joulepath.optimizer.identification.rows.clusters import Clusters, clusters_of
+from joulepath.optimizer.identification.rows.fit_rows import Rows
 
 # share of the greatest variance, of parameters that are scaled to one size: below it, a common error is rounding
 LEAST_ERROR = 1e-3

@@ -13,20 +13,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from models.robot import Array, Robot
-from optimizer.energy.link_regressor import BODY, rigid_torques
-from optimizer.exceptions import InvalidProblem
-from optimizer.identification.arm.friction_columns import columns
-from optimizer.identification.arm.link_errors import link_deviations
-from optimizer.identification.estimates.estimate import Name
-from optimizer.identification.estimates.grouped import Grouped, jackknife, left_out, solve
-from optimizer.identification.fits.block import moving
-from optimizer.identification.fits.torque_fit import LEAST_LOAD_SPREAD, MOST_RELATIVE_SD
-from optimizer.identification.logs.log import Log
-from optimizer.identification.results import Parameter
-from optimizer.identification.rows.clusters import Clusters, clusters_of, shared_variance
-from optimizer.identification.rows.fit_rows import Rows
-from optimizer.problem.arm import Payload
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.energy.link_regressor import BODY, rigid_torques
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.identification.arm.friction_columns import columns
+from joulepath.optimizer.identification.arm.link_errors import link_deviations
+from joulepath.optimizer.identification.estimates.estimate import Name
+from joulepath.optimizer.identification.estimates.grouped import Grouped, jackknife, left_out, solve
+from joulepath.optimizer.identification.fits.block import moving
+from joulepath.optimizer.identification.fits.torque_fit import LEAST_LOAD_SPREAD, MOST_RELATIVE_SD
+from joulepath.optimizer.identification.logs.log import Log
+from joulepath.optimizer.identification.results import Parameter
+from joulepath.optimizer.identification.rows.clusters import Clusters, clusters_of, shared_variance
+from joulepath.optimizer.identification.rows.fit_rows import Rows
+from joulepath.optimizer.problem.arm import Payload
 
 TERMS = ("coulomb", "viscous", "load", "curved", "offset", "rotor_inertia")
 NAMES: tuple[Name, ...] = tuple((f"payload_{part}", None) for part in ("mass", "com_x", "com_y", "com_z"))

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem
 
 LEAST_PERIODS = 2
 

@@ -16,14 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from models.robot import Array, Mask, Robot
-from models.trust import trust_letters
-from models.uncertainty.ranges import P95, default_ranges, large_joints, lognormal, range_of
-from optimizer.identification.arm.link_errors import LINK_MASS
-from optimizer.identification.arm.power_model import Electrics, Motion, packed_size, power
-from optimizer.identification.estimates.grouped import Grouped, adjusted, jackknife, left_out
-from optimizer.identification.estimates.robust import bisquare_weights
-from optimizer.identification.rows.clusters import Clusters, shared_variance
+from joulepath.models.robot import Array, Mask, Robot
+from joulepath.models.trust import trust_letters
+from joulepath.models.uncertainty.ranges import P95, default_ranges, large_joints, lognormal, range_of
+from joulepath.optimizer.identification.arm.link_errors import LINK_MASS
+from joulepath.optimizer.identification.arm.power_model import Electrics, Motion, packed_size, power
+from joulepath.optimizer.identification.estimates.grouped import Grouped, adjusted, jackknife, left_out
+from joulepath.optimizer.identification.estimates.robust import bisquare_weights
+from joulepath.optimizer.identification.rows.clusters import Clusters, shared_variance
 
 # standard deviation of a joint's offset over its Coulomb friction
 OFFSET = 0.05

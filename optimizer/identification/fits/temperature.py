@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.identification.arm.fitted_arm import FittedArm
-from optimizer.identification.estimates.grouped import Grouped, jackknife, left_out, solve
-from optimizer.identification.results import Temperatures
-from optimizer.identification.rows.clusters import Clusters
-from optimizer.identification.rows.fit_rows import Rows
+from joulepath.models.robot import Array
+from joulepath.optimizer.identification.arm.fitted_arm import FittedArm
+from joulepath.optimizer.identification.estimates.grouped import Grouped, jackknife, left_out, solve
+from joulepath.optimizer.identification.results import Temperatures
+from joulepath.optimizer.identification.rows.clusters import Clusters
+from joulepath.optimizer.identification.rows.fit_rows import Rows
 
 LEAST_SPAN = 8.0
 """Span [K] of a joint's temperature over the logs from which its friction is taken to depend on it."""

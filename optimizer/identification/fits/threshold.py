@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.identification.arm.friction_columns import columns
+from joulepath.models.robot import Array
+from joulepath.optimizer.identification.arm.friction_columns import columns
 
 CLASSES = 30
 # samples that a class has at least, standard deviations by which it is off, and share of the friction

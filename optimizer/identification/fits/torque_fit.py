@@ -13,15 +13,15 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from models.robot import Array, Mask, Robot
-from optimizer.identification.arm.friction_columns import COUPLED
-from optimizer.identification.estimates.estimate import Estimate, Name, joined
-from optimizer.identification.estimates.grouped import Grouped, jackknife, left_out, solve
-from optimizer.identification.estimates.robust import weights_of
-from optimizer.identification.fits.block import SCALE, Block, block_of
-from optimizer.identification.options import Coupling, Options
-from optimizer.identification.rows.clusters import Clusters
-from optimizer.identification.rows.fit_rows import Rows
+from joulepath.models.robot import Array, Mask, Robot
+from joulepath.optimizer.identification.arm.friction_columns import COUPLED
+from joulepath.optimizer.identification.estimates.estimate import Estimate, Name, joined
+from joulepath.optimizer.identification.estimates.grouped import Grouped, jackknife, left_out, solve
+from joulepath.optimizer.identification.estimates.robust import weights_of
+from joulepath.optimizer.identification.fits.block import SCALE, Block, block_of
+from joulepath.optimizer.identification.options import Coupling, Options
+from joulepath.optimizer.identification.rows.clusters import Clusters
+from joulepath.optimizer.identification.rows.fit_rows import Rows
 
 # a value whose standard deviation is a larger share of it is not found; nor a load term below so many of them
 MOST_RELATIVE_SD, LOAD_SDS = 0.3, 3.0

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array, Robot
-from optimizer.energy.link_regressor import body_parameters
-from optimizer.identification.fits.block import Block, block_of, moving
-from optimizer.identification.options import Options
-from optimizer.identification.rows.clusters import Clusters
-from optimizer.identification.rows.fit_rows import Rows
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.energy.link_regressor import body_parameters
+from joulepath.optimizer.identification.fits.block import Block, block_of, moving
+from joulepath.optimizer.identification.options import Options
+from joulepath.optimizer.identification.rows.clusters import Clusters
+from joulepath.optimizer.identification.rows.fit_rows import Rows
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,20 +10,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.robot import Array, Robot
-from models.uncertainty.parameters import LINKS
-from optimizer.energy.link_regressor import BODY, body_parameters
-from optimizer.identification.arm.friction_columns import COUPLED
-from optimizer.identification.arm.pseudo_inertia import nearness
-from optimizer.identification.estimates.estimate import Estimate, Name
-from optimizer.identification.estimates.grouped import Grouped, jackknife, left_out
-from optimizer.identification.estimates.robust import bisquare_weights
-from optimizer.identification.fits.consistent import solve_consistent
-from optimizer.identification.fits.torque_fit import LEAST_LOAD_SPREAD, LOAD_SDS
-from optimizer.identification.fits.whole_arm import WholeArm, whole_arm
-from optimizer.identification.options import Options
-from optimizer.identification.rows.clusters import Clusters, shared_variance
-from optimizer.identification.rows.fit_rows import Rows
+from joulepath.models.robot import Array, Robot
+from joulepath.models.uncertainty.parameters import LINKS
+from joulepath.optimizer.energy.link_regressor import BODY, body_parameters
+from joulepath.optimizer.identification.arm.friction_columns import COUPLED
+from joulepath.optimizer.identification.arm.pseudo_inertia import nearness
+from joulepath.optimizer.identification.estimates.estimate import Estimate, Name
+from joulepath.optimizer.identification.estimates.grouped import Grouped, jackknife, left_out
+from joulepath.optimizer.identification.estimates.robust import bisquare_weights
+from joulepath.optimizer.identification.fits.consistent import solve_consistent
+from joulepath.optimizer.identification.fits.torque_fit import LEAST_LOAD_SPREAD, LOAD_SDS
+from joulepath.optimizer.identification.fits.whole_arm import WholeArm, whole_arm
+from joulepath.optimizer.identification.options import Options
+from joulepath.optimizer.identification.rows.clusters import Clusters, shared_variance
+from joulepath.optimizer.identification.rows.fit_rows import Rows
 
 # of the load friction's torque, and of the weights: each begins where the one before ends
 PASSES, WEIGHINGS = 2, 2

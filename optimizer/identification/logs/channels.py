@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from models.robot import Array
-from optimizer.identification.logs.columns import Columns, Group
-from optimizer.identification.logs.filters import noise
-from optimizer.identification.logs.log import Log
-from optimizer.identification.logs.log_report import Channel
+from joulepath.models.robot import Array
+from joulepath.optimizer.identification.logs.columns import Columns, Group
+from joulepath.optimizer.identification.logs.filters import noise
+from joulepath.optimizer.identification.logs.log import Log
+from joulepath.optimizer.identification.logs.log_report import Channel
 
 _UNITS = {"q": "rad", "v": "rad/s", "a": "rad/s²", "power": "W", "temperature": "°C"}
 _EFFORT_UNITS = {"current": "A", "torque": "N·m", "external": "N·m"}

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
-from optimizer.exceptions import InvalidProblem, InvalidTable
+from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 
 Group = Literal["q", "v", "a", "current", "torque", "effort", "temperature", "commanded", "power", "payload"]
 """What columns hold: joint positions, speeds, accelerations, currents, torques, efforts of unknown meaning,

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.identification.logs.log import EffortMeaning
-from optimizer.identification.logs.motion import Motion, thinned
+from joulepath.models.robot import Array
+from joulepath.optimizer.identification.logs.log import EffortMeaning
+from joulepath.optimizer.identification.logs.motion import Motion, thinned
 
 _MOST_ROWS = 4000  # that the slope is taken from
 _KNEE = 0.02  # rad/s over which the sign of the speed is smoothed

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array, Robot
-from optimizer.identification.logs.lag import smooth, without_spikes
-from optimizer.identification.logs.log import EffortMeaning
-from optimizer.identification.logs.log_errors import EffortNotUsable
-from optimizer.identification.logs.log_warnings import numbers_of_joints
-from optimizer.identification.logs.motion import Motion, thinned
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.identification.logs.lag import smooth, without_spikes
+from joulepath.optimizer.identification.logs.log import EffortMeaning
+from joulepath.optimizer.identification.logs.log_errors import EffortNotUsable
+from joulepath.optimizer.identification.logs.log_warnings import numbers_of_joints
+from joulepath.optimizer.identification.logs.motion import Motion, thinned
 
 _MOST_ROWS, _LEAST_ROWS = 4000, 100  # that are compared, of all and of a joint
 _LEAST_SPEED = 0.05  # rad/s

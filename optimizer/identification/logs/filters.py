@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
+from joulepath.models.robot import Array
 
 HIGHEST_CUTOFF = 20.0
 """Cut-off [Hz] of the filter at most: arms move more slowly than that."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from models.robot import Array
-from optimizer.collision.bodies import Indices
-from optimizer.exceptions import InvalidTable
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.bodies import Indices
+from joulepath.optimizer.exceptions import InvalidTable
 
 LEAST_RATE, MOST_RATE = 20.0, 10_000.0
 """Rates [Hz] that are read."""

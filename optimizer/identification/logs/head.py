@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import count
 
-from optimizer.csv_table import SEPARATORS, Lines, line_of, names_of
-from optimizer.exceptions import InvalidTable
+from joulepath.optimizer.csv_table import SEPARATORS, Lines, line_of, names_of
+from joulepath.optimizer.exceptions import InvalidTable
 
 LONGEST_LINE = 16384
 """Most bytes of a line: a full RTDE record has nearly 200 columns."""

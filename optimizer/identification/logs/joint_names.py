@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from optimizer.exceptions import InvalidTable
-from optimizer.identification.logs.columns import AT, Columns, Group, time_of
+from joulepath.optimizer.exceptions import InvalidTable
+from joulepath.optimizer.identification.logs.columns import AT, Columns, Group, time_of
 
 _WORDS: Mapping[Group, str] = {
     "q": "position|pos|q",

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.collision.bodies import Indices
-from optimizer.identification.logs.motion import Motion, thinned
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.bodies import Indices
+from joulepath.optimizer.identification.logs.motion import Motion, thinned
 
 LEAST_LAG = 0.02
 """Shorter lags [s] are left as they are: controllers' own filters have some milliseconds."""

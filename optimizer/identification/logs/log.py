@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.arm import Payload
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.arm import Payload
 
 EffortMeaning = Literal["current", "torque", "external"]
 """What the channel of efforts has: motor currents [A], motor torques at the joints [N·m], or torques from outside

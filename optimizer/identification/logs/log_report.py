@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from optimizer.identification.logs.effort import EffortReport
+from joulepath.optimizer.identification.logs.effort import EffortReport
 
 
 @dataclass(frozen=True)

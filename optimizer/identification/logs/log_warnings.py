@@ -6,10 +6,10 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.identification.logs.columns import Columns
-from optimizer.identification.logs.grid import Grid
-from optimizer.identification.logs.log import Log
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.identification.logs.columns import Columns
+from joulepath.optimizer.identification.logs.grid import Grid
+from joulepath.optimizer.identification.logs.log import Log
 
 _SATURATED, _LEAST_SATURATED = 0.005, 10
 """Fraction and number of moving rows at exactly the greatest effort beyond which it is cut off there."""

@@ -7,10 +7,10 @@ from typing import Self
 
 import numpy as np
 
-from models.robot import Array, Robot
-from optimizer.collision.bodies import Indices
-from optimizer.energy.link_regressor import rigid_torques
-from optimizer.problem.arm import Payload
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.collision.bodies import Indices
+from joulepath.optimizer.energy.link_regressor import rigid_torques
+from joulepath.optimizer.problem.arm import Payload
 
 
 def thinned(count: int, most: int, edge: int = 0) -> Indices:

@@ -7,10 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from models.robot import Array, Mask
-from optimizer.collision.bodies import Indices
-from optimizer.identification.logs.filters import low_passed, noise
-from optimizer.identification.logs.log import Move
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.collision.bodies import Indices
+from joulepath.optimizer.identification.logs.filters import low_passed, noise
+from joulepath.optimizer.identification.logs.log import Move
 
 SHORTEST = 0.1
 """A shorter move [s] is noise, and rest."""

@@ -8,11 +8,11 @@ from math import pi
 
 import numpy as np
 
-from models.robot import Array, Robot
-from optimizer.exceptions import InvalidTable
-from optimizer.identification.logs.columns import Group
-from optimizer.identification.logs.grid import LEAST_RATE, Grid
-from optimizer.replay.recording import FAR_OUT, MOST_ACCELERATION, MOST_SPEED
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.exceptions import InvalidTable
+from joulepath.optimizer.identification.logs.columns import Group
+from joulepath.optimizer.identification.logs.grid import LEAST_RATE, Grid
+from joulepath.optimizer.replay.recording import FAR_OUT, MOST_ACCELERATION, MOST_SPEED
 
 _MOST_ANGLE = 20 * pi  # rad, ten turns
 _MOST: Mapping[Group, float] = {"v": MOST_SPEED, "commanded": MOST_SPEED, "a": MOST_ACCELERATION}

@@ -11,29 +11,35 @@ from typing import Any, Literal
 
 import numpy as np
 
-from models.robot import Array, Robot
-from optimizer.exceptions import InvalidProblem
-from optimizer.identification.logs.channels import channels_of
-from optimizer.identification.logs.columns import Columns, Group, mapped, other_positions, recognised
-from optimizer.identification.logs.effort import EffortReport, effort_report
-from optimizer.identification.logs.effort_checks import check_signs, effort_warnings, joint_efforts
-from optimizer.identification.logs.filters import noise
-from optimizer.identification.logs.grid import Grid, grid_of
-from optimizer.identification.logs.head import head_of
-from optimizer.identification.logs.joint_names import by_joint_name, in_order_of_joints
-from optimizer.identification.logs.lag import lag_of, power_lag_of
-from optimizer.identification.logs.log import EffortMeaning, Log
-from optimizer.identification.logs.log_report import LogReport
-from optimizer.identification.logs.log_warnings import held_warning, log_warnings, numbers_of_joints
-from optimizer.identification.logs.motion import Motion
-from optimizer.identification.logs.moves import cut, still_by_command, still_by_speed
-from optimizer.identification.logs.possible import check_coarse, check_leaps, check_radians, check_sizes, joined_turns
-from optimizer.identification.logs.rows import MOST_BYTES, Rows, Source
-from optimizer.identification.logs.speeds import speeds_of
-from optimizer.identification.logs.units import check_units, is_line_of_units, parted
-from optimizer.identification.logs.usable_effort import check_measured, usable
-from optimizer.problem.arm import Payload
-from optimizer.problem.arrays import frozen
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.identification.logs.channels import channels_of
+from joulepath.optimizer.identification.logs.columns import Columns, Group, mapped, other_positions, recognised
+from joulepath.optimizer.identification.logs.effort import EffortReport, effort_report
+from joulepath.optimizer.identification.logs.effort_checks import check_signs, effort_warnings, joint_efforts
+from joulepath.optimizer.identification.logs.filters import noise
+from joulepath.optimizer.identification.logs.grid import Grid, grid_of
+from joulepath.optimizer.identification.logs.head import head_of
+from joulepath.optimizer.identification.logs.joint_names import by_joint_name, in_order_of_joints
+from joulepath.optimizer.identification.logs.lag import lag_of, power_lag_of
+from joulepath.optimizer.identification.logs.log import EffortMeaning, Log
+from joulepath.optimizer.identification.logs.log_report import LogReport
+from joulepath.optimizer.identification.logs.log_warnings import held_warning, log_warnings, numbers_of_joints
+from joulepath.optimizer.identification.logs.motion import Motion
+from joulepath.optimizer.identification.logs.moves import cut, still_by_command, still_by_speed
+from joulepath.optimizer.identification.logs.possible import (
+    check_coarse,
+    check_leaps,
+    check_radians,
+    check_sizes,
+    joined_turns,
+)
+from joulepath.optimizer.identification.logs.rows import MOST_BYTES, Rows, Source
+from joulepath.optimizer.identification.logs.speeds import speeds_of
+from joulepath.optimizer.identification.logs.units import check_units, is_line_of_units, parted
+from joulepath.optimizer.identification.logs.usable_effort import check_measured, usable
+from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.arrays import frozen
 
 _OF_ANGLES: tuple[Group, ...] = ("q", "v", "a", "commanded")
 _EFFORTS: tuple[Group, ...] = ("current", "torque", "effort")

@@ -8,13 +8,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.energy.losses import breakdown
-from optimizer.energy.plant import Plant
-from optimizer.identification.logs.log import Log
-from optimizer.problem.arm import Arm
-from optimizer.replay.recording import BLOCK, in_blocks
-from optimizer.replay.recording import Log as Motion
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.losses import breakdown
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.identification.logs.log import Log
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.replay.recording import BLOCK, in_blocks
+from joulepath.optimizer.replay.recording import Log as Motion
 
 
 @dataclass(frozen=True)

@@ -13,13 +13,13 @@ from zlib import error as ZlibError
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.csv_table import line_of, names_of, numbers_of, with_points, wrong_length
-from optimizer.deadline import checkpoint
-from optimizer.exceptions import InvalidTable
-from optimizer.identification.logs.head import LONGEST_LINE, Head, is_comment
-from optimizer.identification.logs.log_errors import LogTooLarge
-from optimizer.replay.recording import BLOCK, MOST_ROWS
+from joulepath.models.robot import Array
+from joulepath.optimizer.csv_table import line_of, names_of, numbers_of, with_points, wrong_length
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.exceptions import InvalidTable
+from joulepath.optimizer.identification.logs.head import LONGEST_LINE, Head, is_comment
+from joulepath.optimizer.identification.logs.log_errors import LogTooLarge
+from joulepath.optimizer.replay.recording import BLOCK, MOST_ROWS
 
 MOST_BYTES = 1 << 30
 """Most bytes of a log after unpacking, if the caller does not allow fewer."""

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.exceptions import InvalidTable
-from optimizer.identification.logs.columns import Columns
-from optimizer.identification.logs.filters import derivative, filtered, low_passed, noise
-from optimizer.identification.logs.log_warnings import numbers_of_joints
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidTable
+from joulepath.optimizer.identification.logs.columns import Columns
+from joulepath.optimizer.identification.logs.filters import derivative, filtered, low_passed, noise
+from joulepath.optimizer.identification.logs.log_warnings import numbers_of_joints
 
 _MISFIT = 0.2
 """Greatest deviation of logged speeds from the change of the positions, over the speeds, as standard deviations."""

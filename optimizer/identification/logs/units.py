@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from optimizer.exceptions import InvalidTable
-from optimizer.identification.logs.columns import Columns, Group
-from optimizer.identification.logs.head import number
+from joulepath.optimizer.exceptions import InvalidTable
+from joulepath.optimizer.identification.logs.columns import Columns, Group
+from joulepath.optimizer.identification.logs.head import number
 
 _DIGITS = frozenset("0123456789")
 _BEGINS = re.compile(r"[-+]?[.,]?[0-9]")  # of what is rather a number, or several

@@ -6,11 +6,11 @@ from typing import Literal
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.identification.logs.columns import Group
-from optimizer.identification.logs.effort import EffortReport
-from optimizer.identification.logs.log import EffortMeaning
-from optimizer.identification.logs.log_errors import EffortNotUsable
+from joulepath.models.robot import Array
+from joulepath.optimizer.identification.logs.columns import Group
+from joulepath.optimizer.identification.logs.effort import EffortReport
+from joulepath.optimizer.identification.logs.log import EffortMeaning
+from joulepath.optimizer.identification.logs.log_errors import EffortNotUsable
 
 OTHERWISE = (
     "Otherwise the log is of another robot, a column never changes, the joints are in another order than the robot's, "

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.identification.arm.fitted_arm import FittedArm
-from optimizer.identification.fits.fitting import LINK_MASS_SCALE, Fitted
-from optimizer.identification.results import Advice
-from optimizer.identification.rows.fit_rows import Rows
+from joulepath.models.robot import Array
+from joulepath.optimizer.identification.arm.fitted_arm import FittedArm
+from joulepath.optimizer.identification.fits.fitting import LINK_MASS_SCALE, Fitted
+from joulepath.optimizer.identification.results import Advice
+from joulepath.optimizer.identification.rows.fit_rows import Rows
 
 _DO = {
     "coulomb": "Log slow and fast moves of this joint, in both directions.",

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.robot import Mask
-from optimizer.identification.arm.fitted_arm import FittedArm
-from optimizer.identification.fits.fitting import motor_torque
-from optimizer.identification.results import Curves
-from optimizer.identification.rows.fit_rows import Rows
+from joulepath.models.robot import Mask
+from joulepath.optimizer.identification.arm.fitted_arm import FittedArm
+from joulepath.optimizer.identification.fits.fitting import motor_torque
+from joulepath.optimizer.identification.results import Curves
+from joulepath.optimizer.identification.rows.fit_rows import Rows
 
 MOST = 1500
 """Rows of all parts together, but for one more of each part."""

@@ -13,12 +13,12 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import stdtrit
 
-from models.robot import Array
-from models.uncertainty.ranges import P95
-from optimizer.identification.arm.fitted_arm import FittedArm
-from optimizer.identification.estimates.grouped import jackknife
-from optimizer.identification.fits.fitting import Fitted
-from optimizer.identification.rows.fit_rows import Rows
+from joulepath.models.robot import Array
+from joulepath.models.uncertainty.ranges import P95
+from joulepath.optimizer.identification.arm.fitted_arm import FittedArm
+from joulepath.optimizer.identification.estimates.grouped import jackknife
+from joulepath.optimizer.identification.fits.fitting import Fitted
+from joulepath.optimizer.identification.rows.fit_rows import Rows
 
 # relative standard deviation of friction from day to day, where there are too few logs to measure it: 2 to 4 % in
 # twelve logs of a UR10e over two months

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array, Robot
-from optimizer.energy.link_regressor import BODY, body_parameters
-from optimizer.identification.arm.base_parameters import base_parameters
-from optimizer.identification.arm.fitted_arm import FittedArm
-from optimizer.identification.arm.pseudo_inertia import pseudo_inertias
-from optimizer.identification.options import Options
-from optimizer.identification.results import Physical, Structure
-from optimizer.identification.rows.fit_rows import Rows
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.energy.link_regressor import BODY, body_parameters
+from joulepath.optimizer.identification.arm.base_parameters import base_parameters
+from joulepath.optimizer.identification.arm.fitted_arm import FittedArm
+from joulepath.optimizer.identification.arm.pseudo_inertia import pseudo_inertias
+from joulepath.optimizer.identification.options import Options
+from joulepath.optimizer.identification.results import Physical, Structure
+from joulepath.optimizer.identification.rows.fit_rows import Rows
 
 # of the largest singular value of the scaled columns: below it, a combination of base parameters is not excited
 LEAST_EXCITED = 1e-3

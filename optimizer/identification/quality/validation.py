@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array, Robot
-from models.uncertainty.ranges import P95
-from optimizer.identification.arm.fitted_arm import FittedArm, own_arm
-from optimizer.identification.fits.fitting import Fitted, motor_torque
-from optimizer.identification.quality.curves import curves_of
-from optimizer.identification.quality.interval import Spread, energy_sd
-from optimizer.identification.results import PowerErrors, Prediction, TorqueErrors, Validation
-from optimizer.identification.rows.fit_rows import Rows
+from joulepath.models.robot import Array, Robot
+from joulepath.models.uncertainty.ranges import P95
+from joulepath.optimizer.identification.arm.fitted_arm import FittedArm, own_arm
+from joulepath.optimizer.identification.fits.fitting import Fitted, motor_torque
+from joulepath.optimizer.identification.quality.curves import curves_of
+from joulepath.optimizer.identification.quality.interval import Spread, energy_sd
+from joulepath.optimizer.identification.results import PowerErrors, Prediction, TorqueErrors, Validation
+from joulepath.optimizer.identification.rows.fit_rows import Rows
 
 
 @dataclass(frozen=True, eq=False)

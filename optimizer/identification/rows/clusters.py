@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from models.robot import Array
-from optimizer.identification.rows.fit_rows import Rows
+from joulepath.models.robot import Array
+from joulepath.optimizer.identification.rows.fit_rows import Rows
 
 Numbers = npt.NDArray[np.int64]
 

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from models.robot import Array, Mask, Robot
-from optimizer.deadline import checkpoint
-from optimizer.energy.link_regressor import rigid_regressor, rigid_torques
-from optimizer.exceptions import InvalidProblem
-from optimizer.identification.logs.log import Log, Move
-from optimizer.identification.rows.same_motion import groups_of_motions
+from joulepath.models.robot import Array, Mask, Robot
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.energy.link_regressor import rigid_regressor, rigid_torques
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.identification.logs.log import Log, Move
+from joulepath.optimizer.identification.rows.same_motion import groups_of_motions
 
 Numbers = npt.NDArray[np.int64]
 

@@ -12,7 +12,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from models.robot import Array, Mask
+from joulepath.models.robot import Array, Mask
 
 Numbers = npt.NDArray[np.int64]
 

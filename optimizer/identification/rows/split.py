@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Mask
-from optimizer.identification.errors import NothingHeldOut
-from optimizer.identification.rows.fit_rows import Rows
+from joulepath.models.robot import Mask
+from joulepath.optimizer.identification.errors import NothingHeldOut
+from joulepath.optimizer.identification.rows.fit_rows import Rows
 
 
 def held_out(rows: Rows, fraction: float) -> list[Mask]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from app.access.client import Client, Role
-from app.access.rules import check_owner, check_role, needed_role
-from app.exceptions import NotOwner, RoleTooLow
+from joulepath.app.access.client import Client, Role
+from joulepath.app.access.rules import check_owner, check_role, needed_role
+from joulepath.app.exceptions import NotOwner, RoleTooLow
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from app.access.start import check_access, is_loopback, log_access
-from app.settings import Settings, WrongSettings, read_settings
+from joulepath.app.access.start import check_access, is_loopback, log_access
+from joulepath.app.settings import Settings, WrongSettings, read_settings
 from tests.app.access.test_key_file import add
 from tests.app.live import EXIT, ROOT
 
@@ -43,7 +43,7 @@ def test_a_file_that_is_not_there_never_means_open(tmp_path: Path) -> None:
 
 def test_the_process_ends_with_the_remedies() -> None:
     run = subprocess.run(
-        [sys.executable, "-m", "app"],
+        [sys.executable, "-m", "joulepath.app"],
         cwd=ROOT,
         env=os.environ | {"JOULEPATH_HOST": "0.0.0.0", "PORT": "0"},
         capture_output=True,

@@ -13,13 +13,13 @@ from typing import Any
 
 import pytest
 
-from app.cli.main import main
+from joulepath.app.cli.main import main
 from tests.app.requests import move
 
 ROOT = Path(__file__).parents[3]
 
 
-COMMAND = [sys.executable, "-c", "from app.cli.main import main; main()"]
+COMMAND = [sys.executable, "-c", "from joulepath.app.cli.main import main; main()"]
 
 
 CSV = ROOT / "examples" / "evaluate" / "paper_motion_1.csv"

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from app.schemas.cycle import CycleResponse
-from app.schemas.evaluate import EvaluateResponse
-from app.schemas.examples.evaluate import EVALUATE_EXAMPLES
-from app.schemas.response import OptimizeResponse
-from app.settings import Settings
+from joulepath.app.schemas.cycle import CycleResponse
+from joulepath.app.schemas.evaluate import EvaluateResponse
+from joulepath.app.schemas.examples.evaluate import EVALUATE_EXAMPLES
+from joulepath.app.schemas.response import OptimizeResponse
+from joulepath.app.settings import Settings
 from tests.app.cli.console import CSV, CSV_OPTIONS, Here, request, run
 from tests.app.requests import HOME, NEAR, PATIENT
 
@@ -184,7 +184,7 @@ def test_serve_takes_host_and_port(here: Here, monkeypatch: pytest.MonkeyPatch) 
         settings = Settings()
         served.append((settings.host, settings.port))
 
-    monkeypatch.setattr("app.__main__.main", record)
+    monkeypatch.setattr("joulepath.app.__main__.main", record)
     # so that what the command sets is undone
     monkeypatch.setenv("JOULEPATH_HOST", "203.0.113.7")
     monkeypatch.setenv("JOULEPATH_PORT", "1")

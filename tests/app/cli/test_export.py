@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from app.cli.export import NAMES
-from app.schemas.export import ExportFormat
+from joulepath.app.cli.export import NAMES
+from joulepath.app.schemas.export import ExportFormat
 from tests.app.cli.console import ROOT as PROJECT
 from tests.app.cli.console import Here
 

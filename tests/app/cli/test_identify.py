@@ -10,11 +10,11 @@ import click
 import numpy as np
 import pytest
 
-from app.cli.identify import identify, summary_of
-from app.schemas import errors as problems
-from app.schemas.identifications import IdentificationResult, Target, Term
-from models.registry import load_robot
-from optimizer.problem.arm import Payload
+from joulepath.app.cli.identify import identify, summary_of
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.identifications import IdentificationResult, Target, Term
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.problem.arm import Payload
 from tests.app.cli.console import Here
 from tests.identification_logs import csv_of, recorded, truth_of
 

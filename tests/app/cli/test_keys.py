@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from app.access.key_ring import KeyRing
+from joulepath.app.access.key_ring import KeyRing
 from tests.app.cli.console import ROOT, Here
 
 
@@ -57,7 +57,7 @@ def test_what_is_refused(arguments: tuple[str, ...], word: str, here: Here, tmp_
 
 def test_where_the_package_is_not_installed(tmp_path: Path) -> None:
     """As in the image and in `deploy/compose.yaml`."""
-    command = [sys.executable, "-m", "app.cli", "keys", "add", "press", "--file", tmp_path / "keys.yaml"]
+    command = [sys.executable, "-m", "joulepath.app.cli", "keys", "add", "press", "--file", tmp_path / "keys.yaml"]
     made = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     assert KeyRing(tmp_path / "keys.yaml").find(made.stdout.strip())
 

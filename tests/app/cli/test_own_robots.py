@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from app.schemas.examples.own_arm import URDF
+from joulepath.app.schemas.examples.own_arm import URDF
 from tests.app.cli.console import Here, run
 from tests.app.requests import PATIENT
 

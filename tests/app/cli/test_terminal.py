@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from app.cli.interrupts import interruptible
+from joulepath.app.cli.interrupts import interruptible
 from tests.app.cli.console import COMMAND, PATIENCE, ROOT, Here, environment, request
 from tests.app.requests import AMPLE, long_search
 

@@ -17,16 +17,16 @@ import dask
 import pytest
 from distributed import Scheduler, Worker
 
-from app.cluster import link
-from app.cluster import machine as app_machine
-from app.cluster.link import LOOK, PER_PROCESS, Cluster
-from app.cluster.machine import RESOURCES
-from app.engine.result import TaskResult
-from app.engine.task import Task
-from app.engine.work import Ended, Work, result_of, taking
-from app.exceptions import ClusterUnavailable, TaskFailed, WorkerDied
-from optimizer.exceptions import OutsideLimits
-from optimizer.progress import CandidatesFound, Event
+from joulepath.app.cluster import link
+from joulepath.app.cluster import machine as app_machine
+from joulepath.app.cluster.link import LOOK, PER_PROCESS, Cluster
+from joulepath.app.cluster.machine import RESOURCES
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.engine.task import Task
+from joulepath.app.engine.work import Ended, Work, result_of, taking
+from joulepath.app.exceptions import ClusterUnavailable, TaskFailed, WorkerDied
+from joulepath.optimizer.exceptions import OutsideLimits
+from joulepath.optimizer.progress import CandidatesFound, Event
 from tests.app.engine.simple_tasks import Count, Die, Fail, Hold, ProcessId
 from tests.app.live import ROOT, alive
 
@@ -42,7 +42,9 @@ async def until(condition: Callable[[], bool]) -> None:
 
 
 def machine(scheduler: Scheduler, workers: int = 1) -> Worker:
-    return Worker(scheduler.address, nthreads=workers, memory_limit=0, preload=["app.cluster"], dashboard=False)
+    return Worker(
+        scheduler.address, nthreads=workers, memory_limit=0, preload=["joulepath.app.cluster"], dashboard=False
+    )
 
 
 def with_cluster(test: Callable[[Cluster, Scheduler], Awaitable[None]], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -246,7 +248,7 @@ async def refused_by(cluster: Cluster, caplog: pytest.LogCaptureFixture, reason:
     """Until the log has the reason why nothing is sent to the cluster, which it says once."""
 
     def told() -> list[str]:
-        records = [record for record in caplog.records if record.name == "app.cluster.link"]
+        records = [record for record in caplog.records if record.name == "joulepath.app.cluster.link"]
         return [vars(record)["reason"] for record in records if "cannot be used" in record.message]
 
     await until(lambda: bool(told()))
@@ -262,9 +264,9 @@ async def refused_by(cluster: Cluster, caplog: pytest.LogCaptureFixture, reason:
 
 def other_version(folder: Path) -> None:
     """A copy of this package with one character more."""
-    for package in ("app", "optimizer", "models"):
-        shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("static", "__pycache__"))
-    with (folder / "optimizer" / "deadline.py").open("a", encoding="utf-8") as file:
+    copy = folder / "joulepath"
+    shutil.copytree(ROOT / "joulepath", copy, ignore=shutil.ignore_patterns("static", "__pycache__"))
+    with (copy / "optimizer" / "deadline.py").open("a", encoding="utf-8") as file:
         file.write("#")
 
 
@@ -324,7 +326,7 @@ def test_a_scheduler_that_hangs_and_goes_on(monkeypatch: pytest.MonkeyPatch, tmp
         cluster = Cluster(address)
         cluster.start()
         try:
-            async with Worker(address, nthreads=1, memory_limit=0, preload=["app.cluster"], dashboard=False):
+            async with Worker(address, nthreads=1, memory_limit=0, preload=["joulepath.app.cluster"], dashboard=False):
                 await until(lambda: cluster.slots == PER_PROCESS)
                 running = start(cluster, hold(tmp_path / "runs"))
                 await until((tmp_path / "runs" / "started").exists)

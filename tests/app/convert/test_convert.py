@@ -9,12 +9,12 @@ import pinocchio as pin
 import pytest
 from pydantic import TypeAdapter
 
-from app.convert.pose import to_matrix
-from app.convert.request import to_problem
-from app.schemas.common import Pose
-from app.schemas.request import OptimizeRequest
-from models.registry import load_robot
-from optimizer.exceptions import InvalidProblem
+from joulepath.app.convert.pose import to_matrix
+from joulepath.app.convert.request import to_problem
+from joulepath.app.schemas.common import Pose
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.exceptions import InvalidProblem
 from tests.app.requests import move
 
 # of a rotation computed in double precision in two ways

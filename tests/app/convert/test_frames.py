@@ -11,20 +11,20 @@ import pinocchio as pin
 import pytest
 from fastapi.testclient import TestClient
 
-from app.convert.cycle import to_work_round
-from app.convert.ik import to_collision_arm
-from app.convert.request import to_problem
-from app.schemas.cycle import CycleRequest
-from app.schemas.ik import IKRequest
-from app.schemas.request import OptimizeRequest
-from models.own_arm.description import Description
-from models.registry import load_robot, robot_names
-from models.robot import Array
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.problem.arm import Arm
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.pose import Pose
-from optimizer.problem.targets import AnyOf
+from joulepath.app.convert.cycle import to_work_round
+from joulepath.app.convert.ik import to_collision_arm
+from joulepath.app.convert.request import to_problem
+from joulepath.app.schemas.cycle import CycleRequest
+from joulepath.app.schemas.ik import IKRequest
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.models.own_arm.description import Description
+from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.targets import AnyOf
 from tests.models.own_arm.arms import robot
 
 # sin π is not 0 in floating point

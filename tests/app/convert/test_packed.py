@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
-from app.convert.packed import packed, unpacked
+from joulepath.app.convert.packed import packed, unpacked
 
 DOCUMENTS = [b"", b"{}", b'{"q":[1.5707963267948966,-0.0]}' * 1000, zlib.compress(b"x" * 99), packed(b"x" * 99)]
 

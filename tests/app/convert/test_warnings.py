@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from app.convert.warnings import MISSED, NO_DEFAULT_MOTION, certified_warnings
+from joulepath.app.convert.warnings import MISSED, NO_DEFAULT_MOTION, certified_warnings
 
 
 def solution(complete: bool, names: list[str]) -> Any:

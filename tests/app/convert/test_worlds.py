@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 import trimesh
 
-from app.convert import mesh_file
-from app.convert.mesh_file import MOST_KEPT_TRIANGLES, mesh_from_file
-from app.convert.scene import to_scene
-from app.schemas.examples.values import MESH_FILE
-from app.schemas.scene import MOST_CELLS, Scene
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.clouds import MOST_TRIANGLES, Points, Voxels
+from joulepath.app.convert import mesh_file
+from joulepath.app.convert.mesh_file import MOST_KEPT_TRIANGLES, mesh_from_file
+from joulepath.app.convert.scene import to_scene
+from joulepath.app.schemas.examples.values import MESH_FILE
+from joulepath.app.schemas.scene import MOST_CELLS, Scene
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.clouds import MOST_TRIANGLES, Points, Voxels
 
 # a file in single precision rounds coordinates of a metre to this [m]
 SINGLE = 1e-7

@@ -8,10 +8,10 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.engine.listening import listener
-from app.engine.result import TaskResult
-from optimizer.deadline import Deadline, checkpoint
-from optimizer.progress import CandidatesFound
+from joulepath.app.engine.listening import listener
+from joulepath.app.engine.result import TaskResult
+from joulepath.optimizer.deadline import Deadline, checkpoint
+from joulepath.optimizer.progress import CandidatesFound
 
 
 def text(value: object) -> TaskResult:

@@ -6,7 +6,7 @@ from contextlib import ExitStack
 
 import pytest
 
-from app.engine.census import Census
+from joulepath.app.engine.census import Census
 
 
 def test_the_oldest_that_still_waits_counts() -> None:

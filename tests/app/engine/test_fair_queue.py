@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from app.engine.fair_queue import PATIENCE
-from app.exceptions import Busy, TooManyRequests
+from joulepath.app.engine.fair_queue import PATIENCE
+from joulepath.app.exceptions import Busy, TooManyRequests
 from tests.app.engine.simple_tasks import Hold, ProcessId
 from tests.app.engine.test_pool import LONG, Bench, until, with_engine
 

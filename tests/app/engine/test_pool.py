@@ -14,13 +14,13 @@ from typing import Any
 
 import pytest
 
-from app.engine.pool import Engine
-from app.engine.task import outcome
-from app.engine.work import result_of
-from app.exceptions import Busy, InvalidRequest, ShuttingDown, TaskFailed, WorkerDied
-from app.settings import Settings
-from optimizer.exceptions import DeadlineExceeded, OutsideLimits
-from optimizer.progress import CandidatesFound, Event
+from joulepath.app.engine.pool import Engine
+from joulepath.app.engine.task import outcome
+from joulepath.app.engine.work import result_of
+from joulepath.app.exceptions import Busy, InvalidRequest, ShuttingDown, TaskFailed, WorkerDied
+from joulepath.app.settings import Settings
+from joulepath.optimizer.exceptions import DeadlineExceeded, OutsideLimits
+from joulepath.optimizer.progress import CandidatesFound, Event
 from tests.app.engine.simple_tasks import Count, Die, Fail, Hold, ProcessId, TimeLeft, failing_warm_up, no_warm_up
 from tests.app.live import alive
 

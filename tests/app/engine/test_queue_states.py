@@ -15,9 +15,9 @@ from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule, run_state_machine_as_test
 
-from app.engine import fair_queue
-from app.engine.fair_queue import PATIENCE, FairQueue, Place, State
-from app.exceptions import Busy
+from joulepath.app.engine import fair_queue
+from joulepath.app.engine.fair_queue import PATIENCE, FairQueue, Place, State
+from joulepath.app.exceptions import Busy
 
 CAPACITY, SHARE = 8, 5
 CLIENTS = st.sampled_from("abc")

@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from app.engine.result import TaskResult
-from app.engine.spare import PATIENCE
-from app.engine.work import Ended, Work, result_of, taking
-from app.exceptions import Preempted, WorkerDied
-from optimizer.exceptions import DeadlineExceeded, OutsideLimits
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.engine.spare import PATIENCE
+from joulepath.app.engine.work import Ended, Work, result_of, taking
+from joulepath.app.exceptions import Preempted, WorkerDied
+from joulepath.optimizer.exceptions import DeadlineExceeded, OutsideLimits
 from tests.app.engine.simple_tasks import Die, Fail, Hold, ProcessId
 from tests.app.engine.test_pool import DEADLINE_GRACE, LONG, Bench, until, with_engine
 

@@ -11,11 +11,11 @@ from typing import Any
 
 import pytest
 
-from app.engine import pool
-from app.engine.fair_queue import PATIENCE
-from app.engine.work import result_of
-from app.exceptions import Preempted, ServiceError, ShuttingDown, WorkerDied
-from optimizer.exceptions import DeadlineExceeded, JoulepathError
+from joulepath.app.engine import pool
+from joulepath.app.engine.fair_queue import PATIENCE
+from joulepath.app.engine.work import result_of
+from joulepath.app.exceptions import Preempted, ServiceError, ShuttingDown, WorkerDied
+from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from tests.app.engine.simple_tasks import Die, DieOnce, EndEarly, Hold, HoldWatching, ProcessId
 from tests.app.engine.test_pool import DEADLINE_GRACE, LONG, SHUTDOWN_GRACE, Bench, until, with_engine
 

@@ -13,12 +13,12 @@ import httpx2
 import pytest
 from starlette.testclient import TestClient
 
-from app.access.key_file import changing, hash_of
-from app.main import create_app
-from app.schemas import errors as problems
-from app.schemas.examples.own_arm import PUT_EXAMPLES
-from app.schemas.examples.values import STUDY_ID
-from app.settings import Settings
+from joulepath.app.access.key_file import changing, hash_of
+from joulepath.app.main import create_app
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.examples.own_arm import PUT_EXAMPLES
+from joulepath.app.schemas.examples.values import STUDY_ID
+from joulepath.app.settings import Settings
 from tests.app.access.test_key_file import add
 from tests.app.live import ANSWER, CLIENT, LOCAL, Server, serving
 from tests.app.routes.test_problems import refused

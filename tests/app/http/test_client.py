@@ -7,9 +7,9 @@ from ipaddress import ip_network
 import pytest
 from starlette.types import Scope
 
-from app.access.client import Client
-from app.http.client import ProxyHeader, sender
-from app.settings import Settings
+from joulepath.app.access.client import Client
+from joulepath.app.http.client import ProxyHeader, sender
+from joulepath.app.settings import Settings
 
 PROXIES = (ip_network("127.0.0.1"), ip_network("10.0.0.0/8"), ip_network("fd00::/8"))
 

@@ -14,11 +14,11 @@ import zstandard
 from starlette.responses import Response, StreamingResponse
 from starlette.types import Message, Receive, Scope, Send
 
-from app.http import content_coding
-from app.http.accept_encoding import preferred
-from app.http.compression import Compression
-from app.http.content_coding import ContentCoding
-from app.schemas import errors as problems
+from joulepath.app.http import content_coding
+from joulepath.app.http.accept_encoding import preferred
+from joulepath.app.http.compression import Compression
+from joulepath.app.http.content_coding import ContentCoding
+from joulepath.app.schemas import errors as problems
 from tests.app.live import ANSWER, ROOT, Server
 from tests.app.requests import move
 

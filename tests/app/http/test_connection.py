@@ -8,7 +8,7 @@ from contextlib import ExitStack
 
 import pytest
 
-from app.schemas.errors import Busy, HeadTooLarge, RequestTimeout, ShuttingDown, TooManyRequests
+from joulepath.app.schemas.errors import Busy, HeadTooLarge, RequestTimeout, ShuttingDown, TooManyRequests
 from tests.app.live import EXIT, Server, serving, until
 from tests.app.raw import answer_on, connected, ends, is_reset, post
 from tests.selection import long_but

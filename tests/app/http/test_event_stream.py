@@ -11,9 +11,9 @@ import httpx2
 import orjson
 import pytest
 
-from app.schemas.compare import CompareResponse
-from app.schemas.cycle import CycleResponse
-from app.schemas.errors import (
+from joulepath.app.schemas.compare import CompareResponse
+from joulepath.app.schemas.cycle import CycleResponse
+from joulepath.app.schemas.errors import (
     DurationTooShort,
     ProblemDetails,
     TooManyRequests,
@@ -21,8 +21,8 @@ from app.schemas.errors import (
     Validation,
     WorkerLost,
 )
-from app.schemas.pareto import ParetoResponse
-from app.schemas.response import OptimizeResponse
+from joulepath.app.schemas.pareto import ParetoResponse
+from joulepath.app.schemas.response import OptimizeResponse
 from tests.app.live import CLIENT, GRACE, Server, serving, until
 from tests.app.requests import HOME, NEAR, long_search, move
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 from starlette.requests import Request
 
-from app.http.weights import is_wanted
+from joulepath.app.http.weights import is_wanted
 from tests.app.live import Server, serving
 from tests.app.raw import RawAnswer, answer_on, connected
 

@@ -10,8 +10,8 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 from starlette.testclient import TestClient
 
-from app.main import create_app
-from app.settings import Settings
+from joulepath.app.main import create_app
+from joulepath.app.settings import Settings
 from tests.app.live import CLIENT, GRACE, LOCAL, Server, serving, until
 from tests.app.requests import long_search, move
 

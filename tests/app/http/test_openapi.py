@@ -13,10 +13,10 @@ from schemathesis.checks import not_a_server_error
 from schemathesis.specs.openapi.checks import negative_data_rejection, positive_data_acceptance
 from starlette.testclient import TestClient
 
-from app import __version__
-from app.main import create_app
-from app.schemas.errors import PROBLEMS
-from app.settings import Settings
+from joulepath import __version__
+from joulepath.app.main import create_app
+from joulepath.app.schemas.errors import PROBLEMS
+from joulepath.app.settings import Settings
 from tests.app.live import GRACE, ROOT, Server, serving
 
 

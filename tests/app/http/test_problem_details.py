@@ -9,17 +9,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app import exceptions as service
-from app.engine.result import json_document
-from app.exceptions import ServiceError
-from app.http.problem_details import TABLE, problem_content, problem_type
-from app.schemas.errors import Internal, NoTrajectory, OutsideLimits, UnreachablePose
-from optimizer import exceptions
-from optimizer.exceptions import JoulepathError
-from optimizer.excitation.errors import ExcitationInfeasible
-from optimizer.identification import errors as identification_errors
-from optimizer.identification.logs.log_errors import EffortNotUsable, LogTooLarge
-from optimizer.solution import CandidateReport, Clearance, UnreachableTarget
+from joulepath.app import exceptions as service
+from joulepath.app.engine.result import json_document
+from joulepath.app.exceptions import ServiceError
+from joulepath.app.http.problem_details import TABLE, problem_content, problem_type
+from joulepath.app.schemas.errors import Internal, NoTrajectory, OutsideLimits, UnreachablePose
+from joulepath.optimizer import exceptions
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.excitation.errors import ExcitationInfeasible
+from joulepath.optimizer.identification import errors as identification_errors
+from joulepath.optimizer.identification.logs.log_errors import EffortNotUsable, LogTooLarge
+from joulepath.optimizer.solution import CandidateReport, Clearance, UnreachableTarget
 
 CANDIDATE = CandidateReport("left/up/flip", "left/up/flip", np.zeros(6), np.ones(6), "failed", "no step left", 12.5)
 COLLIDING = exceptions.CollidingBranch("left/up/flip", 0, np.zeros(6), ("table", "forearm"), 0.02)
@@ -58,7 +58,7 @@ ERRORS: list[JoulepathError] = [
 ]
 
 
-OURS = ("app.exceptions", "optimizer.")
+OURS = ("joulepath.app.exceptions", "joulepath.optimizer.")
 """Modules of errors."""
 SERVICE_ERRORS: list[ServiceError] = [
     service.InvalidRequest([{"loc": ["body", "start"], "msg": "Field required"}]),

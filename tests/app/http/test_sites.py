@@ -10,9 +10,9 @@ import httpx2
 import pytest
 from starlette.testclient import TestClient
 
-from app.main import create_app
-from app.schemas import errors as problems
-from app.settings import Settings
+from joulepath.app.main import create_app
+from joulepath.app.schemas import errors as problems
+from joulepath.app.settings import Settings
 from tests.app.live import CLIENT, Server, serving
 from tests.app.routes.test_problems import refused
 

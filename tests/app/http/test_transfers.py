@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from app.exceptions import TooManyBytes, TooManyBytesOfClient
-from app.http.transfers import BytesInFlight
-from app.schemas.errors import Busy, TooManyRequests
+from joulepath.app.exceptions import TooManyBytes, TooManyBytesOfClient
+from joulepath.app.http.transfers import BytesInFlight
+from joulepath.app.schemas.errors import Busy, TooManyRequests
 from tests.app.live import Server, serving, until
 from tests.app.raw import RawAnswer, answer_on, connected, post
 

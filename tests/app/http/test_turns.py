@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 
-from app.http.turns import Turns
+from joulepath.app.http.turns import Turns
 
 MOST = 3
 

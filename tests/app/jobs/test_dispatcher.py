@@ -10,22 +10,22 @@ from datetime import timedelta
 from functools import partial
 from pathlib import Path
 
-from app.access.client import OPERATOR
-from app.convert.packed import packed, unpacked
-from app.engine.result import TaskResult
-from app.engine.work import Take
-from app.exceptions import ClusterUnavailable, Preempted, WorkerDied
-from app.jobs import dispatcher as module
-from app.jobs.dispatcher import LEASE, Dispatcher
-from app.jobs.holder import is_gone, new_holder
-from app.jobs.jobs import Jobs
-from app.settings import Settings
-from app.store import jobs
-from app.store.jobs import NewJob, NewRequest
-from app.store.store import Store
-from app.store.tables import JobRequest, now
-from app.tasks.job_request import JobRequestTask, JobResult
-from optimizer.progress import Tell, nobody
+from joulepath.app.access.client import OPERATOR
+from joulepath.app.convert.packed import packed, unpacked
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.engine.work import Take
+from joulepath.app.exceptions import ClusterUnavailable, Preempted, WorkerDied
+from joulepath.app.jobs import dispatcher as module
+from joulepath.app.jobs.dispatcher import LEASE, Dispatcher
+from joulepath.app.jobs.holder import is_gone, new_holder
+from joulepath.app.jobs.jobs import Jobs
+from joulepath.app.settings import Settings
+from joulepath.app.store import jobs
+from joulepath.app.store.jobs import NewJob, NewRequest
+from joulepath.app.store.store import Store
+from joulepath.app.store.tables import JobRequest, now
+from joulepath.app.tasks.job_request import JobRequestTask, JobResult
+from joulepath.optimizer.progress import Tell, nobody
 
 PATIENCE = 60.0
 BODY = packed(b"{}")

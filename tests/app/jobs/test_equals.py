@@ -9,18 +9,18 @@ from typing import Any
 import orjson
 import pytest
 
-from app import __version__
-from app.access.client import OPERATOR
-from app.convert.packed import packed, unpacked
-from app.engine.result import AnswerFigures, TaskResult
-from app.exceptions import TaskFailed
-from app.store import jobs
-from app.store.cache import Meaning
-from app.store.jobs import NewJob, NewRequest
-from app.store.store import Store
-from app.store.tables import JobRequest
-from app.tasks.job_request import JobRequestTask, JobResult
-from optimizer.exceptions import OutsideLimits
+from joulepath import __version__
+from joulepath.app.access.client import OPERATOR
+from joulepath.app.convert.packed import packed, unpacked
+from joulepath.app.engine.result import AnswerFigures, TaskResult
+from joulepath.app.exceptions import TaskFailed
+from joulepath.app.store import jobs
+from joulepath.app.store.cache import Meaning
+from joulepath.app.store.jobs import NewJob, NewRequest
+from joulepath.app.store.store import Store
+from joulepath.app.store.tables import JobRequest
+from joulepath.app.tasks.job_request import JobRequestTask, JobResult
+from joulepath.optimizer.exceptions import OutsideLimits
 from tests.app.jobs.test_dispatcher import BODY, Service, is_done, requests, until, with_store
 
 

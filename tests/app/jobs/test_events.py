@@ -10,10 +10,10 @@ from typing import Any, TypeVar
 import pytest
 from sqlalchemy.orm import Session
 
-from app.jobs import events
-from app.jobs.changes import Changes
-from app.jobs.events import events_after
-from app.store.store import Store
+from joulepath.app.jobs import events
+from joulepath.app.jobs.changes import Changes
+from joulepath.app.jobs.events import events_after
+from joulepath.app.store.store import Store
 from tests.app.jobs.test_dispatcher import Service, is_done, sent, until, with_store
 
 T = TypeVar("T")

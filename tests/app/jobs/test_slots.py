@@ -11,15 +11,15 @@ from typing import Any
 
 import pytest
 
-from app.convert.packed import packed
-from app.engine.work import Ended, Take, Work, taking
-from app.exceptions import ClusterUnavailable, TaskFailed
-from app.jobs.executor import ClusterExecutor, LocalExecutor
-from app.store import job_events, logs
-from app.store.store import Store
-from app.store.tables import StoredLog, new_id, now
-from app.tasks.job_request import IDENTIFY, JobRequestTask
-from optimizer.progress import CandidatesFound, CandidateTried, Event, Improved, nobody
+from joulepath.app.convert.packed import packed
+from joulepath.app.engine.work import Ended, Take, Work, taking
+from joulepath.app.exceptions import ClusterUnavailable, TaskFailed
+from joulepath.app.jobs.executor import ClusterExecutor, LocalExecutor
+from joulepath.app.store import job_events, logs
+from joulepath.app.store.store import Store
+from joulepath.app.store.tables import StoredLog, new_id, now
+from joulepath.app.tasks.job_request import IDENTIFY, JobRequestTask
+from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Event, Improved, nobody
 from tests.app.jobs.test_dispatcher import Service, is_done, requests, sent, until, with_store
 
 

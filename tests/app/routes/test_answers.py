@@ -9,16 +9,16 @@ import orjson
 import pytest
 from starlette.testclient import TestClient
 
-from app.convert.candidates import MOST_IN_A_PROBLEM, most_telling
-from app.engine.result import AnswerFigures, TaskResult
-from app.schemas import errors as problems
-from app.schemas.answers import AnswerList
-from app.schemas.cycle import CycleResponse
-from app.schemas.response import OptimizeResponse
-from app.settings import Settings
-from app.store.store import Store
-from app.store.store_answers import keep_answer
-from optimizer.solution import CandidateReport, CandidateStatus
+from joulepath.app.convert.candidates import MOST_IN_A_PROBLEM, most_telling
+from joulepath.app.engine.result import AnswerFigures, TaskResult
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.answers import AnswerList
+from joulepath.app.schemas.cycle import CycleResponse
+from joulepath.app.schemas.response import OptimizeResponse
+from joulepath.app.settings import Settings
+from joulepath.app.store.store import Store
+from joulepath.app.store.store_answers import keep_answer
+from joulepath.optimizer.solution import CandidateReport, CandidateStatus
 from tests.app.requests import EXAMPLES, HOME, NEAR, PATIENT, move
 from tests.app.store.test_store import with_store
 

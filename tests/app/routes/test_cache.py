@@ -13,17 +13,17 @@ import pytest
 from sqlalchemy.orm import Session
 from starlette.testclient import TestClient
 
-from app.engine.result import TaskResult
-from app.schemas.request import OptimizeRequest
-from app.settings import Settings
-from app.store.answers import prune
-from app.store.cache import Asked
-from app.store.store import Store
-from app.store.store_answers import keep_answer
-from app.store.tables import CachedAnswer
-from app.tasks.answer_cache import AnswerCache
-from app.tasks.answer_figures import figures_of
-from app.tasks.read_body import HeldBody
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.app.settings import Settings
+from joulepath.app.store.answers import prune
+from joulepath.app.store.cache import Asked
+from joulepath.app.store.store import Store
+from joulepath.app.store.store_answers import keep_answer
+from joulepath.app.store.tables import CachedAnswer
+from joulepath.app.tasks.answer_cache import AnswerCache
+from joulepath.app.tasks.answer_figures import figures_of
+from joulepath.app.tasks.read_body import HeldBody
 from tests.app.job_clients import ended
 from tests.app.requests import HOME, NEAR, move
 from tests.app.store.test_store import with_store

@@ -11,12 +11,12 @@ import pytest
 from scipy.interpolate import BSpline
 from starlette.testclient import TestClient
 
-from app.convert.arm import to_arm
-from app.schemas import errors as problems
-from app.schemas.request import OptimizeRequest
-from optimizer.collision.model import CollisionModel
-from optimizer.nlp.clearance_constraint import RESERVE
-from optimizer.problem.arm import Arm
+from joulepath.app.convert.arm import to_arm
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.nlp.clearance_constraint import RESERVE
+from joulepath.optimizer.problem.arm import Arm
 from tests.app.requests import EXAMPLES, HOME, move
 from tests.app.routes.test_examples import EXAMPLES as FILES
 from tests.app.routes.test_problems import DOWN, refused

@@ -7,8 +7,8 @@ from typing import Any, get_args
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas.compare import CompareResponse
-from optimizer.problem.problem import MethodName
+from joulepath.app.schemas.compare import CompareResponse
+from joulepath.optimizer.problem.problem import MethodName
 from tests.app.requests import PATIENT
 from tests.selection import long_but
 

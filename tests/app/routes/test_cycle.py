@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.convert.warnings import NO_DEFAULT_MOTION
-from app.routes.parameters import deadline_of
-from app.schemas.cycle import CycleRequest, CycleResponse
-from app.schemas.response import OptimizeResponse
+from joulepath.app.convert.warnings import NO_DEFAULT_MOTION
+from joulepath.app.routes.parameters import deadline_of
+from joulepath.app.schemas.cycle import CycleRequest, CycleResponse
+from joulepath.app.schemas.response import OptimizeResponse
 from tests.app.requests import HOME, PATIENT
 
 # relative: sums of the same numbers in another order

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas.response import OptimizeResponse
+from joulepath.app.schemas.response import OptimizeResponse
 from tests.app.requests import HOME, PATIENT
 from tests.app.routes.test_cycle import PART, ROUNDING, answered, down
 

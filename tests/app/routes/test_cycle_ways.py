@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas.cycle import CycleResponse
-from app.schemas.response import OptimizeResponse
+from joulepath.app.schemas.cycle import CycleResponse
+from joulepath.app.schemas.response import OptimizeResponse
 from tests.app.routes.test_cycle import a_round, down
 
 LINES = {

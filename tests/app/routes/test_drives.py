@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas.response import OptimizeResponse
+from joulepath.app.schemas.response import OptimizeResponse
 from tests.app.requests import EXAMPLES, move
 
 BALANCE = 1e-4  # relative; quadrature of the corners of power

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas import errors as problems
-from app.schemas.errors import ProblemDetails
-from app.schemas.evaluate import EvaluateResponse
-from app.schemas.examples.evaluate import CSV_EXAMPLES, EVALUATE_EXAMPLES
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.errors import ProblemDetails
+from joulepath.app.schemas.evaluate import EvaluateResponse
+from joulepath.app.schemas.examples.evaluate import CSV_EXAMPLES, EVALUATE_EXAMPLES
 from tests.app.requests import HOME, NEAR, move
 
 REQUESTS: dict[str, Any] = {name: example["value"] for name, example in EVALUATE_EXAMPLES.items()}

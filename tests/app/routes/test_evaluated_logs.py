@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas import errors as problems
-from app.schemas.evaluate import EvaluateResponse
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.problem.arm import Payload
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.evaluate import EvaluateResponse
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.problem.arm import Payload
 from tests.app.job_clients import ended
 from tests.app.routes.test_problems import refused
 from tests.identification_logs import SILENT, Recording, csv_of, recorded, truth_of

@@ -8,7 +8,7 @@ import runpy
 import pytest
 from fastapi.testclient import TestClient
 
-from app.schemas.examples import BODY_EXAMPLES, JSON
+from joulepath.app.schemas.examples import BODY_EXAMPLES, JSON
 from tests.app.job_clients import ended, sent
 from tests.app.live import ROOT
 from tests.app.requests import PATIENT

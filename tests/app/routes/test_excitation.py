@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas import errors as problems
-from app.schemas.examples.excitation import EXCITATION_EXAMPLES
-from app.schemas.excitation import ExcitationResponse
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.examples.excitation import EXCITATION_EXAMPLES
+from joulepath.app.schemas.excitation import ExcitationResponse
 from tests.app.requests import HOME
 from tests.app.routes.test_problems import refused
 

@@ -10,11 +10,11 @@ import pytest
 import yaml
 from starlette.testclient import TestClient
 
-from app.schemas import errors as problems
-from app.schemas.export import FORMATS, ExportFormat
 from benchmarks.read_back.urscript_machine import Controller
-from models.registry import load_robot
-from models.urdf import urdf_of
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.export import FORMATS, ExportFormat
+from joulepath.models.registry import load_robot
+from joulepath.models.urdf import urdf_of
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_problems import refused
 from tests.app.test_openapi_examples import DOCUMENT

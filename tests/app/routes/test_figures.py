@@ -12,14 +12,14 @@ import pytest
 import yaml
 from starlette.testclient import TestClient
 
-from app.main import create_app
-from app.schemas import errors as problems
-from app.schemas.examples.figures import FIGURES
-from app.schemas.figures import FiguresDetail, FiguresList
-from app.settings import Settings
-from models.registry import load_robot
-from models.uncertainty.document import InvalidFigures
-from optimizer.optimize import optimize
+from joulepath.app.main import create_app
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.examples.figures import FIGURES
+from joulepath.app.schemas.figures import FiguresDetail, FiguresList
+from joulepath.app.settings import Settings
+from joulepath.models.registry import load_robot
+from joulepath.models.uncertainty.document import InvalidFigures
+from joulepath.optimizer.optimize import optimize
 from tests.app.live import LOCAL
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_problems import refused

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from app.schemas.response import OptimizeResponse
+from joulepath.app.schemas.response import OptimizeResponse
 
 Z = [0.0, 0.0, 1.0]
 DOWN = [0.0, 1.0, 0.0, 0.0]

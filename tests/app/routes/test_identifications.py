@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas import errors as problems
-from app.schemas.excitation import ExcitationRequest
-from app.schemas.identifications import (
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.excitation import ExcitationRequest
+from joulepath.app.schemas.identifications import (
     Identification,
     IdentificationList,
     IdentificationResult,
@@ -19,8 +19,8 @@ from app.schemas.identifications import (
     ResidualCurves,
     ResidualMove,
 )
-from models.registry import load_robot
-from optimizer.problem.arm import Payload
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.problem.arm import Payload
 from tests.app.requests import HOME
 from tests.app.routes.test_problems import refused
 from tests.identification_logs import Truth, csv_of, recorded, truth_of

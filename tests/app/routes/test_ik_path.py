@@ -9,10 +9,10 @@ import pinocchio as pin
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas import errors as problems
-from app.schemas.examples.ik import IK_PATH_EXAMPLES
-from app.schemas.ik_path import IKPathResponse
-from models.registry import load_robot
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.examples.ik import IK_PATH_EXAMPLES
+from joulepath.app.schemas.ik_path import IKPathResponse
+from joulepath.models.registry import load_robot
 from tests.app.requests import HOME
 
 GUESS = [2.7, -1.4, 1.8, -2.0, -1.57, 0.0]

@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.main import create_app
-from app.schemas import errors as problems
-from app.schemas.jobs import Job, JobList
-from app.schemas.response import OptimizeResponse
-from app.settings import Settings
+from joulepath.app.main import create_app
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.jobs import Job, JobList
+from joulepath.app.schemas.response import OptimizeResponse
+from joulepath.app.settings import Settings
 from tests.app.job_clients import ended, evaluation, optimization, parsed, sent, shown
 from tests.app.live import LOCAL
 from tests.app.requests import HOME, NEAR, move

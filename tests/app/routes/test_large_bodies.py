@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.routes.large_bodies import LARGE
-from app.schemas.examples import BODY_EXAMPLES
-from app.schemas.request import OptimizeRequest
-from app.tasks.read_body import HeldBody, ReadBodyTask, held
+from joulepath.app.routes.large_bodies import LARGE
+from joulepath.app.schemas.examples import BODY_EXAMPLES
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.app.tasks.read_body import HeldBody, ReadBodyTask, held
 from tests.app.requests import AMPLE, HOME, move
 
 POSE = {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}

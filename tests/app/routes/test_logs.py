@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.access.client import Role
-from app.convert.logs import stored_log
-from app.main import create_app
-from app.schemas import errors as problems
-from app.schemas.examples.logs import LOG_EXAMPLES
-from app.schemas.examples.own_arm import ARM
-from app.schemas.logs import LogDetail, LogList
-from app.settings import Settings
-from models.registry import load_robot
+from joulepath.app.access.client import Role
+from joulepath.app.convert.logs import stored_log
+from joulepath.app.main import create_app
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.examples.logs import LOG_EXAMPLES
+from joulepath.app.schemas.examples.own_arm import ARM
+from joulepath.app.schemas.logs import LogDetail, LogList
+from joulepath.app.settings import Settings
+from joulepath.models.registry import load_robot
 from tests.app.access.test_key_file import add
 from tests.app.live import CLIENT, LOCAL, Server
 from tests.app.routes.test_problems import refused

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas.response import OptimizeResponse
-from optimizer.solution import Certificate
-from optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
+from joulepath.app.schemas.response import OptimizeResponse
+from joulepath.optimizer.solution import Certificate
+from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
 from tests.app.requests import EXAMPLES, long_search, move
 from tests.selection import long_but
 

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.main import create_app
-from app.schemas import errors as problems
-from app.schemas.examples.own_arm import ARM
-from app.schemas.robots import RobotDetail, RobotList
-from app.settings import Settings
-from optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
+from joulepath.app.main import create_app
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.examples.own_arm import ARM
+from joulepath.app.schemas.robots import RobotDetail, RobotList
+from joulepath.app.settings import Settings
+from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
 from tests.app.live import LOCAL
 from tests.app.requests import PATIENT
 from tests.app.routes.test_problems import refused

@@ -11,7 +11,7 @@ from scipy.stats import spearmanr
 from starlette.testclient import TestClient
 
 from benchmarks import paper
-from models.robot import Array
+from joulepath.models.robot import Array
 from tests.app.live import ROOT
 
 PRINTED = np.loadtxt(ROOT / "tests" / "reference" / "paper_table3_power.csv", delimiter=",", skiprows=1)[:, 1]

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas.examples.pareto import PARETO_EXAMPLES
-from app.schemas.pareto import ParetoResponse
-from app.schemas.response import OptimizeResponse
+from joulepath.app.schemas.examples.pareto import PARETO_EXAMPLES
+from joulepath.app.schemas.pareto import ParetoResponse
+from joulepath.app.schemas.response import OptimizeResponse
 from tests.app.requests import move
 
 # fresh answers and those of a front are local optima found from different guesses

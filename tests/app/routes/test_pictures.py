@@ -12,14 +12,14 @@ import pytest
 import trimesh
 from starlette.testclient import TestClient
 
-from app.schemas import errors as problems
-from app.tasks.pictures import PictureTask, kept
+from joulepath.app.schemas import errors as problems
+from joulepath.app.tasks.pictures import PictureTask, kept
 from tests.app.live import ANSWER, ROOT
 from tests.app.routes.test_problems import refused
 
 MAKE = """
 import hashlib
-from app.tasks.pictures import PictureTask, _path
+from joulepath.app.tasks.pictures import PictureTask, _path
 content = PictureTask("ur5e", "test").run(60).document
 print(_path("ur5e").stat().st_ino, hashlib.sha256(content).hexdigest())
 """

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas import errors as problems
-from app.schemas.examples.own_arm import ARM
-from app.schemas.replay import ReplayResponse
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.examples.own_arm import ARM
+from joulepath.app.schemas.replay import ReplayResponse
 from tests.app.requests import HOME, NEAR, PATIENT, move
 from tests.app.routes.test_problems import refused
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.convert.pose import to_matrix
-from app.schemas.common import QuaternionPose
-from app.schemas.ik import IKResponse
-from app.schemas.robots import RobotDetail, RobotList
-from models.registry import load_robot, robot_names
-from optimizer.kinematics.inverse import inverse_kinematics_for
+from joulepath.app.convert.pose import to_matrix
+from joulepath.app.schemas.common import QuaternionPose
+from joulepath.app.schemas.ik import IKResponse
+from joulepath.app.schemas.robots import RobotDetail, RobotList
+from joulepath.models.registry import load_robot, robot_names
+from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from tests.app.requests import PATIENT
 
 POSE = {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
-from app import routes
+from joulepath.app import routes
 
 SHARED = {
     "dependencies",
@@ -24,9 +24,9 @@ FILES = sorted(Path(routes.__path__[0]).glob("*.py"))
 def test_routes_import_no_routes() -> None:
     for file in FILES:
         for node in ast.walk(ast.parse(file.read_text())):
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("app.routes"):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("joulepath.app.routes"):
                 assert node.module is not None
-                assert node.module.removeprefix("app.routes.") in SHARED, (file.name, node.module)
+                assert node.module.removeprefix("joulepath.app.routes.") in SHARED, (file.name, node.module)
 
 
 def test_only_the_dependencies_read_the_applications_state() -> None:

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas import errors as problems
-from app.schemas.studies import IterationDetail, Study, StudyList, StudySummary
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.studies import IterationDetail, Study, StudyList, StudySummary
 from tests.app.databases import postgres, why_no_postgres
 from tests.app.live import Server, serving
 from tests.app.requests import HOME, NEAR, move

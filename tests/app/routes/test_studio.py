@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas import errors as problems
+from joulepath.app.schemas import errors as problems
 from tests.app.live import ROOT
 from tests.app.routes.test_problems import refused
 

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.convert.pose import to_matrix
-from app.main import create_app
-from app.schemas import errors as problems
-from app.schemas.common import QuaternionPose
-from app.schemas.suggestions import Suggestions
-from app.settings import Settings
-from models.registry import load_robot
-from optimizer.kinematics.inverse import inverse_kinematics_for
-from optimizer.kinematics.tcp import rotated_poses
-from optimizer.problem.arm import Arm
+from joulepath.app.convert.pose import to_matrix
+from joulepath.app.main import create_app
+from joulepath.app.schemas import errors as problems
+from joulepath.app.schemas.common import QuaternionPose
+from joulepath.app.schemas.suggestions import Suggestions
+from joulepath.app.settings import Settings
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
+from joulepath.optimizer.kinematics.tcp import rotated_poses
+from joulepath.optimizer.problem.arm import Arm
 from tests.app.live import LOCAL
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_studies import ABSENT, SECRET, added, begin

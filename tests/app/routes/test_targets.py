@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas.errors import UnreachableTargets
-from app.schemas.response import OptimizeResponse
+from joulepath.app.schemas.errors import UnreachableTargets
+from joulepath.app.schemas.response import OptimizeResponse
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_validation import POSE, refused
 from tests.selection import long_but

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas import common
-from app.schemas.errors import UnsupportedMediaType, Validation
+from joulepath.app.schemas import common
+from joulepath.app.schemas.errors import UnsupportedMediaType, Validation
 from tests.app.requests import HOME, move
 
 SECRET = "caller-secret-7f3a"

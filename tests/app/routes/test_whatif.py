@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.exceptions import InvalidRequest
-from app.schemas.evaluate import EvaluateResponse
-from app.schemas.response import OptimizeResponse
-from app.schemas.whatif import WhatifResponse
-from app.tasks import answer_collector
-from app.tasks.answer_collector import AnswerCollector
+from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.schemas.evaluate import EvaluateResponse
+from joulepath.app.schemas.response import OptimizeResponse
+from joulepath.app.schemas.whatif import WhatifResponse
+from joulepath.app.tasks import answer_collector
+from joulepath.app.tasks.answer_collector import AnswerCollector
 from tests.app.requests import HOME, NEAR, move
 from tests.optimizer.moves import tcp_pose
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import text
 
-from app.store.database import create_database_engine
+from joulepath.app.store.database import create_database_engine
 from tests.app.databases import Postgres, postgres, why_no_postgres
 
 MISSING = why_no_postgres()

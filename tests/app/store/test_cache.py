@@ -8,11 +8,11 @@ from functools import partial
 
 from sqlalchemy.orm import Session
 
-from app.engine.result import StoredAnswer
-from app.store import answers, cache
-from app.store.cache import Answered, Asked
-from app.store.store import Store
-from app.store.tables import new_id
+from joulepath.app.engine.result import StoredAnswer
+from joulepath.app.store import answers, cache
+from joulepath.app.store.cache import Answered, Asked
+from joulepath.app.store.store import Store
+from joulepath.app.store.tables import new_id
 from tests.app.store.test_store import with_store
 
 ASKED = Asked("a" * 64, 10.0)

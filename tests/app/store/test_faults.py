@@ -15,13 +15,13 @@ from typing import Any
 import pytest
 from sqlalchemy import text
 
-from app.access.client import OPERATOR
-from app.engine.result import StoredAnswer
-from app.exceptions import StoreFault, StoreUnavailable
-from app.store import answers, studies
-from app.store.database import create_database_engine
-from app.store.store import Store
-from app.store.tables import new_id
+from joulepath.app.access.client import OPERATOR
+from joulepath.app.engine.result import StoredAnswer
+from joulepath.app.exceptions import StoreFault, StoreUnavailable
+from joulepath.app.store import answers, studies
+from joulepath.app.store.database import create_database_engine
+from joulepath.app.store.store import Store
+from joulepath.app.store.tables import new_id
 from tests.app.databases import postgres
 from tests.app.live import serving
 from tests.app.requests import move

@@ -10,14 +10,14 @@ from alembic import command
 from alembic.config import Config
 from sqlalchemy import event, text
 
-from app.access.client import OPERATOR
-from app.engine.result import StoredAnswer
-from app.store import studies
-from app.store.database import create_database_engine, migrate
-from app.store.store import Store
-from app.store.studies import Step
-from app.store.tables import Iteration, Study, new_id
-from app.studies.answers import detail, entries
+from joulepath.app.access.client import OPERATOR
+from joulepath.app.engine.result import StoredAnswer
+from joulepath.app.store import studies
+from joulepath.app.store.database import create_database_engine, migrate
+from joulepath.app.store.store import Store
+from joulepath.app.store.studies import Step
+from joulepath.app.store.tables import Iteration, Study, new_id
+from joulepath.app.studies.answers import detail, entries
 from tests.app.store.test_store import with_store
 
 ENERGIES = [100.0, 80.0, 90.0, 60.0, 60.0, 70.0]

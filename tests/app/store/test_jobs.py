@@ -10,15 +10,15 @@ from functools import partial
 import pytest
 from sqlalchemy import func, select
 
-from app.access.client import OPERATOR
-from app.convert.packed import packed, unpacked
-from app.engine.result import AnswerFigures, StoredAnswer
-from app.exceptions import JobNotCancellable, KeyReused, TooManyWaiting, UnknownAnswer, UnknownJob
-from app.store import answers, job_events, jobs, leases
-from app.store.jobs import NewJob, NewRequest
-from app.store.leases import Lease, Outcome
-from app.store.store import Store
-from app.store.tables import Answer, JobEvent, JobRequest, new_id
+from joulepath.app.access.client import OPERATOR
+from joulepath.app.convert.packed import packed, unpacked
+from joulepath.app.engine.result import AnswerFigures, StoredAnswer
+from joulepath.app.exceptions import JobNotCancellable, KeyReused, TooManyWaiting, UnknownAnswer, UnknownJob
+from joulepath.app.store import answers, job_events, jobs, leases
+from joulepath.app.store.jobs import NewJob, NewRequest
+from joulepath.app.store.leases import Lease, Outcome
+from joulepath.app.store.store import Store
+from joulepath.app.store.tables import Answer, JobEvent, JobRequest, new_id
 
 MUCH = 1 << 30
 START = datetime(2030, 1, 1, tzinfo=UTC)

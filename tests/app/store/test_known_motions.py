@@ -8,8 +8,8 @@ from functools import partial
 
 from sqlalchemy.orm import Session
 
-from app.store import known_motions
-from app.store.store import Store
+from joulepath.app.store import known_motions
+from joulepath.app.store.store import Store
 from tests.app.store.test_store import with_store
 
 CELL, OTHER = "c" * 64, "d" * 64

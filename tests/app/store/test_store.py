@@ -23,16 +23,16 @@ from alembic.migration import MigrationContext
 from sqlalchemy import func, select, text, update
 from starlette.testclient import TestClient
 
-from app.engine.result import StoredAnswer, TaskResult
-from app.exceptions import StoreUnavailable, UnknownAnswer
-from app.schemas import answers as schemas
-from app.schemas import errors as problems
-from app.settings import Settings
-from app.store import answers, database
-from app.store.database import create_database_engine, migrate
-from app.store.store import Store
-from app.store.store_answers import store_answers
-from app.store.tables import Answer, Table, new_id, now
+from joulepath.app.engine.result import StoredAnswer, TaskResult
+from joulepath.app.exceptions import StoreUnavailable, UnknownAnswer
+from joulepath.app.schemas import answers as schemas
+from joulepath.app.schemas import errors as problems
+from joulepath.app.settings import Settings
+from joulepath.app.store import answers, database
+from joulepath.app.store.database import create_database_engine, migrate
+from joulepath.app.store.store import Store
+from joulepath.app.store.store_answers import store_answers
+from joulepath.app.store.tables import Answer, Table, new_id, now
 from tests.app.databases import Postgres, why_no_postgres
 from tests.app.live import ROOT, WARM_UP, Server, serving
 from tests.app.requests import move
@@ -102,7 +102,7 @@ def test_the_comparison_above_can_fail(tmp_path: Path) -> None:
 
 
 def test_several_processes_may_migrate_at_once(url: str) -> None:
-    code = "import sys; from app.store.database import *; migrate(create_database_engine(sys.argv[1]))"
+    code = "import sys; from joulepath.app.store.database import *; migrate(create_database_engine(sys.argv[1]))"
     processes = [subprocess.Popen([sys.executable, "-c", code, url], cwd=ROOT) for _ in range(4)]
     assert [process.wait(60) for process in processes] == [0] * 4
     assert tables(url) == []

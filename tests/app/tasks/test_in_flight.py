@@ -7,11 +7,11 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
-from app.engine.result import TaskResult
-from app.exceptions import Busy
-from app.store.cache import Asked
-from app.tasks.in_flight import InFlight
-from optimizer.exceptions import OutsideLimits
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions import Busy
+from joulepath.app.store.cache import Asked
+from joulepath.app.tasks.in_flight import InFlight
+from joulepath.optimizer.exceptions import OutsideLimits
 
 ASKED = Asked("key", 10.0)
 

@@ -10,11 +10,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from app.schemas.examples.own_arm import URDF
-from models.from_figures import robot_of
-from models.own_arm.description import Description, InvalidArm
-from models.own_arm.figures import own_figures
-from models.robot import Array, Robot
+from joulepath.app.schemas.examples.own_arm import URDF
+from joulepath.models.from_figures import robot_of
+from joulepath.models.own_arm.description import Description, InvalidArm
+from joulepath.models.own_arm.figures import own_figures
+from joulepath.models.robot import Array, Robot
 
 AMPLE = 300.0
 

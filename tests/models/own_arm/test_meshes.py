@@ -13,15 +13,15 @@ import pytest
 import trimesh
 from scipy.spatial import ConvexHull
 
-from models.capsule_cover import not_held
-from models.meshes import link_surfaces
-from models.own_arm.capsule_around import DIGIT, capsule_around
-from models.own_arm.description import Description, InvalidArm
-from models.own_arm.figures import own_figures
-from models.own_arm.mesh_files import corners, in_folder, in_zip
-from models.registry import load_robot
-from models.robot import Array, LinkCapsule
-from models.uploads.limits import LIMITS
+from joulepath.models.capsule_cover import not_held
+from joulepath.models.meshes import link_surfaces
+from joulepath.models.own_arm.capsule_around import DIGIT, capsule_around
+from joulepath.models.own_arm.description import Description, InvalidArm
+from joulepath.models.own_arm.figures import own_figures
+from joulepath.models.own_arm.mesh_files import corners, in_folder, in_zip
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, LinkCapsule
+from joulepath.models.uploads.limits import LIMITS
 from tests.models.own_arm.arms import RICH, RICH_ARM, robot
 from tests.models.test_capsule_cover import meshes as arm_folder
 from tests.selection import long_but
@@ -137,10 +137,10 @@ def test_the_longest_agreement_of_paths_counts() -> None:
 def test_a_zip_that_is_none_or_too_large(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InvalidArm, match="no zip"):
         in_zip(b"PK")
-    monkeypatch.setattr("models.own_arm.mesh_files.LIMITS", dataclasses.replace(LIMITS, mesh_bytes=10_000))
+    monkeypatch.setattr("joulepath.models.own_arm.mesh_files.LIMITS", dataclasses.replace(LIMITS, mesh_bytes=10_000))
     with pytest.raises(InvalidArm, match="unpacks to more"):
         in_zip(zipped({"a.stl": b"0" * 20_000}))
-    monkeypatch.setattr("models.own_arm.mesh_files.LIMITS", dataclasses.replace(LIMITS, mesh_files=1))
+    monkeypatch.setattr("joulepath.models.own_arm.mesh_files.LIMITS", dataclasses.replace(LIMITS, mesh_files=1))
     with pytest.raises(InvalidArm, match="2 mesh files"):
         in_zip(zipped({"a.stl": b"0", "b.obj": b"0"}))
 

@@ -8,9 +8,9 @@ import re
 
 import pytest
 
-from models.from_figures import robot_of
-from models.own_arm.description import InvalidArm
-from models.own_arm.figures import own_figures
+from joulepath.models.from_figures import robot_of
+from joulepath.models.own_arm.description import InvalidArm
+from joulepath.models.own_arm.figures import own_figures
 from tests.models.own_arm.arms import RICH, RICH_ARM
 from tests.selection import long_but
 

@@ -9,17 +9,17 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from app.schemas.examples.own_arm import URDF
-from models.from_figures import robot_of
-from models.own_arm.description import Collision, Description, Drives, Electronics, InvalidArm, Motion
-from models.own_arm.figures import own_figures
-from models.registry import load_figures, load_robot
-from models.robot import Array
-from models.trust import energy_trust
-from models.urdf import urdf_of
-from optimizer import Arm, Problem, optimize
-from optimizer.collision.model import collision_model
-from optimizer.kinematics.ur_closed_form import URClosedForm
+from joulepath import Arm, Problem, optimize
+from joulepath.app.schemas.examples.own_arm import URDF
+from joulepath.models.from_figures import robot_of
+from joulepath.models.own_arm.description import Collision, Description, Drives, Electronics, InvalidArm, Motion
+from joulepath.models.own_arm.figures import own_figures
+from joulepath.models.registry import load_figures, load_robot
+from joulepath.models.robot import Array
+from joulepath.models.trust import energy_trust
+from joulepath.models.urdf import urdf_of
+from joulepath.optimizer.collision.model import collision_model
+from joulepath.optimizer.kinematics.ur_closed_form import URClosedForm
 from tests.models.own_arm.arms import AMPLE, HELD, PLAIN, RICH, RICH_ARM, refused, robot, whole
 from tests.models.test_capsule_cover import meshes as arm_folder
 

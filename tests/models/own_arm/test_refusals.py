@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from app.schemas.examples.own_arm import URDF
-from models.own_arm.description import Collision, Drives, Electronics, InvalidArm, Motion
-from models.own_arm.figures import own_figures
-from models.registry import load_robot
+from joulepath.app.schemas.examples.own_arm import URDF
+from joulepath.models.own_arm.description import Collision, Drives, Electronics, InvalidArm, Motion
+from joulepath.models.own_arm.figures import own_figures
+from joulepath.models.registry import load_robot
 from tests.models.own_arm.arms import RICH, RICH_ARM, refused
 
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.convert.own_arm import to_description
-from app.schemas.examples.figures import FIGURES
-from app.schemas.examples.own_arm import ARM
-from app.schemas.own_arm import OwnArm
-from models.own_arm.figures import own_figures
-from models.own_arm.robots import own_robot
-from models.registry import load_robot
-from models.robot import Array, Robot
-from models.uncertainty.parameters import BASE_POWER, PER_JOINT, count, place, values
-from models.uncertainty.ranges import default_ranges
-from models.uncertainty.spread import DRAWS, spread_of
+from joulepath.app.convert.own_arm import to_description
+from joulepath.app.schemas.examples.figures import FIGURES
+from joulepath.app.schemas.examples.own_arm import ARM
+from joulepath.app.schemas.own_arm import OwnArm
+from joulepath.models.own_arm.figures import own_figures
+from joulepath.models.own_arm.robots import own_robot
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Robot
+from joulepath.models.uncertainty.parameters import BASE_POWER, PER_JOINT, count, place, values
+from joulepath.models.uncertainty.ranges import default_ranges
+from joulepath.models.uncertainty.spread import DRAWS, spread_of
 
 UR5E = load_robot("ur5e")
 EXACT = FIGURES | {

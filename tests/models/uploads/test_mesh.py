@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from models.meshes import mesh_file
-from models.robot import Array
-from models.uploads.limits import UnreadableFile
-from models.uploads.mesh import read_mesh
-from models.uploads.mesh_text import MeshSize
+from joulepath.models.meshes import mesh_file
+from joulepath.models.robot import Array
+from joulepath.models.uploads.limits import UnreadableFile
+from joulepath.models.uploads.mesh import read_mesh
+from joulepath.models.uploads.mesh_text import MeshSize
 from tests.models.test_capsule_cover import meshes as arm_folder
 
 SQUARE = """#

@@ -6,10 +6,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.robot import Array
-from optimizer.bounds.chain_derivatives import ChainDerivatives
-from optimizer.kinematics.rigid_body_model import rigid_body_model
-from optimizer.problem.arm import Arm
+from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
+from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.problem.arm import Arm
 from tests.optimizer.moves import CEILING, PAYLOAD, ROBOT, TILTED
 
 ROUNDING = 1e-11  # of sums of some hundred products of order 10

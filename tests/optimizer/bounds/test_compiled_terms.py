@@ -8,19 +8,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.bounds.chain_derivatives import ChainDerivatives
-from optimizer.bounds.friction_conjugate import FrictionConjugate
-from optimizer.bounds.grid_cells import Curvature, GridCells, Spacing
-from optimizer.bounds.grid_points import GridPoints
-from optimizer.bounds.least_potential import LeastPotential
-from optimizer.bounds.path_terms import path_terms
-from optimizer.bounds.reference import Reference, half_sides
-from optimizer.bounds.speed_conjugate import SpeedConjugate
-from optimizer.bounds.weights import Weights
-from optimizer.native.shared_library import shared_library
-from optimizer.problem.arm import Arm, Payload
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
+from joulepath.optimizer.bounds.friction_conjugate import FrictionConjugate
+from joulepath.optimizer.bounds.grid_cells import Curvature, GridCells, Spacing
+from joulepath.optimizer.bounds.grid_points import GridPoints
+from joulepath.optimizer.bounds.least_potential import LeastPotential
+from joulepath.optimizer.bounds.path_terms import path_terms
+from joulepath.optimizer.bounds.reference import Reference, half_sides
+from joulepath.optimizer.bounds.speed_conjugate import SpeedConjugate
+from joulepath.optimizer.bounds.weights import Weights
+from joulepath.optimizer.native.shared_library import shared_library
+from joulepath.optimizer.problem.arm import Arm, Payload
 from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED
 
 STEPS = 7

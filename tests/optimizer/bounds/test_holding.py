@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from scipy.integrate import simpson
 
-from models.robot import Array
-from optimizer.bounds.holding import Cells
-from optimizer.bounds.straight_line import Line
-from optimizer.problem.problem import LEAST_DURATION, Problem
-from optimizer.search.baselines import guesses
-from optimizer.search.holding_cells import HoldingCells
-from optimizer.search.lower_bound import NetEnergy
-from optimizer.trajectories import bspline
-from optimizer.trajectories.seven_segment import shortest_duration
-from optimizer.trajectories.spline import peak_rates, sample, spline_of
+from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.holding import Cells
+from joulepath.optimizer.bounds.straight_line import Line
+from joulepath.optimizer.problem.problem import LEAST_DURATION, Problem
+from joulepath.optimizer.search.baselines import guesses
+from joulepath.optimizer.search.holding_cells import HoldingCells
+from joulepath.optimizer.search.lower_bound import NetEnergy
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.optimizer.trajectories.spline import peak_rates, sample, spline_of
 from tests.optimizer.moves import limits, problem
 from tests.optimizer.search.test_lower_bound import CONDITIONS, QUADRATURE, Torques, bound, ends, motions
 from tests.selection import long_but

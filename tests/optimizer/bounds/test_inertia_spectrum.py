@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.bounds.chain_derivatives import ChainDerivatives
-from optimizer.bounds.inertia_spectrum import InertiaSpectrum
-from optimizer.problem.arm import Arm
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
+from joulepath.optimizer.bounds.inertia_spectrum import InertiaSpectrum
+from joulepath.optimizer.problem.arm import Arm
 from tests.optimizer.moves import PAYLOAD
 
 STEP = 1e-4

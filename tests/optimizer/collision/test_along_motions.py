@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.collision import clearance_proof
-from optimizer.collision.clearance_proof import GAP, is_proven_clear, proven_clearance
-from optimizer.collision.model import STRIDE, CollisionModel
-from optimizer.problem.arm import Arm
-from optimizer.problem.clouds import Points
-from optimizer.problem.scene import Obstacle, Scene
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision import clearance_proof
+from joulepath.optimizer.collision.clearance_proof import GAP, is_proven_clear, proven_clearance
+from joulepath.optimizer.collision.model import STRIDE, CollisionModel
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.clouds import Points
+from joulepath.optimizer.problem.scene import Obstacle, Scene
 from tests.optimizer.cells import LOADS, arm_in_cell, cell, positions, wander
 from tests.optimizer.moves import ROBOT
 

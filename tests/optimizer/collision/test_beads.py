@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from optimizer.collision.model import CollisionModel
-from optimizer.collision.numpy_distances import NumpyDistances
-from optimizer.collision.pair_arrays import PairArrays
-from optimizer.nlp.clearance_constraint import COUNTED, ClearanceConstraint
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.collision.numpy_distances import NumpyDistances
+from joulepath.optimizer.collision.pair_arrays import PairArrays
+from joulepath.optimizer.nlp.clearance_constraint import COUNTED, ClearanceConstraint
 from tests.optimizer.cells import LOADS, arm_in_cell, cell
 
 # Coal ends its search within 1e-6 m

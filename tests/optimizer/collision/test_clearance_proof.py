@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from optimizer.collision.clearance_proof import GAP, RELATIVE_GAP, proven_clearance
-from optimizer.collision.model import CollisionModel
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.clouds import Points
-from optimizer.problem.scene import (
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.collision.clearance_proof import GAP, RELATIVE_GAP, proven_clearance
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.clouds import Points
+from joulepath.optimizer.problem.scene import (
     Attachment,
     Box,
     Capsule,
@@ -24,7 +24,7 @@ from optimizer.problem.scene import (
     Shape,
     Sphere,
 )
-from optimizer.trajectories.spline import Spline
+from joulepath.optimizer.trajectories.spline import Spline
 from tests.optimizer.cells import LOADS, at, cell, positions, wander
 from tests.optimizer.moves import ROBOT
 from tests.selection import long_but

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.collision.clearance_proof import GAP, RELATIVE_GAP, proven_clearance
-from optimizer.collision.close_pass import CLOSE, close_pass
-from optimizer.collision.model import CollisionModel
-from optimizer.problem.arm import Arm
-from optimizer.problem.scene import Obstacle, Scene, Sphere
-from optimizer.replay.evaluate import evaluate
-from optimizer.replay.recording import Waypoints
-from optimizer.solution import Clearance
-from optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.clearance_proof import GAP, RELATIVE_GAP, proven_clearance
+from joulepath.optimizer.collision.close_pass import CLOSE, close_pass
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
+from joulepath.optimizer.replay.evaluate import evaluate
+from joulepath.optimizer.replay.recording import Waypoints
+from joulepath.optimizer.solution import Clearance
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.cells import at
 from tests.optimizer.moves import ROBOT
 

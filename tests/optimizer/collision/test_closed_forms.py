@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.collision.closed_form_distance import box_segment, segment_segment
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.closed_form_distance import box_segment, segment_segment
 
 COUNT = 2000
 EXACT = 1e-13  # m; lengths are of the order of 1 m, rounding 1e-16

@@ -9,20 +9,20 @@ import coal
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.collision.bounding_tree import BoundingTree, point_segment
-from optimizer.collision.clearance_proof import GAP, RELATIVE_GAP, proven_clearance
-from optimizer.collision.closed_form_distance import triangle_segment
-from optimizer.collision.clouds import LONGEST_EDGE, Cloud, divided
-from optimizer.collision.coal_distance import SKIN, coal_shape
-from optimizer.collision.cores import Core
-from optimizer.collision.model import CollisionModel
-from optimizer.collision.state_validity import StateValidityChecker
-from optimizer.exceptions import InvalidProblem, StartInCollision
-from optimizer.optimize import optimize
-from optimizer.problem.clouds import MOST_POINTS, Points, TriangleMesh, Voxels
-from optimizer.problem.clouds import Cloud as Shape
-from optimizer.problem.scene import Attachment, Box, Mesh, Obstacle, Scene, Sphere
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.bounding_tree import BoundingTree, point_segment
+from joulepath.optimizer.collision.clearance_proof import GAP, RELATIVE_GAP, proven_clearance
+from joulepath.optimizer.collision.closed_form_distance import triangle_segment
+from joulepath.optimizer.collision.clouds import LONGEST_EDGE, Cloud, divided
+from joulepath.optimizer.collision.coal_distance import SKIN, coal_shape
+from joulepath.optimizer.collision.cores import Core
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.collision.state_validity import StateValidityChecker
+from joulepath.optimizer.exceptions import InvalidProblem, StartInCollision
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.clouds import MOST_POINTS, Points, TriangleMesh, Voxels
+from joulepath.optimizer.problem.clouds import Cloud as Shape
+from joulepath.optimizer.problem.scene import Attachment, Box, Mesh, Obstacle, Scene, Sphere
 from tests.optimizer.cells import LOADS, arm_in_cell, at, wander
 from tests.optimizer.moves import GOAL, START, problem_with
 from tests.selection import long_but

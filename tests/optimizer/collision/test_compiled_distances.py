@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.collision.bodies import Body
-from optimizer.collision.cores import Core, box_corners
-from optimizer.collision.model import CollisionModel
-from optimizer.collision.pair_distance import PairGeometry
-from optimizer.native.shared_library import shared_library
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.bodies import Body
+from joulepath.optimizer.collision.cores import Core, box_corners
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.collision.pair_distance import PairGeometry
+from joulepath.optimizer.native.shared_library import shared_library
 from tests.optimizer.cells import LOADS, arm_in_cell, cell
 from tests.optimizer.collision.test_closed_forms import COUNT, KINDS, NEARLY_PARALLEL, segments
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.collision.cores import core_of
-from optimizer.problem.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Shape, Sphere
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.cores import core_of
+from joulepath.optimizer.problem.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Shape, Sphere
 
 ROUNDING = 1e-12  # m; sums of a few products of sizes below 1 m
 CORNERS = np.random.default_rng(4).normal(size=(20, 3)) * 0.2

@@ -9,15 +9,24 @@ import coal
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.collision.coal_distance import _lower_bound, coal_shape
-from optimizer.collision.model import CollisionModel
-from optimizer.collision.numpy_distances import NumpyDistances
-from optimizer.collision.pair_arrays import PairArrays
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.scene import Attachment, Cylinder, Mesh, Obstacle, Scene, Shape, Sphere, capsule_between
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.coal_distance import _lower_bound, coal_shape
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.collision.numpy_distances import NumpyDistances
+from joulepath.optimizer.collision.pair_arrays import PairArrays
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.scene import (
+    Attachment,
+    Cylinder,
+    Mesh,
+    Obstacle,
+    Scene,
+    Shape,
+    Sphere,
+    capsule_between,
+)
 from tests.optimizer.cells import LOADS, arm_in_cell
 from tests.optimizer.moves import ROBOT
 from tests.selection import long_but

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.collision.clouds import MOST_DIVIDED, MOST_KEPT_PARTS, cloud_of
-from optimizer.problem.clouds import Points
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.clouds import MOST_DIVIDED, MOST_KEPT_PARTS, cloud_of
+from joulepath.optimizer.problem.clouds import Points
 
 # clouds that fill the cache
 FIT = 4

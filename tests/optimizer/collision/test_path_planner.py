@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from models.robot import Array
-from optimizer import optimize
-from optimizer.collision.model import CollisionModel
-from optimizer.collision.path_planner import (
+from joulepath import optimize
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.collision.path_planner import (
     REGIONS,
     STEP,
     PlannedPaths,
@@ -21,21 +21,21 @@ from optimizer.collision.path_planner import (
     interpolation_is_free,
     plan_paths,
 )
-from optimizer.collision.state_validity import StateValidityChecker
-from optimizer.deadline import NEVER, Deadline
-from optimizer.exceptions import NoCollisionFreeTrajectory, NoTrajectory
-from optimizer.kinematics.forward import joint_placements
-from optimizer.kinematics.inverse import inverse_kinematics_for
-from optimizer.kinematics.path_constraints import PathConstraints, path_constraint_list
-from optimizer.methods import planned_paths
-from optimizer.methods.free_spline import FreeSpline
-from optimizer.methods.planned_paths import FROM_PLANNED_PATH
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.problem import Problem
-from optimizer.problem.scene import Box, HalfSpace, Obstacle, Scene, Shape, capsule_between
-from optimizer.problem.tool_cone import ToolCone
-from optimizer.trajectories.spline import sample
+from joulepath.optimizer.collision.state_validity import StateValidityChecker
+from joulepath.optimizer.deadline import NEVER, Deadline
+from joulepath.optimizer.exceptions import NoCollisionFreeTrajectory, NoTrajectory
+from joulepath.optimizer.kinematics.forward import joint_placements
+from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
+from joulepath.optimizer.kinematics.path_constraints import PathConstraints, path_constraint_list
+from joulepath.optimizer.methods import planned_paths
+from joulepath.optimizer.methods.free_spline import FreeSpline
+from joulepath.optimizer.methods.planned_paths import FROM_PLANNED_PATH
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.scene import Box, HalfSpace, Obstacle, Scene, Shape, capsule_between
+from joulepath.optimizer.problem.tool_cone import ToolCone
+from joulepath.optimizer.trajectories.spline import sample
 from tests.optimizer.cells import LOADS, arm_in_cell, cell
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
 from tests.optimizer.moves import ROBOT, problem_with
@@ -252,7 +252,7 @@ def test_a_motion_deep_inside_an_obstacle_is_left_for_a_planned_path_once_one_is
     best_known: float, was_postponed: bool, planned: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # what got out at great cost is compared with planned paths, too
-    monkeypatch.setattr("optimizer.methods.free_spline.WAY_OUT", np.inf)
+    monkeypatch.setattr("joulepath.optimizer.methods.free_spline.WAY_OUT", np.inf)
     arm, q_start, q_goal = task("post")
     solver = FreeSpline(PreparedProblem.of(problem(arm, q_start, q_goal)), q_start, q_goal, NEVER)
     solver.best_known, solver.was_postponed = best_known, was_postponed

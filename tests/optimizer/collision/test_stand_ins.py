@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.collision.stand_ins import StandIns, StandInSettings
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.optimize import optimize
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.problem import Problem
-from optimizer.problem.scene import Attachment, Box, HalfSpace, Mesh, Obstacle, Scene, Sphere, capsule_between
-from optimizer.replay.evaluate import evaluate
-from optimizer.replay.recording import Waypoints
-from optimizer.solution import Clearance
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.stand_ins import StandIns, StandInSettings
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.scene import Attachment, Box, HalfSpace, Mesh, Obstacle, Scene, Sphere, capsule_between
+from joulepath.optimizer.replay.evaluate import evaluate
+from joulepath.optimizer.replay.recording import Waypoints
+from joulepath.optimizer.solution import Clearance
 from tests.optimizer.cells import at
 from tests.optimizer.moves import AMPLE, HOME, ROBOT
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.energy.kernel import Kernel
-from optimizer.energy.kernel_expressions import Parameters
-from optimizer.energy.plant import KNEE
-from optimizer.prepared_problem import PreparedProblem
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.kernel import Kernel
+from joulepath.optimizer.energy.kernel_expressions import Parameters
+from joulepath.optimizer.energy.plant import KNEE
+from joulepath.optimizer.prepared_problem import PreparedProblem
 from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, problem
 
 NODES = 40

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from optimizer.energy.losses import breakdown
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.problem import Problem
-from optimizer.trajectories.quadrature import quadrature
-from optimizer.trajectories.spline import Spline, sample
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.energy.losses import breakdown
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.trajectories.quadrature import quadrature
+from joulepath.optimizer.trajectories.spline import Spline, sample
 from tests.optimizer.moves import AMPLE
 
 # relative; the documented figures, rounded up

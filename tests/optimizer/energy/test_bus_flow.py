@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from models.robot import Array
-from optimizer.energy.bus_flow import drawn_at, exchange
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.energy.losses import power_flow
-from optimizer.exceptions import InvalidProblem
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Inverter, Payload
-from optimizer.problem.bus import Bus
-from optimizer.search.lower_bound import lower_bounds
-from optimizer.solution import Solution
-from optimizer.trajectories.spline import sample
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.bus_flow import drawn_at, exchange
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.energy.losses import power_flow
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Inverter, Payload
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.search.lower_bound import lower_bounds
+from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.trajectories.spline import sample
 from tests.optimizer.energy.kernel_states import left_out
 from tests.optimizer.moves import ROBOT, limits, problem
 from tests.selection import long_but

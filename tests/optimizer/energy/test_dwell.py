@@ -10,15 +10,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from optimizer.energy.dwell import dwell_energy, holding_power, linear_dwells
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.exceptions import DurationTooShort, InvalidProblem
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Payload
-from optimizer.problem.bus import Bus
-from optimizer.problem.cycle import Cycle
-from optimizer.solution import Solution
+from joulepath.optimizer.energy.dwell import dwell_energy, holding_power, linear_dwells
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.exceptions import DurationTooShort, InvalidProblem
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.solution import Solution
 from tests.optimizer.moves import ROBOT, fixed, problem
 from tests.selection import long_but
 

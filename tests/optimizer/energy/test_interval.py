@@ -9,27 +9,37 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.registry import load_figures, load_robot
-from models.robot import Array, FrictionLaw, Robot
-from models.uncertainty.parameters import BASE_POWER, DRIVES, FRICTION, LINKS, PER_JOINT, count, index, place, values
-from models.uncertainty.ranges import default_ranges
-from models.uncertainty.spread import DRAWS, Spread, spread_of
-from optimizer.energy.dwell import dwell_energy, holding_power
-from optimizer.energy.interval import Known, interval_of, saving_interval
-from optimizer.energy.losses import breakdown
-from optimizer.energy.plant import REPORT_NODES
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Inverter
-from optimizer.problem.bus import Bus
-from optimizer.problem.cycle import Cycle
-from optimizer.problem.problem import Problem
-from optimizer.replay.evaluate import evaluate
-from optimizer.replay.recording import Log, LogBlock
-from optimizer.search.baselines import guesses
-from optimizer.solution import Sensitivity
-from optimizer.trajectories.spline import Spline, fine_samples
-from optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.models.registry import load_figures, load_robot
+from joulepath.models.robot import Array, FrictionLaw, Robot
+from joulepath.models.uncertainty.parameters import (
+    BASE_POWER,
+    DRIVES,
+    FRICTION,
+    LINKS,
+    PER_JOINT,
+    count,
+    index,
+    place,
+    values,
+)
+from joulepath.models.uncertainty.ranges import default_ranges
+from joulepath.models.uncertainty.spread import DRAWS, Spread, spread_of
+from joulepath.optimizer.energy.dwell import dwell_energy, holding_power
+from joulepath.optimizer.energy.interval import Known, interval_of, saving_interval
+from joulepath.optimizer.energy.losses import breakdown
+from joulepath.optimizer.energy.plant import REPORT_NODES
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Inverter
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.replay.evaluate import evaluate
+from joulepath.optimizer.replay.recording import Log, LogBlock
+from joulepath.optimizer.search.baselines import guesses
+from joulepath.optimizer.solution import Sensitivity
+from joulepath.optimizer.trajectories.spline import Spline, fine_samples
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, problem, torques
 from tests.optimizer.test_load_friction import loaded
 
@@ -108,7 +118,7 @@ def test_the_gradient_is_the_slope(name: str, monkeypatch: pytest.MonkeyPatch) -
         )  # fmt: skip
         task = problem(**given | {"robot": replace(task.arm.robot, drives=drives)})
     spline = quintic_spline(START, GOAL, 0.9)
-    monkeypatch.setattr("optimizer.energy.interval.spread_of", lambda *_: certain(spread_of(ROBOT, "curved")))
+    monkeypatch.setattr("joulepath.optimizer.energy.interval.spread_of", lambda *_: certain(spread_of(ROBOT, "curved")))
     found = PreparedProblem.of(task).sensitivity(spline)
     assert abs(found.shift) < 1e-6
     found = found.gradient
@@ -154,7 +164,7 @@ def test_the_gradient_by_the_links_is_the_slope(name: str, monkeypatch: pytest.M
     robot, spline = with_link_errors(given.pop("robot", ROBOT)), quintic_spline(START, GOAL, 0.9)
     scale = np.array([1.0, 0.8, 1.2, 1.0, 1.0, 1.0])
     task = problem(**given, robot=robot, link_mass_scale=scale)
-    monkeypatch.setattr("optimizer.energy.interval.spread_of", lambda *given: certain(spread_of(*given)))
+    monkeypatch.setattr("joulepath.optimizer.energy.interval.spread_of", lambda *given: certain(spread_of(*given)))
     found = PreparedProblem.of(task).sensitivity(spline).gradient
     assert found.shape == (count(6, links=True),)
     for part, joint in (("m", 1), ("mx", 1), ("mz", 2), ("Izz", 1), ("my", 3), ("Ixz", 4)):

@@ -9,9 +9,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.energy.inverse_dynamics import SymbolicPayload, inverse_dynamics
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.inverse_dynamics import SymbolicPayload, inverse_dynamics
 
 STATES = 1000
 TORQUE_TOLERANCE = 1e-9  # N·m; both recursions round at about 1e-13 of torques of some 500 N·m

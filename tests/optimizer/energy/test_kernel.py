@@ -9,13 +9,13 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.energy import kernel
-from optimizer.energy.kernel import Kernel, kernel_for
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.energy.kernel_expressions import Parameters, build
-from optimizer.energy.kernel_functions import Interpreted
-from optimizer.energy.losses import drawn_power, power_flow
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy import kernel
+from joulepath.optimizer.energy.kernel import Kernel, kernel_for
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.energy.kernel_expressions import Parameters, build
+from joulepath.optimizer.energy.kernel_functions import Interpreted
+from joulepath.optimizer.energy.losses import drawn_power, power_flow
 from tests.optimizer.energy.kernel_states import LOSSY, NODES, TASK, TORQUE, left_out, states
 from tests.optimizer.moves import ROBOT, torques
 

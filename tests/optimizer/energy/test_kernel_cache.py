@@ -19,15 +19,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.registry import robot_names
-from models.robot import Robot
-from optimizer.energy import kernel
-from optimizer.energy.kernel import Kernel, kernel_for
-from optimizer.energy.kernel_cache import SOURCES, compile_kernel, digest, library_path
-from optimizer.energy.kernel_expressions import build
-from optimizer.energy.kernel_source import AVX2, PORTABLE, source
-from optimizer.native.library_cache import compiler, workplace
-from optimizer.optimize import optimize
+from joulepath.models.registry import robot_names
+from joulepath.models.robot import Robot
+from joulepath.optimizer.energy import kernel
+from joulepath.optimizer.energy.kernel import Kernel, kernel_for
+from joulepath.optimizer.energy.kernel_cache import SOURCES, compile_kernel, digest, library_path
+from joulepath.optimizer.energy.kernel_expressions import build
+from joulepath.optimizer.energy.kernel_source import AVX2, PORTABLE, source
+from joulepath.optimizer.native.library_cache import compiler, workplace
+from joulepath.optimizer.optimize import optimize
 from tests.optimizer.energy.kernel_states import LOSSY, TASK, TORQUE, states
 from tests.optimizer.moves import GOAL, ROBOT, START, problem, torques
 from tests.selection import long_but
@@ -212,7 +212,7 @@ def test_several_processes_make_one_library_of_each_robot(workshop: Workshop, na
 
     They make the library that all arms share, too.
     """
-    command = [sys.executable, "-W", "error::RuntimeWarning", "-m", "optimizer.energy.precompile", *names]
+    command = [sys.executable, "-W", "error::RuntimeWarning", "-m", "joulepath.optimizer.energy.precompile", *names]
     processes = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(3)]
     printed = [process.communicate(timeout=ALL_COMPILED)[0].splitlines() for process in processes]
     assert [process.returncode for process in processes] == [0, 0, 0]

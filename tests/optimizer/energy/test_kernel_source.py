@@ -9,11 +9,11 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from optimizer.energy.kernel_cache import COMPILER_FLAGS
-from optimizer.energy.kernel_expressions import SYMBOLICS, build, sizes
-from optimizer.energy.kernel_functions import Compiled, Interpreted
-from optimizer.energy.kernel_source import source, vectors
-from optimizer.native.library_cache import compiler
+from joulepath.optimizer.energy.kernel_cache import COMPILER_FLAGS
+from joulepath.optimizer.energy.kernel_expressions import SYMBOLICS, build, sizes
+from joulepath.optimizer.energy.kernel_functions import Compiled, Interpreted
+from joulepath.optimizer.energy.kernel_source import source, vectors
+from joulepath.optimizer.native.library_cache import compiler
 from tests.optimizer.energy.kernel_states import states
 from tests.optimizer.moves import ROBOT
 

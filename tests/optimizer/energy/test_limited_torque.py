@@ -9,19 +9,19 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.from_figures import robot_of
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.certificate import certify
-from optimizer.energy.kernel import Kernel
-from optimizer.energy.kernel_expressions import build
-from optimizer.energy.kernel_functions import Interpreted
-from optimizer.energy.limited_torque import limited_torque
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import Problem
-from optimizer.replay.evaluate import evaluate
-from optimizer.replay.recording import Log, LogBlock
+from joulepath.models.from_figures import robot_of
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.energy.kernel import Kernel
+from joulepath.optimizer.energy.kernel_expressions import build
+from joulepath.optimizer.energy.kernel_functions import Interpreted
+from joulepath.optimizer.energy.limited_torque import limited_torque
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.replay.evaluate import evaluate
+from joulepath.optimizer.replay.recording import Log, LogBlock
 from tests.optimizer.energy.kernel_states import LOSSY, TORQUE, left_out, states
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem, torques
 

@@ -6,10 +6,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.robot import Array
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, problem
 
 TORQUE_TOLERANCE = 1e-9  # N·m; both recursions round at about 1e-13 of torques of some 500 N·m

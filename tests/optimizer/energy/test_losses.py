@@ -9,11 +9,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array, Drives, Electronics
-from optimizer.energy.losses import breakdown, drawn_power, power_flow, smooth_abs
-from optimizer.problem.arm import Arm
-from optimizer.problem.bus import Bus
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Drives, Electronics
+from joulepath.optimizer.energy.losses import breakdown, drawn_power, power_flow, smooth_abs
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.bus import Bus
 
 IDENTITY_TOLERANCE = 1e-9  # relative; spectrally accurate quadrature of smooth shaft power leaves rounding only
 ROUTE_TOLERANCE = 1e-12  # relative; numpy and CasADi evaluate the same formulas in another order

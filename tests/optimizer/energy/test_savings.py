@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.uncertainty.parameters import count
-from optimizer.energy.interval import Known, saving_interval, saving_intervals
-from optimizer.solution import Sensitivity
+from joulepath.models.uncertainty.parameters import count
+from joulepath.optimizer.energy.interval import Known, saving_interval, saving_intervals
+from joulepath.optimizer.solution import Sensitivity
 from tests.optimizer.moves import problem
 
 

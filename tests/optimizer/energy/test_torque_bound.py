@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.certificate import certify
-from optimizer.energy.limited_torque import limited_torque
-from optimizer.energy.torque_bound import TorqueSamples, torque_bounds
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.problem import Problem
-from optimizer.trajectories import bspline
-from optimizer.trajectories.quadrature import grid
-from optimizer.trajectories.spline import Spline, sample, spline_of
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.energy.limited_torque import limited_torque
+from joulepath.optimizer.energy.torque_bound import TorqueSamples, torque_bounds
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.quadrature import grid
+from joulepath.optimizer.trajectories.spline import Spline, sample, spline_of
 
 # relative; the bound stops at 1e-6 of the limit, and these motions use a third of a limit or more
 SHARP = 4e-6

@@ -7,8 +7,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.registry import load_robot
-from optimizer.energy.torque_regressor import torque_regressor
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.energy.torque_regressor import torque_regressor
 
 # entries reach some 100; both recursions round at 1e-13
 TOLERANCE = 1e-10

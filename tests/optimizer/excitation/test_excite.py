@@ -6,19 +6,19 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.registry import load_robot
-from optimizer.exceptions import DeadlineExceeded, InvalidProblem
-from optimizer.excitation import excite as module
-from optimizer.excitation.errors import ExcitationInfeasible
-from optimizer.excitation.excitation_problem import Criterion, ExcitationProblem
-from optimizer.excitation.excite import MOUNTING_PLANE, Excitation, excite
-from optimizer.excitation.fourier import FourierBasis
-from optimizer.excitation.information import Information
-from optimizer.excitation.torque_columns import TorqueColumns
-from optimizer.kinematics.rigid_body_model import rigid_body_model
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.scene import Obstacle, Scene, Sphere
-from optimizer.problem.tool_cone import ToolCone
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
+from joulepath.optimizer.excitation import excite as module
+from joulepath.optimizer.excitation.errors import ExcitationInfeasible
+from joulepath.optimizer.excitation.excitation_problem import Criterion, ExcitationProblem
+from joulepath.optimizer.excitation.excite import MOUNTING_PLANE, Excitation, excite
+from joulepath.optimizer.excitation.fourier import FourierBasis
+from joulepath.optimizer.excitation.information import Information
+from joulepath.optimizer.excitation.torque_columns import TorqueColumns
+from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
+from joulepath.optimizer.problem.tool_cone import ToolCone
 
 ARM = Arm(robot=load_robot("ur5e"))
 # of finite differences over 2e-6 of a cost with corners in its second derivative

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.read_back.random_motions import arm_of, random_spline
-from optimizer.exports.program import Move, Program, Rest
-from optimizer.problem.arm import Payload
+from joulepath.optimizer.exports.program import Move, Program, Rest
+from joulepath.optimizer.problem.arm import Payload
 
 LOAD = Payload(1.5, np.array([0.0, 0.01, 0.06]))
 

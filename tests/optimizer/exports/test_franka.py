@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from benchmarks.read_back.random_motions import one_move
-from optimizer.exceptions import FormatUnsuitable
-from optimizer.exports.franka import ROUNDING, FrankaOptions, to_franka
+from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.exports.franka import ROUNDING, FrankaOptions, to_franka
 from tests.optimizer.exports.programs import round_with_payload
 
 

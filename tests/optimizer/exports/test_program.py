@@ -12,17 +12,17 @@ import numpy as np
 import pytest
 
 from benchmarks.read_back.random_motions import arm_of, one_move, random_spline
-from optimizer.energy.plant import Plant
-from optimizer.exceptions import InvalidProblem, NotCertified
-from optimizer.exports.certified import certified, check_samples
-from optimizer.exports.program import Move, Program, Rest, program_of_round
-from optimizer.optimize_round import optimize_round
-from optimizer.problem.arm import Payload
-from optimizer.problem.stops import Stop
-from optimizer.problem.work_round import WorkRound
-from optimizer.solution import Trajectory
-from optimizer.trajectories.spline import Spline, retimed
-from optimizer.trajectories.through_samples import spline_through
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.exceptions import InvalidProblem, NotCertified
+from joulepath.optimizer.exports.certified import certified, check_samples
+from joulepath.optimizer.exports.program import Move, Program, Rest, program_of_round
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.solution import Trajectory
+from joulepath.optimizer.trajectories.spline import Spline, retimed
+from joulepath.optimizer.trajectories.through_samples import spline_through
 from tests.optimizer.exports.programs import round_with_payload
 from tests.optimizer.moves import AMPLE, GOAL, START
 

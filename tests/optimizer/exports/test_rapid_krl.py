@@ -7,11 +7,11 @@ import pytest
 
 from benchmarks.read_back.point_programs import cut, deviation, read_krl, read_rapid, stated, through
 from benchmarks.read_back.random_motions import OWN, arm_of, one_move, random_spline
-from optimizer.exceptions import FormatUnsuitable
-from optimizer.exports.axes import Axes
-from optimizer.exports.krl import KrlOptions, to_krl
-from optimizer.exports.program import Move, Program, Rest
-from optimizer.exports.rapid import RapidOptions, to_rapid
+from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.exports.axes import Axes
+from joulepath.optimizer.exports.krl import KrlOptions, to_krl
+from joulepath.optimizer.exports.program import Move, Program, Rest
+from joulepath.optimizer.exports.rapid import RapidOptions, to_rapid
 from tests.optimizer.exports.programs import LOAD, round_with_payload
 
 # 1e-6 degrees, and the rounding of times at the speed of these motions

@@ -11,13 +11,13 @@ import yaml
 
 from benchmarks.read_back.joint_trajectories import deviations, followed
 from benchmarks.read_back.random_motions import arm_of, one_move
-from models.robot import Array
-from optimizer.exceptions import FormatUnsuitable
-from optimizer.exports import quintic_points as points_module
-from optimizer.exports.program import Move, Program
-from optimizer.exports.quintic_points import POSITION_TOLERANCE, VELOCITY_TOLERANCE
-from optimizer.exports.ros_messages import RosOptions, to_moveit, to_ros2
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.exports import quintic_points as points_module
+from joulepath.optimizer.exports.program import Move, Program
+from joulepath.optimizer.exports.quintic_points import POSITION_TOLERANCE, VELOCITY_TOLERANCE
+from joulepath.optimizer.exports.ros_messages import RosOptions, to_moveit, to_ros2
+from joulepath.optimizer.trajectories.spline import Spline
 from tests.optimizer.exports.programs import round_with_payload
 
 # fields of the messages, as their definitions have them

@@ -8,13 +8,13 @@ from io import BytesIO
 import numpy as np
 import pytest
 
-from app.convert.motion_csv import MotionCsv
 from benchmarks.read_back.random_motions import one_move
-from optimizer.exceptions import FormatUnsuitable
-from optimizer.exports.csv_table import to_csv
-from optimizer.exports.json_document import to_json
-from optimizer.exports.npz_arrays import to_npz
-from optimizer.trajectories.spline import Spline
+from joulepath.app.convert.motion_csv import MotionCsv
+from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.exports.csv_table import to_csv
+from joulepath.optimizer.exports.json_document import to_json
+from joulepath.optimizer.exports.npz_arrays import to_npz
+from joulepath.optimizer.trajectories.spline import Spline
 from tests.optimizer.exports.programs import LOAD, round_with_payload
 
 # twelve significant digits of numbers below 1e4

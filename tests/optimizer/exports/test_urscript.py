@@ -10,11 +10,11 @@ from scipy.interpolate import make_lsq_spline
 
 from benchmarks.read_back.random_motions import arm_of, one_move, random_spline
 from benchmarks.read_back.urscript_machine import Controller, Halt, translated
-from models.robot import Array
-from optimizer.exceptions import FormatUnsuitable
-from optimizer.exports.program import Move, Program
-from optimizer.exports.urscript import SET_POINT_ERROR, UrscriptOptions, to_urscript
-from optimizer.trajectories.spline import retimed
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.exports.program import Move, Program
+from joulepath.optimizer.exports.urscript import SET_POINT_ERROR, UrscriptOptions, to_urscript
+from joulepath.optimizer.trajectories.spline import retimed
 from tests.optimizer.exports.programs import LOAD, round_with_payload
 
 EVIL = 'pick"\n  set_standard_digital_out(7, True)\r# \u2028 end'

@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem
-from optimizer.identification.document import document_of
-from optimizer.identification.errors import NoPowerChannel, NotExcited, NothingHeldOut
-from optimizer.identification.identify import Identification, fit
-from optimizer.identification.logs.log import Log, Move
-from optimizer.identification.logs.log_errors import EffortNotUsable
-from optimizer.identification.options import Options
-from optimizer.identification.quality import curves as curves_module
-from optimizer.problem.arm import Payload
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.identification.document import document_of
+from joulepath.optimizer.identification.errors import NoPowerChannel, NotExcited, NothingHeldOut
+from joulepath.optimizer.identification.identify import Identification, fit
+from joulepath.optimizer.identification.logs.log import Log, Move
+from joulepath.optimizer.identification.logs.log_errors import EffortNotUsable
+from joulepath.optimizer.identification.options import Options
+from joulepath.optimizer.identification.quality import curves as curves_module
+from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import GRAVITY, Noise, Recording, Truth, recorded, truth_of
 
 ROBOT = load_robot("ur10e")

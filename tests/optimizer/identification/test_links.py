@@ -9,18 +9,18 @@ import pinocchio as pin
 import pytest
 
 from benchmarks.identification_logs import MISSING, folder, tx40
-from models.from_figures import robot_of
-from models.registry import load_robot, robot_names
-from models.robot import Array, Robot
-from models.uncertainty.document import covariance_of, with_document
-from models.uncertainty.parameters import LINKS
-from optimizer.energy.link_regressor import body_parameters, rigid_regressor, rigid_torques
-from optimizer.identification.arm.base_parameters import base_parameters
-from optimizer.identification.arm.pseudo_inertia import nearness, pseudo_inertias
-from optimizer.identification.document import document_of
-from optimizer.identification.fits.consistent import solve_consistent
-from optimizer.identification.identify import fit
-from optimizer.identification.options import Options
+from joulepath.models.from_figures import robot_of
+from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.robot import Array, Robot
+from joulepath.models.uncertainty.document import covariance_of, with_document
+from joulepath.models.uncertainty.parameters import LINKS
+from joulepath.optimizer.energy.link_regressor import body_parameters, rigid_regressor, rigid_torques
+from joulepath.optimizer.identification.arm.base_parameters import base_parameters
+from joulepath.optimizer.identification.arm.pseudo_inertia import nearness, pseudo_inertias
+from joulepath.optimizer.identification.document import document_of
+from joulepath.optimizer.identification.fits.consistent import solve_consistent
+from joulepath.optimizer.identification.identify import fit
+from joulepath.optimizer.identification.options import Options
 from tests.identification_logs import recorded, truth_of
 
 ROUNDING = 1e-9

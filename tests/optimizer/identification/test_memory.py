@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.registry import load_robot
+from joulepath.models.registry import load_robot
 from tests.identification_logs import Form, csv_of, recorded, truth_of
 
 ROOT = Path(__file__).parents[3]
@@ -21,10 +21,10 @@ SCRIPT = """
 import resource
 from dataclasses import replace
 import numpy as np
-from models.registry import load_robot
-from optimizer.identification.identify import fit
-from optimizer.identification.logs.log import Move
-from optimizer.identification.options import Options
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.identification.identify import fit
+from joulepath.optimizer.identification.logs.log import Move
+from joulepath.optimizer.identification.options import Options
 from tests.identification_logs import recorded, truth_of
 robot = load_robot("ur10e")
 short = recorded(robot, truth_of(robot), moves=30, rate=500.0).log()
@@ -44,10 +44,10 @@ ROWS = 1_000_000
 FROM_FILE = """
 import resource, sys
 from pathlib import Path
-from models.registry import load_robot
-from optimizer.identification.identify import fit
-from optimizer.identification.options import Options
-from optimizer.identification.logs.reading import read_log
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.identification.identify import fit
+from joulepath.optimizer.identification.options import Options
+from joulepath.optimizer.identification.logs.reading import read_log
 robot = load_robot("ur10e")
 log = read_log(Path(sys.argv[1]), robot)
 fit(robot, [log], Options(refit=True))

@@ -8,16 +8,16 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.energy.link_regressor import body_parameters, rigid_regressor, rigid_torques
-from optimizer.exceptions import InvalidProblem
-from optimizer.identification.arm.base_parameters import base_parameters
-from optimizer.identification.fits.base_wrench import base_wrench_regressor, fit_base_wrench
-from optimizer.identification.fits.periodic import mean_period, most_likely
-from optimizer.identification.fits.threshold import velocity_threshold
-from optimizer.identification.identify import fit
-from optimizer.identification.options import Options
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.link_regressor import body_parameters, rigid_regressor, rigid_torques
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.identification.arm.base_parameters import base_parameters
+from joulepath.optimizer.identification.fits.base_wrench import base_wrench_regressor, fit_base_wrench
+from joulepath.optimizer.identification.fits.periodic import mean_period, most_likely
+from joulepath.optimizer.identification.fits.threshold import velocity_threshold
+from joulepath.optimizer.identification.identify import fit
+from joulepath.optimizer.identification.options import Options
 from tests.identification_logs import recorded, truth_of
 
 ROBOT = load_robot("ur5e")

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.identification_logs import tx40, ur3e
-from models.robot import Array, Robot
-from optimizer.identification.fits.fitting import fit_rows, motor_torque
-from optimizer.identification.fits.threshold import velocity_threshold
-from optimizer.identification.identify import fit
-from optimizer.identification.logs.log import Log
-from optimizer.identification.options import Options
-from optimizer.identification.quality.structure import structure_of
-from optimizer.identification.rows.fit_rows import rows_of
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.identification.fits.fitting import fit_rows, motor_torque
+from joulepath.optimizer.identification.fits.threshold import velocity_threshold
+from joulepath.optimizer.identification.identify import fit
+from joulepath.optimizer.identification.logs.log import Log
+from joulepath.optimizer.identification.options import Options
+from joulepath.optimizer.identification.quality.structure import structure_of
+from joulepath.optimizer.identification.rows.fit_rows import rows_of
 
 PLAIN = Options(held_out=0.0, terms=("coulomb", "viscous", "offset"))
 REFIT = replace(PLAIN, refit=True)

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from optimizer.exceptions import InvalidProblem
-from optimizer.identification.errors import NotExcited, PayloadUnknown
-from optimizer.identification.fits.payload_fit import Carried
-from optimizer.identification.identify import fit
-from optimizer.identification.logs.log import Log
-from optimizer.identification.options import Options
-from optimizer.problem.arm import Payload
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.identification.errors import NotExcited, PayloadUnknown
+from joulepath.optimizer.identification.fits.payload_fit import Carried
+from joulepath.optimizer.identification.identify import fit
+from joulepath.optimizer.identification.logs.log import Log
+from joulepath.optimizer.identification.options import Options
+from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import Noise, recorded, truth_of
 
 ROBOT = load_robot("ur10e")

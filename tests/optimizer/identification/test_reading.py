@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from models.registry import load_robot
-from optimizer.exceptions import InvalidProblem, InvalidTable
-from optimizer.identification.logs.grid import grid_of
-from optimizer.identification.logs.log import Log
-from optimizer.identification.logs.log_errors import EffortNotUsable, LogTooLarge
-from optimizer.identification.logs.reading import LogOptions, read, read_log
-from optimizer.problem.arm import Payload
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
+from joulepath.optimizer.identification.logs.grid import grid_of
+from joulepath.optimizer.identification.logs.log import Log
+from joulepath.optimizer.identification.logs.log_errors import EffortNotUsable, LogTooLarge
+from joulepath.optimizer.identification.logs.reading import LogOptions, read, read_log
+from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import SILENT, Form, Recording, csv_of, recorded, rigid_torques, truth_of, with_current
 
 ROBOT = load_robot("ur5e")

@@ -9,8 +9,8 @@ import numpy as np
 
 from benchmarks.identification import tx40_torque
 from benchmarks.identification_logs import ur3e
-from optimizer.identification.identify import fit
-from optimizer.identification.options import Options
+from joulepath.optimizer.identification.identify import fit
+from joulepath.optimizer.identification.options import Options
 
 
 def test_power_of_moves_that_no_fit_has_seen(place: Path) -> None:

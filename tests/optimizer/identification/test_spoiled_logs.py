@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.exceptions import InvalidTable
-from optimizer.identification.errors import NotExcited
-from optimizer.identification.identify import fit
-from optimizer.identification.logs.log_errors import EffortNotUsable
-from optimizer.identification.logs.reading import LogOptions, read, read_log
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidTable
+from joulepath.optimizer.identification.errors import NotExcited
+from joulepath.optimizer.identification.identify import fit
+from joulepath.optimizer.identification.logs.log_errors import EffortNotUsable
+from joulepath.optimizer.identification.logs.reading import LogOptions, read, read_log
 from tests.identification_logs import Recording, csv_of, recorded, truth_of, with_current
 
 ROBOT = load_robot("ur10e")

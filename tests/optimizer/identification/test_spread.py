@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.identification.estimates.grouped import Grouped, adjusted, jackknife, left_out
-from optimizer.identification.identify import fit
-from optimizer.identification.quality.interval import own_variance
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.identification.estimates.grouped import Grouped, adjusted, jackknife, left_out
+from joulepath.optimizer.identification.identify import fit
+from joulepath.optimizer.identification.quality.interval import own_variance
 from tests.identification_logs import off_the_model, recorded, truth_of
 
 GROUPS, SIZE = 12, 30

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.identification.identify import fit
-from optimizer.identification.logs.log import Log
-from optimizer.identification.options import Options
-from optimizer.identification.quality.advice import slope as advice_slope
-from optimizer.identification.rows.fit_rows import rows_of
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.identification.identify import fit
+from joulepath.optimizer.identification.logs.log import Log
+from joulepath.optimizer.identification.options import Options
+from joulepath.optimizer.identification.quality.advice import slope as advice_slope
+from joulepath.optimizer.identification.rows.fit_rows import rows_of
 from tests.identification_logs import recorded, rigid_torques, truth_of
 
 ROBOT = load_robot("ur10e")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
-from optimizer.kinematics.ik_solutions import IKSolution
-from optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.ik_solutions import IKSolution
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from tests.optimizer.moves import ROBOT
 
 IK = required_inverse_kinematics(ROBOT, "goal")

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 
-from models.registry import load_robot
-from models.robot import Array, Robot
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.ik_solutions import PrincipalSolution
-from optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.ik_solutions import PrincipalSolution
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 
 # m and rad: what an answer may miss its pose by, and a configuration itself; and what two of them differ by at least
 ACCURACY, FOUND, SAME = 1e-9, 1e-6, 1e-6

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.registry import load_robot
-from optimizer.kinematics.across_curve import LEFT, MANY, led, onto, second_order, step_across
-from optimizer.kinematics.chain import Chain, miss, pose_error
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.kinematics.across_curve import LEFT, MANY, led, onto, second_order, step_across
+from joulepath.optimizer.kinematics.chain import Chain, miss, pose_error
 from tests.optimizer.chains import serial_chain
 
 CHAINS = [Chain.of(load_robot("gen3").model), Chain.of(serial_chain(7).model)]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.kinematics import course_matching
-from optimizer.kinematics.course_matching import matched
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics import course_matching
+from joulepath.optimizer.kinematics.course_matching import matched
 
 
 def _courses(rng: np.random.Generator) -> list[Array]:

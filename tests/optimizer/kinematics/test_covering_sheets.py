@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array, Robot
-from optimizer.kinematics.angles import nearest_turn, wrapped
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.covering_sheets import CoveringSheet, boxes_on, covering_sheets
-from optimizer.kinematics.redundant_arm import RedundantArm
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.covering_sheets import CoveringSheet, boxes_on, covering_sheets
+from joulepath.optimizer.kinematics.redundant_arm import RedundantArm
 from tests.optimizer.chains import serial_chain
 from tests.selection import long_but
 

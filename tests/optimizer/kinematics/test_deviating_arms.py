@@ -8,11 +8,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.robot import Robot
-from optimizer.exceptions import SingularPose
-from optimizer.kinematics.decomposition import DecomposedArm
-from optimizer.kinematics.inverse import required_inverse_kinematics
-from optimizer.kinematics.ur_closed_form import URClosedForm
+from joulepath.models.robot import Robot
+from joulepath.optimizer.exceptions import SingularPose
+from joulepath.optimizer.kinematics.decomposition import DecomposedArm
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.kinematics.ur_closed_form import URClosedForm
 from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, KUKA, UR5E, calibrated, inside, solved
 from tests.selection import long_but
 

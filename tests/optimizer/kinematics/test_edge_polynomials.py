@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.kinematics.redundant_pose import Polynomial, _angles, _product, _sum, _wave
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.redundant_pose import Polynomial, _angles, _product, _sum, _wave
 
 
 def test_polynomials_are_what_they_say() -> None:

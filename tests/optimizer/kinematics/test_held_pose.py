@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.kinematics.held_pose import HeldPose
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.problem.arm import Arm
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.held_pose import HeldPose
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.problem.arm import Arm
 
 # m, rad
 HELD = 1e-9

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem
-from optimizer.kinematics.inverse import inverse_kinematics_for, required_inverse_kinematics
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for, required_inverse_kinematics
 from tests.optimizer.chains import serial_chain
 from tests.optimizer.kinematics.flange import (
     ACCURACY,

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.robot import Robot
-from optimizer import Arm, Pose, Problem, optimize
-from optimizer.exceptions import UnreachablePose
-from optimizer.kinematics.decomposition import DecomposedArm
-from optimizer.kinematics.inverse import required_inverse_kinematics
-from optimizer.kinematics.multi_start import MOST_BRANCHES, MultiStart
-from optimizer.kinematics.ur_closed_form import URClosedForm
+from joulepath import Arm, Pose, Problem, optimize
+from joulepath.models.robot import Robot
+from joulepath.optimizer.exceptions import UnreachablePose
+from joulepath.optimizer.kinematics.decomposition import DecomposedArm
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.kinematics.multi_start import MOST_BRANCHES, MultiStart
+from joulepath.optimizer.kinematics.ur_closed_form import URClosedForm
 from tests.optimizer.chains import move, serial_chain
 from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, UR5E, calibrated, flange, inside, solved
 from tests.selection import long_but

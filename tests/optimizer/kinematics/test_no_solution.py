@@ -9,11 +9,11 @@ import pinocchio as pin
 import pytest
 from scipy.optimize import minimize
 
-from models.robot import Array, Limits
-from optimizer.exceptions import SingularPose, UnreachablePose
-from optimizer.kinematics.inverse import ClosedFormInverseKinematics, required_inverse_kinematics
-from optimizer.kinematics.self_motion import SelfMotion
-from optimizer.problem.branches import Label
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
+from joulepath.optimizer.kinematics.inverse import ClosedFormInverseKinematics, required_inverse_kinematics
+from joulepath.optimizer.kinematics.self_motion import SelfMotion
+from joulepath.optimizer.problem.branches import Label
 from tests.optimizer.kinematics.flange import (
     DATA,
     EVERYDAY,

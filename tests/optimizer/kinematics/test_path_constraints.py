@@ -4,10 +4,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.kinematics.forward import joint_placements
-from optimizer.kinematics.path_constraints import PathConstraints, PointSpeedConstraint, ToolConeConstraint
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.forward import joint_placements
+from joulepath.optimizer.kinematics.path_constraints import PathConstraints, PointSpeedConstraint, ToolConeConstraint
 
 ROBOT = load_robot("ur5e")
 PLACEMENTS = joint_placements(ROBOT.model)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from optimizer.deadline import Deadline
-from optimizer.exceptions import DeadlineExceeded
-from optimizer.kinematics.path_following import PathPoint, follow
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.problem.arm import Arm
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.exceptions import DeadlineExceeded
+from joulepath.optimizer.kinematics.path_following import PathPoint, follow
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.problem.arm import Arm
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import START
 

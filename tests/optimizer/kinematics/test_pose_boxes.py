@@ -9,16 +9,16 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.robot import Array
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.pose_boxes import PoseBoxes
-from optimizer.kinematics.rigid_body_model import rigid_body_model
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.kinematics.wrist_boxes import WristBoxes
-from optimizer.kinematics.wrist_geometry import WristGeometry
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.pose_boxes import PoseBoxes
+from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.kinematics.wrist_boxes import WristBoxes
+from joulepath.optimizer.kinematics.wrist_geometry import WristGeometry
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from tests.optimizer.chains import serial_chain
 from tests.optimizer.moves import GOAL, HOME, PAYLOAD, ROBOT, TILTED, problem
 from tests.selection import long_but

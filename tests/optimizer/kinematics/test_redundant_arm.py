@@ -8,14 +8,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array, Robot
-from optimizer.exceptions import UnreachablePose
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.free_turn import LOOPS, FreeTurn
-from optimizer.kinematics.inverse import required_inverse_kinematics
-from optimizer.kinematics.redundant_arm import RedundantArm
-from optimizer.kinematics.redundant_curve import RedundantCurve
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.exceptions import UnreachablePose
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.free_turn import LOOPS, FreeTurn
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.kinematics.redundant_arm import RedundantArm
+from joulepath.optimizer.kinematics.redundant_curve import RedundantCurve
 from tests.optimizer.chains import serial_chain
 from tests.selection import long_but
 

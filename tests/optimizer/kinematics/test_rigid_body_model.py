@@ -7,8 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from optimizer.kinematics.rigid_body_model import rigid_body_model
-from optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.problem.arm import Arm, Payload
 from tests.optimizer.moves import ROBOT
 
 BARE = sum(body.mass for body in ROBOT.model.inertias)

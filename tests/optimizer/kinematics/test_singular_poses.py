@@ -8,12 +8,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from models.robot import Array
-from optimizer.kinematics.ik_solutions import IKSolution
-from optimizer.kinematics.inverse import MEMBERS
-from optimizer.kinematics.self_motion import SelfMotion
-from optimizer.kinematics.ur_closed_form import LEAST_AHEAD, URClosedForm
-from optimizer.problem.branches import BranchFilter
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.ik_solutions import IKSolution
+from joulepath.optimizer.kinematics.inverse import MEMBERS
+from joulepath.optimizer.kinematics.self_motion import SelfMotion
+from joulepath.optimizer.kinematics.ur_closed_form import LEAST_AHEAD, URClosedForm
+from joulepath.optimizer.problem.branches import BranchFilter
 from tests.optimizer.kinematics.flange import (
     ACCURACY,
     EVERYDAY,

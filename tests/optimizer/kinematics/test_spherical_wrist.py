@@ -9,15 +9,15 @@ import pinocchio as pin
 import pytest
 from scipy.optimize import brentq
 
-from models.robot import Array
-from optimizer.exceptions import SingularPose, UnreachablePose
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.decomposition import DecomposedArm
-from optimizer.kinematics.inverse import required_inverse_kinematics
-from optimizer.kinematics.joint_axes import JointAxes
-from optimizer.kinematics.spherical_wrist import SphericalWrist
-from optimizer.problem.branches import BranchFilter
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.decomposition import DecomposedArm
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.kinematics.joint_axes import JointAxes
+from joulepath.optimizer.kinematics.spherical_wrist import SphericalWrist
+from joulepath.optimizer.problem.branches import BranchFilter
 from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, KUKA, flange, inside, solved
 from tests.selection import long_but
 

@@ -7,9 +7,9 @@ import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
-from models.robot import Array
-from optimizer.kinematics.tcp import T_last_tcp, flange_pose, rotated_poses, tcp_jacobian, tcp_pose
-from optimizer.problem.arm import Arm
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.tcp import T_last_tcp, flange_pose, rotated_poses, tcp_jacobian, tcp_pose
+from joulepath.optimizer.problem.arm import Arm
 from tests.optimizer import moves
 
 T_FLANGE_TCP = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.7, 1.1), np.array([0.02, -0.05, 0.18])).homogeneous

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from optimizer.certificate import certify
-from optimizer.kinematics.tool_course import ToolCourse
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.tool_path import ToolPath
-from optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.moves import tcp_pose
 from tests.optimizer.tool_paths import HOME, along, moved
 

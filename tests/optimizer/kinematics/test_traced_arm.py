@@ -8,23 +8,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array, Robot
-from optimizer import Arm, Pose, Problem, optimize
-from optimizer.exceptions import SingularPose, UnreachablePose
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.chain import Chain, miss, pose_error
-from optimizer.kinematics.curve_tracing import cycles, traced
-from optimizer.kinematics.hermite import hermite_weights
-from optimizer.kinematics.inverse import required_inverse_kinematics
-from optimizer.kinematics.nearby_arm import NearbyArm
-from optimizer.kinematics.nearby_loops import LONG, SHORT, followed
-from optimizer.kinematics.newton import solved
-from optimizer.kinematics.redundant_arm import RedundantArm
-from optimizer.kinematics.seed_table import SeedTable
-from optimizer.kinematics.traced_arm import TracedArm
-from optimizer.kinematics.traced_curve import TracedCurve
-from optimizer.problem.branches import NumberedBranch
+from joulepath import Arm, Pose, Problem, optimize
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.chain import Chain, miss, pose_error
+from joulepath.optimizer.kinematics.curve_tracing import cycles, traced
+from joulepath.optimizer.kinematics.hermite import hermite_weights
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.kinematics.nearby_arm import NearbyArm
+from joulepath.optimizer.kinematics.nearby_loops import LONG, SHORT, followed
+from joulepath.optimizer.kinematics.newton import solved
+from joulepath.optimizer.kinematics.redundant_arm import RedundantArm
+from joulepath.optimizer.kinematics.seed_table import SeedTable
+from joulepath.optimizer.kinematics.traced_arm import TracedArm
+from joulepath.optimizer.kinematics.traced_curve import TracedCurve
+from joulepath.optimizer.problem.branches import NumberedBranch
 from tests.optimizer.chains import move, serial_chain
 from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, flange, inside
 from tests.selection import long_but

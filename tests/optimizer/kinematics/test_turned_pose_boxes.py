@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.tcp import flange_pose, tcp_pose
-from optimizer.kinematics.turned_pose_boxes import BRANCHES, TurnedPose
-from optimizer.problem.arm import Arm
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.pose import Pose
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.tcp import flange_pose, tcp_pose
+from joulepath.optimizer.kinematics.turned_pose_boxes import BRANCHES, TurnedPose
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.pose import Pose
 
 # rad: what a solution of the closed form may be off, next to a singularity
 EXACT = 1e-9

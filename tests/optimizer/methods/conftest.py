@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from optimizer.methods import polynomial_ga
+from joulepath.optimizer.methods import polynomial_ga
 
 FEW_GENERATIONS = 20
 

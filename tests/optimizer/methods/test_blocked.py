@@ -8,22 +8,22 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from models.robot import Array
-from optimizer.deadline import Deadline
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.exceptions import NoCollisionFreeTrajectory
-from optimizer.methods import METHODS, planned_paths, solver_for
-from optimizer.methods.duration_intervals import duration_intervals
-from optimizer.methods.method import SolveStatus
-from optimizer.methods.path_retiming import PathRetiming, RetimingProgram
-from optimizer.methods.planned_paths import ALONG_PLANNED_PATH, FROM_PLANNED_PATH, plan, smooth_path, to_goal
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import MethodName, Problem
-from optimizer.problem.scene import Box, Obstacle, Scene, Sphere
-from optimizer.problem.tool_cone import ToolCone
-from optimizer.trajectories import bspline, quintic
-from optimizer.trajectories.spline import least_time_scale, retimed, spline_of
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.exceptions import NoCollisionFreeTrajectory
+from joulepath.optimizer.methods import METHODS, planned_paths, solver_for
+from joulepath.optimizer.methods.duration_intervals import duration_intervals
+from joulepath.optimizer.methods.method import SolveStatus
+from joulepath.optimizer.methods.path_retiming import PathRetiming, RetimingProgram
+from joulepath.optimizer.methods.planned_paths import ALONG_PLANNED_PATH, FROM_PLANNED_PATH, plan, smooth_path, to_goal
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import MethodName, Problem
+from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
+from joulepath.optimizer.problem.tool_cone import ToolCone
+from joulepath.optimizer.trajectories import bspline, quintic
+from joulepath.optimizer.trajectories.spline import least_time_scale, retimed, spline_of
 from tests.optimizer.moves import ROBOT, problem_with
 from tests.selection import long_but
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-from optimizer.methods.duration_intervals import DurationInterval, fastest
-from optimizer.methods.free_spline import FreeSpline
-from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
-from optimizer.search.fastest import fastest_of
-from optimizer.search.run import Run
-from optimizer.trajectories.ruckig_motion import time_optimal_spline
-from optimizer.trajectories.spline import lasting
+from joulepath.optimizer.methods.duration_intervals import DurationInterval, fastest
+from joulepath.optimizer.methods.free_spline import FreeSpline
+from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.search.fastest import fastest_of
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.trajectories.ruckig_motion import time_optimal_spline
+from joulepath.optimizer.trajectories.spline import lasting
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, problem
 
 SPLINE = lasting(time_optimal_spline(ROBOT.limits, START, GOAL), 2.0)

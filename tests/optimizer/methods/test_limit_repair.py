@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.energy.limited_torque import limited_parts
-from optimizer.energy.torque_bound import SHARPNESS
-from optimizer.methods.limit_repair import torque_peaks
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.trajectories import bspline, seven_segment
-from optimizer.trajectories.bspline import Basis
-from optimizer.trajectories.spline import Spline, peak_rates, retimed, sample, time_scale
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.limited_torque import limited_parts
+from joulepath.optimizer.energy.torque_bound import SHARPNESS
+from joulepath.optimizer.methods.limit_repair import torque_peaks
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.trajectories import bspline, seven_segment
+from joulepath.optimizer.trajectories.bspline import Basis
+from joulepath.optimizer.trajectories.spline import Spline, peak_rates, retimed, sample, time_scale
 from tests.optimizer.moves import PAYLOAD, START, TILTED, limits, problem
 
 # finer than the certificate's grid of 1 ms

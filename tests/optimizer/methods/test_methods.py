@@ -11,20 +11,20 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from optimizer.deadline import NEVER
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.exceptions import DurationTooShort
-from optimizer.methods import METHODS, polynomial_ga
-from optimizer.methods.method import SolveResult, with_excess
-from optimizer.methods.polynomial_ga import PolynomialGA
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.bus import Bus
-from optimizer.problem.problem import MethodName
-from optimizer.search.candidates import bound, pairs
-from optimizer.search.ends import ends
-from optimizer.solution import Solution
-from optimizer.trajectories.ruckig_motion import time_optimal_spline
+from joulepath.optimizer.deadline import NEVER
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.exceptions import DurationTooShort
+from joulepath.optimizer.methods import METHODS, polynomial_ga
+from joulepath.optimizer.methods.method import SolveResult, with_excess
+from joulepath.optimizer.methods.polynomial_ga import PolynomialGA
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.problem import MethodName
+from joulepath.optimizer.search.candidates import bound, pairs
+from joulepath.optimizer.search.ends import ends
+from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.trajectories.ruckig_motion import time_optimal_spline
 from tests.optimizer.clocks import LAST_READINGS, CountingClock
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, fixed, limits, problem, random_moves, tcp_pose
 from tests.selection import long_but

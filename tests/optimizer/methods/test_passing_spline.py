@@ -7,20 +7,20 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.deadline import Deadline
-from optimizer.exceptions import InvalidProblem, NoTrajectory, OutsideLimits
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.methods.duration_intervals import fastest
-from optimizer.methods.passing_spline import PassingSpline
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import Problem
-from optimizer.problem.scene import Box, Obstacle, Scene
-from optimizer.search.run import Run
-from optimizer.solution import Solution
-from optimizer.trajectories.joined import joined
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.exceptions import InvalidProblem, NoTrajectory, OutsideLimits
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.methods.duration_intervals import fastest
+from joulepath.optimizer.methods.passing_spline import PassingSpline
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.trajectories.joined import joined
+from joulepath.optimizer.trajectories.spline import Spline
 from tests.optimizer.moves import AMPLE, GOAL, START, fixed, problem
 
 # rad; rounding of a spline at a time that is known to rounding

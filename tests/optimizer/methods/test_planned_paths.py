@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from optimizer.collision.path_planner import USUAL, Effort, PlannedPaths, PlanningEnd, along, plan_paths
-from optimizer.deadline import NEVER, Deadline
-from optimizer.methods import free_spline, planned_paths
-from optimizer.methods.free_spline import FreeSpline
-from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.methods.planned_paths import FROM_PLANNED_PATH
-from optimizer.methods.sqp_method import NOT_MUCH_BETTER, above
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.bus import Bus, BusMode
-from optimizer.problem.targets import AnyOf
-from optimizer.surroundings import Surroundings
+from joulepath.optimizer.collision.path_planner import USUAL, Effort, PlannedPaths, PlanningEnd, along, plan_paths
+from joulepath.optimizer.deadline import NEVER, Deadline
+from joulepath.optimizer.methods import free_spline, planned_paths
+from joulepath.optimizer.methods.free_spline import FreeSpline
+from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.methods.planned_paths import FROM_PLANNED_PATH
+from joulepath.optimizer.methods.sqp_method import NOT_MUCH_BETTER, above
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.bus import Bus, BusMode
+from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.surroundings import Surroundings
 from tests.optimizer.collision.test_path_planner import AMPLE, between, least, problem, task, walled_in
 
 

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from models.robot import Array
-from optimizer.deadline import Deadline
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.methods import METHODS, solver_for
-from optimizer.methods import duration_intervals as duration_intervals
-from optimizer.methods.free_spline import TIGHT, FreeSpline
-from optimizer.methods.method import Method, SolveResult, SolveStatus
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import Problem
-from optimizer.trajectories.seven_segment import ramp, shortest_duration
-from optimizer.trajectories.spline import Spline, sampled
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.methods import METHODS, solver_for
+from joulepath.optimizer.methods import duration_intervals as duration_intervals
+from joulepath.optimizer.methods.free_spline import TIGHT, FreeSpline
+from joulepath.optimizer.methods.method import Method, SolveResult, SolveStatus
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.trajectories.seven_segment import ramp, shortest_duration
+from joulepath.optimizer.trajectories.spline import Spline, sampled
 from tests.optimizer.moves import (
     GOAL,
     PAYLOAD,

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from models.robot import Array
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.methods.time_optimal_scaling import GRID, TRUST, time_optimal_on_line
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.search.baselines import broken_limits
-from optimizer.trajectories import bspline
-from optimizer.trajectories.bspline import DEGREE
-from optimizer.trajectories.time_scalings import quintic
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.methods.time_optimal_scaling import GRID, TRUST, time_optimal_on_line
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.search.baselines import broken_limits
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.bspline import DEGREE
+from joulepath.optimizer.trajectories.time_scalings import quintic
 from tests.optimizer.moves import CEILING, GOAL, PAYLOAD, ROBOT, START, limits, problem, random_moves, torques
 
 # relative; acceleration switches somewhere between two of the 60 steps, and toppra's lies on one of them

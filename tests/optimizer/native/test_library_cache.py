@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from optimizer.native import library_cache
-from optimizer.native.library_cache import (
+from joulepath.optimizer.native import library_cache
+from joulepath.optimizer.native.library_cache import (
     CompilerHangs,
     Patience,
     cache_directory,
@@ -107,7 +107,7 @@ def test_a_compiler_that_hung_rests(tmp_path: Path, hung: Path, monkeypatch: pyt
 def test_a_program_that_ends_takes_a_hung_compiler_along(tmp_path: Path, hung: Path) -> None:
     code = (
         "import sys, threading, time; from pathlib import Path\n"
-        "from optimizer.native.library_cache import compile_library\n"
+        "from joulepath.optimizer.native.library_cache import compile_library\n"
         "threading.Thread(target=compile_library, args=(Path(sys.argv[1]), (), str), daemon=True).start()\n"
         "while not Path(sys.argv[2]).exists(): time.sleep(0.02)\n"
     )
@@ -118,7 +118,7 @@ def test_a_program_that_ends_takes_a_hung_compiler_along(tmp_path: Path, hung: P
 def test_killed_processes_leave_one_hung_compiler_at_most(tmp_path: Path, hung: Path) -> None:
     """It has inherited the lock: whoever comes later gives up instead of starting another one."""
     code = (
-        "import sys; from pathlib import Path; from optimizer.native.library_cache import compile_library\n"
+        "import sys; from pathlib import Path; from joulepath.optimizer.native.library_cache import compile_library\n"
         "compile_library(Path(sys.argv[1]), (), str)\n"
     )
     process = subprocess.Popen([sys.executable, "-c", code, tmp_path / "arm.so"])

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.registry import load_robot, robot_names
-from optimizer.kinematics.forward import joint_placements, link_frames, link_frames_by_numpy
-from optimizer.native.shared_library import library_path
+from joulepath.models.registry import load_robot, robot_names
+from joulepath.optimizer.kinematics.forward import joint_placements, link_frames, link_frames_by_numpy
+from joulepath.optimizer.native.shared_library import library_path
 
 FRAMES = 1e-14  # m and cosines; both round, and numpy's sine differs in the last digit
 
@@ -20,9 +20,9 @@ FRAMES = 1e-14  # m and cosines; both round, and numpy's sine differs in the las
 MOTION = """
 import logging; logging.basicConfig()
 from tests.optimizer.moves import GOAL, START
-from optimizer import Arm, Problem, load_robot, optimize
-from optimizer.problem.scene import Obstacle, Scene, Sphere
-from optimizer.native.shared_library import shared_library
+from joulepath import Arm, Problem, load_robot, optimize
+from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
+from joulepath.optimizer.native.shared_library import shared_library
 from tests.optimizer.cells import at
 scene = Scene([Obstacle("ball", Sphere(0.1), at([0.3, -0.5, 0.4]))])
 arm = Arm(robot=load_robot("ur5e"), scene=scene)
@@ -70,7 +70,7 @@ def test_nobody_waits_for_a_compiler_that_hangs(tmp_path: Path) -> None:
 
 def test_it_is_made_once_and_made_anew_when_damaged(tmp_path: Path) -> None:
     environment = os.environ | {"JOULEPATH_CACHE_DIR": str(tmp_path)}
-    script = "from optimizer.native.shared_library import shared_library; print(shared_library(60))"
+    script = "from joulepath.optimizer.native.shared_library import shared_library; print(shared_library(60))"
 
     def load() -> float:
         found = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True)

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from models.robot import Array
-from optimizer.energy.kernel_expressions import build
-from optimizer.nlp.nonlinear_program import NonlinearProgram
-from optimizer.trajectories.bspline import REST_POINTS, Basis
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.kernel_expressions import build
+from joulepath.optimizer.nlp.nonlinear_program import NonlinearProgram
+from joulepath.optimizer.trajectories.bspline import REST_POINTS, Basis
 from tests.optimizer.moves import ROBOT
 
 # of the optimiser's grid, every so many points of each knot span, both of its ends among them

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.nlp.nonlinear_program import NonlinearProgram
-from optimizer.nlp.passing import Passing
-from optimizer.nlp.sliding_ends import Slide
+from joulepath.models.robot import Array
+from joulepath.optimizer.nlp.nonlinear_program import NonlinearProgram
+from joulepath.optimizer.nlp.passing import Passing
+from joulepath.optimizer.nlp.sliding_ends import Slide
 from tests.optimizer.energy.kernel_states import places
 
 # duration [s], and length of a step

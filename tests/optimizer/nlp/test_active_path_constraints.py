@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.kinematics.forward import joint_placements
-from optimizer.kinematics.path_constraints import PathConstraints, PointSpeedConstraint, ToolConeConstraint
-from optimizer.nlp.active_path_constraints import PathConstraintRows
-from optimizer.nlp.coordinates import Coordinates
-from optimizer.trajectories import bspline
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.forward import joint_placements
+from joulepath.optimizer.kinematics.path_constraints import PathConstraints, PointSpeedConstraint, ToolConeConstraint
+from joulepath.optimizer.nlp.active_path_constraints import PathConstraintRows
+from joulepath.optimizer.nlp.coordinates import Coordinates
+from joulepath.optimizer.trajectories import bspline
 from tests.optimizer.moves import GOAL, ROBOT, START
 
 STEP = 1e-6  # of control points [rad, or of the line's fraction] and of the duration [s]

@@ -5,25 +5,25 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer import optimize
-from optimizer.collision.model import CollisionModel
-from optimizer.deadline import NEVER
-from optimizer.kinematics.forward import joint_placements
-from optimizer.kinematics.path_constraints import PathConstraints
-from optimizer.methods.free_spline import FreeSpline
-from optimizer.methods.limit_repair import REPAIR_MARGIN
-from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.methods.sqp_method import COSTLIER, NO_BETTER
-from optimizer.nlp.clearance_constraint import CHECKED, COUNTED, RESERVE, SCALE, ClearanceConstraint
-from optimizer.nlp.working_set_qp import NEAR_PATH
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import Problem
-from optimizer.problem.scene import Box, Obstacle, Scene, Sphere
-from optimizer.problem.tool_cone import ToolCone
-from optimizer.solution import Solution
-from optimizer.trajectories.spline import sample
+from joulepath import optimize
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.deadline import NEVER
+from joulepath.optimizer.kinematics.forward import joint_placements
+from joulepath.optimizer.kinematics.path_constraints import PathConstraints
+from joulepath.optimizer.methods.free_spline import FreeSpline
+from joulepath.optimizer.methods.limit_repair import REPAIR_MARGIN
+from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.methods.sqp_method import COSTLIER, NO_BETTER
+from joulepath.optimizer.nlp.clearance_constraint import CHECKED, COUNTED, RESERVE, SCALE, ClearanceConstraint
+from joulepath.optimizer.nlp.working_set_qp import NEAR_PATH
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
+from joulepath.optimizer.problem.tool_cone import ToolCone
+from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.trajectories.spline import sample
 from tests.optimizer.moves import fixed, problem_with
 
 ROBOT = load_robot("ur5e")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.nlp.convex_quadratic import MOST_AGAIN, Convexity
+from joulepath.models.robot import Array
+from joulepath.optimizer.nlp.convex_quadratic import MOST_AGAIN, Convexity
 
 WIDTH = 5
 # relative; rounding of factorisations of well-conditioned matrices

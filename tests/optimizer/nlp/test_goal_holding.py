@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.kinematics.held_pose import HeldPose
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.methods.duration_intervals import duration_intervals
-from optimizer.nlp.coordinates import Coordinates
-from optimizer.nlp.goal_holding import GoalHolding
-from optimizer.nlp.nonlinear_program import NonlinearProgram
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.cycle import Cycle
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.trajectories import bspline
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.held_pose import HeldPose
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.methods.duration_intervals import duration_intervals
+from joulepath.optimizer.nlp.coordinates import Coordinates
+from joulepath.optimizer.nlp.goal_holding import GoalHolding
+from joulepath.optimizer.nlp.nonlinear_program import NonlinearProgram
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.trajectories import bspline
 from tests.optimizer.moves import AMPLE
 from tests.optimizer.nlp.test_sliding_ends import GOAL, START, curve, straight
 

@@ -8,13 +8,13 @@ from functools import partial
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.energy.plant import SHARPER_WIDTHS
-from optimizer.methods.sharp_motion import sharp_motion
-from optimizer.nlp.interior_point import InteriorPoint
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.trajectories import bspline
-from optimizer.trajectories.spline import peak_rates, spline_of
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.plant import SHARPER_WIDTHS
+from joulepath.optimizer.methods.sharp_motion import sharp_motion
+from joulepath.optimizer.nlp.interior_point import InteriorPoint
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.spline import peak_rates, spline_of
 from tests.optimizer.moves import GOAL, START, fixed, limits, problem
 
 DURATION, WIDE, WIDTH = 2.0, 0.5, 0.1

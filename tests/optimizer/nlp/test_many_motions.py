@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.energy.plant import WIDTH
-from optimizer.nlp.many_motions import ManyMotions
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.trajectories import bspline
-from optimizer.trajectories.spline import peak_rates, spline_of
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.plant import WIDTH
+from joulepath.optimizer.nlp.many_motions import ManyMotions
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.spline import peak_rates, spline_of
 from tests.optimizer.moves import GOAL, START, fixed, limits, problem
 
 DURATION = 2.0

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from models.robot import Array
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.energy.losses import drawn_power, power_flow
-from optimizer.energy.plant import KNEE, WIDTH
-from optimizer.nlp.coordinates import Coordinates
-from optimizer.nlp.nonlinear_program import NonlinearProgram
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.trajectories import bspline
-from optimizer.trajectories.bspline import DEGREE, Basis
-from optimizer.trajectories.quadrature import quadrature
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.energy.losses import drawn_power, power_flow
+from joulepath.optimizer.energy.plant import KNEE, WIDTH
+from joulepath.optimizer.nlp.coordinates import Coordinates
+from joulepath.optimizer.nlp.nonlinear_program import NonlinearProgram
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.bspline import DEGREE, Basis
+from joulepath.optimizer.trajectories.quadrature import quadrature
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem, torques
 from tests.optimizer.nlp.second_differences import without_dry_friction
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.nlp.coordinates import Coordinates
-from optimizer.nlp.nonlinear_program import NonlinearProgram
-from optimizer.nlp.passing import Passes
-from optimizer.nlp.sqp import SqpStatus, solve
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.trajectories import bspline
-from optimizer.trajectories.passing import deviations
-from optimizer.trajectories.spline import spline_of
+from joulepath.models.robot import Array
+from joulepath.optimizer.nlp.coordinates import Coordinates
+from joulepath.optimizer.nlp.nonlinear_program import NonlinearProgram
+from joulepath.optimizer.nlp.passing import Passes
+from joulepath.optimizer.nlp.sqp import SqpStatus, solve
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.passing import deviations
+from joulepath.optimizer.trajectories.spline import spline_of
 from tests.optimizer.moves import GOAL, ROBOT, START, problem
 from tests.optimizer.nlp.second_differences import assert_curvature, without_dry_friction
 

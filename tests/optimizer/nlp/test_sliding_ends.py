@@ -8,18 +8,18 @@ from functools import cache
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.kinematics.held_pose import HeldPose
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.nlp.coordinates import Coordinates
-from optimizer.nlp.nonlinear_program import NonlinearProgram
-from optimizer.nlp.sliding_ends import Slide, SlidingEnds
-from optimizer.nlp.sqp import SqpStatus, solve
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.problem import Problem
-from optimizer.trajectories import bspline
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.held_pose import HeldPose
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.nlp.coordinates import Coordinates
+from joulepath.optimizer.nlp.nonlinear_program import NonlinearProgram
+from joulepath.optimizer.nlp.sliding_ends import Slide, SlidingEnds
+from joulepath.optimizer.nlp.sqp import SqpStatus, solve
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.trajectories import bspline
 from tests.optimizer.nlp.second_differences import assert_curvature, without_dry_friction
 
 PANDA = load_robot("panda")

@@ -10,17 +10,17 @@ import pytest
 from scipy.interpolate import BSpline
 from scipy.optimize import nnls
 
-from models.robot import Array, Limits
-from optimizer.deadline import Deadline
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.energy.plant import KNEE
-from optimizer.nlp.coordinates import Coordinates
-from optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
-from optimizer.nlp.sqp import PROGRESS, Result, SqpStatus, solve
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.trajectories import bspline
-from optimizer.trajectories.bspline import DEGREE, Basis
-from optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.energy.plant import KNEE
+from joulepath.optimizer.nlp.coordinates import Coordinates
+from joulepath.optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
+from joulepath.optimizer.nlp.sqp import PROGRESS, Result, SqpStatus, solve
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.bspline import DEGREE, Basis
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, fixed, limits, problem, random_moves, torques
 from tests.optimizer.nlp.ipopt_peer import Peer
 from tests.selection import long_but

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
-from optimizer.nlp.qp_rows import ROOM, QPRows
-from optimizer.nlp.working_set_qp import MOST_ROUNDS, NEAR, QPInputs, WorkingSetQP
+from joulepath.models.robot import Array
+from joulepath.optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
+from joulepath.optimizer.nlp.qp_rows import ROOM, QPRows
+from joulepath.optimizer.nlp.working_set_qp import MOST_ROUNDS, NEAR, QPInputs, WorkingSetQP
 from tests.optimizer.moves import GOAL, START
 from tests.optimizer.nlp.test_sqp import program, quintic, shortest
 

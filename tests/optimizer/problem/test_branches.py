@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from optimizer.problem.branches import BranchFilter, Label
+from joulepath.optimizer.problem.branches import BranchFilter, Label
 
 LABELS = [
     Label("left", "up", "flip"),

@@ -10,9 +10,9 @@ import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.pose import (
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.pose import (
     QUATERNION_TOLERANCE,
     Pose,
     rotation_from_quaternion,

@@ -10,11 +10,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem, OutsideLimits
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
 from tests.optimizer.moves import GOAL, ROBOT, START, limits, problem, problem_with, tcp_pose
 
 ROTATED = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.4, 2.0), np.array([0.4, 0.1, 0.5])).homogeneous

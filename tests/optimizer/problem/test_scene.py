@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from optimizer.collision.cores import core_of
-from optimizer.exceptions import InvalidProblem
-from optimizer.problem.scene import (
+from joulepath.optimizer.collision.cores import core_of
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.scene import (
     MOST_OBSTACLES,
     MOST_VERTICES,
     Attachment,

@@ -11,16 +11,16 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.robot import Array
-from optimizer.energy.plant import Plant
-from optimizer.exceptions import DeadlineExceeded, InvalidProblem, InvalidTable
-from optimizer.kinematics.rigid_body_model import rigid_body_model
-from optimizer.optimize import optimize
-from optimizer.problem.arm import Arm
-from optimizer.problem.bus import Bus
-from optimizer.replay.evaluate import MOST_SEGMENTS, Evaluation, evaluate
-from optimizer.replay.recording import BLOCK, Log, LogBlock, Waypoints, in_blocks
-from optimizer.trajectories.time_scalings import quintic
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, InvalidTable
+from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.replay.evaluate import MOST_SEGMENTS, Evaluation, evaluate
+from joulepath.optimizer.replay.recording import BLOCK, Log, LogBlock, Waypoints, in_blocks
+from joulepath.optimizer.trajectories.time_scalings import quintic
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem
 
 VIA = START + np.array([-0.4, 0.3, 0.5, -0.6, 0.8, 0.2])

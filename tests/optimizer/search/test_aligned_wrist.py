@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer import Arm, Pose, Problem, optimize
-from optimizer.exceptions import JoulepathError
-from optimizer.kinematics.inverse import required_inverse_kinematics
-from optimizer.solution import Solution
+from joulepath import Arm, Pose, Problem, optimize
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.solution import Solution
 from tests.optimizer.kinematics.six_joints import KUKA, flange
 from tests.selection import long_but
 

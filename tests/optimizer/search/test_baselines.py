@@ -12,15 +12,23 @@ import pinocchio as pin
 import pytest
 import ruckig
 
-from models.registry import load_robot
-from models.robot import Array, Limits
-from optimizer.problem.arm import Payload
-from optimizer.problem.problem import Problem
-from optimizer.search.baselines import Broken, baselines, broken_limits, guesses, motion_energy, nearest, saving
-from optimizer.solution import Baseline
-from optimizer.trajectories import quadrature
-from optimizer.trajectories.ruckig_motion import time_optimal
-from optimizer.trajectories.time_scalings import SampledMotion, controller_default, quintic, trapezoid
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.search.baselines import (
+    Broken,
+    baselines,
+    broken_limits,
+    guesses,
+    motion_energy,
+    nearest,
+    saving,
+)
+from joulepath.optimizer.solution import Baseline
+from joulepath.optimizer.trajectories import quadrature
+from joulepath.optimizer.trajectories.ruckig_motion import time_optimal
+from joulepath.optimizer.trajectories.time_scalings import SampledMotion, controller_default, quintic, trapezoid
 from tests.optimizer.moves import problem_with
 
 EXACT = 1e-12  # relative; closed forms in double precision

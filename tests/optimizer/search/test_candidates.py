@@ -9,23 +9,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.deadline import NEVER, Deadline
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.exceptions import TorqueInfeasible, UnreachablePose
-from optimizer.kinematics.inverse import inverse_kinematics_for
-from optimizer.methods import solver_for
-from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Payload
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.problem import Problem
-from optimizer.search import candidates as search
-from optimizer.search.branch_and_bound import explore
-from optimizer.search.candidates import Candidate
-from optimizer.search.ends import ends
-from optimizer.surroundings import Surroundings
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import NEVER, Deadline
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.exceptions import TorqueInfeasible, UnreachablePose
+from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
+from joulepath.optimizer.methods import solver_for
+from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.search import candidates as search
+from joulepath.optimizer.search.branch_and_bound import explore
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.ends import ends
+from joulepath.optimizer.surroundings import Surroundings
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem, tcp_pose, torques
 from tests.selection import long_but
 

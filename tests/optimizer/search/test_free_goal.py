@@ -10,30 +10,30 @@ import pinocchio as pin
 import pytest
 from scipy.stats import qmc
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem, NoReachableTarget, UnreachablePose
-from optimizer.kinematics.inverse import inverse_kinematics_for
-from optimizer.kinematics.orientation_tolerance import excess_angle, nearest_orientation, sample_orientations
-from optimizer.methods.duration_intervals import duration_intervals
-from optimizer.nlp.coordinates import Coordinates, GoalConstraints
-from optimizer.nlp.nonlinear_program import NonlinearProgram
-from optimizer.nlp.sqp import solve
-from optimizer.optimize import optimize
-from optimizer.pareto import pareto
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Payload
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.bus import Bus
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.cycle import Cycle
-from optimizer.problem.pose import Pose
-from optimizer.problem.targets import AnyOf
-from optimizer.search.free_goal import goal_constraints
-from optimizer.search.reserve import RESERVE
-from optimizer.search.run import Run
-from optimizer.search.sampled_ends import BATCH
-from optimizer.solution import Solution
-from optimizer.trajectories import bspline
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem, NoReachableTarget, UnreachablePose
+from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
+from joulepath.optimizer.kinematics.orientation_tolerance import excess_angle, nearest_orientation, sample_orientations
+from joulepath.optimizer.methods.duration_intervals import duration_intervals
+from joulepath.optimizer.nlp.coordinates import Coordinates, GoalConstraints
+from joulepath.optimizer.nlp.nonlinear_program import NonlinearProgram
+from joulepath.optimizer.nlp.sqp import solve
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.pareto import pareto
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.search.free_goal import goal_constraints
+from joulepath.optimizer.search.reserve import RESERVE
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.search.sampled_ends import BATCH
+from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.trajectories import bspline
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
 from tests.optimizer.moves import GOAL, HOME, PAYLOAD, ROBOT, START, TILTED, fixed, paper_poses, problem, tcp_pose
 from tests.optimizer.nlp.second_differences import without_dry_friction

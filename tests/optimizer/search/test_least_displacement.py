@@ -6,8 +6,8 @@ from itertools import product
 
 import numpy as np
 
-from models.robot import Array, Limits
-from optimizer.search.least_displacement import ROUNDING, least_displacement
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.search.least_displacement import ROUNDING, least_displacement
 
 NQ, COUNT = 2, 200
 ONES = np.ones(NQ)

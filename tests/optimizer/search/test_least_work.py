@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.deadline import Deadline
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.search.candidates import Reason
-from optimizer.search.least_work import explore_least_work
-from optimizer.search.rough_work import COARSE, RoughWork, best_of_each
-from optimizer.search.run import Run
-from optimizer.solution import CandidateStatus, Solution
-from optimizer.trajectories import bspline
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.search.candidates import Reason
+from joulepath.optimizer.search.least_work import explore_least_work
+from joulepath.optimizer.search.rough_work import COARSE, RoughWork, best_of_each
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.solution import CandidateStatus, Solution
+from joulepath.optimizer.trajectories import bspline
 from tests.optimizer.moves import GOAL, START, fixed, problem, tcp_pose
 
 DURATION = 3.0

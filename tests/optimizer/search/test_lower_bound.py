@@ -11,21 +11,21 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from models.robot import Array, Robot
-from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.energy.losses import breakdown
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Payload
-from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
-from optimizer.search.baselines import guesses, motion_energy
-from optimizer.search.lower_bound import lower_bounds, priced_bounds
-from optimizer.solution import Energy
-from optimizer.trajectories import bspline
-from optimizer.trajectories.bspline import DEGREE
-from optimizer.trajectories.quadrature import quadrature
-from optimizer.trajectories.seven_segment import shortest_duration
-from optimizer.trajectories.spline import peak_rates, spline_of
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.energy.losses import breakdown
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
+from joulepath.optimizer.search.baselines import guesses, motion_energy
+from joulepath.optimizer.search.lower_bound import lower_bounds, priced_bounds
+from joulepath.optimizer.solution import Energy
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.bspline import DEGREE
+from joulepath.optimizer.trajectories.quadrature import quadrature
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.optimizer.trajectories.spline import peak_rates, spline_of
 from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, changed, fixed, limits, problem
 from tests.selection import long_but
 

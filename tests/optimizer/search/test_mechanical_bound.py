@@ -9,15 +9,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.robot import Array
-from optimizer.deadline import NEVER
-from optimizer.methods.free_spline import FreeSpline
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.search.mechanical_bound import EnergyRange, mechanical_bounds
-from optimizer.trajectories import bspline
-from optimizer.trajectories.seven_segment import shortest_duration
-from optimizer.trajectories.spline import Spline, peak_rates, spline_of, time_scale
-from optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import NEVER
+from joulepath.optimizer.methods.free_spline import FreeSpline
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.search.mechanical_bound import EnergyRange, mechanical_bounds
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.optimizer.trajectories.spline import Spline, peak_rates, spline_of, time_scale
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.moves import PAYLOAD, TILTED, fixed, limits, problem
 from tests.selection import long_but
 

@@ -7,20 +7,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.exceptions import JoulepathError
-from optimizer.kinematics.angles import nearest_turn, wrapped
-from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.newton import solved
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.cycle import Cycle
-from optimizer.problem.targets import AnyOf
-from optimizer.search.candidates import Candidate, pairs
-from optimizer.search.ends import ends
-from optimizer.search.lower_bound import lower_bounds
-from optimizer.search.missed_branches import all_known, bound_of_others
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.newton import solved
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.search.candidates import Candidate, pairs
+from joulepath.optimizer.search.ends import ends
+from joulepath.optimizer.search.lower_bound import lower_bounds
+from joulepath.optimizer.search.missed_branches import all_known, bound_of_others
 from tests.optimizer.search.test_redundant_goals import asked, members, pose_of, tasks
 from tests.selection import long_but
 

@@ -8,21 +8,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from optimizer.certificate import certify
-from optimizer.deadline import DeadlinePassed
-from optimizer.exceptions import DeadlineExceeded
-from optimizer.in_hand import least_certified
-from optimizer.methods import METHODS
-from optimizer.methods.method import Method, SolveResult, SolveStatus
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import MethodName
-from optimizer.search import refinement
-from optimizer.search.incumbent import Incumbent
-from optimizer.search.run import Run
-from optimizer.solution import Certificate, Solution
-from optimizer.trajectories.spline import Spline, lasting
-from optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.deadline import DeadlinePassed
+from joulepath.optimizer.exceptions import DeadlineExceeded
+from joulepath.optimizer.in_hand import least_certified
+from joulepath.optimizer.methods import METHODS
+from joulepath.optimizer.methods.method import Method, SolveResult, SolveStatus
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import MethodName
+from joulepath.optimizer.search import refinement
+from joulepath.optimizer.search.incumbent import Incumbent
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.solution import Certificate, Solution
+from joulepath.optimizer.trajectories.spline import Spline, lasting
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.moves import GOAL, PAYLOAD, START, fixed, problem
 from tests.selection import long_but
@@ -100,7 +100,7 @@ def test_what_the_certificate_refuses_is_not_all_that_was_found(monkeypatch: pyt
             return replace(honest, start_error=(1.0, 0.0))
         return honest
 
-    monkeypatch.setattr("optimizer.search.incumbent.certify", judge)
+    monkeypatch.setattr("joulepath.optimizer.search.incumbent.certify", judge)
     found = Run(asked, [known]).solution()
     assert refused
     assert found.certificate.valid and found.energy.electrical.total == cost_of(known)

@@ -8,24 +8,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.optimize import optimize
-from optimizer.problem.arm import Arm
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.cycle import Cycle
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.targets import AnyOf
-from optimizer.search.candidates import Candidate
-from optimizer.search.ends import label_of
-from optimizer.search.near_goals import APART, MOST, OTHERS, activate_near_goals
-from optimizer.search.run import Run
-from optimizer.search.sampled_ends import nearest_configuration
-from optimizer.search.seeds import estimates
-from optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.ends import label_of
+from joulepath.optimizer.search.near_goals import APART, MOST, OTHERS, activate_near_goals
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.search.sampled_ends import nearest_configuration
+from joulepath.optimizer.search.seeds import estimates
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.selection import long_but
 
 # s: no search comes near it, however busy the machine

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from benchmarks.tasks import collision_free
-from models.registry import load_robot
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.problem.arm import Arm
-from optimizer.problem.bus import Bus
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.search.candidates import Candidate
-from optimizer.search.incumbent import Incumbent
-from optimizer.search.other_starts import start_beside
-from optimizer.search.run import Run
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.incumbent import Incumbent
+from joulepath.optimizer.search.other_starts import start_beside
+from joulepath.optimizer.search.run import Run
 
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0

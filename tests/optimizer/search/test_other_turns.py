@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.bus import Bus
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.search.candidates import FULL_TURN, Candidate
-from optimizer.search.other_turns import MOST, NEAR, other_turns
-from optimizer.search.run import Run
-from optimizer.search.seeds import estimates_between, expected
-from optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.search.candidates import FULL_TURN, Candidate
+from joulepath.optimizer.search.other_turns import MOST, NEAR, other_turns
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.search.seeds import estimates_between, expected
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0

@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from optimizer.exceptions import DurationTooShort
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.optimize import optimize
-from optimizer.problem.arm import Arm
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.search.quicker_ends import with_quicker_ends
-from optimizer.search.run import Run
-from optimizer.search.sampled_ends import fastest_samples
-from optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.exceptions import DurationTooShort
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.search.quicker_ends import with_quicker_ends
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.search.sampled_ends import fastest_samples
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 from tests.optimizer.moves import AMPLE, fixed
 
 # m, rad: what the certificate allows at an end

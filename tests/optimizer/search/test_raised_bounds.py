@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from optimizer.deadline import NEVER, Deadline
-from optimizer.kinematics.tcp import tcp_pose as tcp_pose_of
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.search import candidates as search
-from optimizer.search import dual_cells
-from optimizer.search.ends import ends
-from optimizer.search.raised_bounds import LEAST_GAP, QUICK, raise_bounds
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.deadline import NEVER, Deadline
+from joulepath.optimizer.kinematics.tcp import tcp_pose as tcp_pose_of
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.search import candidates as search
+from joulepath.optimizer.search import dual_cells
+from joulepath.optimizer.search.ends import ends
+from joulepath.optimizer.search.raised_bounds import LEAST_GAP, QUICK, raise_bounds
 from tests.optimizer.moves import GOAL, START, problem, tcp_pose
 from tests.selection import long_but
 

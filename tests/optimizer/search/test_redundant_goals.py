@@ -9,22 +9,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array, Robot
-from optimizer.collision.model import collision_model
-from optimizer.exceptions import JoulepathError
-from optimizer.kinematics.inverse import required_inverse_kinematics
-from optimizer.kinematics.self_motion import SelfMotion
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.search.candidates import bound, pairs
-from optimizer.search.ends import ends
-from optimizer.search.holding_cells import HoldingCells
-from optimizer.search.self_motion_bound import self_motion_bound
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.collision.model import collision_model
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.kinematics.self_motion import SelfMotion
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.search.candidates import bound, pairs
+from joulepath.optimizer.search.ends import ends
+from joulepath.optimizer.search.holding_cells import HoldingCells
+from joulepath.optimizer.search.self_motion_bound import self_motion_bound
 from tests.selection import long_but
 
 # relative: the least step along a curve and the solver's tolerance

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.registry import load_robot
-from optimizer.optimize import optimize
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.optimize import optimize
 from tests.optimizer.moves import problem
 
 # relative: a spline of Ruckig's motion is slower than the motion where jumps of its jerk are close

@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 
 from benchmarks.tasks import collision_free
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.optimize import optimize
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.bus import Bus
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.search.run import Run
-from optimizer.search.seeds import MOST_ESTIMATED, MOST_SEEDS, NEAR, activate_seeds, estimates
-from optimizer.solution import CandidateStatus
-from optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.search.seeds import MOST_ESTIMATED, MOST_SEEDS, NEAR, activate_seeds, estimates
+from joulepath.optimizer.solution import CandidateStatus
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0

@@ -8,23 +8,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.exceptions import JoulepathError
-from optimizer.kinematics.inverse import required_inverse_kinematics
-from optimizer.kinematics.self_motion import SelfMotion
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.bus import Bus
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.cycle import Cycle
-from optimizer.problem.problem import Problem
-from optimizer.problem.targets import AnyOf
-from optimizer.search.candidates import bound, pairs
-from optimizer.search.ends import ends
-from optimizer.search.holding_cells import HoldingCells
-from optimizer.search.self_motion_bound import self_motion_bound
-from optimizer.solution import Solution
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.kinematics.self_motion import SelfMotion
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.search.candidates import bound, pairs
+from joulepath.optimizer.search.ends import ends
+from joulepath.optimizer.search.holding_cells import HoldingCells
+from joulepath.optimizer.search.self_motion_bound import self_motion_bound
+from joulepath.optimizer.solution import Solution
 from tests.optimizer.moves import ROBOT, problem, tcp_pose
 from tests.selection import long_but
 

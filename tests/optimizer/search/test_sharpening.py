@@ -9,15 +9,15 @@ import pytest
 
 from benchmarks.reference import FILES, load, problem_of
 from benchmarks.tasks import move
-from optimizer.deadline import Deadline
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.bus import Bus
-from optimizer.search.attempts import solve
-from optimizer.search.branch_and_bound import explore
-from optimizer.search.incumbent import Incumbent
-from optimizer.search.run import Run
-from optimizer.search.sharpening import sharpen
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.search.attempts import solve
+from joulepath.optimizer.search.branch_and_bound import explore
+from joulepath.optimizer.search.incumbent import Incumbent
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.search.sharpening import sharpen
 from tests.optimizer.moves import AMPLE, problem
 
 # relative; what is promised against the best of many starts on as many control points

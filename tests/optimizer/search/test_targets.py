@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.exceptions import InvalidProblem, NoReachableTarget, OutsideLimits
-from optimizer.optimize import optimize
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import narrowed
-from optimizer.problem.targets import AnyOf, members, single
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem, NoReachableTarget, OutsideLimits
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import narrowed
+from joulepath.optimizer.problem.targets import AnyOf, members, single
 from tests.optimizer.moves import GOAL, HOME, START, limits, paper_poses, problem, tcp_pose
 from tests.selection import long_but
 

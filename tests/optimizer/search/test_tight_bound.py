@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from optimizer.optimize import optimize
-from optimizer.problem.bus import Bus
-from optimizer.problem.cycle import Cycle
-from optimizer.problem.problem import Problem
-from optimizer.solution import Solution
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.solution import Solution
 from tests.optimizer.moves import PAYLOAD, ROBOT, START, fixed, limits, problem, random_moves, tcp_pose
 from tests.selection import long_but
 

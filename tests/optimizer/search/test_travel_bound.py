@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Payload
-from optimizer.search.lower_bound import lower_bounds, travel_bounds
-from optimizer.search.run import Run
-from optimizer.trajectories import bspline
-from optimizer.trajectories.spline import Spline, least_time_scale, retimed, spline_of
-from optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.search.lower_bound import lower_bounds, travel_bounds
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.spline import Spline, least_time_scale, retimed, spline_of
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, problem
 from tests.selection import long_but
 

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.pose import Pose
-from optimizer.problem.stops import Stop
-from optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.work_round import WorkRound
 from tests.optimizer.moves import AMPLE, ROBOT
 
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])

@@ -7,8 +7,8 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.sequence.chains import LeastChain
+from joulepath.models.robot import Array
+from joulepath.optimizer.sequence.chains import LeastChain
 
 
 def least_of_all(costs: list[Array], closed: bool) -> float:

@@ -9,21 +9,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.exceptions import PathInfeasible
-from optimizer.kinematics.tcp import tcp_pose as pose_of
-from optimizer.kinematics.tool_course import ToolCourse
-from optimizer.optimize_round import optimize_round
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.free_order import FreeOrder
-from optimizer.problem.problem import Problem
-from optimizer.problem.stop_path import StopPath
-from optimizer.problem.stops import Stop
-from optimizer.problem.tool_path import ToolPath
-from optimizer.problem.work_round import WorkRound
-from optimizer.sequence.divided_paths import PLACES, _cheapest, _costs, with_divided_paths
-from optimizer.sequence.strands import Strand, strands_of
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import PathInfeasible
+from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
+from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.free_order import FreeOrder
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.stop_path import StopPath
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.sequence.divided_paths import PLACES, _cheapest, _costs, with_divided_paths
+from joulepath.optimizer.sequence.strands import Strand, strands_of
 from tests.optimizer.moves import ROBOT
 from tests.optimizer.sequence.rounds import PART
 from tests.optimizer.sequence.test_optimize_round import assert_true

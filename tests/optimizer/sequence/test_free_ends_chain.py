@@ -10,28 +10,28 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.deadline import NEVER
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.least_time import least_time, least_way
-from optimizer.kinematics.tcp import flange_pose
-from optimizer.kinematics.tool_course import ToolCourse
-from optimizer.kinematics.ur_closed_form import URClosedForm
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.stop_path import StopPath
-from optimizer.problem.stops import Stop
-from optimizer.problem.tool_path import ToolPath
-from optimizer.problem.work_round import WorkRound
-from optimizer.search.lower_bound import LeastBound
-from optimizer.sequence import free_orientations
-from optimizer.sequence.free_ends_chain import FreeEndsChain
-from optimizer.sequence.round_search import RoundSearch
-from optimizer.sequence.single_joint_bound import Boxes, SingleJointBound
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import NEVER
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.least_time import least_time, least_way
+from joulepath.optimizer.kinematics.tcp import flange_pose
+from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.kinematics.ur_closed_form import URClosedForm
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.stop_path import StopPath
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.search.lower_bound import LeastBound
+from joulepath.optimizer.sequence import free_orientations
+from joulepath.optimizer.sequence.free_ends_chain import FreeEndsChain
+from joulepath.optimizer.sequence.round_search import RoundSearch
+from joulepath.optimizer.sequence.single_joint_bound import Boxes, SingleJointBound
 from tests.optimizer.moves import AMPLE
 from tests.optimizer.sequence.rounds import HOME, PART
 from tests.selection import long_but
@@ -130,7 +130,7 @@ def test_no_chain_has_less(seed: int, robot: str) -> None:
 def test_fewer_rounds_give_a_weaker_bound(monkeypatch: pytest.MonkeyPatch) -> None:
     asked, bounds = _round(0), []
     for rounds in (0, 6):
-        monkeypatch.setattr("optimizer.sequence.free_ends_chain.ROUNDS", rounds)
+        monkeypatch.setattr("joulepath.optimizer.sequence.free_ends_chain.ROUNDS", rounds)
         bounds.append(_chain(asked).least(NEVER))
     assert 0 < bounds[0] < bounds[1]
 

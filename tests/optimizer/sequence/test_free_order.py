@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.exceptions import ContradictoryOrder, DeadlineExceeded, InvalidProblem
-from optimizer.optimize_round import optimize_round
-from optimizer.problem.free_order import FreeOrder
-from optimizer.problem.work_round import WorkRound
-from optimizer.sequence.round_search import RoundSearch
-from optimizer.sequence.tours import Tours
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import ContradictoryOrder, DeadlineExceeded, InvalidProblem
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.problem.free_order import FreeOrder
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.sequence.round_search import RoundSearch
+from joulepath.optimizer.sequence.tours import Tours
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.sequence.rounds import pick_and_place
 from tests.optimizer.sequence.test_lines import with_lines

@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from models.robot import Array
-from optimizer.exceptions import DeadlineExceeded, InvalidProblem, UnreachablePose
-from optimizer.optimize_round import optimize_round
-from optimizer.problem.arm import Arm
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.line import Line
-from optimizer.problem.pose import Pose
-from optimizer.problem.stop_path import StopPath
-from optimizer.problem.stops import Stop
-from optimizer.problem.tool_path import ToolPath
-from optimizer.problem.work_round import WorkRound
-from optimizer.sequence import free_orientations, ways
-from optimizer.sequence.round_solution import RoundSolution
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, UnreachablePose
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.line import Line
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.stop_path import StopPath
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.sequence import free_orientations, ways
+from joulepath.optimizer.sequence.round_solution import RoundSolution
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import AMPLE, ROBOT, tcp_pose
 from tests.optimizer.sequence.rounds import HOME

@@ -8,15 +8,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from optimizer.optimize_round import optimize_round
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.problem import Problem
-from optimizer.problem.scene import Box, Obstacle, Scene
-from optimizer.problem.stops import Stop
-from optimizer.problem.work_round import WorkRound
-from optimizer.sequence.known_motions import KnownMotion, KnownMotions, knowing
-from optimizer.sequence.round_solution import RoundSolution
-from optimizer.trajectories.spline import Spline
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.sequence.known_motions import KnownMotion, KnownMotions, knowing
+from joulepath.optimizer.sequence.round_solution import RoundSolution
+from joulepath.optimizer.trajectories.spline import Spline
 from tests.optimizer.moves import ROBOT
 from tests.optimizer.sequence.rounds import HOME, pick_and_place
 from tests.optimizer.sequence.test_optimize_round import assert_true

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.deadline import NEVER
-from optimizer.exceptions import DeadlineExceeded, NoSequence
-from optimizer.sequence.lazy_search import LazySearch
-from optimizer.sequence.legs import Leg
-from optimizer.trajectories.spline import Spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import NEVER
+from joulepath.optimizer.exceptions import DeadlineExceeded, NoSequence
+from joulepath.optimizer.sequence.lazy_search import LazySearch
+from joulepath.optimizer.sequence.legs import Leg
+from joulepath.optimizer.trajectories.spline import Spline
 
 RANGE = 3.0
 ROUNDING = 1e-9

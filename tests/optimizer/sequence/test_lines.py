@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from optimizer.exceptions import InvalidProblem, PathInfeasible, StopInCollision
-from optimizer.optimize import optimize
-from optimizer.optimize_round import optimize_round
-from optimizer.problem.arm import Arm
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.line import Line
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.scene import Box, Obstacle, Scene
-from optimizer.problem.stops import Stop
-from optimizer.problem.work_round import WorkRound
-from optimizer.sequence.ways import layers_of
+from joulepath.optimizer.exceptions import InvalidProblem, PathInfeasible, StopInCollision
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.line import Line
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.sequence.ways import layers_of
 from tests.optimizer.moves import AMPLE, ROBOT, tcp_pose
 from tests.optimizer.sequence.rounds import HOME, pick_and_place
 from tests.optimizer.sequence.test_optimize_round import assert_true

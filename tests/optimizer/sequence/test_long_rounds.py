@@ -8,15 +8,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from optimizer.exceptions import InvalidProblem
-from optimizer.optimize_round import optimize_round
-from optimizer.problem.arm import Payload
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.work_round import WorkRound
-from optimizer.progress import Event, Improved
-from optimizer.sequence import legs, round_search
-from optimizer.sequence.round_search import MANY_STOPS
-from optimizer.sequence.round_solution import RoundSolution
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.progress import Event, Improved
+from joulepath.optimizer.sequence import legs, round_search
+from joulepath.optimizer.sequence.round_search import MANY_STOPS
+from joulepath.optimizer.sequence.round_solution import RoundSolution
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.sequence.rounds import PART, pick_and_place
 

@@ -9,17 +9,17 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from optimizer.exceptions import InvalidProblem, RoundTooShort
-from optimizer.optimize_round import optimize_round
-from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.free_order import FreeOrder
-from optimizer.problem.problem import Problem
-from optimizer.search.mechanical_bound import mechanical_bounds
-from optimizer.search.priced_work import CELLS, WORKS, priced_work_bounds
-from optimizer.sequence.round_solution import RoundSolution
-from optimizer.sequence.ways import layers_of
-from optimizer.trajectories.seven_segment import shortest_duration
-from optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.optimizer.exceptions import InvalidProblem, RoundTooShort
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.free_order import FreeOrder
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.search.mechanical_bound import mechanical_bounds
+from joulepath.optimizer.search.priced_work import CELLS, WORKS, priced_work_bounds
+from joulepath.optimizer.sequence.round_solution import RoundSolution
+from joulepath.optimizer.sequence.ways import layers_of
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.moves import ROBOT
 from tests.optimizer.sequence.rounds import HOME, pick_and_place
 from tests.selection import long_but

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.energy.dwell import holding_power
-from optimizer.exceptions import (
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.dwell import holding_power
+from joulepath.optimizer.exceptions import (
     DeadlineExceeded,
     InvalidProblem,
     NoSequence,
@@ -20,21 +20,21 @@ from optimizer.exceptions import (
     StopInCollision,
     UnreachablePose,
 )
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.optimize import optimize
-from optimizer.optimize_round import optimize_round
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.scene import Box, Obstacle, Scene
-from optimizer.problem.stops import Stop
-from optimizer.problem.targets import AnyOf
-from optimizer.problem.work_round import WorkRound
-from optimizer.search.ends import EndConfiguration
-from optimizer.sequence.round_solution import RoundSolution
-from optimizer.sequence.ways import layers_of
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.search.ends import EndConfiguration
+from joulepath.optimizer.sequence.round_solution import RoundSolution
+from joulepath.optimizer.sequence.ways import layers_of
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import AMPLE, ROBOT, torques
 from tests.optimizer.sequence.rounds import HOME, PART, pick_and_place, poses

@@ -10,28 +10,28 @@ from typing import Any
 import numpy as np
 import pytest
 
-from optimizer.exceptions import DeadlineExceeded, InvalidProblem, RoundTooShort
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.optimize_round import optimize_round
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.free_order import FreeOrder
-from optimizer.problem.line import Line
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.stops import Stop
-from optimizer.problem.targets import AnyOf
-from optimizer.problem.work_round import MOST_PASSES, WorkRound
-from optimizer.search.run import Run
-from optimizer.sequence.against_stopping import as_passed, start_from
-from optimizer.sequence.passing_leg import PassingLeg
-from optimizer.sequence.round_search import RoundSearch
-from optimizer.sequence.round_solution import RoundSolution
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, RoundTooShort
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.free_order import FreeOrder
+from joulepath.optimizer.problem.line import Line
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.problem.work_round import MOST_PASSES, WorkRound
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.sequence.against_stopping import as_passed, start_from
+from joulepath.optimizer.sequence.passing_leg import PassingLeg
+from joulepath.optimizer.sequence.round_search import RoundSearch
+from joulepath.optimizer.sequence.round_solution import RoundSolution
 from tests.optimizer.moves import AMPLE, ROBOT
 from tests.optimizer.sequence.rounds import HOME, PART, poses
 from tests.selection import long_but
 
 # the package has the function of this name
-optimize_round_module = importlib.import_module("optimizer.optimize_round")
+optimize_round_module = importlib.import_module("joulepath.optimizer.optimize_round")
 
 ROUNDING = 1e-9
 # relative; a motion's energy from panels that are as long as a share of it

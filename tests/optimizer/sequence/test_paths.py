@@ -9,23 +9,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from optimizer.exceptions import InvalidProblem, PathInfeasible
-from optimizer.optimize import optimize
-from optimizer.optimize_round import optimize_round
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.line import Line
-from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
-from optimizer.problem.scene import Box, Obstacle, Scene
-from optimizer.problem.stop_path import StopPath
-from optimizer.problem.stops import Stop
-from optimizer.problem.targets import AnyOf
-from optimizer.problem.tool_path import ToolPath
-from optimizer.problem.work_round import WorkRound
-from optimizer.sequence.priced_search import priced_motion
-from optimizer.sequence.round_search import RoundSearch
-from optimizer.sequence.ways import layers_of
+from joulepath.optimizer.exceptions import InvalidProblem, PathInfeasible
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.line import Line
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
+from joulepath.optimizer.problem.stop_path import StopPath
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.sequence.priced_search import priced_motion
+from joulepath.optimizer.sequence.round_search import RoundSearch
+from joulepath.optimizer.sequence.ways import layers_of
 from tests.optimizer.moves import AMPLE, ROBOT, tcp_pose
 from tests.optimizer.sequence.rounds import HOME, PART, pick_and_place
 from tests.optimizer.sequence.test_lines import INTO

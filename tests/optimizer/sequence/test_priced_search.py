@@ -7,13 +7,13 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.deadline import NEVER
-from optimizer.exceptions import NoTrajectory
-from optimizer.sequence import priced_search
-from optimizer.sequence.legs import Leg
-from optimizer.sequence.priced_search import MoveOfALeg, PricedMotion
-from optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import NEVER
+from joulepath.optimizer.exceptions import NoTrajectory
+from joulepath.optimizer.sequence import priced_search
+from joulepath.optimizer.sequence.legs import Leg
+from joulepath.optimizer.sequence.priced_search import MoveOfALeg, PricedMotion
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 
 LONGEST = 4.0
 Q: Array = np.zeros(6)

@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.robot import Robot
-from models.uncertainty.spread import spread_of
-from optimizer.energy.dwell import dwell_energy, holding_power
-from optimizer.energy.losses import breakdown
-from optimizer.energy.plant import REPORT_NODES
-from optimizer.optimize_round import optimize_round
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.stops import Stop
-from optimizer.problem.work_round import WorkRound
-from optimizer.sequence.round_solution import Move
-from optimizer.trajectories.spline import fine_samples
+from joulepath.models.robot import Robot
+from joulepath.models.uncertainty.spread import spread_of
+from joulepath.optimizer.energy.dwell import dwell_energy, holding_power
+from joulepath.optimizer.energy.losses import breakdown
+from joulepath.optimizer.energy.plant import REPORT_NODES
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.sequence.round_solution import Move
+from joulepath.optimizer.trajectories.spline import fine_samples
 from tests.optimizer.energy.test_interval import nominal, with_values
 from tests.optimizer.moves import AMPLE, GOAL, PAYLOAD, ROBOT, START, fixed, problem, torques
 

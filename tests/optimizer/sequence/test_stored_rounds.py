@@ -9,17 +9,17 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from models.robot import Array
-from optimizer.energy.bus_flow import charges, pooled
-from optimizer.energy.plant import Plant
-from optimizer.optimize_round import optimize_round
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.bus import Bus
-from optimizer.problem.stops import Stop
-from optimizer.problem.work_round import WorkRound
-from optimizer.sequence.round_solution import RoundSolution
-from optimizer.sequence.stored_charge import Demand, charges_of, drawn
-from optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.bus_flow import charges, pooled
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.sequence.round_solution import RoundSolution
+from joulepath.optimizer.sequence.stored_charge import Demand, charges_of, drawn
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.moves import AMPLE, ROBOT
 from tests.selection import long_but
 

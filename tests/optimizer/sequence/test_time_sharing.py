@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from optimizer.optimize_round import WELL_SHARED
-from optimizer.sequence.time_sharing import SETTLED, SHARED, WORTH_SLOWING, TimeSharing
+from joulepath.optimizer.optimize_round import WELL_SHARED
+from joulepath.optimizer.sequence.time_sharing import SETTLED, SHARED, WORTH_SLOWING, TimeSharing
 
 # W: what a wait draws
 WAITING = 5.0

@@ -10,20 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from optimizer.energy.dwell import holding_power
-from optimizer.exceptions import DeadlineExceeded, InvalidProblem, JoulepathError, NoTrajectory, RoundTooShort
-from optimizer.optimize import optimize
-from optimizer.optimize_round import optimize_round
-from optimizer.problem.branches import BranchFilter
-from optimizer.problem.problem import Problem
-from optimizer.problem.stops import Stop
-from optimizer.problem.work_round import WorkRound
-from optimizer.sequence.round_search import RoundSearch
-from optimizer.sequence.round_solution import RoundSolution
-from optimizer.sequence.time_sharing import TimeSharing
-from optimizer.sequence.time_sharing import duration_of as duration_of_all
-from optimizer.sequence.timed_round import TimedSearch
-from optimizer.sequence.ways import layers_of
+from joulepath.optimizer.energy.dwell import holding_power
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, JoulepathError, NoTrajectory, RoundTooShort
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.work_round import WorkRound
+from joulepath.optimizer.sequence.round_search import RoundSearch
+from joulepath.optimizer.sequence.round_solution import RoundSolution
+from joulepath.optimizer.sequence.time_sharing import TimeSharing
+from joulepath.optimizer.sequence.time_sharing import duration_of as duration_of_all
+from joulepath.optimizer.sequence.timed_round import TimedSearch
+from joulepath.optimizer.sequence.ways import layers_of
 from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.moves import AMPLE, fixed, torques
 from tests.optimizer.sequence.rounds import HOME, pick_and_place

@@ -11,22 +11,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from models.robot import Array
-from optimizer.collision.model import collision_model
-from optimizer.energy.plant import Plant
-from optimizer.exceptions import DeadlineExceeded, InvalidProblem
-from optimizer.optimize import optimize
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.cycle import Cycle
-from optimizer.problem.scene import Box, Obstacle, Scene
-from optimizer.simulation.baseline_courses import ReportedBaseline, planned_baselines
-from optimizer.simulation.planned import PlannedMotion, PlannedTorques
-from optimizer.simulation.reference import MOST_STEPS, course_of
-from optimizer.simulation.replay import Replay, replay
-from optimizer.solution import Solution
-from optimizer.trajectories.spline import Spline
-from optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.model import collision_model
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
+from joulepath.optimizer.simulation.baseline_courses import ReportedBaseline, planned_baselines
+from joulepath.optimizer.simulation.planned import PlannedMotion, PlannedTorques
+from joulepath.optimizer.simulation.reference import MOST_STEPS, course_of
+from joulepath.optimizer.simulation.replay import Replay, replay
+from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import GOAL, PAYLOAD, START, problem, tcp_pose
 

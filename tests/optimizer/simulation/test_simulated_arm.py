@@ -11,17 +11,28 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.registry import load_robot, robot_names
-from models.robot import Array, Robot
-from optimizer.collision.model import collision_model
-from optimizer.kinematics.rigid_body_model import rigid_body_model
-from optimizer.kinematics.tcp import tcp_pose
-from optimizer.problem.arm import Arm, Payload
-from optimizer.problem.clouds import Points
-from optimizer.problem.scene import Attachment, Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Scene, Shape, Sphere
-from optimizer.simulation.shapes import unsimulated
-from optimizer.simulation.simulated_arm import SimulatedArm, with_changes
-from optimizer.simulation.simulator import mujoco
+from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.collision.model import collision_model
+from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.clouds import Points
+from joulepath.optimizer.problem.scene import (
+    Attachment,
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    Obstacle,
+    Scene,
+    Shape,
+    Sphere,
+)
+from joulepath.optimizer.simulation.shapes import unsimulated
+from joulepath.optimizer.simulation.simulated_arm import SimulatedArm, with_changes
+from joulepath.optimizer.simulation.simulator import mujoco
 from tests.models.own_arm.arms import RICH_ARM
 from tests.models.own_arm.arms import robot as own_arm
 from tests.optimizer.moves import PAYLOAD, START, TILTED
@@ -192,7 +203,7 @@ def test_only_a_replay_imports_mujoco() -> None:
         "import sys, app.main, app.server, app.tasks.replay, optimizer.simulation.replay\n"
         "from tests.optimizer.moves import problem; from optimizer import optimize\n"
         "optimize(problem()); print('mujoco' in sys.modules)\n"
-        "from optimizer.simulation.simulator import mujoco; mujoco(); print('mujoco' in sys.modules)\n"
+        "from joulepath.optimizer.simulation.simulator import mujoco; mujoco(); print('mujoco' in sys.modules)\n"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert (run.stdout.split(), run.stderr) == (["False", "True"], "")

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from models.robot import Array
-from optimizer.trajectories import bspline, quintic
-from optimizer.trajectories.bspline import DEGREE, REST_POINTS, Basis
-from optimizer.trajectories.quadrature import quadrature
+from joulepath.models.robot import Array
+from joulepath.optimizer.trajectories import bspline, quintic
+from joulepath.optimizer.trajectories.bspline import DEGREE, REST_POINTS, Basis
+from joulepath.optimizer.trajectories.quadrature import quadrature
 
 EXACT = 1e-11  # a few dozen operations in double precision, on basis functions of order 1
 # absolute, times (points per unit)^d: differentiating d times multiplies rounding by the inverse of a span's length

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from optimizer.trajectories.ruckig_motion import time_optimal_positions, time_optimal_spline
-from optimizer.trajectories.spline import least_time_scale, sample
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.trajectories.ruckig_motion import time_optimal_positions, time_optimal_spline
+from joulepath.optimizer.trajectories.spline import least_time_scale, sample
 
 MOVES = 40
 # relative: jumps of jerk that become one change the jerk of short phases

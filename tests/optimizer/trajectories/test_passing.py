@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from optimizer.trajectories import bspline
-from optimizer.trajectories.joined import joined
-from optimizer.trajectories.passing import deviations, pass_times
-from optimizer.trajectories.spline import Spline, peak_rates, sample, spline_of
-from optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.trajectories.joined import joined
+from joulepath.optimizer.trajectories.passing import deviations, pass_times
+from joulepath.optimizer.trajectories.spline import Spline, peak_rates, sample, spline_of
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 
 ROUNDING = 1e-12
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from models.robot import Array
-from optimizer.trajectories.polynomial import cardinals, chebyshev, polynomials
-from optimizer.trajectories.spline import peak_rates, sample, spline_of
+from joulepath.models.robot import Array
+from joulepath.optimizer.trajectories.polynomial import cardinals, chebyshev, polynomials
+from joulepath.optimizer.trajectories.spline import peak_rates, sample, spline_of
 
 COUNTS = [1, 4, 8, 10, 12]
 EXACT = 1e-10  # Bernstein's coefficients of degree 17 reach 5e3 times the values: five digits of sixteen are lost

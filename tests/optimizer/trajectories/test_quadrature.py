@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from optimizer.trajectories.quadrature import lobatto_nodes, lobatto_panels
+from joulepath.optimizer.trajectories.quadrature import lobatto_nodes, lobatto_panels
 
 ROUNDING = 1e-14  # relative; sums of some hundred products
 BREAKS = np.array([0.3, 0.31, 0.9, 1.7])

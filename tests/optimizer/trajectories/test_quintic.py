@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from optimizer.trajectories.quintic import PEAKS, coefficients, derivatives, fraction
+from joulepath.optimizer.trajectories.quintic import PEAKS, coefficients, derivatives, fraction
 
 S = Polynomial([0, 0, 0, 10, -15, 6])
 TAU = np.linspace(0.0, 1.0, 101)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from optimizer.trajectories import bspline, seven_segment
-from optimizer.trajectories.ramp_knots import RampKnots
+from joulepath.optimizer.trajectories import bspline, seven_segment
+from joulepath.optimizer.trajectories.ramp_knots import RampKnots
 from tests.optimizer.moves import limits
 
 RAMPS = RampKnots()

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.registry import load_robot
-from optimizer.trajectories import ruckig_motion
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.trajectories import ruckig_motion
 
 # rad, rad/s, rad/s²: rounding of polynomials whose jerk is up to some 1e4 rad/s³
 ROUNDING = 1e-10

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import ruckig
 
-from models.robot import Array
-from optimizer.trajectories.seven_segment import shortest_duration, switches
+from joulepath.models.robot import Array
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration, switches
 from tests.optimizer.moves import limits
 
 CASES = 1000

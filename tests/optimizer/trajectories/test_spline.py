@@ -5,8 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from optimizer.trajectories.ruckig_motion import time_optimal_spline
-from optimizer.trajectories.spline import lasting, least_time_scale, peak_rates, retimed, time_scale, time_scales
+from joulepath.optimizer.trajectories.ruckig_motion import time_optimal_spline
+from joulepath.optimizer.trajectories.spline import (
+    lasting,
+    least_time_scale,
+    peak_rates,
+    retimed,
+    time_scale,
+    time_scales,
+)
 from tests.optimizer.moves import GOAL, ROBOT, START, limits
 
 MOTION = time_optimal_spline(ROBOT.limits, START, GOAL)

@@ -1,0 +1,11 @@
+"""Finds the motion of least energy of a robot arm: `optimize(Problem(arm=…, start=…, goal=…))` returns a `Solution`.
+
+The public names are those that `__init__.pyi` imports. Each is loaded when it is first used, so that `import joulepath`
+takes no time in processes that need a part of the package only.
+"""
+
+import lazy_loader
+
+__version__ = "0.1.0"
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,77 @@
+__version__: str
+
+from .models.registry import load_robot
+from .optimizer.exceptions import (
+    ContradictoryOrder,
+    DeadlineExceeded,
+    DurationTooShort,
+    InvalidProblem,
+    JoulepathError,
+    NoReachableTarget,
+    NoSequence,
+    NoTrajectory,
+    OutsideLimits,
+    PathInfeasible,
+    RoundTooShort,
+    SingularPose,
+    TorqueInfeasible,
+    UnknownRobot,
+    UnreachablePose,
+)
+from .optimizer.optimize import optimize
+from .optimizer.optimize_many import Optimized, optimize_many
+from .optimizer.optimize_round import optimize_round
+from .optimizer.pareto import Front, pareto
+from .optimizer.problem.arm import Arm, Payload
+from .optimizer.problem.branches import BranchFilter
+from .optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from .optimizer.problem.line import Line
+from .optimizer.problem.pose import Pose
+from .optimizer.problem.problem import Problem
+from .optimizer.problem.stop_path import StopPath
+from .optimizer.problem.stops import Stop
+from .optimizer.problem.targets import AnyOf
+from .optimizer.problem.tool_path import ToolPath
+from .optimizer.problem.work_round import WorkRound
+from .optimizer.sequence.round_solution import RoundSolution
+from .optimizer.solution import Solution
+
+__all__ = [
+    "AnyOf",
+    "Arm",
+    "BranchFilter",
+    "ConeOrientedPose",
+    "ContradictoryOrder",
+    "DeadlineExceeded",
+    "DurationTooShort",
+    "Front",
+    "InvalidProblem",
+    "JoulepathError",
+    "Line",
+    "NoReachableTarget",
+    "NoSequence",
+    "NoTrajectory",
+    "Optimized",
+    "OutsideLimits",
+    "PathInfeasible",
+    "Payload",
+    "Pose",
+    "Problem",
+    "RoundSolution",
+    "RoundTooShort",
+    "SingularPose",
+    "Solution",
+    "Stop",
+    "StopPath",
+    "ToolPath",
+    "TorqueInfeasible",
+    "UnknownRobot",
+    "UnreachablePose",
+    "WorkRound",
+    "__version__",
+    "load_robot",
+    "optimize",
+    "optimize_many",
+    "optimize_round",
+    "pareto",
+]
