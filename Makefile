@@ -29,12 +29,12 @@ comma := ,
 
 .PHONY: serve test test-long bench lock clean ready lint kernels pytest pytest-long
 
-serve: $(VENV)/.runtime $(STUDIO)/vendor kernels
+serve: $(VENV)/.runtime $(VENV)/.package kernels
 	JOULEPATH_HOST=$(HOST) PORT=$(PORT) exec $(PY) -m joulepath.app
 
 # what the tests need, side by side; bytecode, since they start many processes, even where those may write none
 ready: $(VENV)/.runtime $(COMPILER)
-	@$(MAKE) --no-print-directory --jobs=3 $(VENV)/.dev $(STUDIO)/vendor kernels
+	@$(MAKE) --no-print-directory --jobs=3 $(VENV)/.dev $(VENV)/.package kernels
 	@$(PY) -m compileall -q app optimizer models
 
 # the linters run beside the tests
@@ -68,6 +68,11 @@ $(VENV)/.runtime: requirements.lock $(PY)
 	@$(INSTALL) $<
 	@$(PY) scripts/slim.py $(VENV)
 	@$(PY) scripts/link_libgomp.py
+	@touch $@
+
+# The package itself: `joulepath` and `import joulepath` work from any folder, with the sources of this one.
+$(VENV)/.package: pyproject.toml scripts/build_hook.py $(VENV)/.runtime $(STUDIO)/vendor
+	@$(PY) -m pip install --quiet --disable-pip-version-check --no-deps --editable .
 	@touch $@
 
 # The libraries of the studio page.

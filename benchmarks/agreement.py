@@ -4,7 +4,7 @@
     python -m benchmarks.agreement --count 10 --kind "isolated bus"
 
 Every random request is answered by `/optimize` with a free duration, with the duration of that answer and with
-durations around it, by `/pareto`, by `/compare`, and by `/cycle` as an open round of one stop. All are the same
+durations around it, by `/pareto`, by `/compare`, and by `/cycle` as an open cycle of one stop. All are the same
 problem, or a more constrained one. Reported are the relative differences of the energies from that of the free answer;
 of durations around it, what they need less. The requests of the worst differences are printed.
 """
@@ -138,7 +138,7 @@ def _fixed(outcome: Outcome, energy: float, duration: float, deadline: float) ->
 
 
 def _others(outcome: Outcome, energy: float, free: Json, deadline: float) -> None:
-    """The last point of a front, the row of a comparison, and the round of one stop."""
+    """The last point of a front, the row of a comparison, and the cycle of one stop."""
     body = outcome.request
     front = _answer(
         outcome, "front", ParetoTask(ParetoRequest.model_validate(body | {"points": POINTS}), "", "json"), deadline
@@ -154,9 +154,9 @@ def _others(outcome: Outcome, energy: float, free: Json, deadline: float) -> Non
     fields = {key: value for key, value in body.items() if key != "goal"}
     stops = [{"name": "goal", "target": body["goal"]}]
     asked = CycleRequest.model_validate(fields | {"stops": stops, "closed": False})
-    found = _answer(outcome, "round", CycleTask(asked, ""), deadline)
+    found = _answer(outcome, "cycle", CycleTask(asked, ""), deadline)
     if found is not None:
-        outcome.differences["round"] = _energy(found) / energy - 1
+        outcome.differences["cycle"] = _energy(found) / energy - 1
 
 
 def _answer(outcome: Outcome, name: str, task: Any, deadline: float) -> Json | None:
@@ -176,7 +176,7 @@ def _energy(answer: Json) -> float:
 def summary(outcomes: list[Outcome]) -> Json:
     """The spread of the differences by endpoint, with the request of the worst; and what was refused."""
     answered = [each for each in outcomes if np.isfinite(each.energy)]
-    names = ("fixed", "fixed around", "front", "compare", "round")
+    names = ("fixed", "fixed around", "front", "compare", "cycle")
     rows = {name: [each for each in answered if name in each.differences] for name in names}
     return {
         "count": len(outcomes),

@@ -6,7 +6,7 @@
 Every request is solved, and its lower bound kept. Then motions are optimised from random starts on POINTS control
 points, each to a random configuration that reaches the goal, from one that reaches the start: any branch, any full
 turn, any member of a self-motion, any allowed orientation. The kinds of targets take turns, and half of the requests
-has other conditions: payload, mounting, bus, cycle, a fixed duration, the mechanical objective. With `--load` friction
+has other conditions: payload, mounting, bus, dwell, a fixed duration, the mechanical objective. With `--load` friction
 grows with the torque that a joint carries.
 """
 
@@ -38,7 +38,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import AnyOf
@@ -128,7 +128,7 @@ def _conditions(robot: Robot, rng: np.random.Generator) -> tuple[Arm, dict[str, 
         duration = float(rng.uniform(1.5, 5.0))
         fields = {"duration_min": duration, "duration_max": duration}
     elif kind == 2:
-        fields = {"cycle": Cycle(time=float(rng.uniform(4.0, 8.0)), hold="motors")}
+        fields = {"dwell": Dwell(time=float(rng.uniform(4.0, 8.0)), hold="motors")}
     return arm, fields
 
 

@@ -156,13 +156,13 @@ def mechanical(rng: np.random.Generator) -> Fields:
 
 
 def glass(rng: np.random.Generator) -> Fields:
-    """A tool cone around an axis that both ends keep upright, and a cycle."""
+    """A tool cone around an axis that both ends keep upright, and a dwell."""
     robot = load_robot(ROBOT)
     q = collision_free(rng, robot)
     axis = flange(robot, q)[:3, :3].T @ [0.0, 0.0, 1.0]
     cone = {"axis": axis.tolist(), "direction": [0.0, 0.0, 1.0], "half_angle": 0.3}
     moved = (q + rng.uniform(-2, 2, 6) * [1, 0, 0, 0, 0, 0]).clip(robot.limits.q_min, robot.limits.q_max)
-    return {"start": {"q": q.tolist()}, "goal": {"q": moved.tolist()}, "tool_cone": cone, "cycle": {"time": 8.0}}
+    return {"start": {"q": q.tolist()}, "goal": {"q": moved.tolist()}, "tool_cone": cone, "dwell": {"time": 8.0}}
 
 
 def methods(rng: np.random.Generator) -> Fields:

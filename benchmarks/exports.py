@@ -25,16 +25,16 @@ from benchmarks.read_back.random_motions import OWN, one_move
 from benchmarks.read_back.urscript_machine import Controller
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import FormatUnsuitable
-from joulepath.optimizer.exports.csv_table import to_csv
-from joulepath.optimizer.exports.franka import ROUNDING, to_franka
-from joulepath.optimizer.exports.json_document import to_json
-from joulepath.optimizer.exports.krl import to_krl
-from joulepath.optimizer.exports.npz_arrays import to_npz
-from joulepath.optimizer.exports.program import Move, Program
-from joulepath.optimizer.exports.quintic_points import POSITION_TOLERANCE
-from joulepath.optimizer.exports.rapid import to_rapid
-from joulepath.optimizer.exports.ros_messages import to_moveit, to_ros2
-from joulepath.optimizer.exports.urscript import SET_POINT_ERROR, to_urscript
+from joulepath.optimizer.export.csv_table import to_csv
+from joulepath.optimizer.export.franka import ROUNDING, to_franka
+from joulepath.optimizer.export.json_document import to_json
+from joulepath.optimizer.export.krl import to_krl
+from joulepath.optimizer.export.npz_arrays import to_npz
+from joulepath.optimizer.export.program import Move, Program
+from joulepath.optimizer.export.quintic_points import POSITION_TOLERANCE
+from joulepath.optimizer.export.rapid import to_rapid
+from joulepath.optimizer.export.ros_messages import to_moveit, to_ros2
+from joulepath.optimizer.export.urscript import SET_POINT_ERROR, to_urscript
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.trajectories.spline import Spline

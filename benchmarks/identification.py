@@ -31,17 +31,17 @@ from benchmarks.identification_standins import TORQUE_SENSOR, behind_the_gears, 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Robot
 from joulepath.models.uncertainty.ranges import P95
-from joulepath.optimizer.identification.arm.base_parameters import base_parameters
-from joulepath.optimizer.identification.estimates.estimate import Name
-from joulepath.optimizer.identification.fits.base_fit import BaseFit, base_arm, fit_base
-from joulepath.optimizer.identification.fits.fitting import fit_rows
-from joulepath.optimizer.identification.identify import fit
-from joulepath.optimizer.identification.options import Options
-from joulepath.optimizer.identification.quality.interval import energy_sd, spread_of
-from joulepath.optimizer.identification.quality.validation import power_errors, torque_errors
-from joulepath.optimizer.identification.results import TorqueErrors
-from joulepath.optimizer.identification.rows.clusters import clusters_of
-from joulepath.optimizer.identification.rows.fit_rows import Rows, rows_of
+from joulepath.optimizer.identify.arm.base_parameters import base_parameters
+from joulepath.optimizer.identify.estimates.estimate import Name
+from joulepath.optimizer.identify.fits.base_fit import BaseFit, base_arm, fit_base
+from joulepath.optimizer.identify.fits.fitting import fit_rows
+from joulepath.optimizer.identify.identify import fit
+from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.quality.interval import energy_sd, spread_of
+from joulepath.optimizer.identify.quality.validation import power_errors, torque_errors
+from joulepath.optimizer.identify.results import TorqueErrors
+from joulepath.optimizer.identify.rows.clusters import clusters_of
+from joulepath.optimizer.identify.rows.fit_rows import Rows, rows_of
 from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import Truth, off_the_model, recorded, truth_of
 

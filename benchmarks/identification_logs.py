@@ -14,9 +14,9 @@ from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.own_arm.robots import own_robot
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.identification.logs.log import Log
-from joulepath.optimizer.identification.logs.reading import read_log
-from joulepath.optimizer.identification.options import Coupling
+from joulepath.optimizer.identify.logs.log import Log
+from joulepath.optimizer.identify.logs.reading import read_log
+from joulepath.optimizer.identify.options import Coupling
 
 PLACE = "JOULEPATH_TEST_DATA"
 MISSING = f"{PLACE} does not name the folder of the real logs."

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.signal import lfilter
 
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.identification.logs.log import Log
-from joulepath.optimizer.identification.logs.reading import read_log
+from joulepath.optimizer.identify.logs.log import Log
+from joulepath.optimizer.identify.logs.reading import read_log
 from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import Noise, Recording, Truth, csv_of, recorded, rigid_torques, with_current
 

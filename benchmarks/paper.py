@@ -21,11 +21,11 @@ from scipy.stats import spearmanr
 from joulepath import Problem, optimize
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
+from joulepath.optimizer.evaluate.evaluate import Evaluation, evaluate
+from joulepath.optimizer.evaluate.recording import Waypoints
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.replay.evaluate import Evaluation, evaluate
-from joulepath.optimizer.replay.recording import Waypoints
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "paper.md"

@@ -32,11 +32,11 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.simulation.baseline_courses import ReportedBaseline, planned_baselines
-from joulepath.optimizer.simulation.planned import PlannedMotion, PlannedTorques
-from joulepath.optimizer.simulation.reference import course_of
-from joulepath.optimizer.simulation.replay import Replay, replay
-from joulepath.optimizer.simulation.simulated_arm import SimulatedArm
+from joulepath.optimizer.replay.baseline_courses import ReportedBaseline, planned_baselines
+from joulepath.optimizer.replay.planned import PlannedMotion, PlannedTorques
+from joulepath.optimizer.replay.reference import course_of
+from joulepath.optimizer.replay.replay import Replay, replay
+from joulepath.optimizer.replay.simulated_arm import SimulatedArm
 from joulepath.optimizer.solution import Solution
 
 ROBOTS = ("ur5e", "ur10e", "panda", "kr10_r1100", "iiwa14", "ur3e", "xarm7")

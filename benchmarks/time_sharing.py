@@ -25,7 +25,7 @@ from scipy.optimize import LinearConstraint, brentq, minimize
 
 from benchmarks.command import parser, write_json
 from joulepath.models.robot import Array
-from joulepath.optimizer.sequence.time_sharing import TimeSharing, energy_of
+from joulepath.optimizer.cycle.time_sharing import TimeSharing, energy_of
 
 # the mode in which a robot waits on its motors
 MOTORS = "0"

@@ -18,10 +18,10 @@ from joulepath.optimizer.energy.plant import Plant
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.simulation.controller import command, gains
-from joulepath.optimizer.simulation.play import play
-from joulepath.optimizer.simulation.reference import course_of, reference
-from joulepath.optimizer.simulation.simulated_arm import SimulatedArm, with_changes
+from joulepath.optimizer.replay.controller import command, gains
+from joulepath.optimizer.replay.play import play
+from joulepath.optimizer.replay.reference import course_of, reference
+from joulepath.optimizer.replay.simulated_arm import SimulatedArm, with_changes
 
 # Okabe and Ito's palette, which colour-blind readers can tell apart
 COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]

@@ -1,8 +1,10 @@
 __version__: str
 
 from .models.registry import load_robot
+from .optimizer.cycle.cycle_solution import CycleSolution
 from .optimizer.exceptions import (
     ContradictoryOrder,
+    CycleTooShort,
     DeadlineExceeded,
     DurationTooShort,
     InvalidProblem,
@@ -12,7 +14,6 @@ from .optimizer.exceptions import (
     NoTrajectory,
     OutsideLimits,
     PathInfeasible,
-    RoundTooShort,
     SingularPose,
     TorqueInfeasible,
     UnknownRobot,
@@ -20,11 +21,12 @@ from .optimizer.exceptions import (
 )
 from .optimizer.optimize import optimize
 from .optimizer.optimize_many import Optimized, optimize_many
-from .optimizer.optimize_round import optimize_round
 from .optimizer.pareto import Front, pareto
+from .optimizer.plan_cycle import plan_cycle
 from .optimizer.problem.arm import Arm, Payload
 from .optimizer.problem.branches import BranchFilter
 from .optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from .optimizer.problem.cycle import Cycle
 from .optimizer.problem.line import Line
 from .optimizer.problem.pose import Pose
 from .optimizer.problem.problem import Problem
@@ -32,8 +34,6 @@ from .optimizer.problem.stop_path import StopPath
 from .optimizer.problem.stops import Stop
 from .optimizer.problem.targets import AnyOf
 from .optimizer.problem.tool_path import ToolPath
-from .optimizer.problem.work_round import WorkRound
-from .optimizer.sequence.round_solution import RoundSolution
 from .optimizer.solution import Solution
 
 __all__ = [
@@ -42,6 +42,9 @@ __all__ = [
     "BranchFilter",
     "ConeOrientedPose",
     "ContradictoryOrder",
+    "Cycle",
+    "CycleSolution",
+    "CycleTooShort",
     "DeadlineExceeded",
     "DurationTooShort",
     "Front",
@@ -57,8 +60,6 @@ __all__ = [
     "Payload",
     "Pose",
     "Problem",
-    "RoundSolution",
-    "RoundTooShort",
     "SingularPose",
     "Solution",
     "Stop",
@@ -67,11 +68,10 @@ __all__ = [
     "TorqueInfeasible",
     "UnknownRobot",
     "UnreachablePose",
-    "WorkRound",
     "__version__",
     "load_robot",
     "optimize",
     "optimize_many",
-    "optimize_round",
     "pareto",
+    "plan_cycle",
 ]

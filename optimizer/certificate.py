@@ -55,8 +55,8 @@ def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, rep
     if len(replay.t) > BLOCK:
         checkpoint(len(replay.t) * REST)
     energy = replay.energy
-    if problem.cycle is not None:
-        dwell = dwell_energy(problem.cycle, arm, replay.final_holding_power, spline.duration)
+    if problem.dwell is not None:
+        dwell = dwell_energy(problem.dwell, arm, replay.final_holding_power, spline.duration)
         energy = energy.with_dwell(dwell)
     clearance = proven_clearance(collision_model(arm), spline) if arm.collisions else None
     return Certificate(

@@ -14,7 +14,7 @@ JoulepathError
 │   ├── GoalInCollision
 │   └── StopInCollision
 ├── DurationTooShort
-├── RoundTooShort
+├── CycleTooShort
 ├── PathInfeasible          no configuration leads along the whole tool path
 ├── TorqueInfeasible        the arm cannot hold or move the load
 ├── NoSequence              no chain of configurations through a round
@@ -214,7 +214,7 @@ class NoSequence(JoulepathError):
         self.stop, self.reached, self.open = stop, list(reached), list(open_)
 
 
-class RoundTooShort(JoulepathError):
+class CycleTooShort(JoulepathError):
     """No round that fast was found; `shortest` [s] is the duration of the fastest one found, of which `dwells` [s]."""
 
     def __init__(self, shortest: float, dwells: float) -> None:

@@ -175,22 +175,22 @@ class PreparedProblem(Plant):
 
     def energy(self, spline: Spline) -> Energy:
         """Energy of a motion and of waiting after it, exact except for quadrature."""
-        energy, cycle = super().energy(spline), self.problem.cycle
-        if cycle is None:
+        energy, dwell = super().energy(spline), self.problem.dwell
+        if dwell is None:
             return energy
         hold = float(self.holding_power(spline.control_points[-1]))
-        return energy.with_dwell(dwell_energy(cycle, self.arm, hold, spline.duration))
+        return energy.with_dwell(dwell_energy(dwell, self.arm, hold, spline.duration))
 
     def sensitivity(self, spline: Spline) -> Sensitivity:
         """How the electrical energy of a motion, and of waiting after it, hangs on the arm's figures."""
-        moving, cycle = super().sensitivity(spline), self.problem.cycle
-        if cycle is None:
+        moving, dwell = super().sensitivity(spline), self.problem.dwell
+        if dwell is None:
             return moving
         still = np.zeros((1, self.arm.robot.nq))
         q_end = spline.control_points[-1]
         held = self.torques(q_end[None], still, still)[0]
-        times = waits(cycle, spline.duration)
-        return moving + waiting_sensitivity(self.arm, q_end, held, *times, cycle, arm_spread(self.arm))
+        times = waits(dwell, spline.duration)
+        return moving + waiting_sensitivity(self.arm, q_end, held, *times, dwell, arm_spread(self.arm))
 
     @cached_property
     def objective_parameters(self) -> Array:

@@ -35,9 +35,8 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """How an electrical energy hangs on the figures of the arm: its `gradient` (p,) in the order of
-    `joulepath.models.uncertainty.parameters`, and by how much the mean over their errors is above the energy itself
-    [J]."""
+    """Dependence of an electrical energy on the arm's figures: its `gradient` (p,) in the order of
+    `models.uncertainty.parameters`, and the excess of the mean over their errors above the energy [J]."""
 
     gradient: Array
     shift: float

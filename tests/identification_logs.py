@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.identification.logs.log import EffortMeaning, Log, Move
+from joulepath.optimizer.identify.logs.log import EffortMeaning, Log, Move
 from joulepath.optimizer.problem.arm import Payload
 
 GRAVITY = np.array([0.0, 0.0, -9.81])

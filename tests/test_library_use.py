@@ -31,8 +31,8 @@ PUBLIC = {
     "Payload",
     "Pose",
     "Problem",
-    "RoundSolution",
-    "RoundTooShort",
+    "CycleSolution",
+    "CycleTooShort",
     "SingularPose",
     "Solution",
     "Stop",
@@ -41,11 +41,11 @@ PUBLIC = {
     "TorqueInfeasible",
     "UnknownRobot",
     "UnreachablePose",
-    "WorkRound",
+    "Cycle",
     "load_robot",
     "optimize",
     "optimize_many",
-    "optimize_round",
+    "plan_cycle",
     "pareto",
 }
 
@@ -56,7 +56,7 @@ def test_the_public_names_are_a_promise() -> None:
     # `optimizer.optimize` is also a module, whose import must not hide the function
     assert callable(joulepath.optimize) and callable(joulepath.optimize_many)
     assert callable(joulepath.pareto)
-    assert callable(joulepath.optimize_round)
+    assert callable(joulepath.plan_cycle)
 
 
 def test_one_except_clause_catches_every_error() -> None:

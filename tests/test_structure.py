@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("app", "optimizer", "models")
-STOREYED = ("optimizer", "optimizer/identification", "app")  # whose floors are named
+STOREYED = ("optimizer", "optimizer/identify", "app")  # whose floors are named
 MOST_LINES = 350  # of a file
 MOST_PAGE_LINES = 3000  # of all scripts, styles and markup of the studio page
 MOST_FUNCTION_LINES = 60  # from the first decorator to the last line, docstring included

@@ -19,7 +19,7 @@ Example:
 @FILE
 @OUTPUT
 def cycle(file: str, output: Path | None) -> None:
-    """Finds the round of stops with least energy.
+    """Finds the cycle of stops with least energy.
 
     FILE is the JSON of `POST /cycle`, or - for standard input. The answer is JSON, too. If standard error is a
     terminal, a summary follows: energy, duration, status, lower bound, gap and savings.

@@ -1,4 +1,4 @@
-"""POST /cycle: from a request to a round of the library, and from its solution to the answer."""
+"""POST /cycle: from a request to a cycle of the library, and from its solution to the answer."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ from joulepath.app.schemas.path import StopPath as StopPathRequest
 from joulepath.app.schemas.response import Clearance
 from joulepath.app.schemas.stop import StopRequest
 from joulepath.models.robot import Robot
+from joulepath.optimizer.cycle.cycle_solution import CycleSolution, Move
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.free_order import FreeOrder
 from joulepath.optimizer.problem.line import Line
 from joulepath.optimizer.problem.stop_path import StopPath, at_stop
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.targets import Target
-from joulepath.optimizer.problem.work_round import WorkRound
-from joulepath.optimizer.sequence.round_solution import Move, RoundSolution
 from joulepath.optimizer.solution import Objective, Solution
 
 _PLACE = ("label", "q", "target")
 
 
-def to_work_round(request: asked.CycleRequest, deadline: float) -> WorkRound:
-    """The round of a request, of whose time `deadline` [s] is left.
+def to_cycle(request: asked.CycleRequest, deadline: float) -> Cycle:
+    """The cycle of a request, of whose time `deadline` [s] is left.
 
     Raises UnknownRobot, InvalidProblem, OutsideLimits or DeadlineExceeded.
     """
@@ -44,7 +44,7 @@ def to_work_round(request: asked.CycleRequest, deadline: float) -> WorkRound:
     with until(end):
         time, arm = request.time, to_arm(request)
     least, most = (time.min, time.max) if isinstance(time, asked.TimeRange) else (time, time)
-    return WorkRound(
+    return Cycle(
         arm=arm,
         start=to_target(request.start, arm.robot),
         stops=[_to_stop(k, stop, arm.robot) for k, stop in enumerate(request.stops)],
@@ -91,7 +91,7 @@ def _to_stop(k: int, stop: StopRequest, robot: Robot) -> Stop:
         retreat=_to_line(f"stops.{k}.retreat", stop.retreat, robot),
         path=_to_path(k, stop.path, robot),
         obstacles_ignored=stop.obstacles_ignored,
-        passed=stop.pass_,
+        via=stop.via,
     )
 
 
@@ -126,7 +126,7 @@ def _to_line(field: str, line: LineRequest | None, robot: Robot) -> Line | None:
 
 
 def to_cycle_response(
-    request: asked.CycleRequest, request_id: str, found: RoundSolution, store: Callable[[Solution], str]
+    request: asked.CycleRequest, request_id: str, found: CycleSolution, store: Callable[[Solution], str]
 ) -> dict[str, Any]:
     """The answer of `POST /cycle`; `store` keeps the answer of a move and returns its path."""
     energy = found.energy
@@ -169,8 +169,8 @@ def to_cycle_response(
     }
 
 
-def _warnings(found: RoundSolution) -> list[str]:
-    """Warnings of the round, then those of single moves, which they name."""
+def _warnings(found: CycleSolution) -> list[str]:
+    """Warnings of the cycle, then those of single moves, which they name."""
     of_all = [] if found.complete else [MISSED]
     if found.moves[0].planned.arm.robot.default_motion is None:
         of_all.append(NO_DEFAULT_MOTION)
@@ -183,7 +183,7 @@ def _warnings(found: RoundSolution) -> list[str]:
     ]
 
 
-def _divided(found: RoundSolution) -> list[tuple[str, float]]:
+def _divided(found: CycleSolution) -> list[tuple[str, float]]:
     """Where paths are divided: the stop at which a part ends, and the share of the path until there."""
     paths = [(move.planned.goal, move.planned.tool_path) for move in found.moves]
     parts = [(name, path.section) for name, path in paths if path is not None and path.section is not None]
@@ -237,7 +237,7 @@ def _legs(move: Move, objective: Objective, store: Callable[[Solution], str]) ->
     return legs
 
 
-def _worst_ratio(found: RoundSolution) -> dict[str, float]:
+def _worst_ratio(found: CycleSolution) -> dict[str, float]:
     worst: dict[str, float] = {}
     for move in found.moves:
         for name, ratio in move.solution.certificate.worst_ratio.items():
@@ -245,7 +245,7 @@ def _worst_ratio(found: RoundSolution) -> dict[str, float]:
     return worst
 
 
-def _clearance(found: RoundSolution) -> dict[str, Any] | None:
+def _clearance(found: CycleSolution) -> dict[str, Any] | None:
     """The smallest clearance, with the index of its move among the legs."""
     leg, nearest = 0, None
     for move in found.moves:

@@ -1,16 +1,16 @@
-"""A round as a table: one row per sample of its moves, two per rest."""
+"""A cycle as a table: one row per sample of its moves, two per rest."""
 
 from __future__ import annotations
 
 import csv
 from io import StringIO
 
-from joulepath.optimizer.sequence.round_solution import Move, RoundSolution
+from joulepath.optimizer.cycle.cycle_solution import CycleSolution, Move
 
 Row = list[float | str]
 
 
-def to_cycle_csv(found: RoundSolution) -> str:
+def to_cycle_csv(found: CycleSolution) -> str:
     """CSV with the columns t, leg, kind, then q, v, a, tau_motor of every joint, and power.
 
     Units as in the JSON answer. A rest has its mean power, and no torques: motors or brakes may hold the arm.

@@ -19,12 +19,12 @@ from joulepath.app.convert.solution import energy_fields
 from joulepath.app.convert.warnings import sampled_warnings
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings, SampledClearance
 from joulepath.optimizer.csv_table import FIRST_ROW
+from joulepath.optimizer.evaluate.evaluate import Evaluation
+from joulepath.optimizer.evaluate.interval_energy import IntervalEnergy
+from joulepath.optimizer.evaluate.recording import Log, Waypoints, in_blocks
+from joulepath.optimizer.evaluate.sampler import Samples
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identification.logs.recorded import Measured, motion_of
-from joulepath.optimizer.replay.evaluate import Evaluation
-from joulepath.optimizer.replay.interval_energy import IntervalEnergy
-from joulepath.optimizer.replay.recording import Log, Waypoints, in_blocks
-from joulepath.optimizer.replay.sampler import Samples
+from joulepath.optimizer.identify.logs.recorded import Measured, motion_of
 
 
 @dataclass(frozen=True)

@@ -7,17 +7,17 @@ from collections.abc import Callable
 from joulepath.app.exceptions import InvalidRequest
 from joulepath.app.schemas import export as asked
 from joulepath.app.schemas.export import OPTIONS_OF, ExportFormat, ExportRequest
-from joulepath.optimizer.exports.axes import Axes
-from joulepath.optimizer.exports.csv_table import to_csv
-from joulepath.optimizer.exports.facts import ExportedFile
-from joulepath.optimizer.exports.franka import FrankaOptions, to_franka
-from joulepath.optimizer.exports.json_document import to_json
-from joulepath.optimizer.exports.krl import KrlOptions, to_krl
-from joulepath.optimizer.exports.npz_arrays import to_npz
-from joulepath.optimizer.exports.program import Program
-from joulepath.optimizer.exports.rapid import RapidOptions, to_rapid
-from joulepath.optimizer.exports.ros_messages import Encoding, RosOptions, to_moveit, to_ros2
-from joulepath.optimizer.exports.urscript import UrscriptOptions, to_urscript
+from joulepath.optimizer.export.axes import Axes
+from joulepath.optimizer.export.csv_table import to_csv
+from joulepath.optimizer.export.facts import ExportedFile
+from joulepath.optimizer.export.franka import FrankaOptions, to_franka
+from joulepath.optimizer.export.json_document import to_json
+from joulepath.optimizer.export.krl import KrlOptions, to_krl
+from joulepath.optimizer.export.npz_arrays import to_npz
+from joulepath.optimizer.export.program import Program
+from joulepath.optimizer.export.rapid import RapidOptions, to_rapid
+from joulepath.optimizer.export.ros_messages import Encoding, RosOptions, to_moveit, to_ros2
+from joulepath.optimizer.export.urscript import UrscriptOptions, to_urscript
 
 
 def _check_options(request: ExportRequest, format: ExportFormat) -> None:

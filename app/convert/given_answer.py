@@ -13,12 +13,12 @@ from joulepath.app.exceptions import InvalidRequest
 from joulepath.app.schemas.arm import ArmRequest
 from joulepath.app.schemas.common import RobotName
 from joulepath.models.robot import Array
+from joulepath.optimizer.evaluate.sampler import MOST_SAMPLES
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.exports.certified import check_samples
-from joulepath.optimizer.exports.program import Move, Program, Rest
+from joulepath.optimizer.export.certified import check_samples
+from joulepath.optimizer.export.program import Move, Program, Rest
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.work_round import LONGEST_ROUND, MOST_STOPS
-from joulepath.optimizer.replay.sampler import MOST_SAMPLES
+from joulepath.optimizer.problem.cycle import LONGEST_ROUND, MOST_STOPS
 from joulepath.optimizer.trajectories.spline import Spline
 from joulepath.optimizer.trajectories.through_samples import spline_through
 
@@ -86,7 +86,7 @@ class _Leg(Part):
     answer: str | None
 
 
-class _Round(Part):
+class _Cycle(Part):
     """An answer of `POST /cycle`."""
 
     robot: RobotName
@@ -104,7 +104,7 @@ def to_program(answer: dict[str, Any], arm: ArmRequest | None, kept: Callable[[l
     InvalidRequest, InvalidProblem, NotCertified or UnknownRobot.
     """
     if "legs" in answer:
-        return _round(_Round.model_validate(answer), arm, kept)
+        return _cycle(_Cycle.model_validate(answer), arm, kept)
     if "trajectory" in answer or "samples" in answer:
         return Program((_move(answer, arm, "move"),))
     if _A_FRONT in answer:
@@ -117,13 +117,13 @@ def paths_of_moves(answer: dict[str, Any]) -> list[str]:
     InvalidProblem."""
     if "legs" not in answer:
         return []
-    legs = [leg for leg in _Round.model_validate(answer).legs if leg.kind in MOVING]
+    legs = [leg for leg in _Cycle.model_validate(answer).legs if leg.kind in MOVING]
     if any(leg.answer is None for leg in legs):
         raise InvalidProblem("answer", "The moves of the round are not kept: send the round to POST /cycle again.")
     return [leg.answer for leg in legs if leg.answer is not None]
 
 
-def _round(found: _Round, arm: ArmRequest | None, kept: Callable[[list[str]], list[Any]]) -> Program:
+def _cycle(found: _Cycle, arm: ArmRequest | None, kept: Callable[[list[str]], list[Any]]) -> Program:
     if arm is not None:
         raise InvalidProblem("arm", "The moves of a round have arms of their own: leave `arm` out.")
     moves = iter(kept([leg.answer for leg in found.legs if leg.answer is not None]))

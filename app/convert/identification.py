@@ -11,11 +11,11 @@ import numpy as np
 
 from joulepath.app.schemas.identifications import Fraction, IdentifyRequest
 from joulepath.models.robot import Array
-from joulepath.optimizer.identification.document import document_of
-from joulepath.optimizer.identification.fits.payload_fit import Carried
-from joulepath.optimizer.identification.identify import Identification
-from joulepath.optimizer.identification.options import Options
-from joulepath.optimizer.identification.results import Curves, Validation
+from joulepath.optimizer.identify.document import document_of
+from joulepath.optimizer.identify.fits.payload_fit import Carried
+from joulepath.optimizer.identify.identify import Identification
+from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.results import Curves, Validation
 
 DECIMALS = 4
 """Of the times, torques and powers of a picture."""

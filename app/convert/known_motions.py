@@ -8,7 +8,7 @@ import numpy as np
 import orjson
 
 from joulepath.app.convert.packed import packed, unpacked
-from joulepath.optimizer.sequence.known_motions import KnownMotion, KnownMotions
+from joulepath.optimizer.cycle.known_motions import KnownMotion, KnownMotions
 from joulepath.optimizer.trajectories.spline import Spline
 
 _SPLINE = ("degree", "knots", "control_points")

@@ -7,8 +7,8 @@ from typing import Any
 
 from joulepath.app.convert.arm import robot_named, to_payload
 from joulepath.app.schemas.logs import LogSettings
-from joulepath.optimizer.identification.logs.log import Log
-from joulepath.optimizer.identification.logs.reading import LogOptions, Reading, read_log
+from joulepath.optimizer.identify.logs.log import Log
+from joulepath.optimizer.identify.logs.reading import LogOptions, Reading, read_log
 
 
 def to_log_options(settings: LogSettings, most_bytes: int) -> LogOptions:

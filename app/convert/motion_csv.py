@@ -14,8 +14,8 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.csv_table import FIRST_ROW, header_of, line_of, numbers_of, with_points
+from joulepath.optimizer.evaluate.recording import BLOCK, LogBlock
 from joulepath.optimizer.exceptions import InvalidTable
-from joulepath.optimizer.replay.recording import BLOCK, LogBlock
 
 LONGEST_LINE = 4096
 _COLUMN = re.compile(r"t|[qva][1-9][0-9]?")

@@ -17,9 +17,9 @@ from joulepath.app.schemas.arm import Payload
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
 from joulepath.app.schemas.logs import LogSettings
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
-from joulepath.optimizer.identification.logs.log import Log
-from joulepath.optimizer.identification.logs.log_errors import EffortNotUsable
-from joulepath.optimizer.identification.logs.reading import LogOptions, Reading, check_header, read
+from joulepath.optimizer.identify.logs.log import Log
+from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
+from joulepath.optimizer.identify.logs.reading import LogOptions, Reading, check_header, read
 from joulepath.optimizer.problem import arm as library
 
 S = TypeVar("S", bound=EvaluateSettings)

@@ -11,12 +11,12 @@ from pydantic import Field
 from joulepath.app.convert.fields import fields
 from joulepath.app.convert.given_answer import Number, Part
 from joulepath.app.schemas.replay import DeepestContact, Perturb, SimulatedMotion
-from joulepath.optimizer.exports.program import Move
-from joulepath.optimizer.simulation.baseline_courses import ReportedBaseline, planned_baselines
-from joulepath.optimizer.simulation.outcome import Outcome
-from joulepath.optimizer.simulation.planned import PlannedMotion, PlannedTorques
-from joulepath.optimizer.simulation.reference import course_of
-from joulepath.optimizer.simulation.replay import Quantity, Replay
+from joulepath.optimizer.export.program import Move
+from joulepath.optimizer.replay.baseline_courses import ReportedBaseline, planned_baselines
+from joulepath.optimizer.replay.outcome import Outcome
+from joulepath.optimizer.replay.planned import PlannedMotion, PlannedTorques
+from joulepath.optimizer.replay.reference import course_of
+from joulepath.optimizer.replay.replay import Quantity, Replay
 from joulepath.optimizer.solution import BaselineName, Energy, Objective
 
 

@@ -13,14 +13,14 @@ from joulepath.app.schemas.orientation import InCone, TargetPose
 from joulepath.app.schemas.path import Path, StopPath
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.evaluate.sampler import MOST_SAMPLES
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import LONGEST_DURATION, Problem
 from joulepath.optimizer.problem.targets import AnyOf, Single, Target
 from joulepath.optimizer.problem.tool_path import ToolPath
-from joulepath.optimizer.replay.sampler import MOST_SAMPLES
 
 
 def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
@@ -41,7 +41,7 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
         objective=request.objective,
         duration_min=shortest,
         duration_max=longest,
-        cycle=to_cycle(request.cycle),
+        dwell=to_dwell(request.dwell),
         branch=to_branch(request.branch),
         windings=request.windings,
         bound=request.bound,
@@ -70,11 +70,11 @@ def to_branch(branch: asked.Branch | None) -> BranchFilter | None:
     return None if branch is None else BranchFilter(branch.shoulder, branch.elbow, branch.wrist)
 
 
-def to_cycle(asked_for: asked.Cycle | None) -> Cycle | None:
-    """The cycle of the library. Raises InvalidProblem."""
+def to_dwell(asked_for: asked.Dwell | None) -> Dwell | None:
+    """The dwell of the library. Raises InvalidProblem."""
     if asked_for is None:
         return None
-    return Cycle(asked_for.time, asked_for.hold, asked_for.brake_delay, asked_for.brake_power)
+    return Dwell(asked_for.time, asked_for.hold, asked_for.brake_delay, asked_for.brake_power)
 
 
 def to_target(target: asked.Target, robot: Robot) -> Target:

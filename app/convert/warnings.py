@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from joulepath.optimizer.collision.close_pass import CLOSE
 from joulepath.optimizer.collision.stand_ins import StandInSettings
+from joulepath.optimizer.evaluate.evaluate import Evaluation
 from joulepath.optimizer.problem.arm import PAYLOAD, TOOL
-from joulepath.optimizer.replay.evaluate import Evaluation
-from joulepath.optimizer.simulation.outcome import Outcome
-from joulepath.optimizer.simulation.planned import PlannedMotion
-from joulepath.optimizer.simulation.replay import Replay
-from joulepath.optimizer.simulation.shapes import unsimulated
+from joulepath.optimizer.replay.outcome import Outcome
+from joulepath.optimizer.replay.planned import PlannedMotion
+from joulepath.optimizer.replay.replay import Replay
+from joulepath.optimizer.replay.shapes import unsimulated
 from joulepath.optimizer.solution import Clearance, Solution
 
 ADVICE = "Make sure that the arm and its cell are known as accurately, or ask for a margin."

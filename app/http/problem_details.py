@@ -57,8 +57,8 @@ from joulepath.app.http.validation_messages import told
 from joulepath.app.schemas import errors as problems
 from joulepath.optimizer import exceptions as optimizer_errors
 from joulepath.optimizer.excitation.errors import ExcitationInfeasible
-from joulepath.optimizer.identification import errors as identification_errors
-from joulepath.optimizer.identification.logs.log_errors import EffortNotUsable, LogTooLarge
+from joulepath.optimizer.identify import errors as identification_errors
+from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
 
 TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     InvalidRequest: problems.Validation,
@@ -83,7 +83,7 @@ TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     optimizer_errors.NoSequence: problems.NoSequence,
     optimizer_errors.PathInfeasible: problems.PathInfeasible,
     optimizer_errors.DurationTooShort: problems.DurationTooShort,
-    optimizer_errors.RoundTooShort: problems.CycleTooShort,
+    optimizer_errors.CycleTooShort: problems.DwellTooShort,
     optimizer_errors.TorqueInfeasible: problems.TorqueInfeasible,
     optimizer_errors.NoCollisionFreeTrajectory: problems.NoCollisionFreeTrajectory,
     optimizer_errors.NoTrajectory: problems.NoTrajectory,

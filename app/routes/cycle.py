@@ -31,7 +31,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
 @router.post(
     "/cycle",
-    summary="A round of stops with least energy",
+    summary="A cycle of stops with least energy",
     response_model=CycleResponse,
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}}, **BY_EVENTS}},
@@ -51,9 +51,9 @@ async def cycle(
     reply: ServiceReply,
     cache: ServiceCache,
 ) -> Response:
-    """Finds the arm configuration at every stop of a round, and the motions between them, that need the least
+    """Finds the arm configuration at every stop of a cycle, and the motions between them, that need the least
     electrical energy together. The configuration at one stop decides what the moves from there cost, so that all are
-    chosen at once. Each move refers to its complete answer. `Accept: text/csv` returns the samples of the round,
+    chosen at once. Each move refers to its complete answer. `Accept: text/csv` returns the samples of the cycle,
     `Accept: text/event-stream` events while the search runs, and then the answer."""
     if later.wanted:
         return await later.respond("cycle", body)

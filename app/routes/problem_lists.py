@@ -55,7 +55,7 @@ CYCLE_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
     problems.StopInCollision,
     problems.TorqueInfeasible,
     problems.ContradictoryOrder,
-    problems.CycleTooShort,
+    problems.DwellTooShort,
     problems.NoSequence,
     problems.PathInfeasible,
 )

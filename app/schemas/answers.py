@@ -24,9 +24,9 @@ class AnswerSummary(KeptAnswer):
 
     robot: str | None = described("Name of the robot.", None, "ur5e")
     energy: float | None = described(
-        "Energy of the motion or round, of its objective (electrical for `evaluate`). Null for other kinds.", "J", 57.5
+        "Energy of the motion or cycle, of its objective (electrical for `evaluate`). Null for other kinds.", "J", 57.5
     )
-    duration: float | None = described("Duration of that motion or round; null as `energy`.", "s", 1.33)
+    duration: float | None = described("Duration of that motion or cycle; null as `energy`.", "s", 1.33)
     status: str | None = described("`status` of the answer; null if it has none.", None, "optimal")
 
 

@@ -23,30 +23,30 @@ from joulepath.app.schemas.request import (
 from joulepath.app.schemas.response import GAP, WARNINGS, Clearance, Configuration, WorstRatio
 from joulepath.app.schemas.stop import PlainName, StopRequest
 from joulepath.app.settings import LONGEST_DEADLINE
+from joulepath.optimizer.cycle.cycle_solution import CycleBaselineName
+from joulepath.optimizer.problem.cycle import LONGEST_ROUND, MOST_STOPS
 from joulepath.optimizer.problem.free_order import MOST_FREE_STOPS
 from joulepath.optimizer.problem.problem import MethodName
-from joulepath.optimizer.problem.work_round import LONGEST_ROUND, MOST_STOPS
-from joulepath.optimizer.sequence.round_solution import RoundBaselineName
 from joulepath.optimizer.solution import Objective
 
-# of a round with more stops, the default deadline is longer, and samples are no closer: answers stay as large as before
+# of a cycle with more stops, the default deadline is longer, and samples are no closer: answers stay as large as before
 _MANY_STOPS, _LONG_DEADLINE, _LEAST_PERIOD = 100, 120.0, 1e-3
 
 LongTime = Annotated[float, Field(gt=0, le=LONGEST_ROUND)]
 
 
 class TimeRange(DurationRange):
-    """Bounds on the duration of a round; each is optional."""
+    """Bounds on the duration of a cycle; each is optional."""
 
     min: LongTime | None = described("Smallest duration. Null: no bound.", "s", 10.0, default=None)
     max: LongTime | None = described("Largest duration. Null: no bound.", "s", 12.0, default=None)
 
 
-RoundTime = Annotated[Annotated[LongTime, Tag("seconds")] | Annotated[TimeRange, Tag("range")], SECONDS_OR_RANGE]
+CycleTime = Annotated[Annotated[LongTime, Tag("seconds")] | Annotated[TimeRange, Tag("range")], SECONDS_OR_RANGE]
 
 
 class CycleRequest(ArmRequest):
-    """A round of stops. `payload` is what the arm carries to the first stop that changes it."""
+    """A cycle of stops. `payload` is what the arm carries to the first stop that changes it."""
 
     start: Target = described(
         "Where the arm rests before the first move: joint positions, a pose of the TCP, or one of several targets.",
@@ -100,15 +100,15 @@ class CycleRequest(ArmRequest):
         True,
         default=True,
     )
-    time: RoundTime | None = described(
-        "Duration of the round, dwells and waiting included, or bounds on it. Time is shared among the moves so that "
+    time: CycleTime | None = described(
+        "Duration of the cycle, dwells and waiting included, or bounds on it. Time is shared among the moves so that "
         "the energy is least; what is left over is waited out where that costs least. Null: the optimiser chooses.",
         "s",
         12.0,
         default=None,
     )
     objective: Objective = described(
-        "`electrical`: the energy drawn by the whole round. `mechanical`: the work of its moves, ∫ Σ |tau_j v_j| dt; "
+        "`electrical`: the energy drawn by the whole cycle. `mechanical`: the work of its moves, ∫ Σ |tau_j v_j| dt; "
         "rests need none, and slower moves less, so it needs a `time` or a `time.max`.",
         None,
         "electrical",
@@ -154,7 +154,7 @@ class CycleRequest(ArmRequest):
     )
     deadline: float = described(
         "Wall time from the arrival of the request, including the wait for a worker. When it nears, the service "
-        f"returns the best certified round found so far. With more than {_MANY_STOPS} stops, the default is "
+        f"returns the best certified cycle found so far. With more than {_MANY_STOPS} stops, the default is "
         f"{_LONG_DEADLINE:g} s.",
         "s",
         60.0,
@@ -188,11 +188,11 @@ class CycleRequest(ArmRequest):
         return self
 
 
-class RoundEnergy(MotionEnergy):
-    """Energy of the round: the moves, and dwells and waiting in `electrical.dwell`."""
+class CycleEnergy(MotionEnergy):
+    """Energy of the cycle: the moves, and dwells and waiting in `electrical.dwell`."""
 
     lower_bound: float = described(
-        "Lower bound of the objective: no round that rests at these stops, or goes through those with `pass`, of any "
+        "Lower bound of the objective: no cycle that rests at these stops, or goes through those with `via`, of any "
         "configurations, shapes and durations, needs less.",
         "J",
         536.1,
@@ -201,7 +201,7 @@ class RoundEnergy(MotionEnergy):
 
 
 class StopConfiguration(Configuration):
-    """The arm configuration at a place of the round."""
+    """The arm configuration at a place of the cycle."""
 
     stop: str = described(
         "Name of the stop; with `/approach` or `/retreat` at the outer end of its line, with `/entry` at the start of "
@@ -229,7 +229,7 @@ class CycleLeg(Response):
     start: StopConfiguration = part("Where it begins.")
     goal: StopConfiguration = part("Where it ends; of a dwell and a wait, where it began.")
     passes: list[Passed] = part("Stops that the move passes through, in their order.")
-    t0: float = described("When it begins, from the start of the round.", "s", 1.42)
+    t0: float = described("When it begins, from the start of the cycle.", "s", 1.42)
     duration: float = described("How long it takes.", "s", 0.91)
     electrical: float = described("Electrical energy drawn from the supply.", "J", 71.3)
     mechanical: float = described("Mechanical work.", "J", 30.2)
@@ -250,39 +250,39 @@ class CycleLeg(Response):
 class CycleBaseline(Response):
     """The same stops with the same payloads and dwells, in another way, and in the `time` that is asked for."""
 
-    name: RoundBaselineName = described(
-        "`stopping`: the best round that rests at the stops with `pass`, too; the others then rest there as well. "
+    name: CycleBaselineName = described(
+        "`stopping`: the best cycle that rests at the stops with `via`, too; the others then rest there as well. "
         "`move_by_move`: at each stop the move that needs the least energy by itself, as successive calls of "
         "`POST /optimize` choose it. `controller_default`: to the nearest configuration each time, by the robot's own "
-        "controller with its default speed and acceleration. Where `time` changes the round: `same_factor`, every move "
-        "slowed or sped up alike; `fastest_then_wait`, the fastest round, in configurations of its own, and a wait. "
-        "With a free order, where it is allowed: `given_order`, the best round in the order of `stops`. With an energy "
-        "storage on the bus: `without_storage`, the best round on the same bus without it, beside `move_by_move` "
+        "controller with its default speed and acceleration. Where `time` changes the cycle: `same_factor`, every move "
+        "slowed or sped up alike; `fastest_then_wait`, the fastest cycle, in configurations of its own, and a wait. "
+        "With a free order, where it is allowed: `given_order`, the best cycle in the order of `stops`. With an energy "
+        "storage on the bus: `without_storage`, the best cycle on the same bus without it, beside `move_by_move` "
         "alone.",
         None,
         "move_by_move",
     )
-    duration: float = described("Duration of this round.", "s", 9.9)
-    electrical: float = described("Electrical energy of this round.", "J", 700.2)
+    duration: float = described("Duration of this cycle.", "s", 9.9)
+    electrical: float = described("Electrical energy of this cycle.", "J", 700.2)
     mechanical: float | None = described(
         "Mechanical work of its moves. Null in answers of an earlier version.", "J", 310.4, default=None
     )
     within_limits: bool = described(
         "Whether every move is within the limits; collisions are checked at sample points.", None, True
     )
-    saving: float = described("1 - energy of the answer / energy of this round, of the objective.", "1", 0.15)
+    saving: float = described("1 - energy of the answer / energy of this cycle, of the objective.", "1", 0.15)
     saving_interval: SavingInterval | None = part(
         "How well the saving is known. Null for the objective `mechanical`, and in answers of an earlier version."
     )
 
 
-class RoundClearance(Clearance):
+class CycleClearance(Clearance):
     """Smallest clearance over all moves."""
 
     leg: int = described("Index in `legs`, from 0, of the move that comes so close.", None, 2)
 
 
-class RoundCertificate(Response):
+class CycleCertificate(Response):
     """The certificates of all moves, and how the moves fit together."""
 
     worst_ratio: WorstRatio = part("Largest value / limit over all moves, for each limit.")
@@ -292,9 +292,9 @@ class RoundCertificate(Response):
     )
     energy_error: float = described("Largest `energy_error` of a move: see `POST /optimize`.", "1", 1e-6)
     balance_error: float = described(
-        "Relative difference of the sum of the electrical parts of the round and the total.", "1", 1e-6
+        "Relative difference of the sum of the electrical parts of the cycle and the total.", "1", 1e-6
     )
-    clearance: RoundClearance | None = part("Smallest clearance; null if `collisions` is false.")
+    clearance: CycleClearance | None = part("Smallest clearance; null if `collisions` is false.")
 
 
 class CycleSearch(Response):
@@ -309,30 +309,30 @@ class CycleSearch(Response):
 
 
 class CycleResponse(Answer):
-    """The round of least energy, its moves, and its certificate."""
+    """The cycle of least energy, its moves, and its certificate."""
 
     method: MethodName = described("How the moves are parametrised.", None, "bspline")
     objective: Objective = described("The energy that is minimised.", None, "electrical", default="electrical")
     order: list[str] = described("Names of the stops, as they are visited.", None, ["pick", "place"])
-    duration: float = described("Duration of the round, dwells and waiting included.", "s", 8.3)
+    duration: float = described("Duration of the cycle, dwells and waiting included.", "s", 8.3)
     status: Literal["optimal", "feasible"] = described(
         "`optimal`: every move converged, and no other chain of arm configurations has a lower bound below what was "
-        "found. It does not say that no better round exists: see `optimality_gap`. `feasible`: the round is certified, "
+        "found. It does not say that no better cycle exists: see `optimality_gap`. `feasible`: the cycle is certified, "
         "but the search was not complete, or arm configurations may have been missed.",
         None,
         "optimal",
     )
     price_of_time: float = described(
-        "What one more second would save; negative if it would cost energy. 0 if the round takes its own time.",
+        "What one more second would save; negative if it would cost energy. 0 if the cycle takes its own time.",
         "W",
         31.5,
     )
-    energy: RoundEnergy = part("Energy and power of the round.")
+    energy: CycleEnergy = part("Energy and power of the cycle.")
     legs: Annotated[list[CycleLeg], Field(min_length=1)] = part("Moves and dwells in their order.")
-    baselines: list[CycleBaseline] = part("The same round in other ways; without what was not found in time.")
-    certificate: RoundCertificate = part("Independent check of all moves.")
+    baselines: list[CycleBaseline] = part("The same cycle in other ways; without what was not found in time.")
+    certificate: CycleCertificate = part("Independent check of all moves.")
     warnings: list[str] = described(f"{WARNINGS} Each names its move.", None, [])
-    search: CycleSearch = part("Size and effort of the search for the round.")
+    search: CycleSearch = part("Size and effort of the search for the cycle.")
     answer: str | None = described(
         "Path of this answer: `GET` returns it again. Null if it could not be kept.", None, ANSWER_PATH
     )

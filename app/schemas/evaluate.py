@@ -17,9 +17,9 @@ from joulepath.app.schemas.lengths import ID_LENGTH
 from joulepath.app.schemas.log_file import LogFile
 from joulepath.app.schemas.request import Seconds
 from joulepath.app.schemas.response import BODIES, WARNINGS, SampledMotion
+from joulepath.optimizer.evaluate.limit_report import LimitName
+from joulepath.optimizer.evaluate.sampler import MOST_SAMPLES
 from joulepath.optimizer.problem.problem import LONGEST_DURATION
-from joulepath.optimizer.replay.limit_report import LimitName
-from joulepath.optimizer.replay.sampler import MOST_SAMPLES
 
 MAX_ROWS = 100_000
 """Largest number of rows of a motion sent as JSON; a CSV file may have more."""

@@ -23,7 +23,7 @@ class AnswerRequest(Request):
     )
     arm: ArmRequest | None = described(
         "The arm of the answer: payload, limits, scene, ... as in its request. Null: what the answer says in `arm`. "
-        "Needed if that is null. Its `robot` is that of the answer. Not for a round.",
+        "Needed if that is null. Its `robot` is that of the answer. Not for a cycle.",
         None,
         {"payload": {"mass": 2.0, "com": [0.0, 0.0, 0.05]}},
         default=None,

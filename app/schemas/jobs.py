@@ -135,12 +135,12 @@ class RequestStatus(Response):
     )
     wall_time: float | None = described("Time that the last work on it took; null before its end.", "s", 0.21)
     energy: float | None = described(
-        "Energy of the motion or round that answers it, of its objective (electrical for `evaluate`). Null for other "
+        "Energy of the motion or cycle that answers it, of its objective (electrical for `evaluate`). Null for other "
         "kinds, and without an answer.",
         "J",
         57.5,
     )
-    duration: float | None = described("Duration of that motion or round; null as `energy`.", "s", 1.33)
+    duration: float | None = described("Duration of that motion or cycle; null as `energy`.", "s", 1.33)
     status: str | None = described("`status` of the answer; null if it has none.", None, "optimal")
     answer: str | None = described(
         "Path of the complete answer. It is kept as long as the job. Null without an answer.", None, ANSWER_PATH

@@ -152,12 +152,12 @@ class Path(_OnPath):
 
 class StopPath(_OnPath):
     """A path of the TCP at a stop, like that of a bead of glue: the arm rests at its first pose, follows it, and rests
-    at its last. The branch is chosen for the whole round."""
+    at its last. The branch is chosen for the whole cycle."""
 
     points: Annotated[list[TargetPose], Field(min_length=2, max_length=max(MOST_POINTS.values()) + 2)] = described(
         f"Poses of the TCP: 2 to {MOST_POINTS['lines'] + 2} of lines, to {MOST_POINTS['curve'] + 2} of a curve, "
         "exactly three of an arc. The first and the last may be `free_about` the axis `tolerance.about`: then the "
-        "angles of the tool there are chosen for the whole round.",
+        "angles of the tool there are chosen for the whole cycle.",
         None,
         [
             {"position": [0.4, 0.0, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]},

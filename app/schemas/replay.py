@@ -10,9 +10,9 @@ from joulepath.app.schemas.common import Answer, Request, Response, described, p
 from joulepath.app.schemas.given_answer import AnswerRequest
 from joulepath.app.schemas.response import BODIES
 from joulepath.app.settings import LONGEST_DEADLINE
-from joulepath.optimizer.simulation.controller import ControlName
-from joulepath.optimizer.simulation.outcome import TOUCH
-from joulepath.optimizer.simulation.replay import Quantity
+from joulepath.optimizer.replay.controller import ControlName
+from joulepath.optimizer.replay.outcome import TOUCH
+from joulepath.optimizer.replay.replay import Quantity
 from joulepath.optimizer.solution import BaselineName
 
 Fraction = Annotated[float, Field(gt=0, le=0.9)]
@@ -149,7 +149,7 @@ class AsPlanned(Response):
 class ReplayedMotion(Response):
     """A motion of the answer, planned and simulated."""
 
-    leg: int | None = described("Index in `legs` of a round, from 0; null for an answer of one motion.", None, None)
+    leg: int | None = described("Index in `legs` of a cycle, from 0; null for an answer of one motion.", None, None)
     duration: float = described("Duration of the motion.", "s", 1.8)
     planned: AsPlanned = part("What the answer says.")
     torque_error: float | None = described(

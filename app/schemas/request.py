@@ -13,8 +13,8 @@ from joulepath.app.schemas.common import JointPositions, Request, by_field, desc
 from joulepath.app.schemas.orientation import TargetPose
 from joulepath.app.schemas.path import Path
 from joulepath.app.settings import LONGEST_DEADLINE
+from joulepath.optimizer.evaluate.sampler import MOST_SAMPLES
 from joulepath.optimizer.problem.problem import LONGEST_DURATION, BoundEffort, MethodName
-from joulepath.optimizer.replay.sampler import MOST_SAMPLES
 from joulepath.optimizer.solution import Objective
 
 Seconds = Annotated[float, Field(ge=1e-3, le=LONGEST_DURATION)]
@@ -138,7 +138,7 @@ class Holding(Request):
     )
 
 
-class Cycle(Holding):
+class Dwell(Holding):
     """The wait at the goal: when the arm is needed again, and what holds it until then."""
 
     time: Seconds = described(
@@ -168,14 +168,14 @@ class MotionRequest(ArmRequest):
     )
     duration: Duration | None = described(
         "Duration, or bounds on it. Null: the optimiser chooses the duration. The objective `mechanical` needs a "
-        "number, a `max` or a `cycle`, because a slower motion needs less work. The duration is at most "
+        "number, a `max` or a `dwell`, because a slower motion needs less work. The duration is at most "
         f"{LONGEST_DURATION:g} s and at most {MOST_SAMPLES} times `sample_period`.",
         "s",
         {"max": 3.0},
         default=None,
     )
-    cycle: Cycle | None = described(
-        "The arm waits at the goal until the end of the cycle, and the energy includes the wait. Null: no wait.",
+    dwell: Dwell | None = described(
+        "The arm waits at the goal until the end of the dwell, and the energy includes the wait. Null: no wait.",
         None,
         {"time": 6.0, "hold": "brakes", "brake_delay": 0.5, "brake_power": 20.0},
         default=None,

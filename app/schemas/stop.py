@@ -27,7 +27,7 @@ class StopRequest(Request):
     )
     target: Target | None = described(
         "Joint positions, a pose of the TCP, or one of several targets. The orientation of a single pose may be free "
-        "in part: it is then chosen for the whole round, and the answer is `feasible`.",
+        "in part: it is then chosen for the whole cycle, and the answer is `feasible`.",
         None,
         {"pose": {"position": [0.4, -0.2, 0.1], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
         default=None,
@@ -44,14 +44,13 @@ class StopRequest(Request):
         },
         default=None,
     )
-    pass_: bool = described(
+    via: bool = described(
         "Whether the arm passes through the target without a rest, on its way to the next stop at which it rests. Then "
         "the stop has no `dwell`, `payload`, `path`, lines or `obstacles_ignored`, and the limits of all stops of this "
         "motion hold for all of it.",
         None,
         False,
         default=False,
-        alias="pass",
     )
     dwell: float = described(
         "Time at rest at the stop; with a path, at its end.", "s", 0.4, default=0.0, ge=0, le=LONGEST_DURATION

@@ -1,4 +1,4 @@
-"""Motions of moves of rounds, by what was asked: rounds of the same arm in the same cell have moves in common. Each
+"""Motions of moves of cycles, by what was asked: cycles of the same arm in the same cell have moves in common. Each
 function works on a session."""
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 from joulepath.app.store.tables import KnownMotion, now
 
 MOST_OF_A_CELL = 400
-"""Motions that a round is given: those of its cell that were used last, some 1 kB each."""
+"""Motions that a cycle is given: those of its cell that were used last, some 1 kB each."""
 MOST = 20_000
 """Motions that are kept in all."""
 

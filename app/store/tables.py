@@ -163,13 +163,13 @@ class CachedAnswer(Table):
 
 
 class KnownMotion(Table):
-    """A motion of a move of a round. Rounds of the same arm in the same `cell` may have it in common."""
+    """A motion of a move of a cycle. Cycles of the same arm in the same `cell` may have it in common."""
 
     __tablename__ = "known_motions"
     __table_args__ = (Index(None, "cell", "used"), Index(None, "used"))
 
     cell: Mapped[str] = mapped_column(String(64), primary_key=True)
-    """Hash of what a round says of the arm and its cell."""
+    """Hash of what a cycle says of the arm and its cell."""
     key: Mapped[str] = mapped_column(String(64), primary_key=True)
     """Hash of everything that the motion hangs on."""
     used: Mapped[datetime] = mapped_column(Instant)

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from joulepath.app.convert.cycle import to_cycle_response, to_work_round
+from joulepath.app.convert.cycle import to_cycle, to_cycle_response
+from joulepath.app.convert.cycle_arms import arms_of_moves
 from joulepath.app.convert.cycle_csv import to_cycle_csv
 from joulepath.app.convert.known_motions import to_kept, to_known_motions
-from joulepath.app.convert.round_arms import arms_of_moves
 from joulepath.app.convert.solution import to_optimize_response
 from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
@@ -17,9 +17,9 @@ from joulepath.app.schemas.cycle import CycleRequest
 from joulepath.app.tasks.answer_collector import AnswerCollector
 from joulepath.app.tasks.answer_figures import figures_of
 from joulepath.app.tasks.certified import certified
-from joulepath.optimizer.optimize_round import optimize_round
-from joulepath.optimizer.sequence.known_motions import knowing
-from joulepath.optimizer.sequence.round_solution import RoundSolution
+from joulepath.optimizer.cycle.cycle_solution import CycleSolution
+from joulepath.optimizer.cycle.known_motions import knowing
+from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.solution import Solution
 
 
@@ -39,10 +39,10 @@ class CycleTask:
         """The answer of `POST /cycle`, within about `deadline` seconds."""
         motions = to_known_motions(self.motions)
         with knowing(motions):
-            found = optimize_round(to_work_round(self.request, deadline), tell=listener())
+            found = plan_cycle(to_cycle(self.request, deadline), tell=listener())
         return replace(self._result(found), motions=to_kept(motions))
 
-    def _result(self, found: RoundSolution) -> TaskResult:
+    def _result(self, found: CycleSolution) -> TaskResult:
         collector = AnswerCollector()
         if self.wanted == "csv":
             return TaskResult.of_csv(to_cycle_csv(found))

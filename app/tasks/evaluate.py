@@ -29,10 +29,10 @@ from joulepath.app.exceptions import InvalidRequest
 from joulepath.app.http.problem_details import invalid_request
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
 from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.evaluate.evaluate import evaluate
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable, OutsideLimits
-from joulepath.optimizer.identification.logs.reading import Reading
-from joulepath.optimizer.identification.logs.recorded import measured, motion_of
-from joulepath.optimizer.replay.evaluate import evaluate
+from joulepath.optimizer.identify.logs.reading import Reading
+from joulepath.optimizer.identify.logs.recorded import measured, motion_of
 
 M = TypeVar("M", EvaluateRequest, EvaluateCsvSettings)
 

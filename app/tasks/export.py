@@ -14,9 +14,9 @@ from joulepath.app.http.problem_details import invalid_request
 from joulepath.app.schemas.export import ExportFormat, ExportRequest
 from joulepath.app.tasks.kept_answers import WithKeptAnswers
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.exports.certified import certified
-from joulepath.optimizer.exports.facts import NOT_RUN, ExportedFile
-from joulepath.optimizer.exports.program import Program
+from joulepath.optimizer.export.certified import certified
+from joulepath.optimizer.export.facts import NOT_RUN, ExportedFile
+from joulepath.optimizer.export.program import Program
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from joulepath.app.exceptions import InvalidRequest
 from joulepath.app.schemas.identifications import IdentifyRequest
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identification.identify import fit
+from joulepath.optimizer.identify.identify import fit
 
 Stored = tuple[dict[str, Any], bytes]
 """Settings and packed file of a log."""

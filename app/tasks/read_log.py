@@ -14,7 +14,7 @@ from joulepath.app.exceptions import InvalidRequest
 from joulepath.app.schemas.logs import LogSettings
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
-from joulepath.optimizer.identification.logs.reading import read
+from joulepath.optimizer.identify.logs.reading import read
 
 
 @dataclass(frozen=True)

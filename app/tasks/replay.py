@@ -16,10 +16,10 @@ from joulepath.app.http.problem_details import invalid_request
 from joulepath.app.schemas.replay import ReplayRequest
 from joulepath.app.tasks.kept_answers import WithKeptAnswers
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.simulation.controller import ControlName
-from joulepath.optimizer.simulation.planned import PlannedMotion
-from joulepath.optimizer.simulation.replay import replay
-from joulepath.optimizer.simulation.simulator import mujoco
+from joulepath.optimizer.replay.controller import ControlName
+from joulepath.optimizer.replay.planned import PlannedMotion
+from joulepath.optimizer.replay.replay import replay
+from joulepath.optimizer.replay.simulator import mujoco
 
 PERTURBED_NOTHING = "The arm carries no payload: to change it has no effect."
 NO_BASELINES = (

@@ -24,13 +24,13 @@ from joulepath.app.tasks.certified import certified
 from joulepath.app.tasks.deadline_shares import DeadlineShares
 from joulepath.app.tasks.differences import differences, of_base
 from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.evaluate.evaluate import Evaluation, evaluate
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, InvalidTable, OutsideLimits
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.replay.evaluate import Evaluation, evaluate
 from joulepath.optimizer.solution import Solution
-from joulepath.optimizer.whatif import Changed, whatif
+from joulepath.optimizer.what_if import Changed, what_if
 
 R = TypeVar("R", OptimizeRequest, EvaluateRequest)
 T = TypeVar("T")
@@ -119,7 +119,7 @@ class _Optimized(_Work):
         if self.shares.used_up:
             return self.row(change, DeadlineExceeded([]))
         try:
-            found = whatif(base, replace(problem, deadline=min(asked.deadline, share)))
+            found = what_if(base, replace(problem, deadline=min(asked.deadline, share)))
         except DeadlineExceeded as error:
             return self.row(change, error)
         same = {

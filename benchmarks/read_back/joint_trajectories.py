@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import BPoly
 
-from joulepath.optimizer.exports.program import Program
+from joulepath.optimizer.export.program import Program
 
 POINT = {"positions", "velocities", "accelerations", "effort", "time_from_start"}
 

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.exports.facts import ExportedFile
-from joulepath.optimizer.exports.program import Program
+from joulepath.optimizer.export.facts import ExportedFile
+from joulepath.optimizer.export.program import Program
 
 NUMBER = r"-?\d+\.\d+"
 # the statements that the generated programs use, in the forms of the makers' manuals

@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 
 from joulepath import Arm, Problem, load_robot, optimize
-from joulepath.optimizer.replay.evaluate import evaluate
-from joulepath.optimizer.replay.recording import Log, in_blocks
-from joulepath.optimizer.whatif import whatif
+from joulepath.optimizer.evaluate.evaluate import evaluate
+from joulepath.optimizer.evaluate.recording import Log, in_blocks
+from joulepath.optimizer.what_if import what_if
 
 arm = Arm(robot=load_robot("ur5e"))
 lighter = replace(arm, link_mass_scale=np.full(arm.robot.nq, 0.7))
@@ -28,7 +28,7 @@ print(f"recorded: {recorded.total.energy.electrical.total:.1f} J in {recorded.to
 print(f"limits that it violates: {', '.join(violated) or 'none'}")
 
 best = optimize(Problem(arm=arm, start=low, goal=high))
-changed = whatif(best, Problem(arm=lighter, start=low, goal=high))
+changed = what_if(best, Problem(arm=lighter, start=low, goal=high))
 print(f"optimised: {best.energy.electrical.total:.1f} J in {best.duration:.2f} s")
 print(f"the same motion with links of 70 % of their mass: {changed.same_motion.electrical.total:.1f} J")
 if changed.reoptimised is not None:

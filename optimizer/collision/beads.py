@@ -44,10 +44,10 @@ class Beads:
             T_moving = picked(T, configuration[moving] * links + arrays.links[formed[moving]])
             points[..., moving] = into(T_moving, points[..., moving])
         local = np.abs(into(picked(self._T_core, formed), points))
-        is_round = np.flatnonzero(arrays.is_round[formed])
-        if is_round.size:
-            local[:, 0, is_round] = np.hypot(local[:, 0, is_round], local[:, 1, is_round])
-            local[:, 1, is_round] = 0.0
+        is_cycle = np.flatnonzero(arrays.is_cycle[formed])
+        if is_cycle.size:
+            local[:, 0, is_cycle] = np.hypot(local[:, 0, is_cycle], local[:, 1, is_cycle])
+            local[:, 1, is_cycle] = 0.0
         outside = np.maximum(local - picked(self._half_sizes, formed), 0.0)
         square = (outside[:, 0] ** 2 + outside[:, 1] ** 2 + outside[:, 2] ** 2).min(axis=0)
         bound = np.sqrt(square) - arrays.bead_radii[beaded]

@@ -17,7 +17,7 @@ _SIZES = ("frames", "bodies", "most_points")
 _ARRAYS = (
     "first", "second", "kinds", "growth", "links", "counts", "points", "ball_centres", "ball_radii", "axes",
     "disc_radii", "half_sizes", "T_link_core", "formed", "beaded", "bead_centres", "bead_radii", "form_sizes",
-    "is_round",
+    "is_cycle",
 )  # fmt: skip
 
 

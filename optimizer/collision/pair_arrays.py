@@ -36,7 +36,7 @@ class PairArrays:
     the cores without their `radii` (b,) [m].
 
     `pairs` (p, 2) are indices of bodies, and `growth` (p,) [m] what radii and margins take from their distance.
-    `formed` (p,) is the body of a pair whose form, of half size `form_sizes` (b, 3) [m] about z, is `is_round` (b,) or
+    `formed` (p,) is the body of a pair whose form, of half size `form_sizes` (b, 3) [m] about z, is `is_cycle` (b,) or
     a box; `beaded` (p,) is the other one. `formed` is negative where beads say nothing.
     """
 
@@ -53,7 +53,7 @@ class PairArrays:
     bead_centres: Array
     bead_radii: Array
     form_sizes: Array
-    is_round: Mask
+    is_cycle: Mask
     pairs: Indices
     kinds: Indices
     growth: Array
@@ -90,7 +90,7 @@ class PairArrays:
             bead_centres=np.array([_bead_centres(body) for body in bodies]).reshape(-1, BEADS, 3),
             bead_radii=np.array([body.ball_radius / (BEADS if body.is_segment else 1) for body in bodies]),
             form_sizes=form_sizes,
-            is_round=np.array([core.disc_radius > 0 for core in cores], dtype=bool),
+            is_cycle=np.array([core.disc_radius > 0 for core in cores], dtype=bool),
             pairs=pairs,
             kinds=_kinds(bodies, pairs),
             growth=growth[pairs].sum(axis=1),

@@ -1,4 +1,4 @@
-"""Energy drawn while the arm waits at the goal until its cycle ends.
+"""Energy drawn while the arm waits at the goal until its dwell ends.
 
 After Meike, Ribickis 2011; Meike, Pellicciari, Berselli 2014. The motors hold the gravity torque of the goal
 configuration; static friction would carry part of it and is ignored. With the duration T [s] of the motion:
@@ -18,7 +18,7 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.energy.losses import power_flow
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.dwell import Dwell
 
 
 @dataclass(frozen=True)
@@ -39,29 +39,29 @@ class LinearDwell:
         return LinearDwell(0.0, np.inf, np.zeros(1), np.zeros(1))
 
 
-def linear_dwells(cycle: Cycle, arm: Arm, hold: Array) -> list[LinearDwell]:
-    """The intervals of [0, cycle.time] on which dwell(T) is linear, in order, for holding powers `hold` (...) [W]."""
-    if cycle.hold == "motors":
-        return [LinearDwell(0.0, cycle.time, hold, hold * cycle.time)]
-    brake, kink = np.full_like(hold, brake_power(cycle, arm)), cycle.time - cycle.brake_delay
-    early = LinearDwell(0.0, kink, brake, hold * cycle.brake_delay + brake * kink)
-    late = LinearDwell(max(kink, 0.0), cycle.time, hold, hold * cycle.time)
+def linear_dwells(dwell: Dwell, arm: Arm, hold: Array) -> list[LinearDwell]:
+    """The intervals of [0, dwell.time] on which dwell(T) is linear, in order, for holding powers `hold` (...) [W]."""
+    if dwell.hold == "motors":
+        return [LinearDwell(0.0, dwell.time, hold, hold * dwell.time)]
+    brake, kink = np.full_like(hold, brake_power(dwell, arm)), dwell.time - dwell.brake_delay
+    early = LinearDwell(0.0, kink, brake, hold * dwell.brake_delay + brake * kink)
+    late = LinearDwell(max(kink, 0.0), dwell.time, hold, hold * dwell.time)
     return [interval for interval in (early, late) if interval.t_max > interval.t_min]
 
 
-def dwell_energy(cycle: Cycle, arm: Arm, hold: float, duration: float) -> float:
+def dwell_energy(dwell: Dwell, arm: Arm, hold: float, duration: float) -> float:
     """Energy [J] drawn after a motion of `duration` [s] at a goal with holding power `hold` [W].
 
-    Zero if the motion lasts the whole cycle.
+    Zero if the motion lasts the whole dwell.
     """
-    by_motors, by_brakes = waits(cycle, duration)
-    return hold * by_motors + brake_power(cycle, arm) * by_brakes
+    by_motors, by_brakes = waits(dwell, duration)
+    return hold * by_motors + brake_power(dwell, arm) * by_brakes
 
 
-def waits(cycle: Cycle, duration: float) -> tuple[float, float]:
+def waits(dwell: Dwell, duration: float) -> tuple[float, float]:
     """How long [s] motors, and then brakes, hold the arm after a motion of `duration` [s]."""
-    wait = max(cycle.time - duration, 0.0)
-    by_motors = wait if cycle.hold == "motors" else min(wait, cycle.brake_delay)
+    wait = max(dwell.time - duration, 0.0)
+    by_motors = wait if dwell.hold == "motors" else min(wait, dwell.brake_delay)
     return by_motors, wait - by_motors
 
 
@@ -72,6 +72,6 @@ def holding_power(arm: Arm, tau: Array) -> Array:
     return np.asarray(arm.base_power + joints.sum(axis=-1))
 
 
-def brake_power(cycle: Cycle, arm: Arm) -> float:
+def brake_power(dwell: Dwell, arm: Arm) -> float:
     """Power [W] that the arm draws in all while its brakes hold it."""
-    return arm.base_power if cycle.brake_power is None else cycle.brake_power
+    return arm.base_power if dwell.brake_power is None else dwell.brake_power

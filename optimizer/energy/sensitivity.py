@@ -27,7 +27,7 @@ from joulepath.optimizer.energy.bus_flow import exchange
 from joulepath.optimizer.energy.link_regressor import BODY, rigid_regressor
 from joulepath.optimizer.energy.losses import friction_torque
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.solution import Sensitivity
 
 # of a surplus that is stored, the storage takes all but rounding
@@ -66,13 +66,13 @@ def energy_sensitivity(
 
 
 def waiting_sensitivity(
-    arm: Arm, q: Array, tau: Array, motors: float, brakes: float, cycle: Cycle, spread: Spread
+    arm: Arm, q: Array, tau: Array, motors: float, brakes: float, dwell: Dwell, spread: Spread
 ) -> Sensitivity:
     """That of standing still at q (nq,) [rad]: for so long [s] while motors hold torques tau (nq,) [N·m], then by
     brakes."""
     still = np.zeros((1, len(tau)))
     rates, by_link, _ = _power_rates(q[None], still, still, tau[None], arm, spread)
-    electronics = motors + (brakes if cycle.brake_power is None else 0.0)
+    electronics = motors + (brakes if dwell.brake_power is None else 0.0)
     gradient = np.concatenate([[electronics], motors * rates.ravel(), motors * by_link[0].sum(axis=0)])
     return Sensitivity(gradient, float(gradient @ spread.mean))
 

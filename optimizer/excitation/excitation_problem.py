@@ -8,10 +8,10 @@ from typing import Literal, get_args
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.evaluate.sampler import MOST_SAMPLES
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.arrays import frozen, per_joint
-from joulepath.optimizer.replay.sampler import MOST_SAMPLES
 
 Part = Literal["inertials", "rotor", "friction"]
 """Parameters that are to be told apart: base parameters of the links, rotor inertias, friction (Coulomb, viscous,

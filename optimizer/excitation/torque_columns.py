@@ -12,8 +12,8 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.energy.link_regressor import body_parameters
 from joulepath.optimizer.energy.torque_regressor import torque_regressor
 from joulepath.optimizer.excitation.excitation_problem import Part
-from joulepath.optimizer.identification.arm.base_parameters import base_parameters
-from joulepath.optimizer.identification.fits.torque_fit import LEAST_LOAD_SPREAD
+from joulepath.optimizer.identify.arm.base_parameters import base_parameters
+from joulepath.optimizer.identify.fits.torque_fit import LEAST_LOAD_SPREAD
 from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
 from joulepath.optimizer.problem.arm import Arm
 

@@ -1,6 +1,6 @@
 """Intervals of durations on which the objective of a candidate is smooth, with the kernel parameters of each.
 
-Without a cycle and without energy storage, one interval holds all durations, and the cost is the objective. In a cycle,
+Without a dwell and without energy storage, one interval holds all durations, and the cost is the objective. In a dwell,
 the energy of waiting is linear in the duration on either side of the instant at which the brakes engage: one interval
 each, with an exact weight on time. The saving of an energy storage depends on the charge over the whole motion: the
 cost values each joule of net surplus at the constant `surplus_value`, and motions are compared by their exact energy.
@@ -15,7 +15,7 @@ from joulepath.optimizer.energy.dwell import LinearDwell, linear_dwells, waits
 from joulepath.optimizer.energy.plant import WIDTH
 from joulepath.optimizer.nlp.goal_holding import GoalHolding
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 
 
@@ -24,7 +24,7 @@ class DurationInterval:
     """Durations from t_min to t_max [s], packed kernel parameters p, and a constant part of the cost [J].
 
     `minimum_time`: the duration is the cost. `price` [W]: of time, beside the problem's own objective. `goal_holding`:
-    in a cycle, what waiting at another goal draws beside.
+    in a dwell, what waiting at another goal draws beside.
     """
 
     p: Array
@@ -49,7 +49,7 @@ def duration_intervals(
     t_max = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
     if surplus_value is None and problem.arm.bus.mode == "storage":
         surplus_value = max(problem.arm.bus.efficiency, problem.arm.regeneration)
-    if problem.cycle is None or problem.objective == "mechanical":
+    if problem.dwell is None or problem.objective == "mechanical":
         weights = {problem.objective: 1.0}
         return [DurationInterval(prepared.parameters(**weights, regeneration=surplus_value, width=width), t_min, t_max)]
     hold = prepared.holding_power(q_goal)
@@ -59,15 +59,15 @@ def duration_intervals(
             max(t_min, piece.t_min),
             min(t_max, piece.t_max),
             float(piece.constant),
-            goal_holding=_goal_holding(prepared, problem.cycle, float(hold), piece),
+            goal_holding=_goal_holding(prepared, problem.dwell, float(hold), piece),
         )
-        for piece in linear_dwells(problem.cycle, problem.arm, hold)
+        for piece in linear_dwells(problem.dwell, problem.arm, hold)
         if max(t_min, piece.t_min) <= min(t_max, piece.t_max)
     ]
 
 
-def _goal_holding(prepared: PreparedProblem, cycle: Cycle, hold: float, piece: LinearDwell) -> GoalHolding:
-    first, last = (waits(cycle, T)[0] for T in (piece.t_min, piece.t_max))
+def _goal_holding(prepared: PreparedProblem, dwell: Dwell, hold: float, piece: LinearDwell) -> GoalHolding:
+    first, last = (waits(dwell, T)[0] for T in (piece.t_min, piece.t_max))
     rate = (first - last) / (piece.t_max - piece.t_min)
     return GoalHolding(prepared.holding_power, hold, first + rate * piece.t_min, rate)
 

@@ -1,6 +1,6 @@
 """What holding the arm at the goal draws, where the goal is an unknown of an NLP: more in one posture than in another.
 
-The arm waits there until its cycle ends. The motors hold it for a time that is linear in the duration of the motion.
+The arm waits there until its dwell ends. The motors hold it for a time that is linear in the duration of the motion.
 The NLP counts what they draw at the goal that was given, by its constant and its weight of time; this adds what they
 draw more, or less, at another one.
 """

@@ -1,4 +1,4 @@
-"""A free order of the stops of a round, and what restricts it."""
+"""A free order of the stops of a cycle, and what restricts it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from joulepath.optimizer.exceptions import ContradictoryOrder, InvalidProblem
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.stops import Stop
 
-# stops of a round with a free order: the search visits every subset of them
+# stops of a cycle with a free order: the search visits every subset of them
 MOST_FREE_STOPS = 12
 
 
@@ -61,7 +61,7 @@ def check_order(order: FreeOrder, stops: Sequence[Stop], carried: Payload) -> No
     `carried` is what the arm carries at the start.
     """
     if len(stops) > MOST_FREE_STOPS:
-        raise InvalidProblem("stops", f"A round with a free order has at most {MOST_FREE_STOPS} stops.")
+        raise InvalidProblem("stops", f"A cycle with a free order has at most {MOST_FREE_STOPS} stops.")
     known = [stop.name for stop in stops]
     for field, lists in (("before", order.before), ("together", order.together)):
         for k, names in enumerate(lists):

@@ -13,7 +13,7 @@ from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.targets import AnyOf, Target, members, validated
 from joulepath.optimizer.problem.tool_path import ToolPath
 from joulepath.optimizer.solution import Objective
@@ -33,8 +33,8 @@ class Problem:
 
     `start` and `goal` are joint positions (nq,) [rad], a `Pose`, or an `AnyOf` of these; the goal may be a
     `ConeOrientedPose`. `duration_min` and `duration_max` [s] bound the duration. If they are equal, they fix it; None
-    leaves it to the optimiser. With a `cycle` the arm waits at the goal until the end of the cycle, and the motion
-    lasts no longer than the cycle.
+    leaves it to the optimiser. With a `dwell` the arm waits at the goal until the end of the dwell, and the motion
+    lasts no longer than the dwell.
 
     With a `tool_path` the TCP goes along it from `start` to `goal`, which are a pose or joint positions each: only the
     branch and the timing are free, and `method` and `windings` do not matter. If the tool may turn about an axis on the
@@ -59,7 +59,7 @@ class Problem:
     objective: Objective = "electrical"
     duration_min: float | None = None
     duration_max: float | None = None
-    cycle: Cycle | None = None
+    dwell: Dwell | None = None
     tool_path: ToolPath | None = None
     passes: Sequence[Array] = ()
     branch: BranchFilter | None = None
@@ -90,10 +90,10 @@ class Problem:
         object.__setattr__(self, "passes", passed)
         if passed and not all(isinstance(q, np.ndarray) for q in (self.start, self.goal, *passed)):
             raise InvalidProblem("passes", "With passes, start, goal and passes must be joint positions.")
-        if self.cycle is not None:
-            if self.duration_min is not None and self.duration_min > self.cycle.time:
-                raise InvalidProblem("duration", "The shortest duration must not exceed cycle.time.")
-            longest = self.cycle.time if self.duration_max is None else min(self.duration_max, self.cycle.time)
+        if self.dwell is not None:
+            if self.duration_min is not None and self.duration_min > self.dwell.time:
+                raise InvalidProblem("duration", "The shortest duration must not exceed dwell.time.")
+            longest = self.dwell.time if self.duration_max is None else min(self.duration_max, self.dwell.time)
             object.__setattr__(self, "duration_max", longest)
         if self.objective == "mechanical" and self.duration_max is None:
             raise InvalidProblem(

@@ -1,4 +1,4 @@
-"""A path of the TCP at a stop of a round, like that of a bead of glue."""
+"""A path of the TCP at a stop of a cycle, like that of a bead of glue."""
 
 from __future__ import annotations
 

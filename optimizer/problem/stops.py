@@ -1,4 +1,4 @@
-"""The stops of a round, and the moves that lead over them."""
+"""The stops of a cycle, and the moves that lead over them."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Stop:
     At the stop it follows a `path`, from the target to where the path ends; there it dwells, and the payload changes.
     At the stop, on its lines and its path the obstacles named in `obstacles_ignored` do not count.
 
-    If `passed`, the arm passes through the target without a rest, on its way to the next stop at which it rests. The
+    If `via`, the arm passes through the target without a rest, on its way to the next stop at which it rests. The
     limits of all stops of such a motion hold for all of it.
     """
 
@@ -53,7 +53,7 @@ class Stop:
     retreat: Line | None = None
     path: StopPath | None = None
     obstacles_ignored: Sequence[str] = ()
-    passed: bool = False
+    via: bool = False
 
     @property
     def free_ends(self) -> tuple[bool, bool]:
@@ -80,7 +80,7 @@ class Stop:
 
 @dataclass(frozen=True)
 class PlannedMove:
-    """A move of a round from one place to another, by their names, with `arm`; along a `tool_path` if there is one.
+    """A move of a cycle from one place to another, by their names, with `arm`; along a `tool_path` if there is one.
 
     It passes `through` stops in their order. After it `arm_after` rests, for `dwell` [s]. `at_stop`: the goal is a
     stop, and neither an outer end nor the start.

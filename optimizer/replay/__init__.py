@@ -1,1 +1,1 @@
-"""Given motions: their energy, and the limits that they violate."""
+"""Motions played in MuJoCo: a second opinion on torques, energy, contacts and savings."""

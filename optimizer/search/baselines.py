@@ -7,7 +7,7 @@
 - `controller_default`: the robot's own controller at its default speed and acceleration, a leading-axis trapezoid; left
   out for a robot whose maker publishes none
 
-All go from the start to the nearest goal and wait there until the end of the cycle, if there is one. The acceleration
+All go from the start to the nearest goal and wait there until the end of the dwell, if there is one. The acceleration
 of a trapezoid jumps: its jerk is unbounded, so it is never within a jerk limit.
 """
 
@@ -56,7 +56,7 @@ def baselines(
     q, v, a = (np.concatenate([getattr(motion, name) for motion in motions.values()]) for name in ("q", "v", "a"))
     ends = np.cumsum([len(motion.t) for motion in motions.values()])[:-1]
     result, held = [], np.zeros_like(q_start)
-    if problem.cycle is not None:
+    if problem.dwell is not None:
         goal, still = nearest(problem, q_start, q_goals)[None], np.zeros((1, len(q_start)))
         held = torques(goal, still, still)[0]
     broken = broken_on_the_way([motion.q for motion in motions.values()], [motion.v for motion in motions.values()])
@@ -84,11 +84,11 @@ def compared(
     energy = motion_energy(problem, motion, tau, potential, lost)
     spread = arm_spread(arm)
     sensitivity = energy_sensitivity(motion.weights, motion.q, motion.v, motion.a, tau, arm, spread, lost)
-    if problem.cycle is not None:
+    if problem.dwell is not None:
         hold = float(holding_power(arm, held))
-        energy = energy.with_dwell(dwell_energy(problem.cycle, arm, hold, motion.duration))
-        times = waits(problem.cycle, motion.duration)
-        sensitivity += waiting_sensitivity(arm, motion.q[-1], held, *times, problem.cycle, spread)
+        energy = energy.with_dwell(dwell_energy(problem.dwell, arm, hold, motion.duration))
+        times = waits(problem.dwell, motion.duration)
+        sensitivity += waiting_sensitivity(arm, motion.q[-1], held, *times, problem.dwell, spread)
     return Baseline(
         name=name,
         duration=motion.duration,
@@ -157,14 +157,14 @@ def motion_energy(
 def broken_limits(problem: Problem, motion: SampledMotion, tau: Array, lost: Array | None = None) -> list[str]:
     """The limits that a motion breaks, in words: its exact peaks of the rates, positions and torques at its samples.
 
-    `lost` as of `motion_energy`. A motion that takes longer than the cycle breaks it, too.
+    `lost` as of `motion_energy`. A motion that takes longer than the dwell breaks it, too.
     """
-    late = problem.cycle is not None and motion.duration > problem.cycle.time * (1 + RATIO_TOLERANCE)
+    late = problem.dwell is not None and motion.duration > problem.dwell.time * (1 + RATIO_TOLERANCE)
     limits = problem.arm.active_limits
     tau_limited = limited_torque(problem.arm, tau, motion.v, motion.a, lost)
     jerk = np.where(np.isfinite(limits.j_max), motion.peak_jerk, 0.0)  # where none is in force, unbounded jerk is fine
     ratios = limit_ratios(limits, motion.q, motion.peak_v, motion.peak_a, jerk, tau_limited)
     return [
-        *(["longer than the cycle"] if late else []),
+        *(["longer than the dwell"] if late else []),
         *(too_much(name, ratio) for name, ratio in ratios.items() if ratio > 1 + RATIO_TOLERANCE),
     ]

@@ -232,7 +232,7 @@ def bound(prepared: PreparedProblem, candidates: Sequence[Candidate], checked: S
     # joining takes half the time of making an array of arrays
     q_start = np.concatenate([each.q_start for each in candidates]).reshape(len(candidates), -1)
     q_goal = np.concatenate([each.q_goal for each in candidates]).reshape(len(candidates), -1)
-    hold = prepared.holding_power(q_goal) if prepared.problem.cycle else None
+    hold = prepared.holding_power(q_goal) if prepared.problem.dwell else None
     bounds, shortest = lower_bounds(prepared, q_goal - q_start, levels[:, 1] - levels[:, 0], hold)
     if prepared.problem.objective == "mechanical":
         bounds = np.maximum(bounds, mechanical_bounds(prepared, q_start, q_goal, levels))

@@ -46,7 +46,7 @@ def _applies(incumbent: Incumbent) -> bool:
     """Whether the duration is fixed, and a motion of any duration has a duration of its own."""
     problem = incumbent.problem
     fixed = problem.duration_min == problem.duration_max and not incumbent.deadline.passed
-    plain = problem.objective == "electrical" and problem.cycle is None and not incumbent.uses_storage
+    plain = problem.objective == "electrical" and problem.dwell is None and not incumbent.uses_storage
     return fixed and plain and incumbent.method is FreeSpline
 
 

@@ -38,11 +38,11 @@ class HoldingCells:
 
     @classmethod
     def of(cls, prepared: PreparedProblem) -> HoldingCells | None:
-        """None for another objective, a cycle, friction that grows with the load or is not concave, no copper loss."""
+        """None for another objective, a dwell, friction that grows with the load or is not concave, no copper loss."""
         arm, problem = prepared.arm, prepared.problem
         law, loss = arm.friction_law, copper_loss(arm)
         concave = min(law.coulomb.min(), law.curved.min(), law.viscous.min()) >= 0 and law.knee > 0 < law.speed.min()
-        if problem.objective != "electrical" or problem.cycle or law.load is not None or not concave or loss.min() <= 0:
+        if problem.objective != "electrical" or problem.dwell or law.load is not None or not concave or loss.min() <= 0:
             return None
         return cls(prepared, HoldingBound(arm, ChainDerivatives.of(arm), loss))
 

@@ -34,7 +34,7 @@ def lower_bounds(
     """Bounds (P,) on the problem's objective [J] and least durations (P,) [s] for candidates.
 
     displacement (P, nq) [rad] is goal - start, potential_gain (P,) [J] the gain of potential energy, `hold` (P,) [W]
-    the power that holding the goal draws, needed for a problem with a cycle. A candidate whose least duration exceeds
+    the power that holding the goal draws, needed for a problem with a dwell. A candidate whose least duration exceeds
     the longest allowed one has the bound inf. Along a tool path no motion is shorter than the path leaves it time for
     (`kinematics.least_time`).
 
@@ -50,11 +50,11 @@ def lower_bounds(
     t_max = np.full_like(t_min, most)
     if problem.objective == "mechanical":
         bound = mechanical(potential_gain)
-    elif problem.cycle is None or hold is None:
+    elif problem.dwell is None or hold is None:
         bound = _least_drawn(prepared, displacement, potential_gain, t_min, t_max, np.zeros_like(potential_gain))
     else:
         bound = np.full_like(potential_gain, np.inf)
-        for piece in linear_dwells(problem.cycle, problem.arm, hold):
+        for piece in linear_dwells(problem.dwell, problem.arm, hold):
             low, high = np.maximum(t_min, piece.t_min), np.minimum(t_max, piece.t_max)
             value = piece.constant + _least_drawn(prepared, displacement, potential_gain, low, high, piece.power)
             bound = np.where(low <= high, np.minimum(bound, value), bound)
@@ -157,7 +157,7 @@ def electrical(
     """Bound on the electrical energy [J] of motions with the given joint displacement (P, nq) and potential_gain (P,)
     [J].
 
-    `waiting` (P,) [W] is what a motion saves by every second that it takes: nothing without a cycle.
+    `waiting` (P,) [W] is what a motion saves by every second that it takes: nothing without a dwell.
 
     Energy ≥ ∫ P_net dt = base · T + potential_gain + friction + copper + inverter on every bus:
 

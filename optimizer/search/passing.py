@@ -22,7 +22,7 @@ from joulepath.optimizer.trajectories.spline import Spline
 def bound_through(prepared: PreparedProblem, q_start: Array, q_goal: Array) -> float:
     """Lower bound [J] on the objective of all motions from q_start through the passes to q_goal (nq,) [rad]."""
     problem = prepared.problem
-    if problem.objective == "mechanical" or problem.cycle is not None:
+    if problem.objective == "mechanical" or problem.dwell is not None:
         return -np.inf
     q = np.array([q_start, *problem.passes, q_goal])
     gains = np.diff([prepared.potential(each) for each in q])
@@ -35,7 +35,7 @@ def stopping_baselines(prepared: PreparedProblem, spline: Spline, ours: float) -
 
     `ours` [J] is our objective. A baseline that some part does not have is left out.
     """
-    problem: Problem = replace(prepared.problem, passes=(), cycle=None)
+    problem: Problem = replace(prepared.problem, passes=(), dwell=None)
     q = np.array([spline.control_points[0], *prepared.problem.passes, spline.control_points[-1]])
     times = [0.0, *pass_times(spline.curve, q[1:-1]).tolist(), spline.duration]
     oracle = prepared.torques, prepared.potential, prepared.broken_on_the_way

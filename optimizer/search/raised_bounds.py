@@ -84,12 +84,12 @@ class _Pair:
 
     @cached_property
     def _cells(self) -> list[DurationCells]:
-        """Cells of durations, by how waiting for the cycle's end changes with them."""
+        """Cells of durations, by how waiting for the dwell's end changes with them."""
         prepared, candidate = self.shared.prepared, self.candidate
-        problem, cycle = prepared.problem, prepared.problem.cycle
+        problem, dwell = prepared.problem, prepared.problem.dwell
         dwells = [LinearDwell.none()]
-        if cycle is not None:
-            dwells = linear_dwells(cycle, prepared.arm, prepared.holding_power(candidate.q_goal[None]))
+        if dwell is not None:
+            dwells = linear_dwells(dwell, prepared.arm, prepared.holding_power(candidate.q_goal[None]))
         shortest = max(candidate.shortest, LEAST_DURATION, problem.duration_min or 0.0)
         longest = problem.duration_max or LONGEST_DURATION
         return [

@@ -92,10 +92,10 @@ def estimates_between(
 def _waiting(prepared: PreparedProblem, q_goal: Array, durations: Array) -> Array:
     """Energies (n,) [J] of waiting at goals (n, nq) [rad] until the cycle ends, after motions of durations (n,) [s]."""
     problem = prepared.problem
-    if problem.cycle is None or _is_work(problem):
+    if problem.dwell is None or _is_work(problem):
         return np.zeros(len(durations))
-    by_motors, by_brakes = np.array([waits(problem.cycle, T) for T in durations.tolist()]).T
-    return np.asarray(prepared.holding_power(q_goal) * by_motors + brake_power(problem.cycle, prepared.arm) * by_brakes)
+    by_motors, by_brakes = np.array([waits(problem.dwell, T) for T in durations.tolist()]).T
+    return np.asarray(prepared.holding_power(q_goal) * by_motors + brake_power(problem.dwell, prepared.arm) * by_brakes)
 
 
 def _durations(problem: Problem, shortest: Array, scales: Sequence[float]) -> list[Array]:
@@ -103,12 +103,12 @@ def _durations(problem: Problem, shortest: Array, scales: Sequence[float]) -> li
     for work and in a cycle the longest one, too."""
     least = LEAST_DURATION if problem.duration_min is None else problem.duration_min
     most = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
-    if problem.cycle is not None:
-        most = min(most, problem.cycle.time)
+    if problem.dwell is not None:
+        most = min(most, problem.dwell.time)
     if least == most:
         return [np.full_like(shortest, most)]
     tried = [np.clip(scale * shortest, least, most) for scale in scales]
-    return [*tried, np.full_like(shortest, most)] if _is_work(problem) or problem.cycle is not None else tried
+    return [*tried, np.full_like(shortest, most)] if _is_work(problem) or problem.dwell is not None else tried
 
 
 def how_near(problem: Problem) -> tuple[float, int]:

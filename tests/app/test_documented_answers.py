@@ -47,8 +47,8 @@ SAID: list[tuple[str, str, str, dict[str, Any], str]] = [
 ]
 SLOW: list[tuple[str, str, str, dict[str, Any], str]] = [
     ("docs/paths.md", r"a seam of 0.4 m needs ([\d.]+) J", "optimize/seam_any_turn", {}, TOTAL),
-    ("docs/cycles.md", r"along lines: the round needs\n([\d.]+) J", "cycle/round_parts", {}, TOTAL),
-    ("docs/cycles.md", r"a seam of 0.4 m: the round needs ([\d.]+) J", "cycle/seam_any_turn", {}, TOTAL),
+    ("docs/cycles.md", r"along lines: the cycle needs\n([\d.]+) J", "cycle/round_parts", {}, TOTAL),
+    ("docs/cycles.md", r"a seam of 0.4 m: the cycle needs ([\d.]+) J", "cycle/seam_any_turn", {}, TOTAL),
 ]
 # pages with a shortened answer, and its request
 SHOWN = {

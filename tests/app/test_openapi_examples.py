@@ -92,7 +92,7 @@ def test_every_body_has_an_example() -> None:
         assert {media_type for media_type, *_ in operation.bodies()} == declared.keys(), operation
 
 
-# a front of dozens of durations, all methods, rounds in a given time, among obstacles or along a path, an excitation
+# a front of dozens of durations, all methods, cycles in a given time, among obstacles or along a path, an excitation
 # of all parameters
 SLOW = (
     "post /cycle application/json glue_path",

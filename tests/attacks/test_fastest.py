@@ -13,16 +13,16 @@ from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Robot
-from joulepath.optimizer.exceptions import DurationTooShort, RoundTooShort
+from joulepath.optimizer.exceptions import CycleTooShort, DurationTooShort
 from joulepath.optimizer.methods.fastest_motion import FastestSettings
 from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.optimize_round import optimize_round
 from joulepath.optimizer.pareto import pareto
+from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.problem import LEAST_DURATION, MethodName, Problem
 from joulepath.optimizer.problem.stops import Stop
-from joulepath.optimizer.problem.work_round import WorkRound
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import CEILING, GOAL, PAYLOAD, ROBOT, START, fixed, limits, problem, tcp_pose
 from tests.selection import long_but
@@ -103,16 +103,16 @@ def test_a_front_begins_at_the_fastest_motion() -> None:
     assert len(front.points) == 5
 
 
-def test_a_round_takes_any_time_from_the_fastest_one_on() -> None:
+def test_a_cycle_takes_any_time_from_the_fastest_one_on() -> None:
     start, goal = map(np.array, LOCAL)
     arm = Arm(robot=ROBOT, collisions=False)
-    asked = WorkRound(arm=arm, start=start, stops=[Stop(name="there", target=goal)])
-    with pytest.raises(RoundTooShort) as caught:
-        optimize_round(replace(asked, **fixed(1.4)))
+    asked = Cycle(arm=arm, start=start, stops=[Stop(name="there", target=goal)])
+    with pytest.raises(CycleTooShort) as caught:
+        plan_cycle(replace(asked, **fixed(1.4)))
     shortest = caught.value.shortest
     assert shortest <= 2 * 0.7311
     for duration in (shortest, 1.65):
-        found = optimize_round(replace(asked, **fixed(duration)))
+        found = plan_cycle(replace(asked, **fixed(duration)))
         assert found.duration == pytest.approx(duration, rel=ROUNDING)
         assert all(move.solution.certificate.valid for move in found.moves)
 

@@ -109,7 +109,7 @@ def test_points_rows_and_recordings_say_it_too(client: TestClient) -> None:
         assert found["tool"] >= DEPTH and found["payload"] >= DEPTH + BALL
 
 
-def test_each_move_of_a_round_has_its_own_payload(client: TestClient) -> None:
+def test_each_move_of_a_cycle_has_its_own_payload(client: TestClient) -> None:
     """The tool's end stays above the table: only the part on its way from pick to place reaches into it."""
     target = {"pose": {"position": [0.7, -0.3, 0.02], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
     stops = [
@@ -142,7 +142,7 @@ def kept_answers(client: TestClient) -> list[dict[str, Any]]:
     asked = {"start": {"q": HOME}, "goal": {"q": NEAR}, **PATIENT}
     motion = {"configurations": [HOME, NEAR], "time_per_segment": 1.5, "sample_period": 0.02}
     optimized = client.post("/optimize", json=asked).json()
-    a_round = client.post("/cycle", json={"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], **PATIENT}).json()
+    a_cycle = client.post("/cycle", json={"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], **PATIENT}).json()
     front = client.post("/pareto", json=asked | {"points": 2}).json()
     empty = {"name": "empty", "arm": {"payload": None}}
     changed = client.post("/whatif", json={"evaluate": motion, "changes": [empty], **PATIENT}).json()
@@ -151,13 +151,13 @@ def kept_answers(client: TestClient) -> list[dict[str, Any]]:
     study = client.post("/studies", json={"name": "ids", "threshold": 1.0}).headers["location"]
     step = client.post(f"{study}/iterations", json={"evaluate": motion}).json()
     paths = [
-        *(leg["answer"] for leg in a_round["legs"] if leg["answer"]),
+        *(leg["answer"] for leg in a_cycle["legs"] if leg["answer"]),
         *(point["answer"] for point in front["points"]),
         changed["base"]["answer"],
         *(each["answer"] for each in job["requests"]),
         f"/answers/{step['answer']}",
     ]
-    return [optimized, a_round, *(client.get(path).json()["answer"] for path in paths)]
+    return [optimized, a_cycle, *(client.get(path).json()["answer"] for path in paths)]
 
 
 def test_the_id_in_an_answer_is_that_of_the_kept_answer(client: TestClient) -> None:

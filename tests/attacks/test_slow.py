@@ -16,7 +16,7 @@ from joulepath.optimizer.energy import kernel
 from joulepath.optimizer.energy.kernel_cache import compile_kernel
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.solution import Solution
 from joulepath.optimizer.trajectories.seven_segment import shortest_duration
@@ -123,7 +123,7 @@ def test_other_buses_ramp_as_fast(bus: Bus) -> None:
 
 def test_a_cycle_that_leaves_no_time_to_wait() -> None:
     task = slow(0.1)
-    found = optimize(replace(task, cycle=Cycle(time=1.0005 * shortest(task))))
+    found = optimize(replace(task, dwell=Dwell(time=1.0005 * shortest(task))))
     assert energy(found) < LEAST_KNOWN[0.1] * (1 + MOST_EXCESS)
 
 

@@ -253,7 +253,7 @@ def test_what_is_read_ends_at_its_deadline(clock: CountingClock, log_file: bytes
 
 @pytest.mark.parametrize("content", [gzip.compress(b"") * 10_000, gzip.compress(b"t,q1\n" + b"#\n" * 100_000)])
 def test_gzip_that_yields_nothing_ends_at_the_deadline(content: bytes) -> None:
-    from joulepath.optimizer.identification.logs.reading import read_log
+    from joulepath.optimizer.identify.logs.reading import read_log
 
     with pytest.raises(DeadlinePassed), watch(Deadline(LATE, CountingClock())):
         read_log(content, load_robot("ur5e"))

@@ -190,7 +190,7 @@ def test_progress_is_shown_and_cancelled(page: Page, service: Server) -> None:
     assert service.post("/optimize", move()).status_code == 200
 
 
-def test_a_round_is_played_as_one(browser: Browser, service: Server, page: Page) -> None:
+def test_a_cycle_is_played_as_one(browser: Browser, service: Server, page: Page) -> None:
     show(page, "json")
     page.locator("#json").fill((ROOT / "examples" / "cycle" / "press_tending.json").read_text())
     page.locator("#json").blur()

@@ -19,6 +19,8 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.collision.model import collision_model
 from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.evaluate.evaluate import evaluate
+from joulepath.optimizer.evaluate.recording import Log, Waypoints, in_blocks
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.path_following import follow
@@ -28,7 +30,7 @@ from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import (
     Attachment,
@@ -42,9 +44,7 @@ from joulepath.optimizer.problem.scene import (
 )
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.problem.tool_cone import ToolCone
-from joulepath.optimizer.replay.evaluate import evaluate
-from joulepath.optimizer.replay.recording import Log, Waypoints, in_blocks
-from joulepath.optimizer.whatif import whatif
+from joulepath.optimizer.what_if import what_if
 from tests.optimizer.cells import arm_in_cell, at, wander
 from tests.optimizer.moves import CEILING, GOAL, PAYLOAD, ROBOT, START, TILTED, fixed, problem, random_moves, tcp_pose
 
@@ -152,7 +152,7 @@ def front(asked: Problem, points: int) -> object:
 
 
 def changed_arm(asked: Problem, changed: Problem) -> object:
-    return whatif(optimize(asked, still), changed, still)
+    return what_if(optimize(asked, still), changed, still)
 
 
 def moves() -> list[Work]:
@@ -210,7 +210,7 @@ def surroundings() -> list[Work]:
         "carried cup": problem(START, near, collisions=True, scene=wall, payload=cup, tool=(HOLDER,)),
         "upright": problem(START, near, tool_cone=upright),
         "slow": problem(START, GOAL, tcp_speed=0.4, elbow_speed=0.3),
-        "cycle": problem(START, GOAL, cycle=Cycle(4.0)),
+        "dwell": problem(START, GOAL, dwell=Dwell(4.0)),
         "storage": problem(START, GOAL, bus=Bus("storage", efficiency=0.9, capacity=20.0, power=200.0)),
     }
     return [Work(name, partial(solved, each)) for name, each in asked.items()]

@@ -33,7 +33,7 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import Mesh, Obstacle, Scene
 from joulepath.optimizer.search.reserve import reserve
-from joulepath.optimizer.whatif import whatif
+from joulepath.optimizer.what_if import what_if
 from tests.optimizer.cells import at
 from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.moves import GOAL, ROBOT, START, problem, tcp_pose
@@ -140,7 +140,7 @@ def test_a_change_does_not_overrun(clock: WorkClock) -> None:
     base = optimize(due(HARD["slow joints"], 60.0), clock)
     began = clock.now
     with suppress(DeadlineExceeded):
-        whatif(base, due(HARD["slow joints"], 0.2), clock)
+        what_if(base, due(HARD["slow joints"], 0.2), clock)
     assert clock.now - began < 0.2 + OVERRUN
 
 

@@ -10,12 +10,12 @@ import pytest
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.exceptions import InvalidProblem, NoTrajectory
 from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.optimize_round import optimize_round
+from joulepath.optimizer.plan_cycle import plan_cycle
+from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stop_path import StopPath
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.tool_path import SPEED_TOLERANCE, ToolPath
-from joulepath.optimizer.problem.work_round import WorkRound
 from joulepath.optimizer.solution import Solution
 from tests.optimizer.moves import AMPLE
 from tests.optimizer.test_tool_path import ARM, HOME, along, moved, poses_of
@@ -95,13 +95,13 @@ def test_a_speed_beyond_the_joints_says_what_to_do() -> None:
 
 
 @pytest.mark.long
-def test_a_round_holds_it_in_a_given_time() -> None:
+def test_a_cycle_holds_it_in_a_given_time() -> None:
     bead = StopPath(goal=moved([0.0, 0.25, 0.0]), path=ToolPath(fixed_speed=0.1, ramp=RAMP))
     stop = Stop(name="bead", target=moved([0.0, 0.05, 0.0]), path=bead)
-    asked = WorkRound(arm=ARM, start=HOME, stops=[stop], windings=False, deadline=AMPLE)
-    own = optimize_round(asked)
+    asked = Cycle(arm=ARM, start=HOME, stops=[stop], windings=False, deadline=AMPLE)
+    own = plan_cycle(asked)
     time = own.duration + 0.5
-    found = optimize_round(replace(asked, duration_min=time, duration_max=time))
+    found = plan_cycle(replace(asked, duration_min=time, duration_max=time))
     assert found.duration == pytest.approx(time)
     for round_ in (own, found):
         (path,) = (move for move in round_.moves if move.planned.kind == "path")

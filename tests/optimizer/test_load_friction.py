@@ -18,11 +18,11 @@ from joulepath.optimizer.energy.kernel_expressions import build
 from joulepath.optimizer.energy.kernel_functions import Interpreted
 from joulepath.optimizer.energy.limited_torque import greatest_smooth_part, limited_torque
 from joulepath.optimizer.energy.losses import drawn_power, power_flow
+from joulepath.optimizer.evaluate.evaluate import evaluate
+from joulepath.optimizer.evaluate.recording import Log, LogBlock
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.replay.evaluate import evaluate
-from joulepath.optimizer.replay.recording import Log, LogBlock
 from tests.optimizer.energy.kernel_states import LOSSY, TORQUE, left_out, places, states
 from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, problem, torques
 

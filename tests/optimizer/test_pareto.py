@@ -17,7 +17,7 @@ from joulepath.optimizer.pareto import CONVERGED, Front, pareto
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search.run import Run
@@ -209,7 +209,7 @@ def seeded(seed: int) -> dict[str, Problem]:
         "pose": problem(q_start, tcp_pose(q_goal)),
         "weak motors": problem(q_start, q_goal, limits=weak),
         "payload": problem(q_start, q_goal, payload=PAYLOAD),
-        "cycle": problem(q_start, q_goal, cycle=Cycle(4.0, "brakes", 0.3)),
+        "cycle": problem(q_start, q_goal, cycle=Dwell(4.0, "brakes", 0.3)),
         "storage": problem(q_start, q_goal, payload=PAYLOAD, bus=Bus("storage", 0.9, 5.0, 200.0)),
         "isolated": problem(q_start, q_goal, bus=Bus("isolated")),
         "bounded": problem(q_start, q_goal, duration_min=1.5, duration_max=4.0),

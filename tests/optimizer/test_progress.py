@@ -7,15 +7,15 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from tests.optimizer.cycle.rounds import pick_and_place
 
 from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.optimize_round import optimize_round
 from joulepath.optimizer.pareto import pareto
+from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Event, Improved, forward, nobody
 from joulepath.optimizer.search.candidates import Reason
 from tests.optimizer.moves import GOAL, HOME, problem, tcp_pose
-from tests.optimizer.sequence.rounds import pick_and_place
 from tests.selection import long_but
 
 SAME = 1e-12
@@ -67,20 +67,20 @@ def test_no_bound_is_told_that_is_not_proven() -> None:
         assert each.bound is None or each.bound <= answer.lower_bound
 
 
-def test_a_round_ends_with_its_answer() -> None:
+def test_a_cycle_ends_with_its_answer() -> None:
     events: list[Event] = []
-    found = optimize_round(pick_and_place(1, 2, method="time_scaling"), tell=events.append)
+    found = plan_cycle(pick_and_place(1, 2, method="time_scaling"), tell=events.append)
     last = goes_forward(events)[-1]
     assert last.energy == pytest.approx(sum(each.energy for each in found.moves), rel=SAME)
     assert last.duration == pytest.approx(found.duration, rel=SAME) and last.bound == found.lower_bound
 
 
-def test_a_round_of_another_time_tells_none_of_its_own() -> None:
+def test_a_cycle_of_another_time_tells_none_of_its_own() -> None:
     """In its own time it needs less than in the time that is asked for: that is no answer."""
-    longer = 1.5 * optimize_round(pick_and_place(1, 2, method="time_scaling")).duration
+    longer = 1.5 * plan_cycle(pick_and_place(1, 2, method="time_scaling")).duration
     events: list[Event] = []
     asked = pick_and_place(1, 2, method="time_scaling", duration_min=longer, duration_max=longer)
-    found = optimize_round(asked, tell=events.append)
+    found = plan_cycle(asked, tell=events.append)
     assert [each.energy for each in goes_forward(events)] == [pytest.approx(sum(each.energy for each in found.moves))]
 
 

@@ -20,13 +20,13 @@ from joulepath.optimizer.pareto import pareto
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import MethodName, Problem
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.problem.tool_cone import ToolCone
 from joulepath.optimizer.solution import Solution
-from joulepath.optimizer.whatif import whatif
+from joulepath.optimizer.what_if import what_if
 from tests.optimizer import moves
 from tests.optimizer.chains import move, serial_chain
 from tests.selection import long_but
@@ -107,7 +107,7 @@ def test_a_front_and_a_changed_arm(robot: Robot) -> None:
     asked = problem(robot)
     front = pareto(asked, 2)
     assert all(point.certificate.valid for point in front.points)
-    changed = whatif(front.points[-1], problem(robot, deadline=60.0))
+    changed = what_if(front.points[-1], problem(robot, deadline=60.0))
     assert changed.error is None and changed.certificate.valid
 
 
@@ -141,14 +141,14 @@ def test_every_method(method: MethodName) -> None:
 
 
 def test_limits_along_the_path_waiting_and_a_bus(robot: Robot) -> None:
-    """The TCP's speed and a cone for the tool, a cycle, and energy storage on the bus."""
+    """The TCP's speed and a cone for the tool, a dwell, and energy storage on the bus."""
     arm = Arm(
         robot=robot,
         tcp_speed=0.3,
         tool_cone=ToolCone([0, 0, 1], [0, 0, 1], np.pi),
         bus=Bus(mode="storage", capacity=5.0, power=200.0, efficiency=0.9),
     )
-    solution = optimize(replace(problem(robot), arm=arm, cycle=Cycle(time=4.0, hold="motors")))
+    solution = optimize(replace(problem(robot), arm=arm, dwell=Dwell(time=4.0, hold="motors")))
     assert solution.certificate.valid
     assert {"tcp_speed", "tool_cone"} < set(solution.certificate.worst_ratio)
     assert solution.lower_bound <= solution.energy.electrical.total

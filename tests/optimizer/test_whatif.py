@@ -14,7 +14,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
 from joulepath.optimizer.solution import Solution
-from joulepath.optimizer.whatif import whatif
+from joulepath.optimizer.what_if import what_if
 from tests.optimizer.cells import at
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import PAYLOAD, changed, limits, problem, tcp_pose
@@ -37,7 +37,7 @@ def base(asked: Problem) -> Solution:
 
 
 def test_what_is_not_changed_is_as_it_was(asked: Problem, base: Solution) -> None:
-    found = whatif(base, asked)
+    found = what_if(base, asked)
     assert found.same_motion.electrical == base.energy.electrical
     assert found.reoptimised is not None
     assert found.reoptimised.energy.electrical == base.energy.electrical
@@ -46,7 +46,7 @@ def test_what_is_not_changed_is_as_it_was(asked: Problem, base: Solution) -> Non
 
 def test_same_motion_is_what_pinocchio_says(asked: Problem, base: Solution) -> None:
     loaded = changed(asked, payload=PAYLOAD, link_mass_scale=1.3)
-    found = whatif(base, loaded)
+    found = what_if(base, loaded)
     assert found.certificate.valid
     assert found.certificate.energy_error < QUADRATURE
     spline = base.trajectory.spline
@@ -60,7 +60,7 @@ def test_optimising_anew_never_costs_more(asked: Problem, base: Solution, method
     worse = replace(asked, method=method)  # type: ignore[arg-type]
     same = PreparedProblem.of(worse).energy(base.trajectory.spline).electrical.total
     assert optimize(worse).energy.electrical.total > same
-    found = whatif(base, worse)
+    found = what_if(base, worse)
     assert found.certificate.valid and found.reoptimised is not None and found.reoptimised.certificate.valid
     assert found.reoptimised.energy.electrical.total <= same
 
@@ -68,7 +68,7 @@ def test_optimising_anew_never_costs_more(asked: Problem, base: Solution, method
 def test_what_stands_in_the_way_breaks_the_same_motion(asked: Problem, base: Solution) -> None:
     middle = base.trajectory.q[len(base.trajectory.q) // 2]
     post = Obstacle("post", Sphere(0.03), at(tcp_pose(middle).T[:3, 3]))
-    found = whatif(base, changed(asked, scene=Scene([post]), collisions=True))
+    found = what_if(base, changed(asked, scene=Scene([post]), collisions=True))
     assert not found.certificate.valid
     assert found.certificate.clearance is not None and found.certificate.clearance.min_clearance < 0
     assert found.same_motion.electrical == base.energy.electrical
@@ -79,13 +79,13 @@ def test_what_stands_in_the_way_breaks_the_same_motion(asked: Problem, base: Sol
 
 def test_what_cannot_be_moved_tells_why(asked: Problem, base: Solution) -> None:
     weak = changed(asked, limits=limits(tau_max=[150.0, 5.0, 150.0, 28.0, 28.0, 28.0]))
-    found = whatif(base, weak)
+    found = what_if(base, weak)
     assert found.reoptimised is None and isinstance(found.error, TorqueInfeasible)
     assert found.certificate.worst_ratio["torque"] > 1
 
 
 def test_no_time_leaves_the_same_motion(asked: Problem, base: Solution) -> None:
-    found = whatif(base, changed(asked, deadline=1e-6, link_mass_scale=0.5))
+    found = what_if(base, changed(asked, deadline=1e-6, link_mass_scale=0.5))
     assert found.reoptimised is None and isinstance(found.error, DeadlineExceeded)
     assert found.certificate.valid
 
@@ -96,7 +96,7 @@ def test_wherever_the_deadline_ends_it_the_same_motion_is_in_hand(
 ) -> None:
     """On an arm with a part, the base motion needs less than what time is left for, or there is nothing else."""
     worse = replace(changed(asked, payload=PAYLOAD), method="uniform_scaling", deadline=float(readings))
-    found = whatif(base, worse, CountingClock())
+    found = what_if(base, worse, CountingClock())
     assert found.certificate.valid
     if found.reoptimised is None:
         assert isinstance(found.error, DeadlineExceeded)

@@ -167,7 +167,7 @@ class GoalInCollision(_InCollision):
 
 
 class StopInCollision(_InCollision):
-    """Every arm configuration at a stop of a round is invalid, at least one because it collides: the arm, its tool or
+    """Every arm configuration at a stop of a cycle is invalid, at least one because it collides: the arm, its tool or
     its payload touches a link or an obstacle, or is closer to an obstacle than its `margin`. The arm must be able to
     come with what it carries to the stop, and to leave with what it carries from there. Move the stop or the obstacle.
     If the shapes are too coarse, set `collisions` to false."""
@@ -179,7 +179,7 @@ class StopInCollision(_InCollision):
 
 
 class NoSequence(ProblemDetails):
-    """Every stop of the round can be reached, but no chain of motions within the limits was found through all of them.
+    """Every stop of the cycle can be reached, but no chain of motions within the limits was found through all of them.
     Move `stop` or the stop before it, relax a limit, leave `branch` out or set `windings` to true."""
 
     type: Literal["/problems/no-sequence"] = fixed("type", "/problems/no-sequence")
@@ -222,14 +222,14 @@ class PathInfeasible(ProblemDetails):
     attempts: list[PathAttempt] = part("Arm configurations at the start, the one that gets farthest first; at most 64.")
 
 
-class CycleTooShort(ProblemDetails):
-    """No round was found that is as fast as `time` asks for: the fastest one found takes `shortest`. Allow at least as
+class DwellTooShort(ProblemDetails):
+    """No cycle was found that is as fast as `time` asks for: the fastest one found takes `shortest`. Allow at least as
     much."""
 
-    type: Literal["/problems/cycle-too-short"] = fixed("type", "/problems/cycle-too-short")
+    type: Literal["/problems/dwell-too-short"] = fixed("type", "/problems/dwell-too-short")
     title: Literal["Cycle too short"] = fixed("title", "Cycle too short")
     status: Literal[422] = fixed("status", 422)
-    shortest: float = described("Duration of the fastest round found.", "s", 5.55)
+    shortest: float = described("Duration of the fastest cycle found.", "s", 5.55)
     dwells: float = described("Time of it that the arm dwells.", "s", 0.9)
 
 

@@ -66,9 +66,9 @@ CYCLE_EXAMPLES: dict[str, Example] = {
             "start": {"q": HOME},
             "stops": [
                 {"name": "pick", "target": _down(0.45, -0.3, 0.15), "dwell": 0.3, "payload": PART},
-                {"name": "scanner", "target": _down(0.45, 0.05, 0.35), "pass": True},
+                {"name": "scanner", "target": _down(0.45, 0.05, 0.35), "via": True},
                 {"name": "place", "target": _down(0.1, 0.5, 0.2), "dwell": 0.3, "payload": None},
-                {"name": "bowl", "target": _down(0.4, 0.25, 0.3), "pass": True},
+                {"name": "bowl", "target": _down(0.4, 0.25, 0.3), "via": True},
             ],
             "windings": False,
             "scene": {

@@ -108,7 +108,7 @@ OPTIMIZE_EXAMPLES: dict[str, Example] = {
             "start": {"q": HOME},
             "goal": {"q": [1.2, -0.9, 1.3, -1.9, -1.57, 0.4]},
             "payload": {"mass": 3.0, "com": [0.0, 0.0, 0.06]},
-            "cycle": {"time": 4.0, "hold": "brakes", "brake_delay": 0.5, "brake_power": 15.0},
+            "dwell": {"time": 4.0, "hold": "brakes", "brake_delay": 0.5, "brake_power": 15.0},
             "link_mass_scale": 0.8,
         },
     },

@@ -62,7 +62,7 @@ function poseOf(chosen, robot) {
 
 const stopName = ({ name }, k) => name ?? `${k + 1}`;
 
-/** Start and goal, and the stops of a round; any other number is that of an obstacle. */
+/** Start and goal, and the stops of a cycle; any other number is that of an obstacle. */
 const isEnd = (name) => /[a-z]/.test(name);
 
 /** Where an end stands in a request: the object, and its field. */
@@ -70,9 +70,9 @@ const endIn = (request, name) => (name.startsWith("stop ") ? [request.stops[name
 
 /** Joint positions at an end of the motion that is shown. */
 function answeredAt(name) {
-  const { answer, round, request } = state;
+  const { answer, cycle, request } = state;
   const [stop] = endIn(request, name);
-  const places = round?.legs.flatMap(({ passes, goal }) => [...(passes ?? []), goal]);
+  const places = cycle?.legs.flatMap(({ passes, goal }) => [...(passes ?? []), goal]);
   return (places?.find((place) => place.stop === stopName(stop, Number(name.slice(5)))) ?? answer.branch[name] ?? answer.branch.start).q;
 }
 
@@ -157,7 +157,7 @@ function drawBox() {
 
 /** The request with one more box, on the floor between two of its corners [x, y]. */
 function withBox(request, first, last) {
-  const round = (value) => Math.round(value * 1000) / 1000;
+  const cycle = (value) => Math.round(value * 1000) / 1000;
   const size = first.map((value, axis) => Math.max(0.01, round(Math.abs(last[axis] - value))));
   const position = first.map((value, axis) => round((value + last[axis]) / 2));
   const obstacles = request.scene?.obstacles ?? [];

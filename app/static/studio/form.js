@@ -25,7 +25,7 @@ export function createForm() {
 /** Draws the form, where it is shown. */
 export async function showForm() {
   if ($("pane-form").hidden || !(state.answer || state.problem)) return;
-  if (!state.request) return $("form").replaceChildren(el("p", { class: "hint" }, "The request of a kept round is not kept. Choose an example, or write one as JSON."));
+  if (!state.request) return $("form").replaceChildren(el("p", { class: "hint" }, "The request of a kept cycle is not kept. Choose an example, or write one as JSON."));
   schemas ??= (await openapi()).components.schemas;
   if (!$("robots").childElementCount) $("robots").replaceChildren(...(await get("robots")).robots.map(({ name }) => el("option", {}, name)));
   const { schema, path, drawn } = kindOf(state.request);

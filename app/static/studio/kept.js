@@ -2,7 +2,7 @@
 import { get, send } from "./api.js";
 import { $, el, figure } from "./dom.js";
 import { problem, showAnswer } from "./request.js";
-import { showRound } from "./round.js";
+import { showCycle } from "./cycle.js";
 import { set, state } from "./store.js";
 
 const MOST = 50; // entries of each kind that are listed at a time
@@ -77,12 +77,12 @@ export async function addLog({ log, ...settings }, signal) {
 /** Shows an identification; its page is loaded when it is needed. Throws Problem. */
 export const openIdentification = async (id) => (await import("./residuals.js")).showIdentification(id);
 
-/** Shows a kept answer by its path or id, of a motion or of a round. Throws Problem. */
+/** Shows a kept answer by its path or id, of a motion or of a cycle. Throws Problem. */
 export async function openAnswer(path) {
   problem(null);
   const { answer } = await get(path.includes("/") ? path : `answers/${encodeURIComponent(path)}`);
-  // what was asked for cannot be told from a round
-  if (answer?.legs) return set({ request: null }), showRound(answer, null);
+  // what was asked for cannot be told from a cycle
+  if (answer?.legs) return set({ request: null }), showCycle(answer, null);
   if (!answer?.branch) throw new Error("Only motions and rounds are shown here: this answer is of another kind.");
   // the same arm between the same ends: what the answer does not say of its request stays at the defaults
   set({ request: { robot: answer.robot, ...answer.arm, start: { q: answer.branch.start.q }, goal: { q: answer.branch.goal.q } } });

@@ -4,12 +4,12 @@ import { cellOf } from "./chain.js";
 import { chart, steps } from "./chart.js";
 import { $, el, figure, style } from "./dom.js";
 import { addLog, openIdentification } from "./kept.js";
-import { showRound } from "./round.js";
+import { showCycle } from "./cycle.js";
 import { follow, set, state } from "./store.js";
 
 // what may be asked for, by the field that tells it
 const KINDS = {
-  stops: { path: "cycle", schema: "CycleRequest", verb: "Optimise", drawn: true, show: (answer, request) => showRound(answer, request) },
+  stops: { path: "cycle", schema: "CycleRequest", verb: "Optimise", drawn: true, show: (answer, request) => showCycle(answer, request) },
   logs: { path: "identifications", schema: "IdentifyRequest", verb: "Identify", show: ({ id }) => openIdentification(id) },
   log: { path: "logs", verb: "Add the log", show: added },
 };
@@ -49,7 +49,7 @@ export async function fillExamples() {
   const [first, { paths }] = await Promise.all([get(FIRST), openapi()]);
   const option = (name, body) => Object.assign(el("option", {}, name), { body });
   const of = (path, mark) => Object.values(paths[path].post.requestBody.content["application/json"].examples).map(({ summary, value }) => option(mark + summary, value));
-  $("examples").replaceChildren(option("From a bin to a shelf", first), ...of("/optimize", ""), ...of("/cycle", "Round: "));
+  $("examples").replaceChildren(option("From a bin to a shelf", first), ...of("/optimize", ""), ...of("/cycle", "Cycle: "));
   if (state.request !== example) $("examples").selectedIndex = -1;
 }
 
@@ -175,11 +175,11 @@ export async function robotOf(name) {
 }
 
 /** Shows an answer of POST /optimize. Without its request, the cell is what the answer says of its arm. */
-export async function showAnswer(answer, request, round = null) {
+export async function showAnswer(answer, request, cycle = null) {
   const robot = await robotOf(answer.robot);
   const asked = { ...answer.arm, ...request, robot: answer.robot };
   set({
-    asked: request ?? null, cell: cellOf(asked, robot), robot, answer, chosen: [], round, time: 0, duration: answer.duration,
+    asked: request ?? null, cell: cellOf(asked, robot), robot, answer, chosen: [], cycle, time: 0, duration: answer.duration,
     arms: [{ name: "this motion", answer }],
   });
   const { warnings } = answer;

@@ -21,9 +21,9 @@ export async function standalone() {
   for (const node of page.querySelectorAll("link[rel=stylesheet], link[rel=modulepreload], head script, #ask, #share, noscript, header a.button")) node.remove();
   page.querySelector("#compute-front").closest("article").remove();
   page.body.classList.add("alone");
-  const { answer, robot, round } = state;
+  const { answer, robot, cycle } = state;
   const file = robot.has_meshes ? await meshFileOf(robot).catch(() => null) : null;
-  const data = { answer: { ...answer, answer: null }, request: state.cell, robot, round, meshes: file && base64(file) };
+  const data = { answer: { ...answer, answer: null }, request: state.cell, robot, cycle, meshes: file && base64(file) };
   const main = nameOf(new URL("studio/main.js", location.href).href);
   // as text: elements would be held to the policy of this page
   const inside = [

@@ -9,7 +9,7 @@ export const state = {
   arms: [], // [{name, colour, answer}]: the answer and further branches, which move on one clock
   problem: null, // the error that is shown
   best: null, // the best motion so far of the request that is being computed: {robot, energy, q_goal, ...}
-  round: null, // answer of POST /cycle
+  cycle: null, // answer of POST /cycle
   time: 0,
   duration: 1,
   playing: false,

@@ -8,7 +8,7 @@ import { Eye } from "./eye.js";
 import { Labels } from "./labels.js";
 import { pathOfPower, rampStops } from "./path.js";
 import { kindOf } from "./request.js";
-import { legAt } from "./round.js";
+import { legAt } from "./cycle.js";
 import { placedShape } from "./shapes.js";
 import { follow, state } from "./store.js";
 
@@ -21,7 +21,7 @@ const SLOW = 0.055;
 const FAST = 0.022;
 // pixels along an edge of a pixel of the page, of a still picture: its edges are smooth by that alone
 const STILL = 2;
-const NEAR = 0.5; // of a round, for which the nearest pair is shown before and after its instant [s]
+const NEAR = 0.5; // of a cycle, for which the nearest pair is shown before and after its instant [s]
 const PAUSE = 400; // until then a picture does not count as still [ms]
 
 let view = null;
@@ -91,12 +91,12 @@ class View {
 
   /** Everything anew: another answer, or other arms beside it. */
   build() {
-    const { answer, cell, robot, arms, round } = state;
+    const { answer, cell, robot, arms, cycle } = state;
     if (!answer) return;
     this.chain = new Chain(robot);
     for (const name of ["arms", "path"]) this.empty(this.parts[name]);
     this.arms = arms.map(({ answer: own, colour }, k) => {
-      const arm = new Arm(this.chain, robot, cell, { ...(k ? { tint: colour } : {}), loads: round?.loads.map(({ payload }) => payload) });
+      const arm = new Arm(this.chain, robot, cell, { ...(k ? { tint: colour } : {}), loads: cycle?.loads.map(({ payload }) => payload) });
       this.parts.arms.add(arm.object);
       this.parts.path.add(pathOfPower(own.trajectory, (q) => this.chain.tcp(q, cell.tcp), k ? 0.006 : 0.009));
       return arm;
@@ -105,7 +105,7 @@ class View {
     this.nearest = this.nearestOf(answer);
     this.eye.fit(state.answer.trajectory, this.chain, this.sun);
     this.explain();
-    this.nameStops(round);
+    this.nameStops(cycle);
     this.buildGhosts();
     // a view that was chosen by hand stays, as long as the arm is the same
     if (this.shown !== answer.robot || !this.turned) this.look(1);
@@ -113,10 +113,10 @@ class View {
     this.pose();
   }
 
-  /** The stops of a round, by their names. */
-  nameStops(round) {
+  /** The stops of a cycle, by their names. */
+  nameStops(cycle) {
     const places = new Map(); // several stops may be at one of them
-    for (const [name, q] of new Map(round?.legs.flatMap(({ passes, goal }) => [...(passes ?? []), goal].map(({ stop, q }) => [stop, q])))) {
+    for (const [name, q] of new Map(cycle?.legs.flatMap(({ passes, goal }) => [...(passes ?? []), goal].map(({ stop, q }) => [stop, q])))) {
       const T = this.chain.tcp(q, state.cell.tcp);
       const at = [T[3], T[7], T[11]].map((value) => value.toFixed(3)).join();
       if (!name.includes("/")) places.set(at, [...(places.get(at) ?? []), name]);
@@ -197,7 +197,7 @@ class View {
 
   buildGhosts() {
     this.empty(this.parts.ghosts);
-    const { answer, cell, robot, chosen, best, round } = state;
+    const { answer, cell, robot, chosen, best, cycle } = state;
     if (!answer) return;
     const ghost = (q, tint, opacity) => {
       const arm = new Arm(this.chain, robot, cell, { tint, opacity });
@@ -206,7 +206,7 @@ class View {
     };
     ghost(answer.trajectory.q[0], START, 0.2);
     // a round ends where it begins
-    if (!round) ghost(answer.trajectory.q.at(-1), GOAL, 0.2);
+    if (!cycle) ghost(answer.trajectory.q.at(-1), GOAL, 0.2);
     chosen.forEach(({ q_goal }, k) => ghost(q_goal, new THREE.Color(style(`--joint-${k + 2}`)).getHex(), 0.42));
     if (best?.q_goal && best.robot === answer.robot) ghost(best.q_goal, new THREE.Color(style("--good")).getHex(), 0.42);
     this.draw();
@@ -233,9 +233,9 @@ class View {
   /** The arms at the present time, and what is switched on. */
   pose() {
     if (!this.arms) return;
-    const { show, time, arms, round, answer } = state;
-    const leg = round ? legAt(round.loads, time) : 0;
-    this.ignored = round?.loads[leg].ignored ?? [];
+    const { show, time, arms, cycle, answer } = state;
+    const leg = cycle ? legAt(cycle.loads, time) : 0;
+    this.ignored = cycle?.loads[leg].ignored ?? [];
     this.arms.forEach((arm, k) => {
       const { t, q } = arms[k].answer.trajectory;
       arm.pose(sampleAt(t, q, time));
@@ -245,7 +245,7 @@ class View {
     for (const name of ["ghosts", "path", "axes"]) this.parts[name].visible = show[name];
     $("labels").toggleAttribute("data-without-axes", !show.axes);
     // in a round the arm is elsewhere most of the time
-    const near = this.nearest && show.nearest && (!round || Math.abs(time - answer.certificate.clearance.time) < NEAR);
+    const near = this.nearest && show.nearest && (!cycle || Math.abs(time - answer.certificate.clearance.time) < NEAR);
     this.parts.nearest.visible = Boolean(near);
     if (near) this.labels.put("nearest", this.nearest.text, this.nearest.at, "near");
     else this.labels.drop("nearest");

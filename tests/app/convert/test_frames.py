@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 from fastapi.testclient import TestClient
 
-from joulepath.app.convert.cycle import to_work_round
+from joulepath.app.convert.cycle import to_cycle
 from joulepath.app.convert.ik import to_collision_arm
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.cycle import CycleRequest
@@ -165,7 +165,7 @@ def test_obstacles_path_tool_cone_and_lines_follow_their_frames() -> None:
         {"target": {"pose": in_ros(via)}, "approach": {"direction": [1, 2, 3], "frame": "base_link", "distance": 0.1}},
         {"target": {"pose": in_base(via)}, "approach": {"direction": [-1, -2, 3], "frame": "base", "distance": 0.1}},
     ]
-    stopping = to_work_round(CycleRequest.model_validate({"start": {"q": [0.0] * 6}, "stops": stops}), 10.0).stops
+    stopping = to_cycle(CycleRequest.model_validate({"start": {"q": [0.0] * 6}, "stops": stops}), 10.0).stops
     first, second = (stop.approach for stop in stopping)
     assert first is not None and second is not None
     assert first.frame == second.frame == "base"

@@ -21,7 +21,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.clouds import MOST_TRIANGLES, Points, Voxels
 
-# a file in single precision rounds coordinates of a metre to this [m]
+# a file in single precision cycles coordinates of a metre to this [m]
 SINGLE = 1e-7
 
 

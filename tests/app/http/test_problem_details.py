@@ -17,8 +17,8 @@ from joulepath.app.schemas.errors import Internal, NoTrajectory, OutsideLimits, 
 from joulepath.optimizer import exceptions
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.excitation.errors import ExcitationInfeasible
-from joulepath.optimizer.identification import errors as identification_errors
-from joulepath.optimizer.identification.logs.log_errors import EffortNotUsable, LogTooLarge
+from joulepath.optimizer.identify import errors as identification_errors
+from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
 from joulepath.optimizer.solution import CandidateReport, Clearance, UnreachableTarget
 
 CANDIDATE = CandidateReport("left/up/flip", "left/up/flip", np.zeros(6), np.ones(6), "failed", "no step left", 12.5)
@@ -50,7 +50,7 @@ ERRORS: list[JoulepathError] = [
     exceptions.NoCollisionFreeTrajectory([CANDIDATE], HIT, "left/up/flip", "left/up/no_flip"),
     exceptions.StopInCollision("stops/pick", [COLLIDING]),
     exceptions.NoSequence("stops/place", ["left/up/flip"], ["left/up/no_flip"]),
-    exceptions.RoundTooShort(5.5, 0.9),
+    exceptions.CycleTooShort(5.5, 0.9),
     exceptions.ContradictoryOrder("before", "No order is possible.", ["pick", "place"]),
     exceptions.NotCertified(2, "its velocity is at 1.2 of the limit", {"velocity": 1.2, "torque": np.nan}),
     exceptions.FormatUnsuitable("urscript", "This robot has 7 joints: use ros2."),

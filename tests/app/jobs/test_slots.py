@@ -67,16 +67,16 @@ def test_jobs_wait_until_there_is_a_slot(tmp_path: Path) -> None:
         job_id = await sent(service, 3)
         service.dispatcher.start()
         exchanged = service.dispatcher._exchange
-        rounds = 0
+        cycles = 0
 
         async def counted() -> None:
-            nonlocal rounds
+            nonlocal cycles
             await exchanged()
-            rounds += 1
+            cycles += 1
 
         service.dispatcher._exchange = counted  # type: ignore[method-assign]
         service.dispatcher.wake()
-        await until(lambda: rounds >= 2)
+        await until(lambda: cycles >= 2)
         assert [each.state for each in await requests(store, job_id)] == ["waiting"] * 3
         service.work.slots = 3
         service.work.errors = [ClusterUnavailable()]

@@ -63,8 +63,8 @@ def test_the_answers_are_listed(client: TestClient) -> None:
     study = client.post("/studies", json={"name": "A study", "threshold": 1.0}).headers["location"]
     step = client.post(f"{study}/iterations", json={"evaluate": given}).json()
     round_ = {"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], "candidates": "none", **PATIENT}
-    round_job = client.post("/cycle", json=round_, headers={"Prefer": "respond-async, wait=60"})
-    assert round_job.status_code == 200
+    cycle_job = client.post("/cycle", json=round_, headers={"Prefer": "respond-async, wait=60"})
+    assert cycle_job.status_code == 200
     pages, query = [], "/answers?limit=2"
     for _ in range(3):
         page = client.get(query)
@@ -84,7 +84,7 @@ def test_the_answers_are_listed(client: TestClient) -> None:
         ("optimize", "ur5e", own["status"]),
         ("evaluate", "ur5e", None),
     ]
-    done = round_job.json()
+    done = cycle_job.json()
     (whole,) = [each for each in found if each["kind"] == "cycle"]
     assert whole["energy"] == done["energy"]["electrical"]["total"] and whole["duration"] == done["duration"]
 
@@ -126,7 +126,7 @@ def test_an_answer_larger_than_all_that_may_be_kept_is_not(tmp_path: Any, most: 
     with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
 
 
-def test_the_answers_of_a_front_and_a_round_have_their_paths_and_candidates(client: TestClient) -> None:
+def test_the_answers_of_a_front_and_a_cycle_have_their_paths_and_candidates(client: TestClient) -> None:
     front = client.post("/pareto", json=move(points=2, candidates="none")).json()
     for point in front["points"]:
         kept = client.get(point["answer"]).json()["answer"]

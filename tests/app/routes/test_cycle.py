@@ -1,4 +1,4 @@
-"""POST /cycle: the round as the contract lays it out, its answers by reference, and what is refused."""
+"""POST /cycle: the cycle as the contract lays it out, its answers by reference, and what is refused."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def down(x: float, y: float, z: float) -> dict[str, Any]:
     return {"pose": {"position": [x, y, z], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
 
 
-def a_round(**fields: Any) -> dict[str, Any]:
+def a_cycle(**fields: Any) -> dict[str, Any]:
     """Two stops; a part is carried from the first to the second."""
     stops = [
         {"name": "pick", "target": down(0.45, -0.25, 0.2), "dwell": 0.5, "payload": PART},
@@ -35,7 +35,7 @@ def a_round(**fields: Any) -> dict[str, Any]:
 
 
 def answered(client: TestClient, asked: dict[str, Any]) -> dict[str, Any]:
-    """The answer to a round, which keeps to its schema."""
+    """The answer to a cycle, which keeps to its schema."""
     reply = client.post("/cycle", json=asked)
     assert reply.status_code == 200, reply.text
     CycleResponse.model_validate_json(reply.content)
@@ -45,10 +45,10 @@ def answered(client: TestClient, asked: dict[str, Any]) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def answer(client: TestClient) -> dict[str, Any]:
-    return answered(client, a_round())
+    return answered(client, a_cycle())
 
 
-def test_the_round_is_kept(client: TestClient, answer: dict[str, Any]) -> None:
+def test_the_cycle_is_kept(client: TestClient, answer: dict[str, Any]) -> None:
     again = client.get(answer["answer"]).json()
     assert (again["kind"], again["answer"]) == ("cycle", answer)
     exported = client.post("/export/csv", json={"answer": answer["answer"]})
@@ -105,11 +105,11 @@ def test_every_move_refers_to_its_answer(answer: dict[str, Any], client: TestCli
 
 
 def test_a_payload_that_is_left_out_stays_and_null_puts_it_down(client: TestClient) -> None:
-    stops = a_round()["stops"]
-    carried = client.post("/cycle", json=a_round(stops=[stops[0], {"target": stops[1]["target"]}], closed=False)).json()
+    stops = a_cycle()["stops"]
+    carried = client.post("/cycle", json=a_cycle(stops=[stops[0], {"target": stops[1]["target"]}], closed=False)).json()
     assert [leg["payload_mass"] for leg in carried["legs"]] == [0.0, 2.0, 2.0]
     assert carried["legs"][-1]["goal"]["stop"] == "2"  # a stop without a name has its number
-    put_down = client.post("/cycle", json=a_round(payload=PART, stops=[stops[1]])).json()
+    put_down = client.post("/cycle", json=a_cycle(payload=PART, stops=[stops[1]])).json()
     assert [leg["payload_mass"] for leg in put_down["legs"]] == [2.0, 0.0]
 
 
@@ -168,7 +168,7 @@ REFUSED: dict[str, tuple[str, list[Any] | None, dict[str, Any]]] = {
     "too many stops": ("validation", ["body", "stops"], {"stops": [REST] * 257}),
     "samples of many stops": ("validation", ["body", "sample_period"], {"stops": [REST] * 101, "sample_period": 1e-4}),
     "no time": ("validation", ["body", "time"], {"time": 0.0}),
-    "turned round": ("validation", ["body", "time"], {"time": {"min": 9.0, "max": 8.0}}),
+    "turned cycle": ("validation", ["body", "time"], {"time": {"min": 9.0, "max": 8.0}}),
     "text": ("validation", ["body", "time"], {"time": "long"}),
 }
 
@@ -176,7 +176,7 @@ REFUSED: dict[str, tuple[str, list[Any] | None, dict[str, Any]]] = {
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_is_wrong_is_named(name: str, client: TestClient) -> None:
     kind, loc, fields = REFUSED[name]
-    reply = client.post("/cycle", json=a_round(**fields))
+    reply = client.post("/cycle", json=a_cycle(**fields))
     content = reply.json()
     assert (reply.status_code, content["type"]) == (422, f"/problems/{kind}"), content
     if loc is not None:
@@ -196,11 +196,11 @@ def test_many_stops_have_more_time_by_default_where_the_operator_allows_it(
 
 
 def test_no_time_is_a_deadline_exceeded(client: TestClient) -> None:
-    reply = client.post("/cycle", json=a_round(deadline=0.002))
+    reply = client.post("/cycle", json=a_cycle(deadline=0.002))
     assert (reply.status_code, reply.json()["type"]) == (504, "/problems/deadline-exceeded")
 
 
-def test_a_redundant_arm_warns_once_of_what_holds_for_the_whole_round(client: TestClient) -> None:
+def test_a_redundant_arm_warns_once_of_what_holds_for_the_whole_cycle(client: TestClient) -> None:
     q = [0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8]
     stops = [{"target": {"q": [0.4, *q[1:]]}}, {"target": {"q": [0.4, -0.3, *q[2:]]}}]
     answer = client.post("/cycle", json={"robot": "panda", "start": {"q": q}, "stops": stops, **PATIENT}).json()
@@ -209,7 +209,7 @@ def test_a_redundant_arm_warns_once_of_what_holds_for_the_whole_round(client: Te
 
 
 def test_the_moves_repeat_the_scene_in_its_frame(client: TestClient) -> None:
-    """What computes with a move's arm meets the obstacles where the round did."""
+    """What computes with a move's arm meets the obstacles where the cycle did."""
     pose = {"position": [0.5, 0.0, 0.1], "quaternion": [0.0, 0.0, 0.0, 1.0]}
     scene = {
         "frame": "base_link",
@@ -221,9 +221,9 @@ def test_the_moves_repeat_the_scene_in_its_frame(client: TestClient) -> None:
     assert [arm["scene"]["frame"] for arm in arms] == ["base_link"] * len(legs)
 
 
-def test_a_round_in_a_given_time_waits_on_its_brakes(client: TestClient, answer: dict[str, Any]) -> None:
+def test_a_cycle_in_a_given_time_waits_on_its_brakes(client: TestClient, answer: dict[str, Any]) -> None:
     time, hold = 2.5 * answer["duration"], {"hold": "brakes", "brake_delay": 0.2, "brake_power": 2.0}
-    found = client.post("/cycle", json=a_round(time=time, hold=hold)).json()
+    found = client.post("/cycle", json=a_cycle(time=time, hold=hold)).json()
     assert found["duration"] == pytest.approx(time) and found["price_of_time"] < 0
     (wait,) = (leg for leg in found["legs"] if leg["kind"] == "wait")
     assert wait["start"] == wait["goal"] and wait["answer"] is None
@@ -231,19 +231,19 @@ def test_a_round_in_a_given_time_waits_on_its_brakes(client: TestClient, answer:
     assert found["energy"]["electrical"]["total"] == pytest.approx(sum(leg["electrical"] for leg in legs), rel=ROUNDING)
     assert legs[-1]["t0"] + legs[-1]["duration"] == pytest.approx(time)
     assert "fastest_then_wait" in {each["name"] for each in found["baselines"]} and found["warnings"] == []
-    at_most = client.post("/cycle", json=a_round(time={"max": time})).json()
+    at_most = client.post("/cycle", json=a_cycle(time={"max": time})).json()
     assert at_most["duration"] == answer["duration"] and at_most["price_of_time"] == 0
 
 
-def test_a_round_that_cannot_be_so_fast_says_how_fast_it_can_be(client: TestClient, answer: dict[str, Any]) -> None:
-    reply = client.post("/cycle", json=a_round(time=1.0))
+def test_a_cycle_that_cannot_be_so_fast_says_how_fast_it_can_be(client: TestClient, answer: dict[str, Any]) -> None:
+    reply = client.post("/cycle", json=a_cycle(time=1.0))
     problem = reply.json()
-    assert (reply.status_code, problem["type"], problem["dwells"]) == (422, "/problems/cycle-too-short", 0.5)
+    assert (reply.status_code, problem["type"], problem["dwells"]) == (422, "/problems/dwell-too-short", 0.5)
     assert 1.0 < problem["shortest"] <= answer["duration"]
 
 
 def test_a_free_order_is_told(client: TestClient) -> None:
-    content = a_round(order="free", together=[["pick", "place"]])
+    content = a_cycle(order="free", together=[["pick", "place"]])
     content["stops"].append({"name": "look", "target": down(0.3, 0.3, 0.4)})
     reply = client.post("/cycle", json=content)
     assert reply.status_code == 200, reply.text
@@ -261,19 +261,19 @@ def test_a_free_order_is_told(client: TestClient) -> None:
     ],
 )
 def test_an_order_that_cannot_be_names_its_field(client: TestClient, fields: dict[str, Any], loc: list[Any]) -> None:
-    reply = client.post("/cycle", json=a_round(**fields))
+    reply = client.post("/cycle", json=a_cycle(**fields))
     assert reply.status_code == 422 and reply.json()["errors"][0]["loc"] == loc
 
 
 def test_an_order_that_contradicts_itself_says_which_stops_do(client: TestClient) -> None:
-    reply = client.post("/cycle", json=a_round(order="free", before=[["place", "pick"]], together=[["pick", "place"]]))
+    reply = client.post("/cycle", json=a_cycle(order="free", before=[["place", "pick"]], together=[["pick", "place"]]))
     problem = reply.json()
     assert (reply.status_code, problem["type"]) == (422, "/problems/contradictory-order")
     assert problem["names"] == ["place", "pick"] and "leave out" in problem["detail"]
 
 
-def test_the_round_as_a_table(client: TestClient, answer: dict[str, Any]) -> None:
-    reply = client.post("/cycle", json=a_round(), headers={"Accept": "text/csv"})
+def test_the_cycle_as_a_table(client: TestClient, answer: dict[str, Any]) -> None:
+    reply = client.post("/cycle", json=a_cycle(), headers={"Accept": "text/csv"})
     assert reply.status_code == 200 and reply.headers["content-type"].startswith("text/csv")
     rows = list(csv.DictReader(reply.text.splitlines()))
     times, power = (np.array([float(row[name]) for row in rows]) for name in ("t", "power"))
@@ -287,8 +287,8 @@ def test_the_round_as_a_table(client: TestClient, answer: dict[str, Any]) -> Non
 
 
 @pytest.mark.long
-def test_a_round_of_least_work_has_its_own_gap(client: TestClient) -> None:
-    content = answered(client, a_round(objective="mechanical", time={"max": 8.0}))
+def test_a_cycle_of_least_work_has_its_own_gap(client: TestClient) -> None:
+    content = answered(client, a_cycle(objective="mechanical", time={"max": 8.0}))
     energy = content["energy"]
     work = energy["mechanical"]["total"]
     assert content["objective"] == "mechanical" and energy["lower_bound"] < work
@@ -296,13 +296,13 @@ def test_a_round_of_least_work_has_its_own_gap(client: TestClient) -> None:
     assert work == pytest.approx(sum(leg["mechanical"] for leg in content["legs"]), rel=ROUNDING)
     for each in content["baselines"]:
         assert each["saving"] == pytest.approx(1 - work / each["mechanical"]) and each["saving_interval"] is None
-    refused = client.post("/cycle", json=a_round(objective="mechanical"))
+    refused = client.post("/cycle", json=a_cycle(objective="mechanical"))
     assert refused.status_code == 422 and refused.json()["errors"][0]["loc"] == ["body", "time"]
 
 
 def test_a_storage_is_charged_from_leg_to_leg(client: TestClient) -> None:
     bus = {"mode": "storage", "capacity": 30.0, "power": 500.0, "efficiency": 0.9}
-    content = answered(client, a_round(bus=bus))
+    content = answered(client, a_cycle(bus=bus))
     legs, use = content["legs"], content["energy"]["storage"]
     assert legs[-1]["charge"] == pytest.approx(use["final"]) == pytest.approx(use["initial"])
     assert {each["name"] for each in content["baselines"]} == {"without_storage", "move_by_move"}

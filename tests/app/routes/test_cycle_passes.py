@@ -14,11 +14,11 @@ from tests.app.requests import HOME, PATIENT
 from tests.app.routes.test_cycle import PART, ROUNDING, answered, down
 
 
-def a_round(**fields: Any) -> dict[str, Any]:
+def a_cycle(**fields: Any) -> dict[str, Any]:
     """A part is carried past a scanner."""
     stops = [
         {"name": "pick", "target": down(0.45, -0.3, 0.15), "dwell": 0.3, "payload": PART},
-        {"name": "scanner", "target": down(0.45, 0.05, 0.35), "pass": True},
+        {"name": "scanner", "target": down(0.45, 0.05, 0.35), "via": True},
         {"name": "place", "target": down(0.1, 0.5, 0.2), "payload": None},
     ]
     return {"start": {"q": HOME}, "stops": stops, "windings": False, **PATIENT, **fields}
@@ -26,7 +26,7 @@ def a_round(**fields: Any) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def answer(client: TestClient) -> dict[str, Any]:
-    return answered(client, a_round())
+    return answered(client, a_cycle())
 
 
 def test_a_pass_is_part_of_one_leg(answer: dict[str, Any]) -> None:
@@ -63,7 +63,7 @@ def test_its_answer_is_a_motion_through_the_stop(answer: dict[str, Any], client:
 
 @pytest.mark.long
 def test_tables_programs_and_replays_have_the_whole_leg(answer: dict[str, Any], client: TestClient) -> None:
-    table = client.post("/cycle", json=a_round(), headers={"Accept": "text/csv"})
+    table = client.post("/cycle", json=a_cycle(), headers={"Accept": "text/csv"})
     rows = [row for row in csv.DictReader(table.text.splitlines()) if row["leg"] == "2"]
     assert {row["kind"] for row in rows} == {"move"}
     t = np.array([float(row["t"]) for row in rows]) - answer["legs"][2]["t0"]
@@ -87,24 +87,24 @@ WRONG = {
 
 @pytest.mark.parametrize("field", WRONG)
 def test_what_needs_a_rest_is_refused_by_its_field(field: str, client: TestClient) -> None:
-    stops = a_round()["stops"]
-    reply = client.post("/cycle", json=a_round(stops=[stops[0], stops[1] | WRONG[field], stops[2]]))
+    stops = a_cycle()["stops"]
+    reply = client.post("/cycle", json=a_cycle(stops=[stops[0], stops[1] | WRONG[field], stops[2]]))
     assert reply.status_code == 422 and reply.json()["type"].endswith("/validation")
     assert reply.json()["errors"][0]["loc"] == ["body", "stops", 1, field]
     assert "pass to false" in reply.text
 
 
-@pytest.mark.parametrize("fields", [{"order": "free"}, {"closed": False, "stops": a_round()["stops"][:2]}])
+@pytest.mark.parametrize("fields", [{"order": "free"}, {"closed": False, "stops": a_cycle()["stops"][:2]}])
 def test_where_the_arm_cannot_pass_is_refused(fields: dict[str, Any], client: TestClient) -> None:
-    reply = client.post("/cycle", json=a_round(**fields))
+    reply = client.post("/cycle", json=a_cycle(**fields))
     assert reply.status_code == 422
-    assert reply.json()["errors"][0]["loc"] == ["body", "stops", 1, "pass"]
+    assert reply.json()["errors"][0]["loc"] == ["body", "stops", 1, "via"]
 
 
 def test_pass_is_true_or_false(client: TestClient) -> None:
-    stops = a_round()["stops"]
+    stops = a_cycle()["stops"]
     for wrong in ("yes", 1, None):
-        reply = client.post("/cycle", json=a_round(stops=[stops[0], stops[1] | {"pass": wrong}, stops[2]]))
-        assert reply.status_code == 422 and reply.json()["errors"][0]["loc"] == ["body", "stops", 1, "pass"]
-    reply = client.post("/cycle", json=a_round(stops=[stops[0] | {"pass_": True}, stops[2]]))
+        reply = client.post("/cycle", json=a_cycle(stops=[stops[0], stops[1] | {"via": wrong}, stops[2]]))
+        assert reply.status_code == 422 and reply.json()["errors"][0]["loc"] == ["body", "stops", 1, "via"]
+    reply = client.post("/cycle", json=a_cycle(stops=[stops[0] | {"via_": True}, stops[2]]))
     assert reply.status_code == 422 and "pass_" not in reply.json()["errors"][0]["msg"].partition("use only")[2]

@@ -9,7 +9,7 @@ from starlette.testclient import TestClient
 
 from joulepath.app.schemas.cycle import CycleResponse
 from joulepath.app.schemas.response import OptimizeResponse
-from tests.app.routes.test_cycle import a_round, down
+from tests.app.routes.test_cycle import a_cycle, down
 
 LINES = {
     "approach": {"direction": [0.0, 0.0, 1.0], "distance": 0.08},
@@ -18,8 +18,8 @@ LINES = {
 
 
 def with_lines(**fields: Any) -> dict[str, Any]:
-    """The round of `a_round`, its first stop with lines."""
-    content = a_round()
+    """The cycle of `a_cycle`, its first stop with lines."""
+    content = a_cycle()
     content["stops"][0] |= LINES | fields
     return content
 
@@ -84,7 +84,7 @@ def with_path(**fields: Any) -> dict[str, Any]:
         "dwell": 0.2,
         **LINES,
     }
-    return a_round(stops=[stop])
+    return a_cycle(stops=[stop])
 
 
 @pytest.mark.long
@@ -156,7 +156,7 @@ def test_a_path_is_divided_on_request(client: TestClient) -> None:
     points = [POINTS[0] | {"position": at} for at in ([0.45, -0.1, 0.2], [0.2, 0.5, 0.2])]
     path: dict[str, Any] = {"points": points, "split": True}
     stop = {"name": "glue", "path": path, "branch": {"shoulder": "left", "elbow": "up"}}
-    content = a_round(stops=[stop], limits={"position": {"lower": low, "upper": high}}, collisions=False)
+    content = a_cycle(stops=[stop], limits={"position": {"lower": low, "upper": high}}, collisions=False)
     reply = client.post("/cycle", json=content)
     assert reply.status_code == 200, reply.text
     answer = CycleResponse.model_validate_json(reply.content)
@@ -190,7 +190,7 @@ def test_a_fixed_speed_is_held_or_says_why_not(client: TestClient) -> None:
     def bead(speed: float) -> dict[str, Any]:
         path = {"points": POINTS[:2], "speed": {"min": speed, "max": speed}}
         only = {"shoulder": "right", "elbow": "up", "wrist": "flip"}
-        return a_round(stops=[{"name": "bead", "path": path, "branch": only}], closed=False)
+        return a_cycle(stops=[{"name": "bead", "path": path, "branch": only}], closed=False)
 
     reply = client.post("/cycle", json=bead(0.1))
     assert reply.status_code == 200, reply.text

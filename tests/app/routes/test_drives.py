@@ -1,4 +1,4 @@
-"""Inverters, bus modes, cycle and scaled links through the service."""
+"""Inverters, bus modes, dwell and scaled links through the service."""
 
 from __future__ import annotations
 
@@ -72,8 +72,8 @@ def test_figures_of_the_drives_and_links_reach_the_optimiser(client: TestClient)
 def test_a_cycle_is_waited_out(client: TestClient) -> None:
     plain = answered(client, move())
     assert plain["energy"]["electrical"]["dwell"] == 0
-    motors = answered(client, move(cycle={"time": 3.0}))
-    brakes = answered(client, move(cycle={"time": 3.0, "hold": "brakes", "brake_delay": 0.2, "brake_power": 10.0}))
+    motors = answered(client, move(dwell={"time": 3.0}))
+    brakes = answered(client, move(dwell={"time": 3.0, "hold": "brakes", "brake_delay": 0.2, "brake_power": 10.0}))
     assert total(plain) < total(brakes) < total(motors)
     assert brakes["energy"]["electrical"]["dwell"] > 0
     assert brakes["duration"] < 3.0
@@ -82,8 +82,8 @@ def test_a_cycle_is_waited_out(client: TestClient) -> None:
         assert answer["duration"] <= 3.0 * (1 + 1e-9)
 
 
-def test_a_cycle_too_short_says_how_long(client: TestClient) -> None:
-    answer = client.post("/optimize", json=move(cycle={"time": 0.05}))
+def test_a_dwell_too_short_says_how_long(client: TestClient) -> None:
+    answer = client.post("/optimize", json=move(dwell={"time": 0.05}))
     assert answer.status_code == 422
     assert answer.json()["type"].endswith("duration-too-short")
     assert answer.json()["shortest"] > 0.05
@@ -108,12 +108,12 @@ def test_a_cycle_too_short_says_how_long(client: TestClient) -> None:
         ({"link_mass_scale": 0}, ["body", "link_mass_scale"]),
         ({"link_mass_scale": [1] * 5}, ["body", "link_mass_scale"]),
         ({"link_mass_scale": True}, ["body", "link_mass_scale"]),
-        ({"cycle": {"hold": "brakes"}}, ["body", "cycle", "time"]),
-        ({"cycle": {"time": 1e9}}, ["body", "cycle", "time"]),
-        ({"cycle": {"time": 3, "brake_delay": -1}}, ["body", "cycle", "brake_delay"]),
-        ({"cycle": {"time": 3, "hold": "glue"}}, ["body", "cycle", "hold"]),
-        ({"cycle": {"time": 3}, "duration": 4.0}, ["body", "duration"]),
-        ({"cycle": {"time": 3}, "duration": {"min": 3.5}}, ["body", "duration"]),
+        ({"dwell": {"hold": "brakes"}}, ["body", "dwell", "time"]),
+        ({"dwell": {"time": 1e9}}, ["body", "dwell", "time"]),
+        ({"dwell": {"time": 3, "brake_delay": -1}}, ["body", "dwell", "brake_delay"]),
+        ({"dwell": {"time": 3, "hold": "glue"}}, ["body", "dwell", "hold"]),
+        ({"dwell": {"time": 3}, "duration": 4.0}, ["body", "duration"]),
+        ({"dwell": {"time": 3}, "duration": {"min": 3.5}}, ["body", "duration"]),
     ],
 )
 def test_names_the_field(client: TestClient, fields: dict[str, Any], loc: list[str]) -> None:
@@ -125,6 +125,6 @@ def test_names_the_field(client: TestClient, fields: dict[str, Any], loc: list[s
 
 
 def test_not_a_number_is_refused(client: TestClient) -> None:
-    for fields in ('"cycle": {"time": NaN}', '"link_mass_scale": NaN', '"bus": {"mode": "storage", "capacity": NaN}'):
+    for fields in ('"dwell": {"time": NaN}', '"link_mass_scale": NaN', '"bus": {"mode": "storage", "capacity": NaN}'):
         body = '{"start": {"q": [0, 0, 0, 0, 0, 0]}, "goal": {"q": [0, 0, 0, 0, 0, 1]}, ' + fields + "}"
         assert client.post("/optimize", content=body).status_code == 422

@@ -96,7 +96,7 @@ def test_a_slow_run_is_certified_anew_and_says_so(client: TestClient, answer: Js
     assert float(slow.headers["joulepath-worst-ratio"]) < float(fast.headers["joulepath-worst-ratio"])
 
 
-def test_the_program_of_a_round_runs_from_stop_to_stop(client: TestClient) -> None:
+def test_the_program_of_a_cycle_runs_from_stop_to_stop(client: TestClient) -> None:
     found = client.post("/cycle", json=ROUND).json()
     exported = export(client, "urscript", found, urscript={"digital_output": 1})
     assert exported.status_code == 200, exported.text

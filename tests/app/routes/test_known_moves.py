@@ -1,4 +1,4 @@
-"""Rounds in one cell have moves in common: those that were found before are found again, and answers are the same."""
+"""Cycles in one cell have moves in common: those that were found before are found again, and answers are the same."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ KNOWN = {"Cache-Control": "max-age=60"}
 FAR = [0.6, *NEAR[1:]]
 
 
-def a_round(mass: float, *stops: list[float], **fields: Any) -> dict[str, Any]:
+def a_cycle(mass: float, *stops: list[float], **fields: Any) -> dict[str, Any]:
     payload = {"mass": mass, "com": [0.0, 0.0, 0.05]}
     own = {"start": {"q": HOME}, "stops": [{"target": {"q": q}} for q in stops]}
     return own | {"windings": False, "payload": payload, "robot": "ur5e"} | fields
@@ -38,33 +38,33 @@ def without_times(answer: Any) -> Any:
     return {name: value for name, value in answer.items() if name not in dropped} | {"legs": legs}
 
 
-def test_a_round_of_which_one_stop_changed_solves_only_the_moves_to_and_from_it(client: TestClient) -> None:
-    first = sent(client, a_round(0.111, NEAR, FAR))
+def test_a_cycle_of_which_one_stop_changed_solves_only_the_moves_to_and_from_it(client: TestClient) -> None:
+    first = sent(client, a_cycle(0.111, NEAR, FAR))
     assert all(solves(client, first))
-    again = sent(client, a_round(0.111, NEAR, FAR))
+    again = sent(client, a_cycle(0.111, NEAR, FAR))
     assert not any(solves(client, again))
     assert without_times(again) == without_times(first)
     other = [0.7, *NEAR[1:]]
-    edited = sent(client, a_round(0.111, NEAR, other))
+    edited = sent(client, a_cycle(0.111, NEAR, other))
     assert list(map(bool, solves(client, edited))) == [False, True, True]
-    fresh = sent(client, a_round(0.111, NEAR, other), **{"Cache-Control": "no-cache"})
+    fresh = sent(client, a_cycle(0.111, NEAR, other), **{"Cache-Control": "no-cache"})
     assert all(solves(client, fresh))
     assert without_times(edited) == without_times(fresh)
 
 
 def test_another_arm_or_cell_has_none_of_them(client: TestClient) -> None:
-    first = sent(client, a_round(0.112, NEAR))
-    assert all(solves(client, sent(client, a_round(0.113, NEAR))))
-    assert all(solves(client, sent(client, a_round(0.112, NEAR, gravity=[0.0, 1.0, -9.7]))))
-    assert not any(solves(client, sent(client, a_round(0.112, NEAR))))
+    first = sent(client, a_cycle(0.112, NEAR))
+    assert all(solves(client, sent(client, a_cycle(0.113, NEAR))))
+    assert all(solves(client, sent(client, a_cycle(0.112, NEAR, gravity=[0.0, 1.0, -9.7]))))
+    assert not any(solves(client, sent(client, a_cycle(0.112, NEAR))))
     assert all(solves(client, first))
 
 
-def test_rounds_of_jobs_share_them_with_those_that_are_answered_at_once(client: TestClient) -> None:
-    sent(client, a_round(0.114, NEAR, FAR))
-    job = client.post("/jobs", json={"requests": [{"cycle": a_round(0.114, NEAR)}]}, headers=KNOWN)
+def test_cycles_of_jobs_share_them_with_those_that_are_answered_at_once(client: TestClient) -> None:
+    sent(client, a_cycle(0.114, NEAR, FAR))
+    job = client.post("/jobs", json={"requests": [{"cycle": a_cycle(0.114, NEAR)}]}, headers=KNOWN)
     assert ended(client, job.headers["location"])["state"] == "done"
     (line,) = client.get(f"{job.headers['location']}/results").text.splitlines()
     # the move home is another one than that from the second stop
     assert list(map(bool, solves(client, orjson.loads(line)["result"]))) == [False, True]
-    assert not any(solves(client, sent(client, a_round(0.114, NEAR))))
+    assert not any(solves(client, sent(client, a_cycle(0.114, NEAR))))

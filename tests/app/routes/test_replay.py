@@ -1,4 +1,4 @@
-"""POST /replay: answers by their id and whole, moves of a round, points of a front; what makes no replay."""
+"""POST /replay: answers by their id and whole, moves of a cycle, points of a front; what makes no replay."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def test_a_contact_is_reported(client: TestClient) -> None:
     assert any("table and tool touch" in words or "tool and table touch" in words for words in content["warnings"])
 
 
-def test_the_moves_of_a_round(client: TestClient) -> None:
+def test_the_moves_of_a_cycle(client: TestClient) -> None:
     """Each with what the arm carries on it, within the limits and among the obstacles of its stop."""
     stops = [
         {"name": "pick", "target": {"q": NEAR}, "dwell": 0.1, "payload": {"mass": 2.0, "com": [0.0, 0.0, 0.1]}},
@@ -194,8 +194,8 @@ def test_unknown_ids(client: TestClient) -> None:
     for name in ("x", "/answers/5c0a0e0f-8d1f-4f1c-9a43-2f4a3ad0d1b7", "\0"):
         refused(client.post("/replay", json={"answer": name}), problems.UnknownAnswer)
     leg = {"kind": "move", "start": {"stop": "start"}, "goal": {"stop": "a"}, "duration": 1.0, "answer": "/answers/x"}
-    round_of_lost_moves = {"robot": "ur5e", "legs": [leg]}
-    refused(client.post("/replay", json={"answer": round_of_lost_moves}), problems.UnknownAnswer)
+    cycle_of_lost_moves = {"robot": "ur5e", "legs": [leg]}
+    refused(client.post("/replay", json={"answer": cycle_of_lost_moves}), problems.UnknownAnswer)
 
 
 def test_a_motion_that_takes_long_is_ended(client: TestClient) -> None:

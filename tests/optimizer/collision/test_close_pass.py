@@ -11,10 +11,10 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.collision.clearance_proof import GAP, RELATIVE_GAP, proven_clearance
 from joulepath.optimizer.collision.close_pass import CLOSE, close_pass
 from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.evaluate.evaluate import evaluate
+from joulepath.optimizer.evaluate.recording import Waypoints
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
-from joulepath.optimizer.replay.evaluate import evaluate
-from joulepath.optimizer.replay.recording import Waypoints
 from joulepath.optimizer.solution import Clearance
 from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.cells import at

@@ -9,13 +9,13 @@ import pytest
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.stand_ins import StandIns, StandInSettings
+from joulepath.optimizer.evaluate.evaluate import evaluate
+from joulepath.optimizer.evaluate.recording import Waypoints
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import Attachment, Box, HalfSpace, Mesh, Obstacle, Scene, Sphere, capsule_between
-from joulepath.optimizer.replay.evaluate import evaluate
-from joulepath.optimizer.replay.recording import Waypoints
 from joulepath.optimizer.solution import Clearance
 from tests.optimizer.cells import at
 from tests.optimizer.moves import AMPLE, HOME, ROBOT

@@ -11,31 +11,22 @@ import pytest
 
 from joulepath.models.registry import load_figures, load_robot
 from joulepath.models.robot import Array, FrictionLaw, Robot
-from joulepath.models.uncertainty.parameters import (
-    BASE_POWER,
-    DRIVES,
-    FRICTION,
-    LINKS,
-    PER_JOINT,
-    count,
-    index,
-    place,
-    values,
-)
+from joulepath.models.uncertainty import parameters
+from joulepath.models.uncertainty.parameters import count, index, place, values
 from joulepath.models.uncertainty.ranges import default_ranges
 from joulepath.models.uncertainty.spread import DRAWS, Spread, spread_of
 from joulepath.optimizer.energy.dwell import dwell_energy, holding_power
 from joulepath.optimizer.energy.interval import Known, interval_of, saving_interval
 from joulepath.optimizer.energy.losses import breakdown
 from joulepath.optimizer.energy.plant import REPORT_NODES
+from joulepath.optimizer.evaluate.evaluate import evaluate
+from joulepath.optimizer.evaluate.recording import Log, LogBlock
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Inverter
 from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.replay.evaluate import evaluate
-from joulepath.optimizer.replay.recording import Log, LogBlock
 from joulepath.optimizer.search.baselines import guesses
 from joulepath.optimizer.solution import Sensitivity
 from joulepath.optimizer.trajectories.spline import Spline, fine_samples
@@ -54,9 +45,9 @@ H = 1e-3
 
 def with_values(robot: Robot, law: FrictionLaw, vector: Array) -> Robot:
     """The robot with these figures; the power of its electronics counts as idle power."""
-    parts: dict[str, Any] = {name: vector[place(name, robot.nq)] for name in PER_JOINT}
-    drives = replace(robot.drives, **{name: parts[name] for name in DRIVES})
-    friction = replace(law, **{name: parts[name] for name in FRICTION})
+    parts: dict[str, Any] = {name: vector[place(name, robot.nq)] for name in parameters.PER_JOINT}
+    drives = replace(robot.drives, **{name: parts[name] for name in parameters.DRIVES})
+    friction = replace(law, **{name: parts[name] for name in parameters.FRICTION})
     model = robot.model.copy()
     model.armature = drives.rotor_inertia
     electronics = replace(robot.electronics, idle_power=float(vector[0]), controller_power=0.0)
@@ -83,10 +74,10 @@ class Reevaluated:
         tau = self.tau + (robot.drives.rotor_inertia - arm.drives.rotor_inertia) * self.a
         arm = replace(arm, robot=robot)
         energy = breakdown(self.weights, self.v, self.a, tau, 0.0, arm).electrical.total
-        cycle = self.task.cycle
-        if cycle is None:
+        dwell = self.task.dwell
+        if dwell is None:
             return energy
-        return energy + dwell_energy(cycle, arm, float(holding_power(arm, self.held)), self.duration)
+        return energy + dwell_energy(dwell, arm, float(holding_power(arm, self.held)), self.duration)
 
 
 CONDITIONS: dict[str, dict[str, Any]] = {
@@ -95,8 +86,8 @@ CONDITIONS: dict[str, dict[str, Any]] = {
     "isolated": {"bus": Bus("isolated"), "payload": PAYLOAD},
     "recuperating": {"bus": Bus("recuperating", efficiency=0.8), "payload": PAYLOAD},
     "storage": {"bus": Bus("storage", efficiency=0.9, capacity=50.0), "payload": PAYLOAD},
-    "cycle by motors": {"cycle": Cycle(3.0), "payload": PAYLOAD},
-    "cycle by brakes": {"cycle": Cycle(3.0, hold="brakes", brake_delay=0.5)},
+    "dwell by motors": {"dwell": Dwell(3.0), "payload": PAYLOAD},
+    "dwell by brakes": {"dwell": Dwell(3.0, hold="brakes", brake_delay=0.5)},
 }
 
 
@@ -124,7 +115,8 @@ def test_the_gradient_is_the_slope(name: str, monkeypatch: pytest.MonkeyPatch) -
     found = found.gradient
     energy, base = Reevaluated(task, spline), nominal(task)
     assert found.shape == (count(6),)
-    for name_of, k in [(each, place(each, 6).start + j) for each in PER_JOINT for j in (0, 1, 4)] + [(BASE_POWER, 0)]:
+    chosen = [(each, place(each, 6).start + j) for each in parameters.PER_JOINT for j in (0, 1, 4)]
+    for name_of, k in [*chosen, (parameters.BASE_POWER, 0)]:
         step = STEP * max(abs(base[k]), 0.1)
         up, down = base.copy(), base.copy()
         up[k] += step
@@ -139,7 +131,7 @@ def with_link(robot: Robot, part: str, joint: int, by: float) -> Robot:
     """The robot with a parameter of one link changed."""
     model = robot.model.copy()
     changed = model.inertias[joint + 1].toDynamicParameters()
-    changed[LINKS.index(part)] += by
+    changed[parameters.LINKS.index(part)] += by
     model.inertias[joint + 1] = pin.Inertia.FromDynamicParameters(changed)
     return replace(robot, model=model)
 
@@ -156,7 +148,7 @@ def with_link_errors(robot: Robot) -> Robot:
     return replace(robot, figures=robot.figures | {"covariance": {"names": names, "matrix": matrix}})
 
 
-@pytest.mark.parametrize("name", ["shared", "load", "isolated", "cycle by motors"])
+@pytest.mark.parametrize("name", ["shared", "load", "isolated", "dwell by motors"])
 def test_the_gradient_by_the_links_is_the_slope(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Under a tilted gravity, with links of another weight, which multiplies that of the figures."""
     given = dict(CONDITIONS[name]) | {"gravity": TILTED}

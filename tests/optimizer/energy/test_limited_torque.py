@@ -17,11 +17,11 @@ from joulepath.optimizer.energy.kernel import Kernel
 from joulepath.optimizer.energy.kernel_expressions import build
 from joulepath.optimizer.energy.kernel_functions import Interpreted
 from joulepath.optimizer.energy.limited_torque import limited_torque
+from joulepath.optimizer.evaluate.evaluate import evaluate
+from joulepath.optimizer.evaluate.recording import Log, LogBlock
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.replay.evaluate import evaluate
-from joulepath.optimizer.replay.recording import Log, LogBlock
 from tests.optimizer.energy.kernel_states import LOSSY, TORQUE, left_out, states
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem, torques
 

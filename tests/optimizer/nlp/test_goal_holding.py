@@ -16,7 +16,7 @@ from joulepath.optimizer.nlp.nonlinear_program import NonlinearProgram
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.trajectories import bspline
@@ -24,7 +24,7 @@ from tests.optimizer.moves import AMPLE
 from tests.optimizer.nlp.test_sliding_ends import GOAL, START, curve, straight
 
 ARM = Arm(robot=load_robot("panda"), collisions=False)
-ON_MOTORS, ON_BRAKES = Cycle(time=12.0), Cycle(time=6.0, hold="brakes", brake_delay=1.0, brake_power=20.0)
+ON_MOTORS, ON_BRAKES = Dwell(time=12.0), Dwell(time=6.0, hold="brakes", brake_delay=1.0, brake_power=20.0)
 
 
 def test_a_quadratic_power_has_exact_derivatives() -> None:
@@ -44,10 +44,10 @@ def test_a_quadratic_power_has_exact_derivatives() -> None:
     assert second[7, 7] == 0.0
 
 
-@pytest.mark.parametrize("cycle", [ON_MOTORS, ON_BRAKES], ids=["motors", "brakes"])
-def test_the_cost_of_another_goal_is_that_of_its_wait(cycle: Cycle) -> None:
+@pytest.mark.parametrize("dwell", [ON_MOTORS, ON_BRAKES], ids=["motors", "brakes"])
+def test_the_cost_of_another_goal_is_that_of_its_wait(dwell: Dwell) -> None:
     """A program whose goal has moved costs what the same motion costs in a program of that goal."""
-    prepared = PreparedProblem.of(Problem(arm=ARM, start=START, goal=GOAL, cycle=cycle))
+    prepared = PreparedProblem.of(Problem(arm=ARM, start=START, goal=GOAL, dwell=dwell))
     moved = GOAL + np.array([0.1, -0.2, 0.1, 0.2, 0.0, -0.1, 0.1])
     for here, there in zip(*(duration_intervals(prepared, q) for q in (GOAL, moved)), strict=True):
         own, other = (
@@ -79,9 +79,9 @@ def test_the_cost_of_another_goal_is_that_of_its_wait(cycle: Cycle) -> None:
 
 
 def test_no_posture_near_by_waits_for_less() -> None:
-    """Most of this cycle is a wait: once, its posture was the one that is best without."""
+    """Most of this dwell is a wait: once, its posture was the one that is best without."""
     asked = Problem(
-        arm=ARM, start=START, goal=Pose(tcp_pose(ARM, GOAL)), cycle=ON_MOTORS, duration_max=1.5, deadline=AMPLE
+        arm=ARM, start=START, goal=Pose(tcp_pose(ARM, GOAL)), dwell=ON_MOTORS, duration_max=1.5, deadline=AMPLE
     )
     found = optimize(asked)
     held = HeldPose.of(ARM, found.goal.q)
@@ -92,6 +92,6 @@ def test_no_posture_near_by_waits_for_less() -> None:
         if near is None or not ((ARM.robot.limits.q_min < near) & (near < ARM.robot.limits.q_max)).all():
             continue
         tried += 1
-        other = optimize(Problem(arm=ARM, start=START, goal=near, cycle=ON_MOTORS, duration_max=1.5, deadline=AMPLE))
+        other = optimize(Problem(arm=ARM, start=START, goal=near, dwell=ON_MOTORS, duration_max=1.5, deadline=AMPLE))
         assert other.energy.electrical.total >= found.energy.electrical.total * (1 - 2e-4)
     assert tried >= 2

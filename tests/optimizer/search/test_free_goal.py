@@ -25,7 +25,7 @@ from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.free_goal import goal_constraints
@@ -317,8 +317,8 @@ def test_a_front_follows_a_goal_that_turns(count: int) -> None:
 @pytest.mark.parametrize(
     "given",
     [
-        pytest.param({"cycle": Cycle(time=4.0, hold="motors")}, marks=pytest.mark.long),
-        pytest.param({"cycle": Cycle(time=4.0, hold="brakes", brake_delay=0.3)}, marks=pytest.mark.long),
+        pytest.param({"dwell": Dwell(time=4.0, hold="motors")}, marks=pytest.mark.long),
+        pytest.param({"dwell": Dwell(time=4.0, hold="brakes", brake_delay=0.3)}, marks=pytest.mark.long),
         pytest.param({"bus": Bus(mode="storage", capacity=20.0, efficiency=0.9)}, marks=pytest.mark.long),
         pytest.param({"bus": Bus(mode="isolated")}, marks=pytest.mark.long),
     ],

@@ -15,7 +15,7 @@ from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.newton import solved
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.candidates import Candidate, pairs
 from joulepath.optimizer.search.ends import ends
@@ -85,7 +85,7 @@ def attacked(start: Array, goal: Array, seed: int) -> float:
     return float(best.min())
 
 
-@pytest.mark.parametrize("given", [{}, {"duration_min": 6.0}, {"cycle": Cycle(8.0)}], ids=["free", "slow", "cycle"])
+@pytest.mark.parametrize("given", [{}, {"duration_min": 6.0}, {"dwell": Dwell(8.0)}], ids=["free", "slow", "dwell"])
 def test_no_configuration_of_the_pose_is_below(given: dict[str, Any]) -> None:
     ratios = []
     for k, (start, goal) in enumerate(tasks("gen3", 6)):

@@ -15,7 +15,7 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import AnyOf
@@ -136,7 +136,7 @@ def test_a_branch_that_is_asked_for_is_kept() -> None:
 
 
 def test_estimates_count_what_waiting_at_a_goal_draws() -> None:
-    problem, _ = task("panda", 1, "about", cycle=Cycle(time=4.0, hold="motors"), duration_min=2.0, duration_max=2.0)
+    problem, _ = task("panda", 1, "about", dwell=Dwell(time=4.0, hold="motors"), duration_min=2.0, duration_max=2.0)
     run = Run(problem)
     run.prepare()
     some = [each for each in run.incumbent.candidates if each.holdable][:20:4]

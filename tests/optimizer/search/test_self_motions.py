@@ -17,7 +17,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.candidates import bound, pairs
@@ -105,11 +105,11 @@ def test_answers_next_to_a_singularity_are_those_beside_them(joint: int) -> None
     "given",
     [
         {},
-        pytest.param({"cycle": Cycle(time=4.0, hold="motors")}, marks=pytest.mark.long),
+        pytest.param({"dwell": Dwell(time=4.0, hold="motors")}, marks=pytest.mark.long),
         pytest.param({"objective": "mechanical", "duration_max": 2.0}, marks=pytest.mark.long),
         pytest.param({"bus": Bus(mode="isolated")}, marks=pytest.mark.long),
     ],
-    ids=["electrical", "cycle", "mechanical", "isolated"],
+    ids=["electrical", "dwell", "mechanical", "isolated"],
 )
 def test_no_member_of_a_curve_has_a_lower_bound_below_the_curves(
     given: dict[str, Any], monkeypatch: pytest.MonkeyPatch

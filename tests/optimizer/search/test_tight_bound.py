@@ -10,7 +10,7 @@ import pytest
 
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.solution import Solution
 from tests.optimizer.moves import PAYLOAD, ROBOT, START, fixed, limits, problem, random_moves, tcp_pose
@@ -23,8 +23,8 @@ CASES: dict[str, dict[str, Any]] = {
     "duration near the shortest": fixed(0.75),
     "isolated bus": {"bus": Bus("isolated")},
     "recuperating bus": {"bus": Bus("recuperating", efficiency=0.8)},
-    "wait with motors": {"cycle": Cycle(4.0)},
-    "wait with brakes": {"cycle": Cycle(4.0, "brakes", 0.5, 20.0)},
+    "wait with motors": {"dwell": Dwell(4.0)},
+    "wait with brakes": {"dwell": Dwell(4.0, "brakes", 0.5, 20.0)},
     "plain friction": {"friction": "coulomb_viscous"},
 }
 

@@ -1,0 +1,219 @@
+"""Cycles of stops: what deciding all stops together saves against move by move, the proven gap, and the time.
+
+    python -m benchmarks.rounds --count 20
+    python -m benchmarks.rounds --count 50 --dwell 0
+    python -m benchmarks.rounds --count 50 --anywhere
+    python -m benchmarks.rounds --count 50 --turned
+    python -m benchmarks.rounds --count 5 --stops 12
+    python -m benchmarks.rounds --count 10 --time 1.5
+    python -m benchmarks.rounds --count 20 --stops 2 --near --time 1.5
+    python -m benchmarks.rounds --count 20 --stops 5 --passes 4
+    python -m benchmarks.rounds --count 5 --stops 12 --free
+    python -m benchmarks.rounds --count 1 --stops 245 --deadline 600
+
+A UR5e starts from rest at given joint positions over the table, takes up 2 kg at every other stop, puts it down at the
+next one, and comes back. Poses are drawn with the tool nearly down where the arm reaches them. It dwells 0.3 s at each,
+or as long as `--dwell` says: what it draws then, no choice of configurations saves. Collisions are ignored, so that
+every cycle has an answer. With `--anywhere`, the start is one more such pose, in any configuration: choosing move by
+move, the first move chooses it. With `--turned`, the parts are cycle: the tool may be turned by any angle about its
+axis at every stop. With `--near`, the arm carries 4 kg to each stop from joint positions at most 1.5 rad from those
+before, drawn anywhere: its fastest moves are hard to find. With `--time`, each cycle gets so many times the duration of
+least energy; the excess is what its answer needs beyond the least of its feasible baselines and of the cycle in its own
+time with a wait, and ends the benchmark if there is any. With `--passes`, it passes through the first stops without a
+rest, and carries the part nowhere; then a cycle that needs more than the one that stops there ends the benchmark. With
+`--free`, the order is free, and the arm carries nothing either.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from benchmarks.command import on_one_core, parser, write_json
+from benchmarks.statistics import Spread
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.cycle.cycle_solution import CycleSolution
+from joulepath.optimizer.energy.dwell import holding_power
+from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.plan_cycle import plan_cycle
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.free_order import FreeOrder
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.stops import Stop
+
+HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
+PART, NOTHING = Payload(mass=2.0, com=np.array([0.0, 0.0, 0.05])), Payload()
+# joint positions near each other [rad], and what the arm carries there
+WHOLE_RANGE, NEAR, HEAVY = 2.9, 1.5, Payload(mass=4.0, com=np.array([0.0, 0.0, 0.1]))
+# ring around the base, heights [m], and greatest tilt of the tool [rad]
+NEAREST, FARTHEST, HEIGHTS, TILT = 0.35, 0.7, (0.05, 0.4), 0.2
+
+# of a stop [s]
+DWELL = 0.3
+# of a cycle: largest jump of a joint between legs [rad]; its energy without that of the legs and rests, and without its
+# parts, relative. All are sums of the same numbers in another order
+SUMS = ("joins [rad]", "energy of the legs", "parts of the energy")
+EXACT = 1e-9
+# relative: as exact as energies of equal motions are
+EXCESS, NO_EXCESS = "excess over the least of all", 1e-6
+
+
+def poses(rng: np.random.Generator, count: int) -> list[Pose]:
+    """Poses with the tool nearly down."""
+    found = list[Pose]()
+    while len(found) < count:
+        x, y, z = rng.uniform([-FARTHEST, -FARTHEST, HEIGHTS[0]], [FARTHEST, FARTHEST, HEIGHTS[1]])
+        if NEAREST < np.hypot(x, y) < FARTHEST:
+            roll, pitch, yaw = rng.uniform([-TILT, -TILT, -np.pi], [TILT, TILT, np.pi])
+            found.append(Pose.from_rpy([x, y, z], [np.pi + roll, pitch, yaw]))
+    return found
+
+
+def rounds(
+    seed: int,
+    count: int,
+    stops: int,
+    deadline: float,
+    passes: int = 0,
+    free: bool = False,
+    dwell: float = DWELL,
+    anywhere: bool = False,
+    turned: bool = False,
+) -> Iterator[Cycle]:
+    """The cycles, each with a generator of its own."""
+    arm = Arm(robot=load_robot("ur5e"), collisions=False)
+    for k in range(count):
+        *targets, first = poses(np.random.default_rng([seed, k]), stops + 1)
+        yield Cycle(
+            arm=arm,
+            start=first if anywhere else HOME,
+            stops=[_stop(j, _target(pose, turned), passes, free, dwell) for j, pose in enumerate(targets)],
+            order=FreeOrder() if free else None,
+            deadline=deadline,
+        )
+
+
+def near_cycles(seed: int, count: int, stops: int, deadline: float) -> Iterator[Cycle]:
+    """Cycles over joint positions that are near each other, with a heavy part."""
+    arm = Arm(robot=load_robot("ur5e"), collisions=False, payload=HEAVY)
+    for k in range(count):
+        rng = np.random.default_rng([seed, k])
+        q = [rng.uniform(-WHOLE_RANGE, WHOLE_RANGE, 6)]
+        while len(q) <= stops:
+            q.append(np.clip(q[-1] + rng.uniform(-NEAR, NEAR, 6), -WHOLE_RANGE, WHOLE_RANGE))
+        targets = [Stop(name=str(j), target=each) for j, each in enumerate(q[1:])]
+        yield Cycle(arm=arm, start=q[0], stops=targets, windings=False, deadline=deadline)
+
+
+def _target(pose: Pose, turned: bool) -> Pose | ConeOrientedPose:
+    return ConeOrientedPose.about(pose, np.array([0.0, 0.0, 1.0])) if turned else pose
+
+
+def _stop(number: int, pose: Pose | ConeOrientedPose, passes: int, free: bool, dwell: float) -> Stop:
+    if passes or free:
+        passed = number < passes
+        return Stop(name=str(number), target=pose, dwell=0.0 if passed else dwell, via=passed)
+    return Stop(name=str(number), target=pose, dwell=dwell, payload=NOTHING if number % 2 else PART)
+
+
+def in_time(asked: Cycle, own: CycleSolution, factor: float) -> Cycle:
+    """The cycle in so many times the duration that it has by itself."""
+    duration = factor * own.duration
+    return replace(asked, duration_min=duration, duration_max=duration)
+
+
+def excess(answer: CycleSolution, own: CycleSolution | None) -> float:
+    """What a cycle needs beyond the least of its feasible baselines, relative; `own` is it in its own time, which may
+    wait where that draws least, on its motors.
+
+    Not of `controller_default`, whose acceleration jumps where it begins: no certificate confirms that.
+    """
+    others = [each for each in answer.baselines if each.within_limits and each.name != "controller_default"]
+    known = [each.electrical for each in others]
+    if own is not None and answer.duration >= own.duration:
+        held = [
+            holding_power(move.planned.arm_after, _torque_at(move.planned.arm_after, move.solution.goal.q))
+            for move in own.moves
+        ]
+        known.append(own.energy.electrical.total + (answer.duration - own.duration) * float(min(held)))
+    return answer.energy.electrical.total / min(known) - 1 if known else 0.0
+
+
+def _torque_at(arm: Arm, q: Array) -> Array:
+    still = np.zeros((1, len(q)))
+    return np.asarray(Plant(arm).torques(q[None], still, still)[0])
+
+
+def _sums(answer: CycleSolution) -> dict[str, float]:
+    """What must be zero but for rounding: jumps between legs, and the legs' energies without the cycle's."""
+    electrical = answer.energy.electrical
+    own = sum(move.solution.energy.electrical.total + move.dwell_energy + move.wait_energy for move in answer.moves)
+    errors = answer.joins, abs(own / electrical.total - 1), abs(electrical.parts_sum / electrical.total - 1)
+    return dict(zip(SUMS, errors, strict=True))
+
+
+def main() -> None:
+    """Solves every cycle, and prints savings, gaps, times and the number of motions sought."""
+    arguments = parser(__doc__, seed=0)
+    arguments.add_argument("--count", type=int, default=20, help="cycles (%(default)s)")
+    arguments.add_argument("--stops", type=int, default=6, help="stops of a cycle (%(default)s)")
+    arguments.add_argument("--deadline", type=float, default=60.0, help="deadline of a cycle [s] (%(default)s)")
+    arguments.add_argument("--passes", type=int, default=0, help="stops that are passed (%(default)s)")
+    arguments.add_argument("--free", action="store_true", help="the order is free")
+    arguments.add_argument("--anywhere", action="store_true", help="the start is a pose, in any configuration")
+    arguments.add_argument("--turned", action="store_true", help="the tool may be turned about its axis at the stops")
+    arguments.add_argument("--time", type=float, help="give each cycle so many times its own duration")
+    arguments.add_argument("--near", action="store_true", help="joint positions near each other, with 4 kg")
+    arguments.add_argument("--dwell", type=float, default=DWELL, help="dwell at each stop [s] (%(default)s)")
+    given = arguments.parse_args()
+    on_one_core()
+    compile_kernel(load_robot("ur5e"))
+    plan_cycle(next(rounds(given.seed + 1, 1, 1, given.deadline)))  # loads what the others find loaded
+    found: dict[str, list[float]] = {}
+    optimal = legs = certified = 0
+    how = (given.passes, given.free, given.dwell, given.anywhere, given.turned)
+    size = (given.seed, given.count, given.stops, given.deadline)
+    for asked in near_cycles(*size) if given.near else rounds(*size, *how):
+        own = None if given.time is None else plan_cycle(asked)
+        if own is not None:
+            asked = in_time(asked, own, given.time)
+        began = time.perf_counter()
+        answer = plan_cycle(asked)
+        if any(each.name == "stopping" and each.saving < 0 for each in answer.baselines):
+            raise SystemExit("passing needs more than stopping")
+        legs += len(answer.moves)
+        certified += sum(move.solution.certificate.valid for move in answer.moves)
+        row = {f"saved against {each.name}": each.saving for each in answer.baselines}
+        row[EXCESS] = excess(answer, own)
+        row["gap"] = 1 - answer.lower_bound / answer.energy.electrical.total
+        row["time [s]"] = time.perf_counter() - began
+        row |= _sums(answer)
+        row["distinct legs"] = sum(move.kinds for move in answer.moves)
+        row["motions sought"] = sum(move.solved for move in answer.moves)
+        optimal += answer.status == "optimal"
+        for name, value in row.items():
+            found.setdefault(name, []).append(float(value))
+    print(f"{given.count} cycles of {given.stops} stops, seed {given.seed}: {optimal} optimal")
+    print(f"legs with a valid certificate    {certified} of {legs}")
+    results = {name: Spread.of(values) for name, values in found.items()}
+    for name, spread in results.items():
+        if name in SUMS:
+            print(f"{name:32s} at most {spread.maximum:.1e}")
+        else:
+            print(f"{name:32s} {spread.formatted(digits=3)}, least {spread.minimum:.3f}")
+    write_json(given.json, {"seed": given.seed, "count": given.count, "stops": given.stops} | results)
+    if results[EXCESS].maximum > NO_EXCESS:
+        raise SystemExit(f"a cycle needs {results[EXCESS].maximum:.2%} more than another one in hand")
+    if certified < legs or max(results[name].maximum for name in SUMS) > EXACT:
+        raise SystemExit("a leg is not certified, or the legs are not the cycle")
+
+
+if __name__ == "__main__":
+    main()

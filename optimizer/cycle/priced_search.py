@@ -1,0 +1,171 @@
+"""Motions and chains at a price of time: what needs the least objective + price · duration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.cycle.known_motions import KnownMotion, known_motions
+from joulepath.optimizer.cycle.lazy_search import SHARE_OF_A_LEG, LazySearch
+from joulepath.optimizer.cycle.legs import Leg
+from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
+from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
+from joulepath.optimizer.methods import solver_for
+from joulepath.optimizer.methods.duration_intervals import DurationInterval
+from joulepath.optimizer.methods.fastest_motion import FastestMotion
+from joulepath.optimizer.methods.method import Method, SolveResult
+from joulepath.optimizer.problem.problem import LEAST_DURATION
+from joulepath.optimizer.trajectories.spline import Spline, sampled
+
+
+@dataclass(frozen=True)
+class PricedMotion:
+    """A motion with its objective, `energy` [J]."""
+
+    spline: Spline
+    energy: float
+
+    @property
+    def duration(self) -> float:
+        """Its duration [s]."""
+        return self.spline.duration
+
+    def value(self, price: float) -> float:
+        """Objective + price · duration [J], at a price [W]."""
+        return self.energy + price * self.duration
+
+
+def priced_motion(
+    leg: Leg, s: int, g: int, price: float, longest: float, deadline: Deadline, guess: Spline | None = None
+) -> PricedMotion | None:
+    """The motion of a pair of least objective + price · duration; None if none is found before the deadline.
+
+    `price` [W], `longest` [s]; `guess` is a motion of the same pair, of another duration perhaps.
+    """
+    weights = {leg.prepared.problem.objective: 1.0}
+    p = leg.prepared.parameters(**weights, time=price)
+    interval = DurationInterval(p, LEAST_DURATION, longest, price=price)
+    return _solved(leg, s, g, interval, deadline, guess)
+
+
+class MoveOfALeg:
+    """The move of a pair, nodes `s` and `g` of a leg, at several prices of time; it lasts `longest` [s] at most.
+
+    It begins with the motions `known`, to which it puts those that it finds.
+    """
+
+    def __init__(self, leg: Leg, s: int, g: int, longest: float, deadline: Deadline, known: list[PricedMotion]) -> None:
+        self.leg, self.s, self.g, self.longest, self.deadline = leg, s, g, longest, deadline
+        self.known = known
+
+    def at(self, price: float) -> PricedMotion:
+        """The motion of least objective + price · duration. Raises NoTrajectory, or DeadlineExceeded.
+
+        A solve begins from the best motion that is known, and may end in a worse one: where motions are long, a change
+        of duration hardly changes the objective + price · duration.
+        """
+        pair = (self.leg, self.s, self.g, price, self.longest, self.deadline)
+        guess = min(self.known, key=lambda motion: motion.value(price), default=None)
+        found = priced_motion(*pair, None if guess is None else guess.spline)
+        if found is None and guess is not None:
+            found = priced_motion(*pair)
+        if found is None:
+            raise DeadlineExceeded([]) if self.deadline.passed else NoTrajectory([])
+        self.known.append(found)
+        allowed = [motion for motion in self.known if motion.duration <= self.longest]
+        return min(allowed, key=lambda motion: motion.value(price), default=found)
+
+
+class _FastestOfPair(FastestMotion):
+    """The search for the fastest motion of a pair, nodes `s` and `g` of a leg."""
+
+    def __init__(self, leg: Leg, s: int, g: int, deadline: Deadline, known: Sequence[Spline]) -> None:
+        self._deadline = deadline
+        super().__init__(leg.prepared_for(s, g), leg.start.q[s], leg.goal.q[g], known)
+        problem = leg.prepared.problem
+        self.problem = replace(problem, start=self.q_start, goal=self.q_goal, passes=leg.passes(s, g))
+
+    @property
+    def deadline(self) -> Deadline:
+        return self._deadline
+
+    def solver(self, interval: DurationInterval) -> Method:
+        return solver_for(self.prepared, self.q_start, self.q_goal, self.deadline, interval)
+
+    def confirms(self, spline: Spline) -> bool:
+        return certify(self.problem, spline, self.q_start, self.q_goal, self.prepared.energy(spline)).valid
+
+
+def fastest_motion(leg: Leg, s: int, g: int, deadline: Deadline, known: Sequence[Spline] = ()) -> PricedMotion | None:
+    """The motion of a pair of least duration, certified; None if none is found before the deadline.
+
+    It is no slower than the motions `known` of this pair.
+    """
+    search, motions = _FastestOfPair(leg, s, g, deadline, known), known_motions()
+    key = motions.key("fastest", search.problem, list(known))
+    before = motions.recall(key)
+    spline = search.run() if before is None else before.spline
+    if spline is None:
+        return None
+    if not search.cut_short:
+        motions.keep(key, KnownMotion(spline, None))
+    return PricedMotion(spline, leg.prepared.cost_of(spline))
+
+
+def _solved(
+    leg: Leg, s: int, g: int, interval: DurationInterval, deadline: Deadline, guess: Spline | None = None
+) -> PricedMotion | None:
+    problem = replace(leg.prepared.problem, start=leg.start.q[s], goal=leg.goal.q[g], passes=leg.passes(s, g))
+    motions, asked = known_motions(), (interval, None if guess is None else sampled(guess))
+    key = motions.key("priced", problem, *asked)
+    known = motions.recall(key)
+    result = known.result if known is not None else _looked_for(leg, s, g, interval, deadline, guess)
+    if result is None or result.spline is None:
+        return None
+    if not result.cut_short:
+        motions.keep(key, KnownMotion(result.spline, result.stationarity))
+    return PricedMotion(result.spline, leg.prepared.cost_of(result.spline))
+
+
+def _looked_for(
+    leg: Leg, s: int, g: int, interval: DurationInterval, deadline: Deadline, guess: Spline | None
+) -> SolveResult | None:
+    """What a solver makes of a pair; None if the time is up."""
+    solver = solver_for(leg.prepared_for(s, g), leg.start.q[s], leg.goal.q[g], deadline, interval)
+    try:
+        with watch(deadline):
+            return solver.solve() if guess is None else solver.solve_from(*sampled(guess), False)
+    except DeadlinePassed:
+        return None
+
+
+class PricedSearch(LazySearch):
+    """The search of the least chain at a price of time [W]; `motions` are those found, by leg, start and goal node."""
+
+    def __init__(self, legs: Sequence[Leg], closed: bool, price: float, longest: float, search_end: Deadline) -> None:
+        super().__init__([leg.priced(price, longest) for leg in legs], closed, search_end)
+        self.price, self.longest = price, longest
+        self.motions: dict[tuple[int, int, int], PricedMotion] = {}
+
+    def attempt(self, k: int, s: int, g: int) -> float | None:
+        """Objective + price · duration of a pair's motion [J]; inf if none is found, None once the time is up."""
+        deadline = self.search_end.within(SHARE_OF_A_LEG * self.search_end.left)
+        found = priced_motion(self.legs[k], s, g, self.price, self.longest, deadline)
+        if found is None and deadline.passed:
+            return self.late()
+        if found is None:
+            self.failed = True
+            return np.inf
+        self.motions[k, s, g] = found
+        return found.value(self.price)
+
+    def chain_tried(self, nodes: list[int]) -> None:
+        """Takes no note: at a price of time, what was found is no cycle of the time that is asked for."""
+
+    def motion(self, k: int, s: int, g: int) -> Spline | None:
+        """The motion of a pair; None if none was found."""
+        found = self.motions.get((k, s, g))
+        return None if found is None else found.spline

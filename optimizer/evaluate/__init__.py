@@ -1,0 +1,1 @@
+"""Given motions: their energy, and the limits that they violate."""

@@ -1,0 +1,115 @@
+"""The limits of a given motion: for each, the instant with the largest ratio value / limit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.energy.limited_torque import limited_torque
+from joulepath.optimizer.evaluate.piecewise_motion import Indices, PiecewiseMotion
+from joulepath.optimizer.kinematics.path_constraints import path_constraints_of
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE, ratios
+
+LimitName = Literal["position", "velocity", "acceleration", "jerk", "torque", "tool_cone", "tcp_speed", "elbow_speed"]
+
+# a step where pieces meet, as a fraction of the limit: far above rounding, and too small to matter to an arm
+SPEED_STEP, ACCELERATION_STEP = 1e-6, 1e-4
+
+
+@dataclass(frozen=True)
+class LimitReport:
+    """The instant with the largest `ratio` = |value| / limit: of `joint` at time `t` [s], with `value` and `bound`.
+
+    Position: the ratio is the distance from the middle of the range over half of it. Path constraints: `joint` is None,
+    and the value is an angle [rad] or a speed [m/s]. At a velocity step acceleration and jerk, at an acceleration step
+    the jerk have infinite `value` and `ratio`.
+    """
+
+    limit: LimitName
+    ratio: float
+    joint: str | None
+    t: float
+    value: float
+    bound: float
+
+    @property
+    def held(self) -> bool:
+        """Whether the motion satisfies the limit."""
+        return self.ratio <= 1 + RATIO_TOLERANCE
+
+
+class LimitMonitor:
+    """Updates the worst ratio of every limit of an arm, block after block."""
+
+    def __init__(self, arm: Arm) -> None:
+        self._limits, self._joints, self._arm = arm.active_limits, arm.robot.joint_names, arm
+        self._worst: dict[LimitName, LimitReport] = {}
+        self._path = path_constraints_of(arm)
+        self._path_bounds: dict[str, float] = {
+            name: bound
+            for name, bound in {
+                "tool_cone": arm.tool_cone.half_angle if arm.tool_cone else None,
+                "tcp_speed": arm.tcp_speed,
+                "elbow_speed": arm.elbow_speed,
+            }.items()
+            if bound is not None
+        }
+
+    def update(self, t: Array, q: Array, v: Array, a: Array, jerk: Array, tau: Array) -> None:
+        """Add samples at times t (k,) [s]; the others are (k, nq), tau [N·m] is rigid body and rotor torque."""
+        limits, tau_limited = self._limits, limited_torque(self._arm, tau, v, a)
+        nearer = np.where(q > (limits.q_max + limits.q_min) / 2, limits.q_max, limits.q_min)
+        values = {"position": q, "velocity": v, "acceleration": a, "jerk": jerk, "torque": tau_limited}
+        bounds = {
+            "velocity": limits.v_max, "acceleration": limits.a_max, "jerk": limits.j_max, "torque": limits.tau_max,
+        }  # fmt: skip
+        for name, ratio in ratios(limits, q, v, a, jerk, tau_limited).items():
+            k, j = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
+            bound = nearer[k, j] if name == "position" else bounds[name][j]
+            self._note(name, float(ratio[k, j]), int(j), float(t[k]), float(values[name][k, j]), float(bound))  # type: ignore[arg-type]
+        if self._path is not None:
+            path_ratios = self._path.ratios(q, v)
+            for c, path_name in enumerate(self._path.names):
+                at, bound = int(path_ratios[:, c].argmax()), self._path_bounds[path_name]
+                worst = float(path_ratios[at, c])
+                self._note(path_name, worst, None, float(t[at]), worst * bound, bound)  # type: ignore[arg-type]
+
+    def update_breakpoints(self, motion: PiecewiseMotion, before: PiecewiseMotion | None) -> Indices:
+        """Add the steps at the breakpoints of a block; `before` is the block before it, None for the first.
+
+        Returns the indices (k,) of the pieces that begin with a velocity step.
+        """
+        piece = np.arange(len(motion.segment))
+        _, v_end, a_end, _ = motion.at(piece, np.diff(motion.breakpoints))
+        _, v, a, _ = motion.at(piece, np.zeros(len(piece)))
+        if before is None:
+            v_before, a_before = v[:1], a[:1]
+        else:
+            last = np.array([len(before.segment) - 1])
+            _, v_before, a_before, _ = before.at(last, np.diff(before.breakpoints)[last])
+        t, limits = motion.breakpoints, self._limits
+        speed_step = np.abs(v - np.concatenate([v_before, v_end[:-1]])) / limits.v_max > SPEED_STEP
+        step = np.abs(a - np.concatenate([a_before, a_end[:-1]])) / limits.a_max > ACCELERATION_STEP
+        self._note_step("acceleration", speed_step, t, limits.a_max)
+        self._note_step("jerk", speed_step | step, t, limits.j_max)
+        return np.flatnonzero(speed_step.any(axis=1))
+
+    def report(self) -> list[LimitReport]:
+        """The worst ratio of every limit."""
+        return list(self._worst.values())
+
+    def _note_step(self, name: LimitName, steps: Mask, t: Array, bounds: Array) -> None:
+        steps = steps & np.isfinite(bounds)  # a step violates no limit that is infinite
+        if steps.any():
+            k, j = np.argwhere(steps)[0].tolist()
+            self._note(name, np.inf, j, float(t[k]), np.inf, float(bounds[j]))
+
+    def _note(self, name: LimitName, ratio: float, joint: int | None, t: float, value: float, bound: float) -> None:
+        known = self._worst.get(name)
+        if known is None or ratio > known.ratio:
+            joint_name = None if joint is None else self._joints[joint]
+            self._worst[name] = LimitReport(name, ratio, joint_name, t, value, bound)

@@ -1,0 +1,122 @@
+"""The least clearance of a given motion, by samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.close_pass import CLOSE, model_without_margins
+from joulepath.optimizer.collision.model import ClosestPair, CollisionModel, collision_model
+from joulepath.optimizer.collision.stand_ins import StandIns
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.evaluate.piecewise_motion import PiecewiseMotion
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.solution import Clearance
+
+# greatest time between samples [s], unless a block would have more than MOST_INTERVALS of them
+PERIOD, MOST_INTERVALS = 0.01, 16384
+# samples of a block that are checked first, with exact distances of every pair
+COARSE = 16
+# pairs times configurations that are checked at once
+CHECKS = 100_000
+
+
+@dataclass(frozen=True)
+class LeastClearance:
+    """The least sampled distance [m] between the bodies of `pair`, at `time` [s].
+
+    Samples are at most `spacing` [s] apart: between two of them the distance may be smaller.
+    """
+
+    distance: float
+    pair: tuple[str, str]
+    time: float
+    spacing: float
+
+
+class ClearanceMonitor:
+    """Updates the least clearance of a motion, block after block.
+
+    `nearest` has the margins subtracted; None if no pair is checked. `close_pass` is the least distance without
+    margins; None unless it is below CLOSE at a sample. `unmodelled` are the deepest contacts of the bodies that stand
+    in for a tool and a payload without a shape.
+    """
+
+    def __init__(self, arm: Arm) -> None:
+        self._arm = arm
+        self._beyond_margins = _LeastSampled(collision_model(arm))
+        self._spacing = 0.0
+        self._stand_ins = StandIns.of(arm)
+        self._contacts = dict[str, Clearance]()
+
+    @cached_property
+    def _without_margins(self) -> _LeastSampled:
+        return _LeastSampled(model_without_margins(self._arm))
+
+    def update(self, motion: PiecewiseMotion) -> None:
+        """Add the next block."""
+        begin, end = float(motion.breakpoints[0]), float(motion.breakpoints[-1])
+        t = np.linspace(begin, end, min(int(np.ceil((end - begin) / PERIOD)), MOST_INTERVALS) + 1)
+        self._spacing = max((end - begin) / (len(t) - 1), self._spacing)
+        q = motion.at_times(t)[0]
+        if self._beyond_margins.add(t, q) < CLOSE:
+            self._without_margins.add(t, q)
+        for contact in () if self._stand_ins is None else self._stand_ins.contacts(t, q):
+            known = self._contacts.get(contact.pair[1])
+            if known is None or contact.sampled < known.sampled:
+                self._contacts[contact.pair[1]] = contact
+
+    @property
+    def unmodelled(self) -> list[Clearance]:
+        """The deepest contact of each stand-in over all blocks."""
+        return list(self._contacts.values())
+
+    @property
+    def nearest(self) -> LeastClearance | None:
+        """The least clearance of all blocks."""
+        return self._beyond_margins.least(self._spacing)
+
+    @property
+    def close_pass(self) -> LeastClearance | None:
+        """The least distance of all blocks, if below CLOSE."""
+        if self.nearest is None or self.nearest.distance >= CLOSE:
+            return None
+        least = self._without_margins.least(self._spacing)
+        return least if least is not None and least.distance < CLOSE else None
+
+
+class _LeastSampled:
+    """The least distance of a collision model over samples."""
+
+    def __init__(self, model: CollisionModel) -> None:
+        self._model = model
+        self._closest: ClosestPair | None = None
+        self._time = 0.0
+
+    def least(self, spacing: float) -> LeastClearance | None:
+        """The least distance of all samples, which are at most `spacing` [s] apart; None if no pair is checked."""
+        found = self._closest
+        return None if found is None else LeastClearance(found.distance, found.pair, self._time, spacing)
+
+    def add(self, t: Array, q: Array) -> float:
+        """Check samples q (k, nq) [rad] at times t (k,) [s].
+
+        Returns their least distance [m], or a lower bound of it if an earlier sample was nearer.
+        """
+        # for bodies farther apart than the least distance known, the distance of their enclosing balls is enough
+        coarse = self._model.closest_pairs(q[:: max(len(q) // COARSE, 1)])
+        within = min((closest.distance for closest in coarse), default=np.inf)
+        at_once = max(CHECKS // max(len(self._model.pairs), 1), 1)
+        least = np.inf
+        for low in range(0, len(q), at_once):
+            if low:
+                checkpoint()
+            for k, closest in enumerate(self._model.closest_pairs(q[low : low + at_once], within), low):
+                least = min(least, closest.distance)
+                if self._closest is None or closest.distance < self._closest.distance:
+                    self._closest, self._time = closest, float(t[k])
+            within = within if self._closest is None else min(within, self._closest.distance)
+        return least

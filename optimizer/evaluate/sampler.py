@@ -1,0 +1,78 @@
+"""Samples of a given motion at a constant period."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.bus_flow import drawn_at
+from joulepath.optimizer.energy.losses import power_flow
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.evaluate.piecewise_motion import PiecewiseMotion
+from joulepath.optimizer.exceptions import InvalidProblem
+
+MOST_SAMPLES = 20_000
+"""Most samples that are returned: some 13 MB of JSON for six joints."""
+# a remainder of a period below this fraction of it is rounding, not a sample
+PERIOD_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True)
+class Samples:
+    """A motion at multiples of a period and at its end: t (k,) [s]; q, v, a, tau, tau_motor (k, nq); power (k,) [W].
+
+    `tau` [N·m] is rigid body and rotor, `tau_motor` adds friction. `charge` (k,) [J] is that of the energy storage,
+    None without one.
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    a: Array
+    tau: Array
+    tau_motor: Array
+    power: Array
+    charge: Array | None = None
+
+
+class Sampler:
+    """Samples a motion at multiples of `period` [s], block after block."""
+
+    def __init__(self, plant: Plant, period: float) -> None:
+        self._plant, self._period = plant, period
+        self._parts: list[Samples] = []
+        self._count = 0
+
+    def update(self, motion: PiecewiseMotion, charge: Callable[[Array], Array]) -> None:
+        """Add the samples before the end of a block; `charge` gives that of the energy storage [J] at times (k,) [s].
+
+        Raises InvalidProblem beyond MOST_SAMPLES.
+        """
+        stop = int(np.ceil(motion.breakpoints[-1] / self._period - PERIOD_ROUNDING))
+        if stop >= MOST_SAMPLES:
+            raise InvalidProblem(
+                "sample_period",
+                f"An answer has at most {MOST_SAMPLES} samples: use a longer sample_period, or leave it out.",
+            )
+        if stop > self._count:
+            t = np.asarray(np.arange(self._count, stop) * self._period, dtype=float)
+            self._add(motion, t, charge(t))
+            self._count = stop
+
+    def finish(self, last: PiecewiseMotion, charge: float) -> Samples:
+        """All samples, with one at the end of the `last` block, where the energy storage has `charge` [J]."""
+        self._add(last, last.breakpoints[-1:], np.array([charge]))
+        stored = self._plant.arm.bus.mode == "storage"
+        names = [each.name for each in fields(Samples) if stored or each.name != "charge"]
+        return Samples(**{name: np.concatenate([getattr(part, name) for part in self._parts]) for name in names})
+
+    def _add(self, motion: PiecewiseMotion, t: Array, charge: Array) -> None:
+        arm = self._plant.arm
+        q, v, a, _ = motion.at_times(t)
+        tau = self._plant.torques(q, v, a)
+        flow = power_flow(tau, v, a, arm.drives, arm.friction_law)
+        power = drawn_at(arm.bus, arm.regeneration, arm.base_power, flow.joints, charge)
+        self._parts.append(Samples(t, q, v, a, tau, flow.tau_motor, power, charge))

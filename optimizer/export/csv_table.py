@@ -1,0 +1,25 @@
+"""`csv`: samples of positions, velocities and accelerations, as `POST /evaluate` reads them."""
+
+from __future__ import annotations
+
+from io import StringIO
+
+import numpy as np
+
+from joulepath.optimizer.export.facts import ExportedFile
+from joulepath.optimizer.export.program import Program
+from joulepath.optimizer.export.rows import times
+
+
+def to_csv(program: Program, period: float = 0.008) -> ExportedFile:
+    """Columns t, q1 …, v1 …, a1 … [s, rad]; one row per `period` [s], and the end.
+
+    Raises FormatUnsuitable if the motion is too long.
+    """
+    t = times(program, period, "csv")
+    names = ["t", *(f"{kind}{joint}" for kind in "qva" for joint in range(1, program.robot.nq + 1))]
+    text = StringIO()
+    text.write(",".join(names) + "\n")
+    np.savetxt(text, np.column_stack([t, *program.at(t)]), fmt="%.12g", delimiter=",")
+    notes = (f"Rows every {period:g} s, exact at each; between them it is for the reader to interpolate.",)
+    return ExportedFile.of_text(text.getvalue(), "text/csv", "csv", notes)

@@ -1,0 +1,104 @@
+"""`franka`: samples at the 1 kHz of Franka's control interface, as CSV or as a header for libfranka.
+
+The header holds a motion generator: a callable from `franka::RobotState` and `franka::Duration` to
+`franka::JointPositions`, as `franka::Robot::control` takes it, which ends with `franka::MotionFinished`; see
+generate_joint_position_motion.cpp among the examples of libfranka.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from io import StringIO
+from typing import Literal
+
+import numpy as np
+
+from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.export.facts import ExportedFile, check_joints, header
+from joulepath.optimizer.export.program import Program
+from joulepath.optimizer.export.rows import MOST_ROWS, ticks
+
+PERIOD = 1e-3
+"""Period [s] of the control interface."""
+MOST_COMPILED = 30_000
+"""Most rows of a header: a compiler takes seconds for it."""
+ROUNDING = 1e-12
+"""Rounding of the positions [rad]."""
+
+
+@dataclass(frozen=True)
+class FrankaOptions:
+    """`form`: a table as CSV, or a C++ header with a motion generator."""
+
+    form: Literal["csv", "cpp"] = "csv"
+
+
+def to_franka(program: Program, options: FrankaOptions | None = None) -> ExportedFile:
+    """The table or the header. Raises FormatUnsuitable for another kind of robot, and if it were too large."""
+    options = options or FrankaOptions()
+    check_joints(program, "franka", 7, "Franka", "robots of Franka, with seven joints")
+    if any(timed.payload is not None for timed in program.timed):
+        raise FormatUnsuitable(
+            "franka", "The payload changes on the way, and a motion generator cannot switch it: export move by move."
+        )
+    t = ticks(program, PERIOD, "franka", MOST_ROWS if options.form == "csv" else MOST_COMPILED)
+    q, v, _ = program.at(t)
+    notes = (
+        f"a row every millisecond, exact to {ROUNDING:.0e} rad, the last at the goal",
+        "set the payload with setLoad before, and move to the start with a motion of your own",
+        "limits of the FR3 that depend on the joint positions are not checked",
+    )
+    if options.form == "csv":
+        names = ["t", *(f"{kind}{joint}" for kind in "qv" for joint in range(1, program.robot.nq + 1))]
+        text = StringIO()
+        text.write(",".join(names) + "\n")
+        np.savetxt(text, np.column_stack([t, q, v]), fmt=["%.3f"] + ["%.12f"] * 14, delimiter=",")
+        return ExportedFile.of_text(text.getvalue(), "text/csv", "csv", notes)
+    rows = "\n".join("    {{" + ", ".join(f"{x:.12f}" for x in row) + "}}," for row in q)
+    head = "\n".join(f"// {line}" for line in header(program, "motion generator for libfranka", notes))
+    return ExportedFile.of_text(_HEADER.format(head=head, count=len(q), rows=rows), "text/plain", "hpp", notes)
+
+
+_HEADER = """{head}
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <stdexcept>
+
+#include <franka/control_types.h>
+#include <franka/duration.h>
+#include <franka/robot_state.h>
+
+namespace joulepath {{
+
+// joint positions [rad], one row per millisecond
+constexpr std::size_t kRows = {count};
+constexpr std::array<std::array<double, 7>, kRows> kPositions = {{{{
+{rows}
+}}}};
+
+// for franka::Robot::control; throws if the arm is not at the start
+class Motion {{
+ public:
+  franka::JointPositions operator()(const franka::RobotState& state, franka::Duration period) {{
+    if (tick_ == 0) {{
+      for (std::size_t joint = 0; joint < 7; joint++) {{
+        if (std::abs(state.q_d[joint] - kPositions[0][joint]) > 1e-3) {{
+          throw std::runtime_error("joulepath: the arm is not at the start of the motion");
+        }}
+      }}
+    }}
+    tick_ += period.toMSec();
+    franka::JointPositions next(kPositions[std::min<std::size_t>(tick_, kRows - 1)]);
+    return tick_ >= kRows - 1 ? franka::MotionFinished(next) : next;
+  }}
+
+ private:
+  std::size_t tick_ = 0;
+}};
+
+}}  // namespace joulepath
+"""

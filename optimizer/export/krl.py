@@ -1,0 +1,81 @@
+"""`krl`: a program for KUKA controllers (KR C4 and later), a spline block of SPTP points in a time block.
+
+Syntax, as in KUKA's manual "KUKA System Software 8.x, operating and programming instructions for system integrators",
+chapter on spline motions: `PTP_SPLINE … SPTP {A1 …} … ENDSPLINE`; in it `TIME_BLOCK START`, after each part
+`TIME_BLOCK PART = share [%]`, and last `TIME_BLOCK END = time [s]`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.export.axes import Axes
+from joulepath.optimizer.export.even_points import EvenPoints, even_points, smooth, straight
+from joulepath.optimizer.export.facts import ExportedFile, check_joints, comment, header, output_note
+from joulepath.optimizer.export.program import Move, Program, Timed
+from joulepath.optimizer.problem.arm import Payload
+
+
+@dataclass(frozen=True)
+class KrlOptions:
+    """`tolerance` [rad]: deviation that the number of points is chosen for. `axes`: those of the controller.
+    `digital_output`: number of an output that is on from grasp to release; None switches nothing."""
+
+    tolerance: float = 0.005
+    axes: Axes = field(default_factory=Axes)
+    digital_output: int | None = None
+
+
+def to_krl(program: Program, options: KrlOptions | None = None) -> ExportedFile:
+    """The program. Raises FormatUnsuitable for a robot without six joints or of another maker."""
+    options = options or KrlOptions()
+    check_joints(program, "krl", 6, "KUKA", "robots of KUKA that are programmed in KRL, with six joints")
+    options.axes.check("krl", program.robot.nq)
+    moves = [even_points(move, (straight, smooth), options.tolerance) for move in program.moves]
+    notes = (
+        f"within {max(each.deviation for each in moves):.2e} rad of the spline, if the controller keeps every time",
+        "model of the controller: it passes the points at their times, and between them anything from straight lines "
+        "in joint space to the cubic spline",
+        "what it adds to a time that it cannot keep is not in this bound",
+        *output_note(program, options.digital_output),
+    )
+    lines = ["&ACCESS RVP", "DEF joulepath( )"]
+    lines += [f"; {line}" for line in header(program, "program for KUKA controllers", notes)]
+    lines += ["BAS (#INITMOV,0)", "BAS (#VEL_PTP,10)", "BAS (#ACC_PTP,10)", _load(program.payload)]
+    lines.append(f"PTP {_axes(options, program.start)}")
+    points = iter(moves)
+    for timed in program.timed:
+        lines.append(f"; {comment(timed.step.label)}, {timed.step.duration:.4f} s")
+        lines += _switch(timed, options.digital_output)
+        if isinstance(timed.step, Move):
+            lines += _block(next(points), options)
+        else:
+            lines.append(f"WAIT SEC {timed.step.duration:.3f}")
+    return ExportedFile.of_text("\r\n".join([*lines, "END", ""]), "text/plain", "src", notes)
+
+
+def _load(load: Payload) -> str:
+    x, y, z = (1000 * each for each in load.com)
+    return f"$LOAD={{M {load.mass:.4f},CM {{X {x:.3f},Y {y:.3f},Z {z:.3f},A 0.0,B 0.0,C 0.0}},J {{X 0.0,Y 0.0,Z 0.0}}}}"
+
+
+def _axes(options: KrlOptions, q: Array) -> str:
+    values = options.axes.degrees(q)
+    return "{" + ",".join(f"A{k} {value}" for k, value in enumerate(values, 1)) + "}"
+
+
+def _block(points: EvenPoints, options: KrlOptions) -> list[str]:
+    count = len(points.q) - 1
+    lines = ["PTP_SPLINE", "  TIME_BLOCK START"]
+    for q in points.q[1:]:
+        lines.append(f"  SPTP {_axes(options, q)}")
+        lines.append(f"  TIME_BLOCK PART = {100 / count:.6f}")
+    return [*lines, f"  TIME_BLOCK END = {points.period * count:.6f}", "ENDSPLINE"]
+
+
+def _switch(timed: Timed, output: int | None) -> list[str]:
+    """Lines for what the arm takes up or puts down before a step."""
+    if timed.payload is None:
+        return []
+    return [*([] if output is None else [f"$OUT[{output}]={str(timed.grasps).upper()}"]), _load(timed.payload)]

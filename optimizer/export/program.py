@@ -1,0 +1,155 @@
+"""What is exported: moves along splines and rests between them, in order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.cycle.cycle_solution import CycleSolution
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.trajectories.spline import Spline, retimed, sample
+
+JOIN = 1e-6
+"""Largest jump [rad] of a joint from the end of a move to the start of the next."""
+
+
+@dataclass(frozen=True)
+class Move:
+    """A motion of `arm` from standstill to standstill; `label` is said in comments."""
+
+    spline: Spline
+    arm: Arm
+    label: str = "move"
+
+    @property
+    def duration(self) -> float:
+        """Length [s]."""
+        return self.spline.duration
+
+
+@dataclass(frozen=True)
+class Rest:
+    """The arm stands still for `duration` [s]."""
+
+    duration: float
+    label: str = "rest"
+
+
+@dataclass(frozen=True)
+class Timed:
+    """A step and when it begins [s]. Before it the payload becomes `payload`, where that is not None: the arm takes
+    something up (`grasps`), or puts it down."""
+
+    step: Move | Rest
+    t0: float
+    payload: Payload | None = None
+    grasps: bool = False
+
+
+@dataclass(frozen=True)
+class Program:
+    """Steps for one robot, the first of them a move.
+
+    Moves are slowed down by `speed_scale` already; rests are not. Raises InvalidProblem if the steps do not fit
+    together.
+    """
+
+    steps: tuple[Move | Rest, ...]
+    speed_scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not self.steps or isinstance(self.steps[0], Rest):
+            raise InvalidProblem("answer", "The answer has no motion: export one that begins with a move.")
+        if any(move.arm.robot is not self.robot for move in self.moves):
+            raise InvalidProblem("answer", "The moves are those of several robots: export them one by one.")
+        jumps = [np.abs(a.spline.control_points[-1] - b.spline.control_points[0]) for a, b in pairwise(self.moves)]
+        if max((float(jump.max()) for jump in jumps), default=0.0) > JOIN:
+            raise InvalidProblem(
+                "answer", "A move does not begin where the one before it ends: ask for the round again."
+            )
+
+    @cached_property
+    def moves(self) -> tuple[Move, ...]:
+        """The moves in order."""
+        return tuple(step for step in self.steps if isinstance(step, Move))
+
+    @property
+    def robot(self) -> Robot:
+        """The robot that moves."""
+        first = self.steps[0]
+        assert isinstance(first, Move)
+        return first.arm.robot
+
+    @property
+    def start(self) -> Array:
+        """Joint positions (nq,) [rad] at the start."""
+        first: Array = self.moves[0].spline.control_points[0]
+        return first
+
+    @property
+    def payload(self) -> Payload:
+        """What the arm carries at the start."""
+        return self.moves[0].arm.payload
+
+    @property
+    def duration(self) -> float:
+        """Length [s], rests included."""
+        return sum((step.duration for step in self.steps), 0.0)
+
+    @cached_property
+    def timed(self) -> tuple[Timed, ...]:
+        """The steps with their times. What the arm takes up or puts down, it does as soon as it stands at the place."""
+        timed, t, carried = list[Timed](), 0.0, self.payload
+        for k, step in enumerate(self.steps):
+            following = next((each for each in self.steps[k:] if isinstance(each, Move)), None)
+            payload = None
+            if k and following is not None and not _same(following.arm.payload, carried):
+                payload = following.arm.payload
+            timed.append(Timed(step, t, payload, payload is not None and payload.mass > carried.mass))
+            carried, t = payload or carried, t + step.duration
+        return tuple(timed)
+
+    def at(self, t: Array) -> tuple[Array, Array, Array]:
+        """q [rad], v [rad/s], a [rad/s²], (k, nq) each, at times t (k,) [s] in order."""
+        q, v, a = (np.zeros((len(t), self.robot.nq)) for _ in range(3))
+        place = self.start
+        for each in self.timed:
+            inside = (t >= each.t0) & (t <= each.t0 + each.step.duration)
+            if isinstance(each.step, Move):
+                own = np.clip(t[inside] - each.t0, 0.0, each.step.duration)
+                q[inside], v[inside], a[inside] = sample(each.step.spline, own)
+                place = each.step.spline.control_points[-1]
+            else:
+                q[inside], v[inside], a[inside] = place, 0.0, 0.0
+        beyond = t > self.duration
+        q[beyond] = place
+        return q, v, a
+
+    def slowed(self, speed_scale: float) -> Program:
+        """The same with every move slowed down to this fraction of its speed. Rests stay as long as they are."""
+        steps = tuple(
+            replace(step, spline=retimed(step.spline, 1 / speed_scale)) if isinstance(step, Move) else step
+            for step in self.steps
+        )
+        return Program(steps, self.speed_scale * speed_scale)
+
+
+def program_of_cycle(found: CycleSolution) -> Program:
+    """The moves of a round, its dwells and waits."""
+    steps = list[Move | Rest]()
+    for move in found.moves:
+        planned = move.planned
+        steps.append(Move(move.solution.trajectory.spline, planned.arm, f"{planned.start} to {planned.goal}"))
+        for label, length in (("dwell", planned.dwell), ("wait", move.wait)):
+            if length > 0:
+                steps.append(Rest(length, f"{label} at {planned.goal}"))
+    return Program(tuple(steps))
+
+
+def _same(one: Payload, other: Payload) -> bool:
+    return one.mass == other.mass and np.array_equal(one.com, other.com) and np.array_equal(one.inertia, other.inertia)

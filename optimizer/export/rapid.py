@@ -1,0 +1,93 @@
+"""`rapid`: a module for ABB controllers, MoveAbsJ through points at equal times.
+
+Syntax, as in ABB's technical reference manual "RAPID Instructions, Functions and Data types" (3HAC050917):
+`MoveAbsJ ToJointPos [\\NoEOffs] Speed [\\V] | [\\T] Zone [\\Z] Tool`; `\\T` is the total time of the movement [s].
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.export.axes import Axes
+from joulepath.optimizer.export.even_points import EvenPoints, even_points, rounded, straight
+from joulepath.optimizer.export.facts import ExportedFile, check_joints, comment, header, output_note
+from joulepath.optimizer.export.program import Move, Program, Timed
+from joulepath.optimizer.problem.arm import Payload
+
+SIGNAL = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
+"""Names that RAPID has for signals."""
+_NO_EXTERNAL_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
+# a tool without a mass is refused by the controller [kg]
+_LEAST_MASS = 0.001
+
+
+@dataclass(frozen=True)
+class RapidOptions:
+    """`tolerance` [rad]: deviation that the number of points is chosen for. `axes`: those of the controller.
+    `digital_output`: name of a signal that is on from grasp to release; None switches nothing."""
+
+    tolerance: float = 0.005
+    axes: Axes = field(default_factory=Axes)
+    digital_output: str | None = None
+
+
+def to_rapid(program: Program, options: RapidOptions | None = None) -> ExportedFile:
+    """The module. Raises FormatUnsuitable for a robot without six joints or of another maker."""
+    options = options or RapidOptions()
+    check_joints(program, "rapid", 6, "ABB", "robots of ABB, with six joints")
+    options.axes.check("rapid", program.robot.nq)
+    if options.digital_output is not None and not SIGNAL.fullmatch(options.digital_output):
+        raise FormatUnsuitable("rapid", "rapid.digital_output must be the name of a signal: letters, digits and _.")
+    moves = [even_points(move, (straight, rounded), options.tolerance) for move in program.moves]
+    notes = (
+        f"within {max(each.deviation for each in moves):.2e} rad of the spline, if the controller keeps every time",
+        "model of the controller: straight lines in joint space, each in its time, corners rounded by any amount up to "
+        "the middles of the lines",
+        "what it adds to a time that it cannot keep is not in this bound",
+        *output_note(program, options.digital_output),
+    )
+    loads = _loads(program)
+    lines = ["MODULE Joulepath"]
+    lines += [f"  ! {line}" for line in header(program, "module for ABB controllers", notes)]
+    lines += [_tool(k, load) for k, load in enumerate(loads)]
+    lines += ["  PROC joulepath()", "    " + _instruction(options.axes.degrees(program.start), "v50", "fine", 0)]
+    tool, points = 0, iter(moves)
+    for timed in program.timed:
+        lines.append(f"    ! {comment(timed.step.label)}, {timed.step.duration:.4f} s")
+        if timed.payload is not None:
+            tool += 1
+            lines += _switch(timed, options.digital_output)
+        if isinstance(timed.step, Move):
+            lines += _moves(next(points), options, tool)
+        else:
+            lines.append(f"    WaitTime {timed.step.duration:.3f};")
+    lines += ["  ENDPROC", "ENDMODULE"]
+    return ExportedFile.of_text("\n".join(lines) + "\n", "text/plain", "mod", notes)
+
+
+def _loads(program: Program) -> list[Payload]:
+    return [program.payload, *(timed.payload for timed in program.timed if timed.payload is not None)]
+
+
+def _tool(number: int, load: Payload) -> str:
+    com = ",".join(f"{1000 * x:.3f}" for x in load.com)
+    mass = max(load.mass, _LEAST_MASS)
+    return f"  PERS tooldata jpTool{number}:=[TRUE,[[0,0,0],[1,0,0,0]],[{mass:.4f},[{com}],[1,0,0,0],0,0,0]];"
+
+
+def _instruction(axes: list[str], speed: str, zone: str, tool: int) -> str:
+    return f"MoveAbsJ [[{','.join(axes)}],{_NO_EXTERNAL_AXES}]\\NoEOffs,{speed},{zone},jpTool{tool};"
+
+
+def _moves(points: EvenPoints, options: RapidOptions, tool: int) -> list[str]:
+    speed, last = f"v1000\\T:={points.period:.9f}", len(points.q) - 1
+    rows = enumerate(points.q[1:], 1)
+    return [
+        "    " + _instruction(options.axes.degrees(q), speed, "fine" if k == last else "z10", tool) for k, q in rows
+    ]
+
+
+def _switch(timed: Timed, output: str | None) -> list[str]:
+    return [] if output is None else [f"    SetDO {output},{int(timed.grasps)};"]

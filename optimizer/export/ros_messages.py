@@ -1,0 +1,107 @@
+"""`ros2` and `moveit`: messages with a joint trajectory, as YAML for the command line or JSON for rosbridge.
+
+Definitions: trajectory_msgs/msg/JointTrajectory, control_msgs/action/FollowJointTrajectory,
+moveit_msgs/msg/RobotTrajectory; of rosbridge, ROSBRIDGE_PROTOCOL.md (operations `send_action_goal` and `publish`).
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import yaml
+
+from joulepath.optimizer.export.facts import ExportedFile, header
+from joulepath.optimizer.export.program import Program
+from joulepath.optimizer.export.quintic_points import QuinticPoints, quintic_points
+
+Encoding = Literal["yaml", "json"]
+GOAL_TOLERANCE, GOAL_TIME = 0.01, 1
+"""Largest distance of a joint from the end [rad], and time for it to get there [s]."""
+
+
+@dataclass(frozen=True)
+class RosOptions:
+    """`message`: a FollowJointTrajectory goal or a JointTrajectory. `encoding`: YAML, or JSON for rosbridge.
+    `controller` is the name of the node of the controller."""
+
+    message: Literal["goal", "trajectory"] = "goal"
+    encoding: Encoding = "yaml"
+    controller: str = "joint_trajectory_controller"
+
+
+def to_ros2(program: Program, options: RosOptions | None = None) -> ExportedFile:
+    """The message for a joint trajectory controller. Raises FormatUnsuitable if the motion is too long."""
+    options = options or RosOptions()
+    points = quintic_points(program, "ros2")
+    trajectory = _trajectory(program, points)
+    action, topic = f"/{options.controller}/follow_joint_trajectory", f"/{options.controller}/joint_trajectory"
+    if options.message == "goal":
+        tolerance = [{"name": name, "position": GOAL_TOLERANCE} for name in program.robot.joint_names]
+        message = {
+            "trajectory": trajectory,
+            "goal_tolerance": tolerance,
+            "goal_time_tolerance": {"sec": GOAL_TIME, "nanosec": 0},
+        }
+        kind = "control_msgs/action/FollowJointTrajectory"
+        wrapped = {"op": "send_action_goal", "action": action, "action_type": kind, "args": message, "feedback": True}
+        use = f"ros2 action send_goal {action} {kind} (this file in quotes)"
+    else:
+        kind = "trajectory_msgs/msg/JointTrajectory"
+        message = trajectory
+        wrapped = {"op": "publish", "topic": topic, "type": kind, "msg": message}
+        use = f"ros2 topic pub --once {topic} {kind} (this file in quotes)"
+    return _file(program, points, options.encoding, kind, use, message, wrapped)
+
+
+def to_moveit(program: Program, encoding: Encoding = "yaml") -> ExportedFile:
+    """A RobotTrajectory for MoveIt. Raises FormatUnsuitable if the motion is too long."""
+    points = quintic_points(program, "moveit")
+    message = {"joint_trajectory": _trajectory(program, points), "multi_dof_joint_trajectory": {"joint_names": []}}
+    kind = "moveit_msgs/msg/RobotTrajectory"
+    return _file(program, points, encoding, kind, "for MoveGroupInterface::execute", message, message)
+
+
+def _trajectory(program: Program, points: QuinticPoints) -> dict[str, Any]:
+    rows = zip(points.nanoseconds, points.q.tolist(), points.v.tolist(), points.a.tolist(), strict=True)
+    return {
+        "joint_names": list(program.robot.joint_names),
+        "points": [
+            {
+                "positions": q,
+                "velocities": v,
+                "accelerations": a,
+                "time_from_start": {"sec": t // 1_000_000_000, "nanosec": t % 1_000_000_000},
+            }
+            for t, q, v, a in rows
+        ],
+    }
+
+
+def _file(
+    program: Program,
+    points: QuinticPoints,
+    encoding: Encoding,
+    kind: str,
+    use: str,
+    message: dict[str, Any],
+    wrapped: dict[str, Any],
+) -> ExportedFile:
+    notes = (
+        f"{len(points.nanoseconds)} points, and quintics between them are within {points.position:.1e} rad and "
+        f"{points.velocity:.1e} rad/s of the spline",
+        "payload and outputs are not in the message: set them on the robot",
+        *(
+            f"at {timed.t0:.4f} s the payload becomes {timed.payload.mass:.4g} kg"
+            for timed in program.timed
+            if timed.payload is not None
+        ),
+    )
+    if encoding == "json":
+        return ExportedFile.of_text(json.dumps(wrapped, allow_nan=False), "application/json", "json", notes)
+    head = "".join(f"# {line}\n" for line in header(program, kind, (use, *notes)))
+    # the dumper in C, where PyYAML has it: ten times as fast
+    dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+    body = yaml.dump(message, Dumper=dumper, default_flow_style=None, sort_keys=False, width=1000)
+    return ExportedFile.of_text(head + body, "application/yaml", "yaml", notes)

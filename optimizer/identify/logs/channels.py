@@ -1,0 +1,42 @@
+"""The channels of a log, one by one, as its report lists them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.identify.logs.columns import Columns, Group
+from joulepath.optimizer.identify.logs.filters import noise
+from joulepath.optimizer.identify.logs.log import Log
+from joulepath.optimizer.identify.logs.log_report import Channel
+
+_UNITS = {"q": "rad", "v": "rad/s", "a": "rad/s²", "power": "W", "temperature": "°C"}
+_EFFORT_UNITS = {"current": "A", "torque": "N·m", "external": "N·m"}
+
+
+def channels_of(log: Log, columns: Columns, effort: Group | None) -> tuple[Channel, ...]:
+    """All channels of a log from these columns, whose efforts come from the group `effort`."""
+    return tuple(_channels(log, columns, effort))
+
+
+def _channels(log: Log, columns: Columns, effort: Group | None) -> Iterator[Channel]:
+    units = _UNITS | {"effort": _EFFORT_UNITS.get(log.effort_meaning or "", "")}
+    sources: dict[str, Group | None] = {"q": "q", "v": "v", "a": "a", "effort": effort, "temperature": "temperature"}
+    for name, group in sources.items():
+        values: Array | None = getattr(log, name)
+        if values is None:
+            continue
+        indices = columns.groups.get(group) if group is not None else None
+        for j, size in enumerate(noise(values, log.rate)):
+            column = None if indices is None else columns.names[indices[j]]
+            yield Channel(f"{name}{j + 1}", column, units[name], *_range(values[:, j]), float(size))
+    if log.power is not None:
+        column = " · ".join(columns.names[k] for k in columns.groups["power"])
+        (size,) = noise(log.power[:, None], log.rate)
+        yield Channel("power", column, "W", *_range(log.power), float(size))
+
+
+def _range(values: Array) -> tuple[float, float]:
+    """The least and the greatest of values (n,), with the digits that single precision has."""
+    low, high = (float(f"{each:.7g}") for each in (values.min(), values.max()))
+    return low, high

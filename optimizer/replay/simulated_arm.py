@@ -1,0 +1,127 @@
+"""An arm as a MuJoCo model: its links with the inertias of the figures, rotors as armature, friction, bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.replay.shapes import add_shapes, pose
+from joulepath.optimizer.replay.simulator import mujoco
+
+# speed [rad/s] below which the slope of friction is that at rest
+AT_REST = 1e-9
+
+
+class SimulatedArm:
+    """A MuJoCo model of an arm. `carry` changes its masses and friction without compiling it again.
+
+    `bodies` are the names of the bodies by the number of their geom.
+    """
+
+    def __init__(self, arm: Arm) -> None:
+        self._simulator = mujoco()
+        spec = self._simulator.MjSpec()
+        joints = arm.robot.nq
+        links = [spec.worldbody]
+        for k in range(1, joints + 1):
+            placement = np.asarray(arm.robot.model.jointPlacements[k].homogeneous)
+            link = links[-1].add_body(name=f"link {k}", explicitinertial=True, **pose(placement))
+            # a placeholder: the compiler refuses figures that no rigid body has, such as those of a published link.
+            # It must not coincide with the link's frame, because a model remembers that it does
+            link.mass, link.inertia, link.ipos, link.iquat = 1.0, [1.0, 1.1, 1.2], [0.1, 0.2, 0.3], [0.8, 0.6, 0.0, 0.0]
+            link.add_joint(name=f"joint {k}", type=self._simulator.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
+            links.append(link)
+        self.bodies = add_shapes(self._simulator, spec, links, arm)
+        links[-1].add_site(name="tcp", **pose(arm.robot.T_last_flange @ arm.T_flange_tcp))
+        self.model = spec.compile()
+        self.data = self._simulator.MjData(self.model)
+        self.model.body_sameframe[:] = 0
+        self.carry(arm)
+
+    def carry(self, arm: Arm) -> None:
+        """Takes masses, inertias, gravity and friction from another arm of the same robot and shapes."""
+        self.arm = arm
+        figures = rigid_body_model(arm)
+        for k in range(1, figures.njoints):
+            body = figures.inertias[k]
+            moments, axes = np.linalg.eigh(body.inertia)
+            axes[:, 2] *= np.linalg.det(axes)
+            self.model.body_mass[k] = body.mass
+            self.model.body_ipos[k] = body.lever
+            self.model.body_inertia[k] = moments
+            self.model.body_iquat[k] = Rotation.from_matrix(axes).as_quat(scalar_first=True)
+        self.model.dof_armature[:] = arm.drives.rotor_inertia
+        self.model.opt.gravity[:] = arm.gravity
+        self._simulator.mj_setConst(self.model, self.data)
+
+    @contextmanager
+    def without(self, part: Literal["contact", "constraint"]) -> Iterator[None]:
+        """Within the context, contacts, or contacts and Coulomb friction, have no effect."""
+        bits, flags = self._simulator.mjtDisableBit, self.model.opt.disableflags
+        self.model.opt.disableflags |= int(getattr(bits, f"mjDSBL_{part.upper()}"))
+        try:
+            yield
+        finally:
+            self.model.opt.disableflags = flags
+
+    def rub(self, v: Array, tau_link: Array) -> None:
+        """Sets the friction for a step that ends at about v (nq,) [rad/s], of joints that carry tau_link (nq,) [N·m].
+
+        It is damping, the law's torque over the speed, which MuJoCo multiplies by the speed at the end of the step. The
+        knee of the law is a hundred times too steep for a torque that is known at the beginning.
+        """
+        v = np.maximum(np.abs(v), AT_REST)
+        self.model.dof_damping[:] = self.arm.friction_law.torque(v, tau_link) / v
+
+    def torques(self, q: Array, v: Array, a: Array) -> Array:
+        """Rigid body and rotor torques (k, nq) [N·m] by MuJoCo's inverse dynamics, friction and contacts left out."""
+        found = np.empty_like(q)
+        with self.without("constraint"):
+            for k, state in enumerate(zip(q, v, a, strict=True)):
+                self.data.qpos[:], self.data.qvel[:], self.data.qacc[:] = state
+                self._simulator.mj_inverse(self.model, self.data)
+                found[k] = self.data.qfrc_inverse
+        return found
+
+    def accelerations(self, q: Array, v: Array, tau: Array) -> Array:
+        """Accelerations (k, nq) [rad/s²] under torques tau (k, nq) [N·m], friction and contacts left out."""
+        found = np.empty_like(q)
+        with self.without("constraint"):
+            for k, state in enumerate(zip(q, v, tau, strict=True)):
+                self.data.qpos[:], self.data.qvel[:], self.data.qfrc_applied[:] = state
+                self._simulator.mj_forward(self.model, self.data)
+                found[k] = self.data.qacc
+        return found
+
+    def tcp_position(self, q: Array) -> Array:
+        """Position (3,) [m] of the TCP in the base frame at q (nq,) [rad]."""
+        self.data.qpos[:] = q
+        self._simulator.mj_kinematics(self.model, self.data)
+        return np.array(self.data.site_xpos[0])
+
+
+def with_changes(arm: Arm, payload: float = 1.0, friction: float = 1.0) -> Arm:
+    """The arm with mass and inertia of its payload, and with its friction, multiplied by factors."""
+    load, robot = arm.payload, arm.robot
+    law = arm.friction_law
+    scaled = replace(
+        law,
+        coulomb=law.coulomb * friction,
+        curved=law.curved * friction,
+        viscous=law.viscous * friction,
+        load=None if law.load is None else law.load * friction,
+    )
+    return replace(
+        arm,
+        payload=replace(load, mass=load.mass * payload, inertia=load.inertia * payload),
+        robot=robot if friction == 1 else replace(robot, friction_laws={law.name: scaled}),
+        friction=arm.friction if friction == 1 else law.name,
+    )

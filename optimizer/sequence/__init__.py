@@ -1,1 +1,0 @@
-"""Rounds of many stops: which configuration at each, found as a shortest path through proven bounds."""

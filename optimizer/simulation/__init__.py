@@ -1,1 +1,0 @@
-"""Motions played in MuJoCo: a second opinion on torques, energy, contacts and savings."""

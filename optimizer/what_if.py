@@ -1,0 +1,90 @@
+"""Public entry point: `what_if(base, problem)` compares a motion with the best one of a changed arm.
+
+The change may be lighter links, another payload or other drives. It has two effects, reported apart: the energy of the
+same motion on the changed arm (`same_motion`), and the energy of a motion optimised for it (`reoptimised`).
+"""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
+from joulepath.optimizer.energy.interval import with_interval
+from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
+from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import Problem, narrowed
+from joulepath.optimizer.search.incumbent import SLACK
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.solution import Certificate, Energy, Solution
+from joulepath.optimizer.trajectories.spline import Spline
+
+# least deadline of a search [s]; shares of the time that the first search leaves to the base motion, and of what is
+# left then for a search from it
+LEAST_TIME, KEPT, SOLVED = 1e-3, 0.05, 0.8
+
+
+@dataclass(frozen=True)
+class Changed:
+    """Result of a change.
+
+    `same_motion` is the energy [J] of the base motion on the changed arm, `certificate` says whether it is feasible
+    there. `reoptimised` is the best motion of the changed arm; None, with the `error`, if none was found.
+    """
+
+    same_motion: Energy
+    certificate: Certificate
+    reoptimised: Solution | None
+    error: JoulepathError | None
+
+
+@one_thread()
+def what_if(base: Solution, problem: Problem, clock: Clock = time.perf_counter) -> Changed:
+    """Compare the answer `base` with that of `problem`, the same motion for a changed arm with as many joints.
+
+    The changed problem is solved on its own. If the base motion is feasible on the changed arm and needs less energy
+    than the new motion, or there is none, the problem is solved again with a warm start from it; where time is too
+    short for that, the base motion is the answer. So no answer needs more energy than a feasible base motion.
+    `problem.deadline` [s] holds for all of it. Raises DeadlineExceeded if it passes before the base motion is certified
+    on the changed arm.
+    """
+    deadline = Deadline.after(problem.deadline, clock)
+    spline, prepared = base.trajectory.spline, PreparedProblem.of(problem)
+    asked = narrowed(problem, base.start.target, base.goal.target)
+    try:
+        with watch(deadline):
+            energy = prepared.energy(spline)
+            certificate = certify(asked, spline, base.start.q, base.goal.q, energy)
+            energy = with_interval(energy, prepared.sensitivity(spline), spline.duration, problem.arm)
+    except DeadlinePassed:
+        raise DeadlineExceeded([]) from None
+    found: Solution | None = None
+    failure: JoulepathError | None = None
+    try:
+        found = optimize(replace(problem, deadline=max(deadline.left - KEPT * problem.deadline, LEAST_TIME)), clock)
+    except JoulepathError as error:
+        failure = error
+    same, objective = energy.of(problem.objective), problem.objective
+    if certificate.valid and not deadline.passed and (found is None or same < found.energy.of(objective) * (1 - SLACK)):
+        again = _from_known(problem, spline, deadline)
+        known = [each for each in (found, again) if each is not None]
+        found = min(known, key=lambda each: each.energy.of(objective), default=None)
+    return Changed(energy, certificate, found, failure if found is None else None)
+
+
+def _from_known(problem: Problem, spline: Spline, deadline: Deadline) -> Solution | None:
+    """The solution from a feasible motion on, or this motion as it is; None if there is no time for that either."""
+
+    def run(share: float, known: list[Spline]) -> Run:
+        return Run(replace(problem, deadline=max(share * deadline.left, LEAST_TIME)), known, deadline.clock)
+
+    with suppress(JoulepathError):
+        return run(SOLVED, [spline]).solution()
+    with suppress(JoulepathError):
+        last = run(1.0, [])
+        return last.as_it_is(spline) if last.incumbent.allows(spline.duration) else None
+    return None

@@ -1,0 +1,158 @@
+"""Paths of stops that no configuration follows whole."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise, product
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.optimizer.cycle.rounds import PART
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.cycle.divided_paths import PLACES, _cheapest, _costs, with_divided_paths
+from joulepath.optimizer.cycle.strands import Strand, strands_of
+from joulepath.optimizer.exceptions import PathInfeasible
+from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
+from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.plan_cycle import plan_cycle
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.free_order import FreeOrder
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.stop_path import StopPath
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.tool_path import ToolPath
+from tests.optimizer.cycle.test_optimize_cycle import assert_true
+from tests.optimizer.cycle.test_paths import FREE, a_cycle, down
+from tests.optimizer.moves import ROBOT
+
+# the first joint may turn by no more than 3.3 rad to either side: on the left it comes to its end on the way
+OWN = ROBOT.limits
+NARROW = replace(
+    FREE, limits=OWN.tightened(q_min=np.array([-3.3, *OWN.q_min[1:]]), q_max=np.array([3.3, *OWN.q_max[1:]]))
+)
+BEAD = StopPath(goal=down(0.2, 0.5, 0.2), split=True)
+
+
+def glue(**given: Any) -> Stop:
+    task = {"name": "glue", "target": down(0.45, -0.1, 0.2), "path": BEAD, "branch": BranchFilter("left", "up")}
+    return Stop(**task | given)
+
+
+def divided(*stops: Stop, **given: Any) -> Cycle:
+    return with_divided_paths(a_cycle(*stops, **{"arm": NARROW} | given))
+
+
+def test_a_path_is_divided_where_a_joint_comes_to_its_end() -> None:
+    asked = a_cycle(glue(dwell=0.1, payload=PART), arm=NARROW)
+    with pytest.raises(PathInfeasible) as refusal:
+        plan_cycle(replace(asked, stops=[replace(each, path=replace(BEAD, split=False)) for each in asked.stops]))
+    assert all(0 < each.followed < 1 and each.reason == "outside_limits" for each in refusal.value.attempts)
+    found = plan_cycle(asked)
+    parts = with_divided_paths(asked)
+    assert_true(parts, found)
+    assert found.order == ["glue/1", "glue"] and found.status == "feasible"
+    assert [move.planned.kind for move in found.moves] == ["move", "path", "move", "path", "move"]
+    first, between, second = found.moves[1:4]
+    ends = [pose_of(NARROW, move.solution.trajectory.spline.control_points[[0, -1]]) for move in (first, second)]
+    assert np.abs(ends[0][1] - ends[1][0]).max() < 1e-6, "it goes on where it left off"
+    assert np.abs(ends[0][0] - down(0.45, -0.1, 0.2).T).max() < 1e-6 and np.abs(ends[1][1] - BEAD.goal.T).max() < 1e-6
+    assert np.abs(between.solution.goal.q - between.solution.start.q).max() > 1.0
+    course = ToolCourse.of(ToolPath(), down(0.45, -0.1, 0.2).T, BEAD.goal.T)
+    q = np.vstack([_samples(first.solution.trajectory.spline), _samples(second.solution.trajectory.spline)])
+    position, rotation = course.deviation(pose_of(NARROW, q))
+    assert position.max() < ToolPath().position_tolerance and rotation.max() < ToolPath().rotation_tolerance
+    assert [move.planned.arm.payload.mass for move in found.moves] == [0.0, 0.0, 0.0, 0.0, 2.0]
+    assert first.dwell_energy == 0 < second.dwell_energy
+
+
+def _samples(spline: Any) -> Array:
+    return np.asarray(spline.curve(np.linspace(0.0, spline.duration, 1500)))
+
+
+def test_a_path_that_can_be_followed_stays_whole() -> None:
+    asked = a_cycle(glue(), arm=FREE)
+    assert with_divided_paths(asked) is asked
+    whole = a_cycle(glue(branch=None), arm=NARROW)
+    assert with_divided_paths(whole) is whole, "on the right"
+
+
+def test_every_part_has_the_lines_of_the_stop_and_the_names_of_its_parts() -> None:
+    other = Stop(name="away", target=down(0.1, 0.5, 0.3))
+    order = FreeOrder(before=[("glue", "away")])
+    asked = divided(glue(), other, order=order)
+    assert [stop.name for stop in asked.stops] == ["glue/1", "glue", "away"]
+    assert asked.order == FreeOrder(before=[("glue", "away")], together=[["glue/1", "glue"]])
+    turned = divided(glue(), other, order=FreeOrder(before=[("away", "glue")], together=[["away", "glue"]]))
+    assert turned.order == FreeOrder(before=[("away", "glue/1")], together=[["away", "glue/1", "glue"]])
+
+
+def test_it_is_divided_where_the_reconfiguration_has_the_least_bound() -> None:
+    course = ToolCourse.of(ToolPath(), down(0.45, -0.1, 0.2).T, BEAD.goal.T)
+    strands = strands_of(NARROW, course, BranchFilter("left", "up"))
+    free = PreparedProblem.of(Problem(arm=NARROW, start=down(0.45, -0.1, 0.2), goal=BEAD.goal))
+    on, cost = _costs(free, [free], strands)
+    for at, strand in zip(on.T, strands, strict=True):
+        T, wanted = pose_of(NARROW, strand.configurations(PLACES[at])), course.poses(PLACES[at])
+        assert np.abs(T[:, :3, 3] - wanted[:, :3, 3]).max() < 2e-3, "its points are joined by straight lines"
+    places = _cheapest(strands, on, cost)
+    assert places is not None and len(places) == 1
+    pairs = [(a, b) for a, b in np.ndindex(cost.shape[1:]) if on[0, a] and on[-1, b]]
+    by_place = np.array([min(cost[p, a, b] for a, b in pairs) for p in range(len(PLACES))])
+    assert PLACES[by_place.argmin()] == places[0] and 10 < by_place.min() < np.inf
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_parts_are_as_few_and_as_cheap_as_can_be(seed: int) -> None:
+    """Against all ways through drawn strands, by shortest paths one change after the other."""
+    rng = np.random.default_rng(seed)
+    ends = np.sort(rng.integers(0, len(PLACES), (6, 2)), axis=1)
+    ends[0, 0], ends[1, 1] = 0, len(PLACES) - 1
+    strands = [Strand(PLACES[[a, b]], np.zeros((2, 6))) for a, b in ends]
+    on = np.stack([each.covers(PLACES) for each in strands], axis=1)
+    cost = np.where(
+        on[:, :, None] & on[:, None, :] & ~np.eye(6, dtype=bool), rng.uniform(1, 2, (len(PLACES), 6, 6)), np.inf
+    )
+    best, counts = _brute(on, cost)
+    places = _cheapest(strands, on, cost)
+    if not np.isfinite(best):
+        assert places is None
+        return
+    assert places is not None and len(places) == counts
+    at = [int(np.abs(PLACES - place).argmin()) for place in places]
+    edges, totals = [0, *at, len(PLACES) - 1], list[float]()
+    for way in product(range(6), repeat=len(at) + 1):
+        if all(on[a : b + 1, strand].all() for (a, b), strand in zip(pairwise(edges), way, strict=True)):
+            totals.append(sum(cost[p, a, b] for p, (a, b) in zip(at, pairwise(way), strict=True)))
+    assert min(totals) == pytest.approx(best)
+
+
+def _brute(on: Array, cost: Array) -> tuple[float, int]:
+    """The least cost of the fewest changes, and how many these are."""
+    ends, layer = len(on) - 1, {(a, 0): 0.0 for a in np.flatnonzero(on[0]).tolist()}
+    for changes in range(on.shape[1] + 1):
+        done = [total for (a, at), total in layer.items() if on[at:, a].all()]
+        if done:
+            return min(done), changes
+        following: dict[tuple[int, int], float] = {}
+        for (a, at), total in layer.items():
+            for place in range(at + 1, ends):
+                if not on[place, a]:
+                    break
+                for b in range(on.shape[1]):
+                    if np.isfinite(cost[place, a, b]):
+                        key = (b, place)
+                        following[key] = min(following.get(key, np.inf), total + cost[place, a, b])
+        layer = following
+    return np.inf, 0
+
+
+def test_what_no_configuration_reaches_cannot_be_divided() -> None:
+    far = replace(BEAD, goal=down(0.2, 1.5, 0.2))
+    with pytest.raises(PathInfeasible) as refusal:
+        divided(glue(path=far))
+    assert "cannot be divided" in str(refusal.value) and refusal.value.path == "stops/glue"
+    assert {each.reason for each in refusal.value.attempts} <= {"unreachable", "outside_limits"}

@@ -1,0 +1,153 @@
+"""Cycles with lines into and out of stops."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.optimizer.cycle.rounds import HOME, pick_and_place
+
+from joulepath.optimizer.cycle.ways import layers_of
+from joulepath.optimizer.exceptions import InvalidProblem, PathInfeasible, StopInCollision
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.plan_cycle import plan_cycle
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.line import Line
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
+from joulepath.optimizer.problem.stops import Stop
+from tests.optimizer.cycle.test_optimize_cycle import assert_true
+from tests.optimizer.moves import AMPLE, ROBOT, tcp_pose
+
+INTO = Line(direction=np.array([0.0, 0.0, 1.0]), distance=0.08)
+OUT = Line(direction=np.array([0.0, 0.0, 2.0]), frame="base", distance=0.06, speed=0.3)
+# relative: an optimum that is reached in another search
+CONVERGED = 2e-3
+
+
+def with_lines(asked: Cycle, **given: Any) -> Cycle:
+    lines = {"approach": INTO, "retreat": OUT} | given
+    return replace(asked, stops=[replace(stop, **lines) for stop in asked.stops])
+
+
+def one_stop(**given: Any) -> Cycle:
+    return with_lines(pick_and_place(1, 1, windings=False), **given)
+
+
+def test_the_tool_comes_and_leaves_straight() -> None:
+    asked = with_lines(pick_and_place(1, 2, windings=False))
+    found = plan_cycle(asked)
+    assert_true(asked, found)
+    assert [move.planned.tool_path is not None for move in found.moves] == [False, True, True] * 2 + [False]
+    for move in found.moves:
+        if move.planned.tool_path is None:
+            continue
+        into = move.planned.goal in ("stop 0", "stop 1")
+        spline = move.solution.trajectory.spline
+        T = np.array([tcp_pose(q).T for q in spline.curve(np.linspace(0.0, spline.duration, 500))])
+        at_stop = T[-1] if into else T[0]
+        along = at_stop[:3, 2] if into else np.array([0.0, 0.0, 1.0])
+        ways = (T[:, :3, 3] - T[0, :3, 3]) @ along
+        assert ways[-1] == pytest.approx(INTO.distance if into else OUT.distance, abs=1e-6)
+        assert np.linalg.norm(T[:, :3, 3] - T[0, :3, 3] - ways[:, None] * along, axis=1).max() < 1e-4
+        assert np.abs(T[:, :3, :3] - at_stop[:3, :3]).max() < 2e-3
+        if not into:
+            assert np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1).max() < 0.3 * spline.duration / 499 * 1.001
+    (carried,) = {move.planned.arm.payload.mass for move in found.moves if move.planned.start == "stop 0"}
+    assert carried == 2.0, "what is taken up is lifted along the line"
+
+
+@pytest.mark.long
+def test_it_is_the_least_over_all_configurations_of_the_stop() -> None:
+    asked = one_stop(branch=BranchFilter(elbow="up"))
+    found = plan_cycle(asked)
+    layers, energies = list(layers_of(asked).values()), []
+    assert [layer.name for layer in layers] == [
+        "start",
+        "stops/stop 0/approach",
+        "stops/stop 0",
+        "stops/stop 0/retreat",
+    ]
+    for node in range(len(layers[2].q)):
+        ends = [HOME, *(layer.q[node] for layer in layers[1:]), HOME]
+        total = 0.0
+        for move, q_start, q_goal in zip(asked.moves, ends, ends[1:], strict=False):
+            path = move.tool_path
+            task = Problem(arm=move.arm, start=q_start, goal=q_goal, tool_path=path, windings=False, deadline=AMPLE)
+            total += optimize(task).energy.electrical.total
+        energies.append(total)
+    least = min(energies) + sum(move.dwell_energy for move in found.moves)
+    assert found.status == "optimal" and found.energy.electrical.total == pytest.approx(least, rel=CONVERGED)
+
+
+@pytest.mark.long
+def test_a_cycle_with_lines_takes_a_given_time() -> None:
+    asked = with_lines(pick_and_place(1, 2, windings=False))
+    duration = 1.3 * plan_cycle(asked).duration
+    timed = replace(asked, duration_min=duration, duration_max=duration)
+    found = plan_cycle(timed)
+    assert_true(timed, found)
+    assert found.duration == pytest.approx(duration)
+    assert all(each.saving > 0 for each in found.baselines if each.within_limits)
+
+
+def test_what_is_grasped_is_no_obstacle_on_the_lines() -> None:
+    """A box around the stop: nothing gets there but along the lines, on which it does not count."""
+    (stop,) = pick_and_place(1, 1).stops
+    assert isinstance(stop.target, Pose)
+    box = Obstacle("part", Box(np.array([0.04, 0.04, 0.04])), Pose.from_rotation(stop.target.T[:3, 3], np.eye(3)).T)
+    arm = Arm(robot=ROBOT, scene=Scene([box]))
+    lines = {"approach": INTO, "retreat": OUT}
+    held = replace(stop, dwell=0.1, payload=None, obstacles_ignored=["part"], **lines)
+    asked = Cycle(arm=arm, start=HOME, stops=[held], windings=False, deadline=AMPLE)
+    found = plan_cycle(asked)
+    assert_true(asked, found)
+    with pytest.raises(StopInCollision):
+        plan_cycle(replace(asked, stops=[replace(held, obstacles_ignored=[])]))
+    with pytest.raises(StopInCollision):
+        plan_cycle(replace(asked, stops=[replace(held, retreat=None)]))
+
+
+def test_a_line_that_no_configuration_follows_says_how_far_each_gets() -> None:
+    far = Line(direction=np.array([0.0, 0.0, 1.0]), frame="base", distance=1.5)
+    with pytest.raises(PathInfeasible) as refusal:
+        plan_cycle(one_stop(retreat=far))
+    assert refusal.value.path == "stops/stop 0/retreat" and refusal.value.length == 1.5
+    assert {each.reason for each in refusal.value.attempts} <= {"unreachable", "singular"}
+
+
+@pytest.mark.parametrize(
+    ("given", "field"),
+    [
+        ({"direction": [0.0, 0.0, 0.0]}, "direction"),
+        ({"direction": [0.0, np.nan, 1.0]}, "direction"),
+        ({"distance": 0.0}, "distance"),
+        ({"distance": np.inf}, "distance"),
+        ({"frame": "world"}, "frame"),
+        ({"speed": 0.0}, "speed"),
+    ],
+    ids=str,
+)
+def test_a_wrong_line_names_its_field(given: dict[str, Any], field: str) -> None:
+    with pytest.raises(InvalidProblem) as refusal:
+        Line(**{"direction": [0.0, 0.0, 1.0], "distance": 0.1} | given)
+    assert refusal.value.field == field
+
+
+@pytest.mark.parametrize(("first", "second"), [("a", "a/approach"), ("a/approach", "a")])
+def test_the_outer_ends_of_lines_have_names_of_their_own(first: str, second: str) -> None:
+    stops = [Stop(name=name, target=HOME, approach=INTO) for name in (first, second)]
+    with pytest.raises(InvalidProblem) as refusal:
+        Cycle(arm=Arm(robot=ROBOT), start=HOME, stops=stops)
+    assert refusal.value.field == "stops.1.name"
+
+
+def test_an_unknown_obstacle_is_named() -> None:
+    with pytest.raises(InvalidProblem) as refusal:
+        one_stop(obstacles_ignored=["part"])
+    assert refusal.value.field == "stops.0.obstacles_ignored" and "part" in str(refusal.value)

@@ -1,0 +1,87 @@
+"""Cycles of many stops: the same cycle for fewer motions, told on the way, and the best one so far at a deadline."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from tests.optimizer.cycle.rounds import PART, pick_and_place
+
+from joulepath.optimizer.cycle import cycle_search, legs
+from joulepath.optimizer.cycle.cycle_search import MANY_STOPS
+from joulepath.optimizer.cycle.cycle_solution import CycleSolution
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.plan_cycle import plan_cycle
+from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.progress import Event, Improved
+from tests.optimizer.clocks import CountingClock
+
+# a counting clock never comes to it
+ENDLESS = 1e9
+# share of the readings of a whole search after which the cycle has been found, and the search goes on
+ENOUGH = 0.75
+
+
+def long_cycle(deadline: float) -> Cycle:
+    """One stop more than a cycle of which it is proven that no chain is better."""
+    asked = pick_and_place(1, MANY_STOPS + 1, windings=False, method="time_scaling", deadline=deadline)
+    only = BranchFilter(elbow="up", wrist="no_flip")
+    return replace(asked, stops=[replace(stop, branch=only) for stop in asked.stops])
+
+
+Whole = tuple[CycleSolution, list[Event], float]
+
+
+@pytest.fixture(scope="module")
+def whole() -> Whole:
+    """The long cycle without a deadline, what it told, and the readings of the clock that it took."""
+    events, clock = list[Event](), CountingClock()
+    found = plan_cycle(long_cycle(ENDLESS), clock, events.append)
+    return found, events, clock.now
+
+
+def test_a_long_cycle_tells_what_it_finds_on_the_way(whole: Whole) -> None:
+    found, events, _ = whole
+    told = [each for each in events if isinstance(each, Improved)]
+    assert len(told) > 1 and all(a.energy > b.energy for a, b in pairwise(told))
+    assert told[-1].energy == pytest.approx(found.energy.electrical.total)
+    assert all(each.bound == pytest.approx(found.lower_bound) for each in told)
+
+
+def test_a_deadline_gives_the_best_long_cycle_so_far(whole: Whole) -> None:
+    best, _, readings = whole
+    found = plan_cycle(long_cycle(ENOUGH * readings), CountingClock())
+    assert found.status == "feasible" and found.order == best.order
+    assert all(move.solution.certificate.valid for move in found.moves) and found.joins < 1e-9
+    assert found.lower_bound == best.lower_bound
+    assert found.energy.electrical.total >= best.energy.electrical.total
+    assert sum(move.solved for move in found.moves) < sum(move.solved for move in best.moves)
+
+
+def test_the_proof_alone_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = pick_and_place(5, 4, method="time_scaling")
+    proven = plan_cycle(asked)
+    monkeypatch.setattr(cycle_search, "MANY_STOPS", 1)
+    found = plan_cycle(asked)
+    assert found.energy.electrical.total == proven.energy.electrical.total
+    assert found.lower_bound == proven.lower_bound
+    assert sum(move.solved for move in found.moves) < sum(move.solved for move in proven.moves)
+    assert (proven.status, found.status) == ("optimal", "feasible")
+
+
+def test_too_many_pairs_of_all_moves_are_refused_before_any_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(legs, "MOST_PAIRS_OF_ROUND", 100)
+    with pytest.raises(InvalidProblem, match="fewer stops") as refusal:
+        plan_cycle(pick_and_place(1, 3, windings=False))
+    assert refusal.value.field == "stops"
+
+
+def test_moves_with_the_same_payload_share_an_arm() -> None:
+    asked = pick_and_place(1, 3)
+    same = Payload(mass=PART.mass, com=np.array(PART.com))
+    arms = replace(asked, stops=[*asked.stops[:2], replace(asked.stops[2], payload=same)]).arms
+    assert arms[0] is arms[2] and arms[1] is arms[3] and arms[0] is not arms[1]

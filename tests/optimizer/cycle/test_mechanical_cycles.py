@@ -1,0 +1,132 @@
+"""Cycles of least mechanical work: true, within their time, with a bound that no other round gets below."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from tests.optimizer.cycle.rounds import HOME, pick_and_place
+
+from joulepath.optimizer.cycle.cycle_solution import CycleSolution
+from joulepath.optimizer.cycle.ways import layers_of
+from joulepath.optimizer.exceptions import CycleTooShort, InvalidProblem
+from joulepath.optimizer.plan_cycle import plan_cycle
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.free_order import FreeOrder
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.search.mechanical_bound import mechanical_bounds
+from joulepath.optimizer.search.priced_work import CELLS, WORKS, priced_work_bounds
+from joulepath.optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
+from tests.optimizer.moves import ROBOT
+from tests.selection import long_but
+
+ROUNDING = 1e-9
+# relative: two searches stop at slightly different optima
+CONVERGED = 5e-3
+# s: well above the shortest cycle, and twice as long
+TIME = 6.0
+ASKED = pick_and_place(1, 2, windings=False, objective="mechanical", duration_max=TIME)
+
+
+@cache
+def found(time: float) -> CycleSolution:
+    return plan_cycle(replace(ASKED, duration_max=time))
+
+
+@pytest.mark.parametrize("time", long_but([TIME], [TIME, 2 * TIME]))
+def test_the_cycle_is_true(time: float) -> None:
+    round_ = found(time)
+    assert all(move.solution.certificate.valid for move in round_.moves)
+    assert round_.duration == pytest.approx(time) and round_.joins < ROUNDING
+    work = round_.energy.mechanical.total
+    assert work == pytest.approx(sum(move.solution.energy.mechanical.total for move in round_.moves), rel=ROUNDING)
+    assert 0 < round_.lower_bound <= work and round_.price_of_time >= 0
+    # dwells and waits are in the electrical energy, though they are no work
+    resting = sum(move.dwell_energy + move.wait_energy for move in round_.moves)
+    moving = sum(move.solution.energy.electrical.total for move in round_.moves)
+    assert round_.energy.electrical.total == pytest.approx(moving + resting, rel=ROUNDING)
+    assert round_.energy.electrical.dwell == pytest.approx(resting, rel=ROUNDING) and resting > 0
+    names = {each.name: each for each in round_.baselines}
+    assert {"same_factor", "fastest_then_wait"} <= set(names)
+    for each in names.values():
+        assert each.saving == pytest.approx(1 - work / each.mechanical) and each.saving_interval is None
+        if each.within_limits and each.duration == pytest.approx(time):
+            assert each.saving >= -CONVERGED
+
+
+@pytest.mark.long
+def test_more_time_needs_no_more_work() -> None:
+    short, longer = found(TIME), found(2 * TIME)
+    assert longer.energy.mechanical.total <= short.energy.mechanical.total * (1 + CONVERGED)
+    assert longer.price_of_time <= short.price_of_time + ROUNDING
+
+
+@pytest.mark.long
+def test_it_works_less_than_the_cycle_of_least_electrical_energy() -> None:
+    """In the same time, over configurations that either chooses."""
+    electrical = plan_cycle(replace(ASKED, objective="electrical", duration_max=TIME, duration_min=TIME))
+    ours = found(TIME)
+    assert ours.energy.mechanical.total < electrical.energy.mechanical.total
+    assert ours.lower_bound <= electrical.energy.mechanical.total
+    assert ours.energy.electrical.total >= electrical.energy.electrical.total * (1 - CONVERGED)
+
+
+def test_no_random_cycle_gets_below_the_bound() -> None:
+    """Random chains, every move at an even pace in its random share of the time."""
+    rng, layers, bound = np.random.default_rng(0), list(layers_of(ASKED).values()), found(TIME).lower_bound
+    plants = [PreparedProblem.of(Problem(arm=move.arm, start=HOME, goal=HOME)) for move in ASKED.moves]
+    for _ in range(40):
+        chain = [HOME, *(layer.q[rng.integers(len(layer.q))] for layer in layers[1:]), HOME]
+        shares = rng.dirichlet(np.full(3, 3.0)) * (TIME - ASKED.dwelling)
+        motions = [quintic_spline(a, b, t) for (a, b), t in zip(pairwise(chain), shares, strict=True)]
+        work = sum(plant.energy(each).mechanical.total for plant, each in zip(plants, motions, strict=True))
+        assert bound <= work
+
+
+@pytest.mark.long
+def test_what_the_price_bounds_holds_for_every_duration() -> None:
+    """Against motions from end to end in many durations; without a price it is that of the longest motion."""
+    rng, own = np.random.default_rng(1), ROBOT.limits
+    prepared = PreparedProblem.of(
+        Problem(arm=ASKED.arm, start=HOME, goal=HOME, objective="mechanical", duration_max=5.0)
+    )
+    start = rng.uniform(own.q_min / 2, own.q_max / 2, (30, 6))
+    goal = start + rng.uniform(-3.0, 3.0, (30, 6))
+    levels = np.array([[prepared.potential(q) for q in both] for both in zip(start, goal, strict=True)])
+    free = priced_work_bounds(prepared, start, goal, levels, 0.0, 5.0)
+    exact = mechanical_bounds(prepared, start, goal, levels)
+    assert (free <= exact * (1 + ROUNDING)).all()
+    # the table's works are so far apart
+    assert (free >= exact - (exact + np.abs(levels).sum(axis=1)) * (1000 ** (1 / WORKS) - 1)).all()
+    shortest = shortest_duration(goal - start, own)
+    for price in (0.5, 5.0, 50.0):
+        bound = priced_work_bounds(prepared, start, goal, levels, price, 5.0)
+        assert (bound >= free - ROUNDING).all() and (bound >= price * shortest - ROUNDING).all()
+        for k in range(30):
+            for duration in np.geomspace(shortest[k], 5.0, CELLS):
+                work = prepared.energy(quintic_spline(start[k], goal[k], duration)).mechanical.total
+                assert bound[k] <= work + price * duration
+
+
+@pytest.mark.long
+def test_a_free_order_does_no_more_work() -> None:
+    free = replace(ASKED, order=FreeOrder(together=[[stop.name for stop in ASKED.stops]]))
+    ours = plan_cycle(free)
+    assert ours.lower_bound <= found(TIME).energy.mechanical.total * (1 + ROUNDING)
+    assert ours.energy.mechanical.total == pytest.approx(found(TIME).energy.mechanical.total, rel=CONVERGED)
+
+
+def test_it_needs_a_time_and_rests() -> None:
+    with pytest.raises(InvalidProblem, match="time") as refusal:
+        replace(ASKED, duration_max=None)
+    assert refusal.value.field == "time"
+    passing = replace(ASKED.stops[0], dwell=0.0, payload=None, via=True)
+    with pytest.raises(InvalidProblem) as refusal:
+        replace(ASKED, stops=[passing, ASKED.stops[1]])
+    assert refusal.value.field == "stops.0.pass"
+    with pytest.raises(CycleTooShort):
+        plan_cycle(replace(ASKED, duration_max=ASKED.dwelling + 0.2))

@@ -1,0 +1,268 @@
+"""Cycles that pass through stops: never worse than stopping there, at every pass, above a bound that holds."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import replace
+from itertools import pairwise, product
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.optimizer.cycle.rounds import HOME, PART, poses
+
+from joulepath.optimizer.cycle.against_stopping import as_passed, start_from
+from joulepath.optimizer.cycle.cycle_search import CycleSearch
+from joulepath.optimizer.cycle.cycle_solution import CycleSolution
+from joulepath.optimizer.cycle.passing_leg import PassingLeg
+from joulepath.optimizer.exceptions import CycleTooShort, DeadlineExceeded, InvalidProblem
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.plan_cycle import plan_cycle
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.cycle import MOST_PASSES, Cycle
+from joulepath.optimizer.problem.free_order import FreeOrder
+from joulepath.optimizer.problem.line import Line
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.search.run import Run
+from tests.optimizer.moves import AMPLE, ROBOT
+from tests.selection import long_but
+
+# the package has the function of this name
+optimize_cycle_module = importlib.import_module("joulepath.optimizer.plan_cycle")
+
+ROUNDING = 1e-9
+# relative; a motion's energy from panels that are as long as a share of it
+QUADRATURE = 2e-5
+# relative; two solves that end where a step promises less than this
+PROGRESS = 5e-5
+# relative; two solves of one motion from different guesses, which may end in optima that differ by as much
+GUESSES = 5e-4
+ARM = Arm(robot=ROBOT, collisions=False)
+Q = [
+    HOME + np.array(each)
+    for each in ([0.5, 0.2, -0.2, 0, 0.1, 0], [0.9, 0.1, -0.1, 0.2, 0, 0.3], [1.3, 0.3, -0.3, 0, 0, 0])
+]
+
+
+def passing_cycle(seed: int, count: int, **given: Any) -> Cycle:
+    """A cycle over poses, of which all but the last are passed."""
+    stops = [Stop(name=f"{k}", target=pose, via=k < count - 1) for k, pose in enumerate(poses(seed, count))]
+    return Cycle(**{"arm": ARM, "start": HOME, "stops": stops, "windings": False, "deadline": AMPLE} | given)
+
+
+def of(*stops: Stop, **given: Any) -> Cycle:
+    return Cycle(**{"arm": ARM, "start": HOME, "stops": stops, "windings": False, "deadline": AMPLE} | given)
+
+
+def against(found: CycleSolution) -> dict[str, float]:
+    return {each.name: each.saving for each in found.baselines}
+
+
+@pytest.mark.parametrize("seed", long_but([0], range(6)))
+def test_passing_is_never_worse_than_the_best_cycle_that_stops(seed: int) -> None:
+    asked = passing_cycle(seed, 3)
+    found = plan_cycle(asked)
+    theirs = plan_cycle(replace(asked, stops=[replace(stop, via=False) for stop in asked.stops]))
+    own = found.energy.electrical.total
+    (stopping,) = (each for each in found.baselines if each.name == "stopping")
+    assert stopping.electrical == pytest.approx(theirs.energy.electrical.total, rel=QUADRATURE)
+    assert own <= stopping.electrical and stopping.saving == pytest.approx(1 - own / stopping.electrical)
+    assert found.lower_bound <= own and found.lower_bound <= theirs.lower_bound + ROUNDING
+    assert found.order == ["0", "1", "2"] and found.joins < ROUNDING
+    assert all(move.solution.certificate.valid for move in found.moves)
+    assert own == pytest.approx(sum(move.energy for move in found.moves))
+
+
+def test_every_pass_is_where_its_target_says_and_when_the_answer_says() -> None:
+    asked = passing_cycle(3, 3)
+    found = plan_cycle(asked)
+    move = found.moves[0]
+    assert [each.stop for each in move.passes] == ["0", "1"]
+    assert 0 < move.passes[0].t < move.passes[1].t < move.solution.duration
+    for stop, each in zip(asked.stops, move.passes, strict=False):
+        q = move.solution.trajectory.spline.curve(each.t)
+        assert np.abs(q - each.at.q).max() < ROUNDING
+        assert isinstance(stop.target, Pose)
+        assert np.abs(tcp_pose(ARM, q) - stop.target.T).max() < 1e-6
+        assert np.abs(move.solution.trajectory.spline.curve(each.t, 1)).max() > 0.05
+
+
+def test_the_best_of_all_configurations_is_found() -> None:
+    """Two targets at each of two passes: every combination is solved by itself."""
+    targets = [[q, q + np.array([0.3, -0.3, 0.3, 0, 0, 0])] for q in Q[:2]]
+    stops = [Stop(name=f"{k}", target=AnyOf(tuple(each)), via=True) for k, each in enumerate(targets)]
+    found = plan_cycle(of(*stops, Stop(name="last", target=Q[2]), closed=False))
+    energies = {
+        (a, b): Run(
+            Problem(arm=ARM, start=HOME, goal=Q[2], passes=[targets[0][a], targets[1][b]], deadline=AMPLE)
+        ).solution().energy.electrical.total
+        for a, b in product(range(2), repeat=2)
+    }  # fmt: skip
+    chosen = tuple(each.at.target for each in found.moves[0].passes)
+    assert energies[chosen] <= min(energies.values()) * (1 + 1e-3)
+    assert found.energy.electrical.total <= min(energies.values()) * (1 + 1e-3)
+    assert found.lower_bound <= min(energies.values())
+
+
+def test_routes_come_in_the_order_of_their_bounds_and_none_is_left_out() -> None:
+    search = CycleSearch(passing_cycle(1, 3), clock=lambda: 0.0)
+    leg = search.legs[0]
+    assert isinstance(leg, PassingLeg)
+    routes = list(leg.best_routes(0, 2))
+    sizes = [range(len(layer.q)) for layer in leg.between]
+    assert {route for _, route in routes} == set(product(*sizes))
+    values = [bound for bound, _ in routes]
+    assert values == sorted(values) and leg.least_costs[0, 2] == pytest.approx(values[0])
+    for bound, route in routes[::7]:
+        q = [leg.start.q[0], *leg.configurations(route), leg.goal.q[2]]
+        run = Run(Problem(arm=ARM, start=q[0], goal=q[-1], passes=q[1:-1], deadline=AMPLE))
+        run.prepare()
+        assert run.incumbent.candidates[0].lower_bound == pytest.approx(bound)
+
+
+def test_a_cycle_of_passes_alone_comes_back() -> None:
+    found = plan_cycle(of(*(Stop(name=f"{k}", target=q, via=True) for k, q in enumerate(Q))))
+    (move,) = found.moves
+    assert len(move.passes) == 3 and found.order == ["0", "1", "2"] and found.status == "optimal"
+    ends = move.solution.trajectory.spline.control_points[[0, -1]]
+    assert np.abs(ends - HOME).max() < ROUNDING
+    assert against(found)["stopping"] > 0.03
+
+
+@pytest.mark.parametrize("factor", long_but([0.99], [1.25, 0.99]))
+def test_in_a_given_time_it_is_not_worse_either(factor: float) -> None:
+    stops = [Stop(name=f"{k}", target=q, via=k < 2, dwell=0.2 * (k == 2)) for k, q in enumerate(Q)]
+    own = plan_cycle(of(*stops))
+    time = factor * own.duration
+    found = plan_cycle(of(*stops, duration_min=time, duration_max=time))
+    assert found.duration == pytest.approx(time, rel=1e-9)
+    assert all(move.solution.certificate.valid for move in found.moves)
+    assert own.energy.electrical.total <= found.energy.electrical.total
+    assert found.lower_bound <= found.energy.electrical.total
+    if factor > 1:
+        assert against(found)["stopping"] >= 0 and found.price_of_time < 0
+    else:
+        # stopping takes longer than that
+        assert "stopping" not in against(found) and found.price_of_time >= 0
+
+
+def test_a_time_that_even_passing_does_not_keep_is_too_short() -> None:
+    with pytest.raises(CycleTooShort) as caught:
+        plan_cycle(of(*(Stop(name=f"{k}", target=q, via=True) for k, q in enumerate(Q)), duration_max=0.5))
+    assert 0.5 < caught.value.shortest < 4
+
+
+def test_motions_that_stop_become_motions_that_pass_and_need_no_more() -> None:
+    """What stands in where the search finds nothing better than stopping."""
+    asked = of(*(Stop(name=f"{k}", target=q, via=k < 2) for k, q in enumerate(Q)))
+    theirs = plan_cycle(replace(asked, stopping=True))
+    search = CycleSearch(asked, clock=lambda: 0.0)
+    rested = start_from(search, theirs)
+    assert rested.known.energy == pytest.approx(theirs.energy.electrical.total, rel=QUADRATURE)
+    motions, waits = as_passed(search, rested)
+    assert len(motions) == 2 and not waits and len(theirs.moves) == 4
+    first = sum(move.solution.duration for move in theirs.moves[:3])
+    assert motions[0].duration == pytest.approx(first) and motions[0].certificate.pass_error < ROUNDING
+    assert motions[0].energy.electrical.total <= sum(move.energy for move in theirs.moves[:3]) * (1 + QUADRATURE)
+    assert motions[1] is theirs.moves[3].solution
+
+
+def test_what_stops_is_the_answer_where_the_search_ends_too_early(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its motions are certified as those of a cycle that passes, and it saves nothing."""
+
+    def ended(search: CycleSearch) -> Any:
+        if search.asked.passes:
+            raise DeadlineExceeded([])
+        return searched(search)
+
+    searched = optimize_cycle_module._best_of
+    monkeypatch.setattr(optimize_cycle_module, "_best_of", ended)
+    found = plan_cycle(of(*(Stop(name=f"{k}", target=q, via=k < 2) for k, q in enumerate(Q))))
+    assert found.status == "feasible" and against(found)["stopping"] == pytest.approx(0, abs=1e-12)
+    assert [len(move.passes) for move in found.moves] == [2, 0]
+    assert all(move.solution.certificate.valid for move in found.moves)
+    assert found.lower_bound <= found.energy.electrical.total
+    assert [each.t for each in found.moves[0].passes] == sorted(each.t for each in found.moves[0].passes)
+
+
+def test_limits_of_a_pass_hold_for_the_whole_motion_and_nothing_else() -> None:
+    slow = replace(ROBOT.limits, v_max=np.full(6, 0.5))
+    stops = [Stop(name="slowly", target=Q[0], via=True, limits=slow), Stop(name="last", target=Q[1])]
+    asked = of(*stops)
+    first, back = asked.moves
+    assert (first.arm.active_limits.v_max == 0.5).all() and (back.arm.active_limits.v_max > 0.5).all()
+    stopping = replace(asked, stopping=True).moves
+    assert [(move.start, move.goal) for move in stopping] == [
+        ("start", "slowly"),
+        ("slowly", "last"),
+        ("last", "start"),
+    ]
+    assert all((move.arm.active_limits.v_max == 0.5).all() for move in stopping[:2])
+    found = plan_cycle(asked)
+    assert np.abs(found.moves[0].solution.trajectory.v).max() <= 0.5 and against(found)["stopping"] >= 0
+
+
+LINE = Line(direction=np.array([0.0, 0.0, 1.0]), distance=0.05)
+
+
+@pytest.mark.parametrize(
+    ("field", "given", "round_"),
+    [
+        ("stops.0.dwell", {"dwell": 0.1}, {}),
+        ("stops.0.payload", {"payload": PART}, {}),
+        ("stops.0.payload", {"payload": Payload()}, {}),
+        ("stops.0.approach", {"approach": LINE}, {}),
+        ("stops.0.retreat", {"retreat": LINE}, {}),
+        ("stops.0.pass", {}, {"order": FreeOrder()}),
+        ("stops.1.pass", {"via": False}, {"closed": False}),
+        ("wait", {}, {"wait": "0", "duration_min": 20.0}),
+    ],
+)
+def test_what_does_not_fit_a_pass_is_refused(field: str, given: dict[str, Any], round_: dict[str, Any]) -> None:
+    stops = [Stop(**{"name": "0", "target": Q[0], "via": True} | given), Stop(name="1", target=Q[1], via=True)]
+    with pytest.raises(InvalidProblem) as caught:
+        of(*stops, **round_)
+    assert caught.value.field == field
+
+
+def test_a_motion_has_a_dozen_passes_at_most() -> None:
+    many = [Stop(name=f"{k}", target=Q[k % 3], via=True) for k in range(MOST_PASSES)]
+    of(*many, Stop(name="rest", target=Q[0]), *(replace(stop, name=f"again {stop.name}") for stop in many))
+    with pytest.raises(InvalidProblem) as caught:
+        of(*many, Stop(name="one more", target=Q[0], via=True))
+    assert caught.value.field == f"stops.{MOST_PASSES}.pass"
+
+
+def test_passes_at_the_same_place_are_one() -> None:
+    """Twice in a row, at the start and at the goal: the curve is there already."""
+    places = [HOME, Q[0], Q[0], Q[1]]
+    stops = [Stop(name=f"{k}", target=q, via=True) for k, q in enumerate(places)]
+    found = plan_cycle(of(*stops, Stop(name="rest", target=Q[1]), closed=False))
+    assert [each.stop for each in found.moves[0].passes] == ["0", "1", "2", "3"]
+    assert found.status == "optimal" and found.moves[0].solution.certificate.valid
+    plain = plan_cycle(of(Stop(name="1", target=Q[0], via=True), Stop(name="rest", target=Q[1]), closed=False))
+    assert found.energy.electrical.total == pytest.approx(plain.energy.electrical.total, rel=GUESSES)
+
+
+def test_waiting_is_not_at_a_stop_that_is_passed() -> None:
+    """In much more time than the cycle takes: neither ours nor the one that stops rests there for long."""
+    stops = [Stop(name=f"{k}", target=q, via=k == 0) for k, q in enumerate(Q[:2])]
+    found = plan_cycle(of(*stops, duration_min=12.0, duration_max=12.0, hold="brakes", brake_power=5.0))
+    assert found.duration == pytest.approx(12.0) and sum(move.wait for move in found.moves) > 1
+    assert against(found)["stopping"] >= -ROUNDING
+
+
+def test_a_pass_carries_what_its_motion_carries() -> None:
+    stops = [
+        Stop(name="pick", target=Q[0], payload=PART),
+        Stop(name="by", target=Q[1], via=True),
+        Stop(name="place", target=Q[2], payload=Payload()),
+    ]
+    found = plan_cycle(of(*stops))
+    assert [move.planned.arm.payload.mass for move in found.moves] == [0.0, PART.mass, 0.0]
+    assert [[each.stop for each in move.passes] for move in found.moves] == [[], ["by"], []]
+    starts = [move.t0 for move in found.moves]
+    assert all(b > a for a, b in pairwise(starts))

@@ -1,0 +1,186 @@
+"""Base parameters and refitted links: their number, their torques, and that they are real bodies."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from benchmarks.identification_logs import MISSING, folder, tx40
+from joulepath.models.from_figures import robot_of
+from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.robot import Array, Robot
+from joulepath.models.uncertainty.document import covariance_of, with_document
+from joulepath.models.uncertainty.parameters import LINKS
+from joulepath.optimizer.energy.link_regressor import body_parameters, rigid_regressor, rigid_torques
+from joulepath.optimizer.identify.arm.base_parameters import base_parameters
+from joulepath.optimizer.identify.arm.pseudo_inertia import nearness, pseudo_inertias
+from joulepath.optimizer.identify.document import document_of
+from joulepath.optimizer.identify.fits.consistent import solve_consistent
+from joulepath.optimizer.identify.identify import fit
+from joulepath.optimizer.identify.options import Options
+from tests.identification_logs import recorded, truth_of
+
+ROUNDING = 1e-9
+# Gautier and Khalil's numbers for arms of these forms, without rotors and with them
+COUNTS = {"ur5e": (36, 40), "ur10e": (36, 40), "panda": (43, 48), "iiwa14": (43, 48)}
+
+
+def states(nq: int, count: int, seed: int = 0) -> tuple[Array, Array, Array]:
+    random = np.random.default_rng(seed)
+    q, v, a = (random.normal(0.0, 1.0, (count, nq)) for _ in range(3))
+    return q, v, a
+
+
+@pytest.mark.parametrize("name", COUNTS)
+def test_base_parameters_are_as_many_as_the_arm_has(name: str) -> None:
+    model = load_robot(name).model
+    assert tuple(base_parameters(model, rotors).count for rotors in (False, True)) == COUNTS[name]
+
+
+def test_base_parameters_of_an_arm_of_a_users_own() -> None:
+    place = folder()
+    if place is None:
+        pytest.skip(MISSING)
+    robot, _ = tx40(place)
+    assert tuple(base_parameters(robot.model, rotors).count for rotors in (False, True)) == (36, 40)
+
+
+def test_torques_follow_from_the_base_parameters_alone() -> None:
+    model = load_robot("ur5e").model
+    base = base_parameters(model, rotors=False)
+    q, v, a = states(model.nq, 20, seed=4)
+    regressor = rigid_regressor(model, q, v, a)
+    values = base.combination @ body_parameters(model)
+    expected = rigid_torques(model, q, v, a)
+    assert np.abs(regressor[:, :, base.independent] @ values - expected).max() < ROUNDING * np.abs(expected).max() * 100
+    assert len(base.expressions) == 36 and all("·" in each or each.isidentifier() for each in base.expressions)
+
+
+def test_real_bodies_have_positive_pseudo_inertias_and_no_others() -> None:
+    body = pin.Inertia(2.0, np.array([0.1, 0.0, 0.2]), np.diag([0.02, 0.03, 0.04]))
+    wrong = pin.Inertia(2.0, np.zeros(3), np.diag([0.02, 0.03, 0.06]))  # a moment above the sum of the others
+    assert np.linalg.eigvalsh(pseudo_inertias(body.toDynamicParameters()))[0, 0] > 0
+    assert np.linalg.eigvalsh(pseudo_inertias(wrong.toDynamicParameters()))[0, 0] < 0
+
+
+@pytest.mark.parametrize("name", robot_names())
+def test_nearness_is_a_distance_for_every_robot(name: str) -> None:
+    """Also of parameters that no real body has, as the published ones of one link of the Panda."""
+    metric = nearness(body_parameters(load_robot(name).model))
+    scale = 1 / np.sqrt(np.diag(metric))
+    assert np.linalg.eigvalsh(metric * np.outer(scale, scale))[0] > 0
+
+
+def test_links_whose_published_parameters_are_no_real_bodies_are_refitted() -> None:
+    robot = load_robot("panda")
+    least = np.linalg.eigvalsh(pseudo_inertias(body_parameters(robot.model)))[:, 0]
+    assert least.min() < -1e-4
+    found = fit(robot, [recorded(robot, truth_of(robot), moves=6).log()], Options(refit=True, held_out=0.0))
+    assert found.physical is not None and found.physical.consistent
+
+
+def test_nearness_does_not_depend_on_the_frame() -> None:
+    body = pin.Inertia(2.0, np.array([0.1, 0.0, 0.2]), np.diag([0.02, 0.03, 0.04]))
+    other = pin.Inertia(2.1, np.array([0.11, 0.01, 0.2]), np.diag([0.021, 0.03, 0.04]))
+    placement = pin.SE3(pin.utils.rotate("x", 0.7), np.array([0.3, -0.2, 0.5]))
+
+    def distance(one: pin.Inertia, two: pin.Inertia) -> float:
+        change = two.toDynamicParameters() - one.toDynamicParameters()
+        return float(change @ nearness(one.toDynamicParameters()) @ change)
+
+    # a body that has no extent is given some, in every frame
+    assert distance(placement.act(body), placement.act(other)) == pytest.approx(distance(body, other), rel=0.02)
+
+
+def test_the_nearest_real_body_is_found() -> None:
+    """Of an impossible body: the solution is real, and no real body between it and the start is nearer."""
+    wrong = pin.Inertia(2.0, np.zeros(3), np.diag([0.02, 0.03, 0.06])).toDynamicParameters()
+    metric = nearness(pin.Inertia(2.0, np.zeros(3), np.diag([0.03, 0.04, 0.05])).toDynamicParameters())
+    found = solve_consistent(metric, metric @ wrong, 1, np.full(10, -np.inf))
+    assert np.linalg.eigvalsh(pseudo_inertias(found))[0, 0] > -1e-9
+    for share in (0.5, 0.9, 0.99):
+        between = found + (1 - share) * (wrong - found)
+        assert np.linalg.eigvalsh(pseudo_inertias(between))[0, 0] < 0
+
+
+def heavier(robot: Robot) -> Robot:
+    """The same robot with other links: up to 20 % heavier or lighter, their centres of mass moved by a centimetre."""
+    random, model = np.random.default_rng(3), robot.model.copy()
+    for joint in range(1, model.njoints):
+        body, factor = model.inertias[joint], random.uniform(0.8, 1.2)
+        lever = body.lever + random.uniform(-0.01, 0.01, 3)
+        model.inertias[joint] = pin.Inertia(factor * body.mass, lever, factor * body.inertia)
+    return replace(robot, model=model)
+
+
+def test_a_refit_finds_links_that_the_robots_own_are_not() -> None:
+    robot = load_robot("ur10e")
+    real = heavier(robot)
+    truth = truth_of(real, 1)
+    log = replace(recorded(real, truth, moves=12).log(), power=None)
+    kept, refitted = (fit(robot, [log], Options(refit=refit)) for refit in (False, True))
+    assert kept.validation is not None and refitted.validation is not None
+    before, after = kept.validation.fitted.torque, refitted.validation.fitted.torque
+    assert before is not None and after is not None
+    # the other joints carry little, and what is left there is the noise of the current
+    assert (after.relative < 1.01 * before.relative).all() and after.relative[1] < 0.2 * before.relative[1]
+    assert refitted.physical is not None and refitted.physical.consistent
+    assert (refitted.structure.base, refitted.structure.excited) == (40, 40)
+    change = refitted.fitted.arm.bodies
+    assert change is not None
+    regressor = rigid_regressor(robot.model, *states(6, 50))
+    wrong = body_parameters(robot.model) - body_parameters(real.model)
+    error, own = regressor @ (wrong + change), regressor @ wrong
+    assert np.linalg.norm(error) < 0.1 * np.linalg.norm(own)
+
+
+def test_a_refit_of_a_right_model_moves_nothing_that_matters() -> None:
+    """The prior keeps what the log does not tell, and the log has nothing against the rest."""
+    robot = load_robot("ur10e")
+    found = fit(robot, [replace(recorded(robot, truth_of(robot)).log(), power=None)], Options(refit=True, held_out=0.0))
+    change = found.fitted.arm.bodies
+    assert change is not None
+    regressor = rigid_regressor(robot.model, *states(6, 50))
+    own = regressor @ body_parameters(robot.model)
+    assert np.linalg.norm(regressor @ change) < 0.02 * np.linalg.norm(own)
+
+
+def test_identified_figures_become_a_robot() -> None:
+    """The document is one that requests take: the robot's own figures, with the identified ones in their place."""
+    robot = load_robot("ur10e")
+    truth = truth_of(robot, 1)
+    found = fit(robot, [recorded(robot, truth, moves=10).log()], Options(refit=True, held_out=0.0))
+    document = document_of(found.figures(), "2025-03-14")
+    figures = with_document(robot.name, robot.figures, document)
+    made = robot_of("ur10e", figures)
+    assert made.friction.name == "identified" and made.friction.load is not None
+    assert made.friction.coulomb == pytest.approx(truth.coulomb, rel=0.05)
+    assert made.electronics.idle_power == pytest.approx(truth.idle_power, rel=0.01)
+    change = found.fitted.arm.bodies
+    assert change is not None
+    assert body_parameters(made.model) == pytest.approx(body_parameters(robot.model) + change, abs=1e-6)
+    known = covariance_of(figures)
+    assert known is not None and known.move_sd == found.spread.move
+    assert {"electronics.idle_power", "friction_laws.identified.coulomb.1", "inertials.mx.1"} <= set(known.names)
+    assert found.figures().sd.shape == (len(known.names),)
+
+
+def test_errors_of_refitted_links_are_those_that_the_document_says() -> None:
+    """Torques of other motions, by links that the robot's own are not, and how far they may be off."""
+    robot = load_robot("ur10e")
+    real = heavier(robot)
+    log = replace(recorded(real, truth_of(real, 1), moves=12).log(), power=None)
+    found = fit(robot, [log], Options(refit=True, held_out=0.0))
+    known = covariance_of(document_of(found.figures(), "2025-03-14"))
+    assert known is not None and found.fitted.arm.bodies is not None
+    at = [known.names.index(f"inertials.{part}.{joint}") for joint in range(6) for part in LINKS]
+    covariance = known.matrix[np.ix_(at, at)]
+    regressor = rigid_regressor(robot.model, *states(6, 200))[:, 1:3].reshape(-1, 60)
+    wrong = regressor @ (body_parameters(robot.model) + found.fitted.arm.bodies - body_parameters(real.model))
+    sd = np.sqrt(np.einsum("np,pq,nq->n", regressor, covariance, regressor))
+    assert (np.abs(wrong) <= 3 * sd).mean() > 0.95
+    # and not by far more than they are
+    assert np.sqrt(np.mean((wrong / sd) ** 2)) > 0.2

@@ -1,0 +1,86 @@
+"""The memory of reading a log and of a fit: logs can be long."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from itertools import cycle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from joulepath.models.registry import load_robot
+from tests.identification_logs import Form, csv_of, recorded, truth_of
+
+ROOT = Path(__file__).parents[3]
+# of the rows and columns of a fit with the links' inertials, beside the log
+MOST_MEMORY = 100e6
+SCRIPT = """
+import resource
+from dataclasses import replace
+import numpy as np
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.identify.identify import fit
+from joulepath.optimizer.identify.logs.log import Move
+from joulepath.optimizer.identify.options import Options
+from tests.identification_logs import recorded, truth_of
+robot = load_robot("ur10e")
+short = recorded(robot, truth_of(robot), moves=30, rate=500.0).log()
+rows, times = len(short.q), -(-1_000_000 // len(short.q))
+moves = tuple(Move(k * rows + m.start, k * rows + m.end, m.at_rest) for k in range(times) for m in short.moves)
+again = {name: np.concatenate([getattr(short, name)] * times) for name in ("q", "v", "a", "effort", "power")}
+log = replace(short, **again, time=np.arange(rows * times) / short.rate, temperature=None, moves=moves)
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+fit(robot, [log], Options(refit=True))
+print(len(log.time), (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024)
+"""
+
+# bytes of the whole process, from the file to the figures: with 26 columns on a uniform grid, and with 33 whose times
+# jitter, so that they are interpolated
+MOST_OF_ALL = {"own": 480e6, "rtde": 500e6}
+ROWS = 1_000_000
+FROM_FILE = """
+import resource, sys
+from pathlib import Path
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.identify.identify import fit
+from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.logs.reading import read_log
+robot = load_robot("ur10e")
+log = read_log(Path(sys.argv[1]), robot)
+fit(robot, [log], Options(refit=True))
+print(len(log.time), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+"""
+
+
+def lines(form: Form) -> Iterator[str]:
+    """Of a log with all channels, which repeats the same moves; the times of RTDE jitter."""
+    robot = load_robot("ur10e")
+    short = csv_of(recorded(robot, truth_of(robot), moves=30, rate=500.0, closed=True), form).decode().splitlines()
+    cells = [line.partition(",")[2] for line in short[1:]]
+    shifts = np.random.default_rng(0).uniform(-0.3, 0.3, ROWS) * (form == "rtde")
+    yield short[0]
+    times = ((k + shift) / 500 for k, shift in enumerate(shifts.tolist()))
+    yield from (f"{time:.6f},{row}" for time, row in zip(times, cycle(cells), strict=False))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("form", ["own", "rtde"])
+def test_a_million_rows_of_a_file_are_refitted_within_memory(tmp_path: Path, form: Form) -> None:
+    file = tmp_path / "log.csv"
+    with file.open("w") as written:
+        written.writelines(f"{line}\n" for line in lines(form))
+    command = [sys.executable, "-c", FROM_FILE, str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+    rows, memory = (int(each) for each in done.stdout.split())
+    assert 0.99 * ROWS < rows < 1.01 * ROWS and 0 < memory < MOST_OF_ALL[form], memory
+
+
+@pytest.mark.long
+def test_a_refit_of_a_million_rows_stays_within_memory() -> None:
+    """In a process of its own, whose peak counts nothing else."""
+    done = subprocess.run([sys.executable, "-c", SCRIPT], capture_output=True, text=True, check=True, cwd=ROOT)
+    rows, memory = (int(each) for each in done.stdout.split())
+    assert rows >= 1_000_000 and 0 < memory < MOST_MEMORY

@@ -1,0 +1,130 @@
+"""The payload of an arm from a log without it and one with it, where the truth is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.identify.errors import NotExcited, PayloadUnknown
+from joulepath.optimizer.identify.fits.payload_fit import Carried
+from joulepath.optimizer.identify.identify import fit
+from joulepath.optimizer.identify.logs.log import Log
+from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.problem.arm import Payload
+from tests.identification_logs import Noise, recorded, truth_of
+
+ROBOT = load_robot("ur10e")
+PAYLOAD = Payload(2.805, np.array([0.01, -0.02, 0.06]), np.diag([0.006, 0.006, 0.004]))
+NOTHING = Payload()
+ASKED = Options(fit=("payload",), held_out=0.0)
+NOISE = Noise(current=0.1)
+# of the standard deviations: what one of a thousand figures exceeds
+FAR = 4.0
+
+
+def log_of(carried: Payload, seed: int, said: Payload, motions: int = 0) -> Log:
+    """A log of a unit with other friction than the robot's own, which carried one payload and says another."""
+    truth = replace(truth_of(ROBOT, seed), payload=carried)
+    log = recorded(ROBOT, truth, moves=12, seed=motions, noise=NOISE).log()
+    return replace(log, power=None, payload=said)
+
+
+def found_in(*logs: Log, options: Options = ASKED) -> Carried:
+    found = fit(ROBOT, logs, options).payload
+    assert found is not None
+    return found
+
+
+def check(carried: Carried, mass: float = PAYLOAD.mass) -> None:
+    sd = np.sqrt(np.diag(carried.covariance))
+    assert not carried.why
+    assert abs(carried.mass - mass) <= min(0.015 * mass, FAR * sd[0])
+    assert 0 < sd[0] <= 0.02
+    assert (np.abs(carried.com - PAYLOAD.com) <= FAR * sd[1:]).all() and sd[1:].max() < 0.005
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_mass_and_centre_of_mass_are_found(seed: int) -> None:
+    """In other motions than those of the log without the payload."""
+    check(found_in(log_of(NOTHING, seed, NOTHING, seed), log_of(PAYLOAD, seed, PAYLOAD, seed + 50)))
+
+
+def test_errors_of_the_links_do_not_become_payload() -> None:
+    """Of a robot whose links are taken to weigh up to 5 % more or less than they do."""
+    scale = np.array([1.05, 0.95, 1.04, 0.96, 1.05, 0.95])
+    model = ROBOT.loaded_model(0.0, np.zeros(3), np.zeros((3, 3)), np.array([0.0, 0.0, -9.81]), scale)
+    logs = [log_of(NOTHING, 2, NOTHING), log_of(PAYLOAD, 2, PAYLOAD, 52)]
+    found = fit(replace(ROBOT, model=model), logs, ASKED).payload
+    assert found is not None
+    check(found)
+
+
+def test_what_the_log_says_of_its_payload_does_not_count() -> None:
+    without, logs = log_of(NOTHING, 0, NOTHING), [log_of(PAYLOAD, 0, said, 50) for said in (NOTHING, Payload(9.0))]
+    assert found_in(without, logs[0]).mass == found_in(without, logs[1]).mass
+
+
+def test_the_other_log_may_carry_something_that_is_known() -> None:
+    half = Payload(1.5, np.array([0.0, 0.0, 0.03]))
+    check(found_in(log_of(half, 1, half), log_of(PAYLOAD, 1, NOTHING, 50)))
+
+
+def test_a_payload_needs_two_logs_that_differ_by_it() -> None:
+    without, loaded = log_of(NOTHING, 0, NOTHING), log_of(PAYLOAD, 0, NOTHING, 50)
+    with pytest.raises(InvalidProblem, match="kg less than the others"):
+        found_in(loaded, without)
+    with pytest.raises(InvalidProblem, match="two logs"):
+        found_in(loaded)
+    for alike in (
+        [without, without],
+        [replace(loaded, payload=PAYLOAD), without],
+        [without, log_of(NOTHING, 0, NOTHING, 9)],
+    ):
+        with pytest.raises(NotExcited) as caught:
+            found_in(*alike)
+        assert caught.value.parameters[0] == "payload_mass"
+        assert caught.value.advice["parameters"] == ["inertials", "rotor", "friction"]
+
+
+def test_a_payload_that_is_not_told_is_none_and_the_rest_is_found() -> None:
+    without = log_of(NOTHING, 0, NOTHING)
+    found = fit(ROBOT, [without, without], Options(fit=("friction", "payload"), held_out=0.0))
+    told = {each.figure for each in found.parameters if each.identified}
+    assert "coulomb" in told and not any(each.startswith("payload") for each in told)
+    assert found.payload is not None and found.payload.mass == 0 and found.payload.why
+
+
+@pytest.mark.long
+def test_held_out_motions_are_predicted_with_the_payload() -> None:
+    """It is found without them: with what the log says, the errors are far larger."""
+    logs = [log_of(NOTHING, 0, NOTHING), log_of(PAYLOAD, 0, NOTHING, 50)]
+    asked, not_asked = (
+        fit(ROBOT, logs, Options(fit=each)).validation for each in (("payload",), ("friction", "rotor"))
+    )
+    assert asked is not None and not_asked is not None
+    better, worse = asked.fitted.torque, not_asked.fitted.torque
+    assert better is not None and worse is not None and (better.rmse[1:4] < 0.5 * worse.rmse[1:4]).all()
+
+
+def test_torque_constants_need_a_payload_that_is_known() -> None:
+    constants = Options(fit=("friction", "torque_constant"), held_out=0.0)
+    log = log_of(NOTHING, 0, NOTHING)
+    assert fit(ROBOT, [log], constants).parameters
+    for logs, options in (
+        ([replace(log, payload_known=False)], constants),
+        ([log, log], Options(fit=("torque_constant", "payload"), held_out=0.0)),
+    ):
+        with pytest.raises(PayloadUnknown) as caught:
+            fit(ROBOT, logs, options)
+        # gravity pulls at neither the first nor the last joint
+        assert {0, 5} <= set(caught.value.joints) and not {1, 2} & set(caught.value.joints)
+
+
+def test_a_payload_is_not_found_together_with_links() -> None:
+    log = log_of(NOTHING, 0, NOTHING)
+    with pytest.raises(InvalidProblem, match="links that are known"):
+        fit(ROBOT, [log, log], Options(fit=("payload",), refit=True))

@@ -1,0 +1,48 @@
+"""Gates on logs of two real arms: what no fit has seen is predicted as well as promised."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.identification import tx40_torque
+from benchmarks.identification_logs import ur3e
+from joulepath.optimizer.identify.identify import fit
+from joulepath.optimizer.identify.options import Options
+
+
+def test_power_of_moves_that_no_fit_has_seen(place: Path) -> None:
+    """From motion alone, each motion left out in its turn: 2.0 W, and 1.3 % of the energy, 4 % at most."""
+    robot, log = ur3e(place)
+    found = fit(robot, [replace(log, effort=None, effort_meaning=None)], Options(held_out=1.0))
+    assert found.validation is not None and found.validation.moves == 19
+    fitted, own, constant = found.validation.fitted.power, found.validation.own.power, found.validation.constant
+    assert fitted is not None and own is not None and constant is not None
+    assert fitted.rmse <= 2.0 and fitted.energy_mean <= 1.3 and fitted.energy_max <= 4.0
+    assert fitted.energy_mean < own.energy_mean < constant.energy_mean
+    assert found.validation.coverage is not None and 0.85 <= found.validation.coverage <= 1.0
+    assert found.validation.half_width is not None and found.validation.half_width <= 2.5
+
+
+def test_currents_tell_friction_that_the_factory_does_not_know(place: Path) -> None:
+    robot, log = ur3e(place)
+    assert log.effort_meaning == "current"
+    found = fit(robot, [log], Options(held_out=1.0))
+    assert found.validation is not None
+    fitted, own = found.validation.fitted.torque, found.validation.own.torque
+    assert fitted is not None and own is not None
+    assert (fitted.relative[:5] < own.relative[:5]).all()
+    assert fitted.shaft_energy < 5.0 < own.shaft_energy
+    # wrist 3 turns by 0.06 rad in these moves
+    wrist = [each for each in found.parameters if each.joint == 5 and each.figure == "viscous"]
+    assert not any(each.identified for each in wrist)
+
+
+def test_published_friction_of_another_maker(place: Path) -> None:
+    """Friction and coupling of a TX40, of which the published values come from the same log."""
+    agreeing, *halves = tx40_torque(place, 0)
+    assert agreeing.value >= 12
+    # the wrist's torques are small, and so are the denominators
+    assert all(np.isfinite(each.value) and each.value < 25.0 for each in halves)

@@ -1,0 +1,148 @@
+"""Logs that would give wrong figures: each is set right, warned of, or refused with its own cause."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidTable
+from joulepath.optimizer.identify.errors import NotExcited
+from joulepath.optimizer.identify.identify import fit
+from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
+from joulepath.optimizer.identify.logs.reading import LogOptions, read, read_log
+from tests.identification_logs import Recording, csv_of, recorded, truth_of, with_current
+
+ROBOT = load_robot("ur10e")
+TRUTH = truth_of(ROBOT)
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    """Two moves there and back, and four others."""
+    return recorded(ROBOT, TRUTH, moves=6)
+
+
+def later(recording: Recording, lag: float) -> Recording:
+    """The recording with currents that come later than the motion [s]."""
+    current = [np.interp(recording.time - lag, recording.time, channel) for channel in recording.current.T]
+    return with_current(recording, np.transpose(current))
+
+
+def table(names: list[str], *columns: Array) -> bytes:
+    """A CSV file."""
+    rows = np.column_stack(columns).tolist()
+    return "\n".join([",".join(names), *(",".join(f"{cell:.9g}" for cell in row) for row in rows)]).encode()
+
+
+@pytest.mark.parametrize("lag", [0.05, -0.1])
+def test_efforts_of_another_clock_are_set_right(recording: Recording, lag: float) -> None:
+    reading = read(csv_of(later(recording, lag)), ROBOT, LogOptions())
+    (found,) = [match for each in reading.report.warnings if (match := re.search(r"comes (\d+) ms (\w+) than", each))]
+    assert abs(int(found[1]) - 1e3 * abs(lag)) <= 3 and found[2] == ("later" if lag > 0 else "earlier")
+    assert reading.log.effort is not None
+    middle = slice(30, -30)
+    error = (reading.log.effort - recording.current)[middle].std(axis=0)
+    assert (error < 0.2 * np.diff(recording.current, axis=0).std(axis=0) * abs(lag) * recording.rate).all()
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.008])
+def test_efforts_in_time_stay_as_they_are(recording: Recording, lag: float) -> None:
+    late = later(recording, lag)
+    reading = read(csv_of(late), ROBOT, LogOptions())
+    assert not any("ms" in each for each in reading.report.warnings)
+    np.testing.assert_allclose(reading.log.effort, late.current, atol=1e-5)
+
+
+def test_times_of_writing_are_not_those_of_the_rows(recording: Recording) -> None:
+    random = np.random.default_rng(0)
+    written = recording.time + np.append(0, random.uniform(-0.3, 0.3, len(recording.time) - 1)) / recording.rate
+    reading = read(csv_of(recording, time=written, without="va"), ROBOT, LogOptions())
+    assert any("times of writing" in each for each in reading.report.warnings)
+    np.testing.assert_allclose(reading.log.q, recording.q, atol=1e-7)
+    assert np.abs(reading.log.a - recording.a).std() < 0.1 * recording.a.std()
+
+
+def test_spikes_are_no_lag_and_are_warned_of(recording: Recording) -> None:
+    random, current = np.random.default_rng(0), recording.current.copy()
+    rows = random.choice(len(current), 12, replace=False)
+    current[rows] += 8 * np.abs(current).max() * random.choice([-1.0, 1.0], (12, ROBOT.nq))
+    reading = read(csv_of(with_current(recording, current)), ROBOT, LogOptions())
+    (words,) = [each for each in reading.report.warnings if "payload" not in each]
+    assert words.startswith("The effort has spikes in 12 rows") and "estimator=irls" in words
+    power = recording.power.copy()
+    power[rows[0]] += 5000
+    words = " ".join(read(csv_of(replace(recording, power=power)), ROBOT, LogOptions()).report.warnings)
+    assert "The power has spikes in 1 rows" in words
+    assert "spikes" not in " ".join(read(csv_of(recording), ROBOT, LogOptions()).report.warnings)
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"), [(180 / np.pi, "57.3 times"), (-1.0, "-1 times"), (0.0, "are 0, while the positions change")]
+)
+def test_speeds_in_another_unit_or_sign_are_named(recording: Recording, factor: float, words: str) -> None:
+    with pytest.raises(InvalidTable, match=words) as caught:
+        read_log(csv_of(replace(recording, v=recording.v * factor)), ROBOT)
+    assert caught.value.column == "v1"
+
+
+def test_causes_of_efforts_that_tell_nothing(recording: Recording) -> None:
+    cases = {
+        "never change": np.zeros_like(recording.current),
+        "other sign": -recording.current,
+        "another order": recording.current[:, ::-1],
+    }
+    for words, current in cases.items():
+        with pytest.raises(EffortNotUsable, match=words):
+            read_log(csv_of(with_current(recording, current)), ROBOT)
+
+
+def test_joints_go_by_their_names_in_whatever_order_they_are(recording: Recording) -> None:
+    joints = sorted(ROBOT.joint_names)
+    order = [ROBOT.joint_names.index(joint) for joint in joints]
+    parts = [each[:, order] for each in (recording.q, recording.v, recording.current)]
+    straight = read_log(csv_of(recording, "ros"), ROBOT)
+    words = ("position", "velocity", "effort")
+    for time, pattern in (("__time", "/joint_states/{}/{}"), ("time", "{}_{}"), ("%time", "field.{1}.{0}")):
+        header = [time, *(pattern.format(joint, word) for word in words for joint in joints)]
+        reading = read(table(header, recording.time, *parts), ROBOT, LogOptions())
+        np.testing.assert_allclose(reading.log.q, straight.q, atol=1e-8)
+        np.testing.assert_allclose(reading.log.effort, straight.effort, atol=1e-6)
+        assert not any("order" in each for each in reading.report.warnings)
+    # names in the rows, as a JointState has them
+    header = ["time", *(f"{word}{k}" for word in words for k in range(6))]
+    lines = table(header, recording.time, *parts).decode().splitlines()
+    names = [",".join(f"name{k}" for k in range(6)), *[",".join(joints)] * (len(lines) - 1)]
+    log = read_log("\n".join(f"{line},{name}" for line, name in zip(lines, names, strict=True)).encode(), ROBOT)
+    np.testing.assert_allclose(log.q, straight.q, atol=1e-8)
+    np.testing.assert_allclose(log.v, straight.v, atol=1e-6)
+    lost = table(["time", *(f"{joint}_position" for joint in joints[1:])], recording.time, parts[0][:, 1:])
+    with pytest.raises(InvalidTable, match=f"no column `position` of {joints[0]}"):
+        read_log(lost, ROBOT)
+
+
+def test_a_channel_that_is_empty_counts_as_not_logged(recording: Recording) -> None:
+    lines = csv_of(recording).decode().splitlines()
+    for empty in ("nan", "", "None"):
+        body = "\n".join([lines[0], *(line.rpartition(",")[0] + "," + empty for line in lines[1:])]).encode()
+        reading = read(body, ROBOT, LogOptions())
+        assert reading.log.power is None
+        assert "The columns of power are empty in the first row, and are not read." in reading.report.warnings
+    # one that ends is an error, as it was
+    body = "\n".join([*lines[:-1], lines[-1].rpartition(",")[0] + ",nan"]).encode()
+    with pytest.raises(InvalidTable, match="p in line"):
+        read_log(body, ROBOT)
+
+
+def test_a_log_of_rest_is_not_excited(recording: Recording) -> None:
+    first = recording.moves[0]
+    assert first.at_rest
+    lines = csv_of(recording).split(b"\n")[: first.end]
+    log = read_log(b"\n".join(lines), ROBOT, effort="current")
+    with pytest.raises(NotExcited) as caught:
+        fit(ROBOT, [log])
+    assert "coulomb" in caught.value.parameters and caught.value.advice["parameters"] == ["rotor", "friction"]

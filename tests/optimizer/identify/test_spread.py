@@ -1,0 +1,79 @@
+"""How well figures and energies are known: the formulas on numbers with known errors, and simulated arms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.identify.estimates.grouped import Grouped, adjusted, jackknife, left_out
+from joulepath.optimizer.identify.identify import fit
+from joulepath.optimizer.identify.quality.interval import own_variance
+from tests.identification_logs import off_the_model, recorded, truth_of
+
+GROUPS, SIZE = 12, 30
+
+
+def _estimates(seed: int) -> tuple[Array, Array, Array]:
+    """The error (3,) of an estimate with a prior; its covariances (3, 3) by adjusted residuals and by leaving out."""
+    random = np.random.default_rng(seed)
+    group = np.repeat(np.arange(GROUPS), SIZE)
+    # one group alone tells the third parameter well: without it, the prior is what is left
+    size = np.where(np.arange(GROUPS) == 0, 1.0, 0.02)[group]
+    columns = random.normal(size=(len(group), 3)) * np.column_stack([np.ones((len(group), 2)), size])
+    prior, true = np.eye(3), random.normal(size=3)
+    shared = random.normal(size=GROUPS)[group]
+    values = columns @ true + shared + random.normal(size=len(group))
+    grouped = Grouped.of(columns, values, np.full(len(group), 0.5), group, GROUPS)
+    precision = grouped.gram.sum(axis=0) + prior
+    found, free = np.linalg.solve(precision, grouped.moment.sum(axis=0)), np.ones(3, dtype=bool)
+    inverse = np.linalg.inv(precision)
+    by_prior = inverse @ prior @ inverse
+    return (
+        found - true,
+        jackknife(adjusted(grouped, found, free, prior)) + by_prior,
+        jackknife(left_out(grouped, found, free, prior)) + by_prior,
+    )
+
+
+def test_adjusted_residuals_tell_the_error_where_leaving_a_group_out_says_too_much() -> None:
+    errors, by_residuals, by_leaving_out = (np.array(each) for each in zip(*map(_estimates, range(400)), strict=True))
+    true = (errors**2).mean(axis=0)
+
+    def ratio(covariances: Array) -> Array:
+        return np.asarray(np.sqrt(np.diagonal(covariances, axis1=1, axis2=2).mean(axis=0) / true))
+
+    # the share by which few groups are widened, for Student's distribution, is 9 %
+    assert (ratio(by_residuals) > 0.88).all() and (ratio(by_residuals) < 1.25).all()
+    assert ratio(by_leaving_out)[2] > 1.3 * ratio(by_residuals)[2]
+
+
+def test_what_figures_do_not_explain_of_moves_is_found_among_errors_of_all_sizes() -> None:
+    random, found = np.random.default_rng(0), list[float]()
+    for _ in range(500):
+        explained = random.lognormal(sigma=2.0, size=30)
+        found.append(own_variance(random.normal(size=30) ** 2 * (explained + 1.0), explained))
+    assert np.mean(found) == pytest.approx(1.0, rel=0.2)
+    # without any of their own, a small share is left
+    explained = np.ones(30)
+    assert 0 < own_variance(0.5 * explained, explained) < 0.2
+    assert own_variance(np.zeros(3), np.ones(3)) == 0
+    assert own_variance(np.array([4.0]), np.zeros(1)) == pytest.approx(4.0)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("effect", [0.0, 0.6])
+@pytest.mark.parametrize("channels", ["currents and power", "power alone"])
+def test_energies_lie_in_their_interval_as_often_as_it_says(channels: str, effect: float) -> None:
+    robot, shares = load_robot("ur10e"), list[float]()
+    for seed in range(40):
+        log = off_the_model(recorded(robot, truth_of(robot, seed), moves=14, seed=seed).log(), effect, seed)
+        seen = replace(log, effort=None, effort_meaning=None) if channels == "power alone" else log
+        validation = fit(robot, [seen]).validation
+        assert validation is not None and validation.coverage is not None
+        shares.append(validation.coverage)
+    # 0.85 to 0.95, with two standard deviations of forty arms
+    assert 0.80 < np.mean(shares) < 0.97

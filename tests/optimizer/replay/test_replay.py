@@ -1,0 +1,260 @@
+"""Motions played in MuJoCo: agreement with the plan, friction at its knee, contacts, changed arms, savings, memory."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.model import collision_model
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.dwell import Dwell
+from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
+from joulepath.optimizer.replay.baseline_courses import ReportedBaseline, planned_baselines
+from joulepath.optimizer.replay.planned import PlannedMotion, PlannedTorques
+from joulepath.optimizer.replay.reference import MOST_STEPS, course_of
+from joulepath.optimizer.replay.replay import Replay, replay
+from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.trajectories.time_scalings import quintic_spline
+from tests.optimizer.clocks import CountingClock
+from tests.optimizer.moves import GOAL, PAYLOAD, START, problem, tcp_pose
+
+# what the documentation promises of feed-forward with PD at 0.25 ms: rad, m, and parts of the energies
+JOINT, TCP, ELECTRICAL, MECHANICAL = 3e-4, 2.5e-4, 5e-4, 1e-3
+# of savings
+POINT = 1e-3
+FAST = 1e-3
+ARM = Arm(robot=load_robot("ur5e"), payload=PAYLOAD)
+
+
+def planned(arm: Arm, spline: Spline, **given: Any) -> PlannedMotion:
+    """A spline as a planned motion, with the energies of our own quadrature."""
+    energy, course = Plant(arm).energy(spline), course_of(spline)
+    torques = None
+    if arm.robot.nq:
+        q, v, a = course(np.linspace(0.0, spline.duration, 20))
+        torques = PlannedTorques(q, v, a, Plant(arm).torques(q, v, a))
+    totals = energy.electrical.total, energy.mechanical.total
+    return PlannedMotion(arm, course, spline.duration, *totals, torques=torques, **given)
+
+
+def quintic(arm: Arm, start: Array = START, goal: Array = GOAL, duration: float = 1.2) -> PlannedMotion:
+    return planned(arm, quintic_spline(start, goal, duration))
+
+
+@cache
+def solution() -> Solution:
+    return optimize(problem(goal=tcp_pose(GOAL), payload=PAYLOAD, windings=False))
+
+
+def answer(arm: Arm = ARM) -> PlannedMotion:
+    """An optimised motion with its baselines."""
+    found, names = solution(), ReportedBaseline.__dataclass_fields__
+    spline = found.trajectory.spline
+    reported = [ReportedBaseline(**{name: getattr(each, name) for name in names}) for each in found.baselines]
+    known = [found.goal.q]
+    baselines = planned_baselines(ARM, found.start.q, known, found.duration, reported)
+    return planned(arm, spline, baselines=baselines)
+
+
+def holds_promise(found: Replay, plan: PlannedMotion) -> None:
+    """Feed-forward with PD follows the plan, at its energy."""
+    run = found.runs["feed_forward"]
+    assert run.joint_error.max() <= JOINT
+    assert run.tcp_error <= TCP
+    assert run.energy.electrical.total == pytest.approx(plan.electrical, rel=ELECTRICAL)
+    assert run.energy.mechanical.total == pytest.approx(plan.mechanical, rel=MECHANICAL)
+    assert not run.collides
+    assert found.torque_error is not None and found.torque_error <= 1e-9
+
+
+@pytest.mark.parametrize("name", ["ur5e", "panda", "kr10_r1100"])
+def test_the_plan_is_what_happens(name: str) -> None:
+    """Also of a robot whose torque limits are those of the links, and of one with large friction."""
+    arm = Arm(robot=load_robot(name), payload=Payload(mass=1.0, com=np.array([0.0, 0.02, 0.06])), collisions=False)
+    middle = (arm.active_limits.q_min + arm.active_limits.q_max) / 2
+    plan = quintic(arm, middle, middle + np.resize([0.5, -0.4, 0.3], arm.robot.nq), 1.5)
+    found = replay(plan, ("feed_forward",))
+    holds_promise(found, plan)
+    assert (found.runs["feed_forward"].saturated == 0).all()
+
+
+def test_an_optimised_motion_is_what_happens() -> None:
+    plan = answer()
+    found = replay(plan)
+    holds_promise(found, plan)
+    worst = solution().certificate.worst_ratio["torque"]
+    assert found.runs["feed_forward"].limit_ratio.max() == pytest.approx(worst, rel=1e-2)
+    # the loop alone sags under gravity and lags behind friction
+    assert found.runs["pd"].joint_error.max() > 10 * JOINT
+    assert found.changes == found.savings == []
+
+
+def test_joints_at_the_knee_of_friction_follow() -> None:
+    """At a milliradian per second friction is most of the torque, and changes by half of itself from joint to joint."""
+    goal = START + 1e-3 * np.array([1.0, -1.0, 0.5, 2.0, -0.2, 3.0])
+    plan = quintic(ARM, START, goal, 1.0)
+    found = replay(plan, ("feed_forward",))
+    holds_promise(found, plan)
+
+
+def test_an_arm_at_rest_stays_there() -> None:
+    """Nothing chatters and nothing creeps where friction is steepest."""
+    plan = quintic(ARM, START, START, 0.5)
+    run = replay(plan, ("feed_forward",)).runs["feed_forward"]
+    assert run.joint_error.max() < 1e-9
+    assert run.energy.electrical.total == pytest.approx(plan.electrical, rel=1e-6)
+
+
+def test_a_coarser_step_is_as_good_to_a_tenth_of_a_milliradian() -> None:
+    plan = answer()
+    runs = [replay(plan, ("feed_forward",), step).runs["feed_forward"] for step in (2e-3, 1e-3, 5e-4)]
+    errors = [run.joint_error.max() for run in runs]
+    assert errors[0] > errors[1] > errors[2]
+    assert errors[0] < 2 * JOINT
+
+
+def in_the_way(margin: float = 0.0, above: float = 0.0) -> Arm:
+    """The arm with a box at the middle of the way of its flange."""
+    T = np.eye(4)
+    T[:3, 3] = tcp_pose((START + GOAL) / 2).T[:3, 3] + [0.0, 0.0, above]
+    return replace(ARM, scene=Scene([Obstacle("box", Box(np.full(3, 0.08)), T, margin)]))
+
+
+def test_an_obstacle_in_the_way_is_touched() -> None:
+    arm = in_the_way()
+    run = replay(quintic(arm), ("feed_forward",), FAST).runs["feed_forward"]
+    assert run.contact is not None and run.collides
+    assert run.contact.pair[0] == "box" or run.contact.pair[1] == "box"
+    assert 0 < run.contact.time < 1.2
+    # it is pushed off its way, and that takes energy
+    assert run.tcp_error > TCP
+    # our own distances say so, too
+    q = quintic(arm).course(np.array([0.6]))[0]
+    assert collision_model(arm).least_distance(q, np.inf) < 0
+    free = replay(quintic(replace(arm, collisions=False)), ("feed_forward",), FAST).runs["feed_forward"]
+    assert free.contact is None and free.tcp_error <= TCP
+
+
+def test_a_margin_is_no_body() -> None:
+    arm = in_the_way(margin=0.5, above=0.5)
+    q = quintic(arm).course(np.linspace(0.0, 1.2, 50))[0]
+    assert (
+        collision_model(arm).least_distance(q, np.inf) < 0 < collision_model(in_the_way(0.0, 0.5)).least_distance(q, 1)
+    )
+    assert replay(quintic(arm), ("feed_forward",), FAST).runs["feed_forward"].contact is None
+
+
+def test_the_savings_persist_as_planned() -> None:
+    """Without a change of the arm, the simulated saving is the planned one; friction and payload move it."""
+    plan = answer()
+    assert {each.name for each in plan.baselines} == {each.name for each in solution().baselines}
+    found = replay(plan, ("feed_forward",), FAST, {"payload": 0.1, "friction": 0.3})
+    assert [(each.quantity, each.factor) for each in found.changes] == [
+        ("payload", 0.9), ("payload", 1.1), ("friction", 0.7), ("friction", 1.3)
+    ]  # fmt: skip
+    for each in found.savings:
+        assert each.simulated == pytest.approx(each.planned, abs=POINT)
+        assert each.least <= each.simulated <= each.most
+        assert each.persists == (each.least > 0 if each.planned > 0 else None)
+    assert {each.name for each in found.savings} == {each.name for each in plan.baselines}
+    lighter, heavier, smooth, rough = (each.outcome for each in found.changes)
+    own = found.runs["feed_forward"].energy.electrical
+    assert lighter.energy.electrical.total < own.total < heavier.energy.electrical.total
+    assert smooth.energy.electrical.friction < 0.8 * own.friction < rough.energy.electrical.friction
+    # the controller does not know
+    assert min(each.joint_error.max() for each in (lighter, heavier, smooth, rough)) > JOINT
+
+
+def test_a_payload_that_is_none_is_not_changed() -> None:
+    found = replay(quintic(replace(ARM, payload=Payload())), ("feed_forward",), FAST, {"payload": 0.1})
+    assert found.changes == []
+
+
+def test_a_joint_at_its_limit_saturates() -> None:
+    """A motion planned at nearly all the torque of a joint: a heavier payload asks for more than there is."""
+    plan = quintic(ARM)
+    tight = (
+        plan.arm.active_limits.tau_max * replay(plan, ("feed_forward",), FAST).runs["feed_forward"].limit_ratio / 0.99
+    )
+    arm = replace(ARM, limits=replace(ARM.active_limits, tau_max=np.minimum(tight, ARM.active_limits.tau_max)))
+    found = replay(quintic(arm), ("feed_forward",), FAST, {"payload": 0.1})
+    as_planned, (lighter, heavier) = found.runs["feed_forward"], (each.outcome for each in found.changes)
+    assert as_planned.limit_ratio.max() == pytest.approx(0.99, abs=5e-3)
+    assert (as_planned.saturated == 0).all() and (lighter.saturated == 0).all()
+    assert heavier.saturated.max() > 0
+    assert heavier.limit_ratio.max() == pytest.approx(1.0)
+
+
+@pytest.mark.long
+def test_waiting_counts_in_savings() -> None:
+    """A baseline that is faster waits longer, and what it draws then is in its planned energy."""
+    found = optimize(problem(payload=PAYLOAD, dwell=Dwell(4.0)))
+    names = ReportedBaseline.__dataclass_fields__
+    reported = [ReportedBaseline(**{name: getattr(each, name) for name in names}) for each in found.baselines]
+    baselines = planned_baselines(ARM, START, [found.goal.q], found.duration, reported)
+    dwell = found.energy.electrical.dwell
+    plan = planned(ARM, found.trajectory.spline, baselines=baselines, waiting=dwell)
+    assert next(each.waiting for each in baselines if each.name == "ruckig") > 10
+    for each in replay(plan, ("feed_forward",), FAST, {"payload": 0.1}).savings:
+        assert each.simulated == pytest.approx(each.planned, abs=POINT)
+
+
+def test_a_velocity_step_is_not_followed() -> None:
+    """A motion at an even speed from standstill: no torque is large enough."""
+    line = Spline(1, np.array([0.0, 0.0, 1.0, 1.0]), np.array([START, GOAL]))
+    found = replay(PlannedMotion(ARM, course_of(line), 1.0, 1.0, 1.0), ("pd",), FAST)
+    assert found.torque_error is None
+    assert found.runs["pd"].joint_error.max() > 10 * JOINT
+
+
+def test_friction_that_grows_with_the_load() -> None:
+    """The controller knows it, and the losses count it."""
+    law = ARM.friction_law
+    loaded = replace(ARM.robot, friction_laws={"loaded": replace(law, name="loaded", load=np.full(6, 0.05))})
+    arm = replace(ARM, robot=loaded)
+    plan, plain = quintic(arm), quintic(ARM)
+    found = replay(plan, ("feed_forward",))
+    holds_promise(found, plan)
+    assert plan.electrical > plain.electrical * (1 + 10 * ELECTRICAL)
+    rough = replay(plan, ("feed_forward",), FAST, {"friction": 0.3}).changes[1].outcome
+    assert rough.energy.electrical.friction > 1.2 * found.runs["feed_forward"].energy.electrical.friction
+
+
+def test_a_motion_of_too_many_steps_is_refused() -> None:
+    with pytest.raises(InvalidProblem, match=f"of at most {MOST_STEPS}") as found:
+        replay(quintic(ARM, duration=300.0), step=1e-5)
+    assert found.value.field == "step"
+
+
+def test_the_deadline_ends_a_replay() -> None:
+    with pytest.raises(DeadlineExceeded):
+        replay(quintic(ARM), deadline=5.0, clock=CountingClock())
+
+
+def memory() -> int:
+    """Memory of this process [byte]."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.mark.long
+def test_no_model_leaks() -> None:
+    """A model with its data has more than a hundred kilobytes: a hundred that stay would be seen."""
+    plan = quintic(in_the_way(above=0.5), duration=0.2)
+    for _ in range(20):
+        replay(plan, step=1e-2, perturb={"payload": 0.1})
+    before = memory()
+    for _ in range(100):
+        replay(plan, step=1e-2, perturb={"payload": 0.1})
+    assert memory() - before < 5e6
