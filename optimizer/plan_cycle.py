@@ -17,7 +17,7 @@ from joulepath.optimizer.cycle.cycle_baselines import (
     of_chain,
 )
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
-from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleSolution, Move, Needed, needed_by
+from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleMove, CycleSolution, Needed, needed_by
 from joulepath.optimizer.cycle.cycles_in_hand import CycleInHand, shared, simple_cycles
 from joulepath.optimizer.cycle.divided_paths import with_divided_paths
 from joulepath.optimizer.cycle.free_orientations import with_free_orientations
@@ -135,7 +135,7 @@ class _Found:
     chain of `move_by_move`; `simple` are the cycles that take no search."""
 
     nodes: list[int]
-    moves: list[Move]
+    moves: list[CycleMove]
     price: float
     bound: float
     timing: TimedSearch | None = None

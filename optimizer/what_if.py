@@ -29,7 +29,7 @@ LEAST_TIME, KEPT, SOLVED = 1e-3, 0.05, 0.8
 
 
 @dataclass(frozen=True)
-class Changed:
+class WhatIf:
     """Result of a change.
 
     `same_motion` is the energy [J] of the base motion on the changed arm, `certificate` says whether it is feasible
@@ -43,7 +43,7 @@ class Changed:
 
 
 @one_thread()
-def what_if(base: Solution, problem: Problem, clock: Clock = time.perf_counter) -> Changed:
+def what_if(base: Solution, problem: Problem, clock: Clock = time.perf_counter) -> WhatIf:
     """Compare the answer `base` with that of `problem`, the same motion for a changed arm with as many joints.
 
     The changed problem is solved on its own. If the base motion is feasible on the changed arm and needs less energy
@@ -73,7 +73,7 @@ def what_if(base: Solution, problem: Problem, clock: Clock = time.perf_counter) 
         again = _from_known(problem, spline, deadline)
         known = [each for each in (found, again) if each is not None]
         found = min(known, key=lambda each: each.energy.of(objective), default=None)
-    return Changed(energy, certificate, found, failure if found is None else None)
+    return WhatIf(energy, certificate, found, failure if found is None else None)
 
 
 def _from_known(problem: Problem, spline: Spline, deadline: Deadline) -> Solution | None:

@@ -14,18 +14,18 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.identify.document import document_of
 from joulepath.optimizer.identify.fits.payload_fit import Carried
 from joulepath.optimizer.identify.identify import Identification
-from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.results import Curves, Validation
 
 DECIMALS = 4
 """Of the times, torques and powers of a picture."""
 
 
-def to_options(request: IdentifyRequest) -> Options:
+def to_options(request: IdentifyRequest) -> IdentificationOptions:
     """The options of the library. Raises InvalidProblem."""
     held_out = {"moves": 1.0} if isinstance(request.validate_, str) else {}
     fraction = request.validate_.fraction if isinstance(request.validate_, Fraction) else 0.0
-    return Options(
+    return IdentificationOptions(
         fit=tuple(request.fit),
         refit=request.inertials == "refit",
         held_out=held_out.get("moves", fraction),

@@ -11,7 +11,7 @@ import numpy as np
 
 from joulepath import Arm, Problem, load_robot, optimize
 from joulepath.optimizer.evaluate.evaluate import evaluate
-from joulepath.optimizer.evaluate.recording import Log, in_blocks
+from joulepath.optimizer.evaluate.recording import Recording
 from joulepath.optimizer.what_if import what_if
 
 arm = Arm(robot=load_robot("ur5e"))
@@ -22,7 +22,7 @@ t = np.linspace(0.0, 2.0, 251)
 low, high = np.radians([60, -30, 70, -120, -75, 30]), np.radians([0, -90, 40, -90, -90, 0])
 q = low + np.outer((1 - np.cos(np.pi * t / t[-1])) / 2, high - low)
 
-recorded = evaluate(arm, Log(in_blocks(t, q)))
+recorded = evaluate(arm, Recording.of(t, q))
 violated = [report.limit for report in recorded.limits if not report.held]
 print(f"recorded: {recorded.total.energy.electrical.total:.1f} J in {recorded.total.duration:.2f} s")
 print(f"limits that it violates: {', '.join(violated) or 'none'}")

@@ -27,7 +27,7 @@ Quantity = Literal["payload", "friction"]
 
 
 @dataclass(frozen=True)
-class Changed:
+class ReplayedChange:
     """The motion on an arm of which one `quantity` is multiplied by `factor`; the controller does not know.
 
     `savings` [1] are those of the simulated motion against every simulated baseline on the same arm.
@@ -68,7 +68,7 @@ class Replay:
     planned_ratio: Array
     torque_error: float | None
     runs: dict[ControlName, Outcome]
-    changes: list[Changed]
+    changes: list[ReplayedChange]
     savings: list[SavingRange]
 
 
@@ -127,10 +127,10 @@ class _Replayer:
             yield quantity, 1 - fraction
             yield quantity, 1 + fraction
 
-    def _changed(self, quantity: Quantity, factor: float, control: ControlName) -> Changed:
+    def _changed(self, quantity: Quantity, factor: float, control: ControlName) -> ReplayedChange:
         self._simulated.carry(with_changes(self._planned.arm, **{quantity: factor}))
         found = self._outcome(self._motion, control)
-        return Changed(quantity, factor, found, self._savings(found, control))
+        return ReplayedChange(quantity, factor, found, self._savings(found, control))
 
     def _outcome(self, motion: Reference, control: ControlName) -> Outcome:
         checkpoint()
@@ -158,7 +158,7 @@ class _Replayer:
         found = self._simulated.torques(given.q, given.v, given.a)
         return float((np.abs(found - given.tau) / self._planned.arm.active_limits.tau_max).max())
 
-    def _ranges(self, simulated: Mapping[BaselineName, float], changes: Sequence[Changed]) -> list[SavingRange]:
+    def _ranges(self, simulated: Mapping[BaselineName, float], changes: Sequence[ReplayedChange]) -> list[SavingRange]:
         return [
             SavingRange(
                 each.name,
