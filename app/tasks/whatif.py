@@ -21,9 +21,8 @@ from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.schemas.whatif import Change, WhatifRequest
 from joulepath.app.tasks.answer_collector import AnswerCollector
 from joulepath.app.tasks.certified import certified
-from joulepath.app.tasks.deadline_shares import DeadlineShares
 from joulepath.app.tasks.differences import differences, of_base
-from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.deadline import Deadline, DeadlineShares
 from joulepath.optimizer.evaluate.evaluate import Evaluation, evaluate
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, InvalidTable, OutsideLimits
 from joulepath.optimizer.optimize import optimize
