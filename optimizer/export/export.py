@@ -11,8 +11,9 @@ import numpy as np
 
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
+from joulepath.optimizer.evaluate.sample_check import check_samples
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
-from joulepath.optimizer.export.certified import certified, check_samples
+from joulepath.optimizer.export.certified import certified
 from joulepath.optimizer.export.csv_table import to_csv
 from joulepath.optimizer.export.facts import NOT_RUN, WrittenFile
 from joulepath.optimizer.export.franka import FrankaOptions, to_franka
@@ -164,6 +165,6 @@ def _program(motion: Solution | CycleSolution | Program, problem: Problem | None
         return motion
     if problem is None:
         raise InvalidProblem("problem", "A solution does not name its arm: give the problem that it solves.")
-    move, samples = Move(motion.trajectory.spline, problem.arm), motion.trajectory
-    check_samples(move, samples.t, (samples.q, samples.v, samples.a, samples.tau))
-    return Program((move,))
+    given = motion.trajectory
+    check_samples(problem.arm, given.spline, given.t, (given.q, given.v, given.a, given.tau))
+    return Program((Move(given.spline, problem.arm),))
