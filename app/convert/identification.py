@@ -11,7 +11,6 @@ import numpy as np
 
 from joulepath.app.schemas.identifications import Fraction, IdentifyRequest
 from joulepath.models.robot import Array
-from joulepath.optimizer.identify.document import document_of
 from joulepath.optimizer.identify.fits.payload_fit import Carried
 from joulepath.optimizer.identify.identify import Identification
 from joulepath.optimizer.identify.options import IdentificationOptions
@@ -41,7 +40,7 @@ def identification_fields(found: Identification, validation: Validation) -> dict
     """What an answer says of an identification."""
     return {
         "robot": found.robot.name,
-        "document": document_of(found.figures(), datetime.now(UTC).date().isoformat()),
+        "document": found.document(datetime.now(UTC).date().isoformat()),
         "parameters": [asdict(each) for each in found.parameters],
         "structure": asdict(found.structure),
         "physical": None if found.physical is None else asdict(found.physical),

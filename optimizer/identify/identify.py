@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from joulepath.models.uncertainty.parameters import LINKS
 from joulepath.optimizer.energy.link_regressor import BODY, body_parameters
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.arm.fitted_arm import own_arm
+from joulepath.optimizer.identify.document import document_of
 from joulepath.optimizer.identify.errors import NoPowerChannel, NotExcited, PayloadUnknown
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
 from joulepath.optimizer.identify.estimates.grouped import lag_one
@@ -108,6 +110,18 @@ class Identification:
             move_sd=self.spread.move,
             logs=self.logs,
         )
+
+    def document(self, date: str) -> dict[str, Any]:
+        """The figures as a document, which `load_robot(robot, figures=document)` computes with.
+
+        Args:
+            date: date that the sources of the figures name.
+
+        Returns:
+            Value, unit, source, trust letter and standard deviation of each figure, and their
+            covariance; see docs/identification.md.
+        """
+        return document_of(self.figures(), date)
 
     def _parameters_of_figures(self) -> Iterator[tuple[Name, Array]]:
         """The parameters of the figures that the estimate (p,) stands for, and rows (p,) that make them of it."""

@@ -62,4 +62,4 @@ def test_npz_needs_no_pickle_and_has_samples_and_splines() -> None:
 @pytest.mark.parametrize("write", [to_csv, to_npz])
 def test_a_table_without_an_end_is_refused(write: object) -> None:
     with pytest.raises(FormatUnsuitable, match="longer period"):
-        write(one_move().slowed(1e-2), 1e-4)  # type: ignore[operator]
+        write(one_move().slowed(1e-2), TableOptions(1e-4))  # type: ignore[operator]

@@ -10,7 +10,6 @@ import pytest
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identify.document import document_of
 from joulepath.optimizer.identify.errors import NoPowerChannel, NotExcited, NothingHeldOut
 from joulepath.optimizer.identify.identify import Identification, identify
 from joulepath.optimizer.identify.logs.log import Log, LogMove
@@ -147,7 +146,7 @@ def test_power_alone_tells_how_heavy_the_links_are(scale: float) -> None:
     assert found.validation is not None
     fitted, own = found.validation.fitted.power, found.validation.own.power
     assert fitted is not None and own is not None and fitted.energy_mean < 0.5 * own.energy_mean
-    document = document_of(found.figures(), "2026-01-01")
+    document = found.document("2026-01-01")
     heavier = load_robot("ur10e", figures=document).model
     for own, body in zip(list(ROBOT.model.inertias)[1:], list(heavier.inertias)[1:], strict=True):
         np.testing.assert_allclose(body.mass, links.value * own.mass)

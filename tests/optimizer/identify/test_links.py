@@ -17,7 +17,6 @@ from joulepath.models.uncertainty.parameters import LINKS
 from joulepath.optimizer.energy.link_regressor import body_parameters, rigid_regressor, rigid_torques
 from joulepath.optimizer.identify.arm.base_parameters import base_parameters
 from joulepath.optimizer.identify.arm.pseudo_inertia import nearness, pseudo_inertias
-from joulepath.optimizer.identify.document import document_of
 from joulepath.optimizer.identify.fits.consistent import solve_consistent
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.options import IdentificationOptions
@@ -159,7 +158,7 @@ def test_identified_figures_become_a_robot() -> None:
     robot = load_robot("ur10e")
     truth = truth_of(robot, 1)
     found = identify(robot, [recorded(robot, truth, moves=10).log()], IdentificationOptions(refit=True, held_out=0.0))
-    document = document_of(found.figures(), "2025-03-14")
+    document = found.document("2025-03-14")
     figures = with_document(robot.name, robot.figures, document)
     made = robot_of("ur10e", figures)
     assert made.friction.name == "identified" and made.friction.load is not None
@@ -180,7 +179,7 @@ def test_errors_of_refitted_links_are_those_that_the_document_says() -> None:
     real = heavier(robot)
     log = replace(recorded(real, truth_of(real, 1), moves=12).log(), power=None)
     found = identify(robot, [log], IdentificationOptions(refit=True, held_out=0.0))
-    known = covariance_of(document_of(found.figures(), "2025-03-14"))
+    known = covariance_of(found.document("2025-03-14"))
     assert known is not None and found.fitted.arm.bodies is not None
     at = [known.names.index(f"inertials.{part}.{joint}") for joint in range(6) for part in LINKS]
     covariance = known.matrix[np.ix_(at, at)]
