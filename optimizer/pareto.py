@@ -91,7 +91,7 @@ class _Node:
         return None if self.answer is None else self.answer.trajectory.spline
 
 
-def pareto(problem: Problem, points: int, clock: Clock = time.perf_counter, tell: Tell = nobody) -> Front:
+def pareto(problem: Problem, points: int = 12, clock: Clock = time.perf_counter, tell: Tell = nobody) -> Front:
     """Find the front of energy over duration, from the fastest motion to that of least energy.
 
     Args:

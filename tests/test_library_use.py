@@ -7,6 +7,7 @@ import dataclasses
 import importlib
 import inspect
 import pkgutil
+import re
 import subprocess
 import sys
 import typing
@@ -149,6 +150,26 @@ def in_a_process(code: str, folder: Path) -> str:
     )
     assert run.returncode == 0, run.stderr
     return run.stdout.strip()
+
+
+def python_of(page: Path) -> list[str]:
+    """The Python code of a page or a script."""
+    text = page.read_text(encoding="utf-8")
+    return re.findall(r"```python\n(.*?)```", text, re.DOTALL) if page.suffix == ".md" else [text]
+
+
+def test_pages_and_examples_use_the_public_names() -> None:
+    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "examples" / "library").glob("*.py")]
+    imports = [
+        (page.name, each.module, alias.name)
+        for page in pages
+        for code in python_of(page)
+        for each in ast.walk(ast.parse(code))
+        if isinstance(each, ast.ImportFrom) and (each.module or "").startswith("joulepath")
+        for alias in each.names
+    ]
+    assert len(imports) > 50
+    assert [each for each in imports if each[1] != "joulepath" or each[2] not in joulepath.__all__] == []
 
 
 def test_the_import_loads_nothing() -> None:
