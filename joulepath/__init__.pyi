@@ -253,7 +253,6 @@ __all__ = [
     "Voxels",
     "Waypoints",
     "WhatIf",
-    "__version__",
     "capsule_between",
     "compare",
     "evaluate",

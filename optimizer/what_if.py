@@ -23,7 +23,7 @@ from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.solution import Certificate, Energy, Solution
 from joulepath.optimizer.trajectories.spline import Spline
 
-# least deadline of a search [s]; shares of the time that the first search leaves to the base motion, and of what is
+# least deadline of a search [s]; shares of the time that the first search leaves to the known motion, and of what is
 # left then for a search from it
 LEAST_TIME, KEPT, SOLVED = 1e-3, 0.05, 0.8
 
@@ -32,7 +32,7 @@ LEAST_TIME, KEPT, SOLVED = 1e-3, 0.05, 0.8
 class WhatIf:
     """Result of a change.
 
-    `same_motion` is the energy [J] of the base motion on the changed arm, `certificate` says whether it is feasible
+    `same_motion` is the energy [J] of the known motion on the changed arm, `certificate` says whether it is feasible
     there. `reoptimised` is the best motion of the changed arm; None, with the `error`, if none was found.
     """
 

@@ -115,8 +115,16 @@ class Recording:
 
         Returns:
             The recording, in blocks of at most BLOCK rows.
+
+        Raises:
+            InvalidProblem: the arrays have different numbers of rows.
         """
-        return cls([*_blocks(t, q, v, a)], edges=edges)
+        columns = [None if each is None else np.asarray(each, dtype=float) for each in (t, q, v, a)]
+        if len({len(each) for each in columns if each is not None}) > 1:
+            raise InvalidProblem("trajectory", "t, q, v and a must have as many rows as each other.")
+        rows = [slice(low, high) for low, high in pairwise([*range(0, len(t), BLOCK), len(t)])]
+        blocks = [RecordedRows(*(None if each is None else each[part] for each in columns)) for part in rows]  # type: ignore[arg-type]
+        return cls(blocks, edges=edges)
 
     @property
     def segments(self) -> int:
@@ -151,13 +159,6 @@ class Recording:
             row, last = row + len(t), float(t[-1])
         if row - self.first_row < 2:
             raise InvalidTable("A trajectory needs two or more rows: there is no motion in fewer.", None, None)
-
-
-def _blocks(t: Array, q: Array, v: Array | None = None, a: Array | None = None) -> Iterator[RecordedRows]:
-    """The blocks of a recording that is in memory: t (n,) [s], q, v, a (n, nq) in rad and s."""
-    for low, high in pairwise([*range(0, len(t), BLOCK), len(t)]):
-        rows = slice(low, high)
-        yield RecordedRows(t[rows], q[rows], None if v is None else v[rows], None if a is None else a[rows])
 
 
 def _check_finite(block: RecordedRows, first_row: int) -> None:
