@@ -126,8 +126,10 @@ def read_log(source: str | PathLike[str] | bytes, robot: Robot, options: LogOpti
         InvalidProblem: an option does not fit the file or the robot.
         OSError: the file cannot be read.
     """
-    source = source if isinstance(source, bytes) else Path(source)
-    options = options or LogOptions()
+    return _read(source if isinstance(source, bytes) else Path(source), robot, options or LogOptions())
+
+
+def _read(source: Path | bytes, robot: Robot, options: LogOptions) -> LogReading:
     gravity = frozen(options.gravity, (3,), "gravity")
     remarks: list[str] = []
     channels, dropped = _channels(source, robot, options, remarks)
