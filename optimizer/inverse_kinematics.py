@@ -115,7 +115,9 @@ def _found(arm: Arm, pose: Pose, windings: bool) -> IKSolutions:
     kinematics = required_inverse_kinematics(arm.robot, "pose")
     found = kinematics.solve(pose.T, arm.T_flange_tcp, arm.active_limits, windings, "goal")
     pairs = collision_model(arm).closest_pairs([each.q for each in found]) if arm.collisions else []
-    nearest = pairs or [None] * len(found)
+    nearest: list[ClosestPair | None] = [*pairs]
+    if not pairs:
+        nearest = [None] * len(found)
     solutions = tuple(_solution(arm, *each) for each in zip(found, nearest, strict=True))
     return IKSolutions(solutions, kinematics.complete)
 

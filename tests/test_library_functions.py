@@ -61,14 +61,14 @@ def test_optimize_many() -> None:
         found = {
             each.index: each for each in joulepath.optimize_many([problem(), replace(problem(), goal=far)], executor)
         }
-    assert electrical(found[0].result().energy) == pytest.approx(electrical(solution().energy), rel=1e-6)
+    assert electrical(found[0].result().energy) == pytest.approx(electrical(solution().energy), rel=1e-4)
     with pytest.raises(joulepath.UnreachablePose):
         found[1].result()
 
 
 def test_evaluate_takes_a_solution() -> None:
     found = joulepath.evaluate(problem().arm, solution(), sample_period=0.01)
-    assert electrical(found.total.energy) == pytest.approx(electrical(solution().energy), rel=1e-6)
+    assert electrical(found.total.energy) == pytest.approx(electrical(solution().energy), rel=1e-4)
     assert found.total.duration == pytest.approx(solution().duration)
     assert all(report.held for report in found.limits) and found.speed_jumps == 0
     assert found.samples is not None and found.samples.q[-1] == pytest.approx(GOAL)
@@ -124,7 +124,7 @@ def test_what_if() -> None:
     heavier = replace(problem().arm, payload=joulepath.Payload(mass=3.0))
     found = joulepath.what_if(solution(), replace(problem(), arm=heavier))
     given = joulepath.evaluate(heavier, solution()).total.energy
-    assert electrical(found.same_motion) == pytest.approx(electrical(given), rel=1e-6)
+    assert electrical(found.same_motion) == pytest.approx(electrical(given), rel=1e-4)
     assert found.reoptimised is not None
     if found.certificate.valid:
         assert electrical(found.reoptimised.energy) <= electrical(found.same_motion)

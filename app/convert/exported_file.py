@@ -26,4 +26,5 @@ def to_options(request: ExportRequest, format: ExportFormat, preferred: Encoding
     given: dict[str, Any] = dict(getattr(request, own) or {})
     if "encoding" in kind.__dataclass_fields__:
         given["encoding"] = given.get("encoding") or preferred
-    return kind(**{name: tuple(value) if isinstance(value, list) else value for name, value in given.items()})
+    values: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
+    return kind(**values)
