@@ -11,7 +11,7 @@ import numpy as np
 
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.collision.model import ClosestPair, collision_model
-from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
+from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.kinematics.ik_solutions import LimitedSolution
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
@@ -114,6 +114,7 @@ def inverse_kinematics(
 def _found(arm: Arm, pose: Pose, windings: bool) -> IKSolutions:
     kinematics = required_inverse_kinematics(arm.robot, "pose")
     found = kinematics.solve(pose.T, arm.T_flange_tcp, arm.active_limits, windings, "goal")
+    checkpoint()
     pairs = collision_model(arm).closest_pairs([each.q for each in found]) if arm.collisions else []
     nearest: list[ClosestPair | None] = [*pairs]
     if not pairs:

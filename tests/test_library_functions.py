@@ -14,6 +14,7 @@ import pytest
 
 import joulepath
 from tests.identification_logs import csv_of, recorded, truth_of
+from tests.optimizer.clocks import CountingClock
 
 START = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 GOAL = np.array([1.0, -1.2, 1.8, -2.0, -1.3, 0.5])
@@ -165,7 +166,21 @@ def test_inverse_kinematics_of_seven_joints_names_the_free_ones() -> None:
     assert {joint for each in found for joint in each.free} <= set(robot.joint_names)
 
 
-def test_inverse_kinematics_says_what_is_out_of_reach_or_too_late() -> None:
+def test_what_is_too_late_says_so() -> None:
+    """By a clock whose every look is a second later than the last one."""
+    late = {"clock": CountingClock()}
+    pose = joulepath.Pose.from_rotvec([0.5, 0.1, 0.4], [np.pi, 0.0, 0.0])
+    with pytest.raises(joulepath.DeadlineExceeded):
+        joulepath.inverse_kinematics(joulepath.load_robot("iiwa14"), pose, deadline=1.0, **late)
+    with pytest.raises(joulepath.DeadlineExceeded):
+        joulepath.export(solution(), "csv", problem=problem(), deadline=1.0, **late)
+    with pytest.raises(joulepath.DeadlineExceeded):
+        joulepath.replay(solution(), deadline=1.0, problem=problem(), **late)
+    with pytest.raises(joulepath.DeadlineExceeded):
+        joulepath.compare(replace(problem(), deadline=1.0), ["uniform_scaling", "bspline"], **late)
+
+
+def test_inverse_kinematics_says_what_is_out_of_reach() -> None:
     robot = joulepath.load_robot("ur5e")
     with pytest.raises(joulepath.UnreachablePose) as caught:
         joulepath.inverse_kinematics(robot, joulepath.Pose.from_rotvec([3.0, 0.0, 0.0], [0.0, 0.0, 0.0]))
