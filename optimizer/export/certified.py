@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.energy.plant import Plant
 from joulepath.optimizer.exceptions import InvalidProblem, NotCertified, OutsideLimits
 from joulepath.optimizer.export.program import Program
@@ -18,10 +19,12 @@ def certified(program: Program) -> list[Certificate]:
     """The certificates of all moves.
 
     Checked are the limits of the arm, standstill at the ends and clearance; not a tool path. Raises NotCertified for
-    the first move whose certificate is not valid, and InvalidProblem for one longer than LONGEST_DURATION.
+    the first move whose certificate is not valid, and InvalidProblem for one longer than LONGEST_DURATION. Ends by
+    DeadlinePassed if the watched deadline passes.
     """
     certificates = []
     for index, move in enumerate(program.moves):
+        checkpoint()
         if move.duration > LONGEST_DURATION:
             raise InvalidProblem(
                 "speed_scale", f"A move takes more than {LONGEST_DURATION:g} s: give a larger speed_scale."
