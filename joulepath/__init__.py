@@ -2,8 +2,8 @@
 
     solution = joulepath.optimize(joulepath.Problem(arm=…, start=…, goal=…))
 
-The public names are those that `__init__.pyi` imports. Each is loaded when it is first used, so that
-`import joulepath` takes no time in processes that need only a part of the package.
+The public names are those that `__init__.pyi` imports. Each is loaded when it is first used, so
+that `import joulepath` takes no time in processes that need only a part of the package.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""Public entry point: `compare(problem)` solves one problem by several methods and returns a `Comparison`."""
+"""Public entry point: `compare(problem)` solves a problem by several methods."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Comparison:
 
     @property
     def lower_bound(self) -> float:
-        """Largest of the proven lower bounds [J], each of which holds for the motions of all methods."""
+        """Largest of the proven lower bounds [J]; each holds for the motions of all methods."""
         return max(solution.lower_bound for solution in self.solutions.values())
 
     def excess(self, method: MethodName) -> float:

@@ -1,4 +1,4 @@
-"""Public entry point: `inverse_kinematics(arm, pose)` finds all arm configurations that reach a pose."""
+"""Public entry point: `inverse_kinematics(arm, pose)` finds the configurations of a pose."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class IKSolution:
 
     `q` (nq,) [rad] are its joint positions and `label` its branch, which full turns do not change.
     `limit_distance` [rad] is the least distance of a joint from an end of its range.
-    `smallest_singular_value` is that of the flange's geometric Jacobian (m and rad mixed): near zero,
-    the configuration is nearly singular. `singular` names the parts of the label that are singular.
-    `free` names the joints that can move together while the TCP stays; it is empty for an isolated
-    configuration. `nearest` are the two bodies with the least clearance, margins subtracted; None if
-    no bodies are compared.
+    `smallest_singular_value` is that of the flange's geometric Jacobian (m and rad mixed): near
+    zero, the configuration is nearly singular. `singular` names the parts of the label that are
+    singular. `free` names the joints that can move together while the TCP stays; it is empty for an
+    isolated configuration. `nearest` are the two bodies with the least clearance, margins
+    subtracted; None if no bodies are compared.
     """
 
     q: Array
@@ -52,8 +52,8 @@ class IKSolution:
 class IKSolutions(Sequence[IKSolution]):
     """All configurations found for a pose, as a sequence.
 
-    `complete`: every branch is among them. If not, the inverse kinematics of the robot is not proven
-    to find all of them, and some may be missing.
+    `complete`: every branch is among them. If not, the inverse kinematics of the robot is not
+    proven to find all of them, and some may be missing.
     """
 
     solutions: tuple[IKSolution, ...]
@@ -87,7 +87,7 @@ def inverse_kinematics(
     has some of each self-motion, evenly spread.
 
     Args:
-        arm: arm with its TCP, limits, tool, payload and scene; a robot stands for an arm without any.
+        arm: arm with its TCP, limits, tool, payload and scene; a robot stands for a bare arm.
         pose: pose of the TCP in the robot's base frame.
         windings: whether to include every full turn of a joint that the limits allow. Without them
             there is one solution per branch, the one nearest to zero.

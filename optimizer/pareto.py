@@ -1,4 +1,4 @@
-"""Public entry point: `pareto(problem, points)` returns a `Front`, the Pareto front of energy and duration.
+"""Public entry point: `pareto(problem, points)` returns the front of energy and duration.
 
 The last point is the answer of `optimize`. A motion of another duration that needs less by no more than solves from
 different initial guesses differ is the same optimum and no point of its own.

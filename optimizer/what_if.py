@@ -1,4 +1,4 @@
-"""Public entry point: `what_if(solution, problem)` compares a motion with the best one of a changed arm.
+"""Public entry point: `what_if(solution, problem)` compares a motion with that of another arm.
 
 The change may be lighter links, another payload or other drives. It has two effects, reported apart: the energy of the
 same motion on the changed arm (`same_motion`), and the energy of a motion optimised for it (`reoptimised`).
@@ -61,7 +61,7 @@ def what_if(solution: Solution, problem: Problem, clock: Clock = time.perf_count
         Energy of the known motion on the changed arm, and the best motion of this arm.
 
     Raises:
-        DeadlineExceeded: the deadline passed before the known motion was certified on the changed arm.
+        DeadlineExceeded: the deadline passed before the known motion was certified.
     """
     deadline = Deadline.after(problem.deadline, clock)
     spline, prepared = solution.trajectory.spline, PreparedProblem.of(problem)

@@ -139,7 +139,7 @@ def test_plan_cycle() -> None:
 
 
 def test_inverse_kinematics() -> None:
-    """Goal configurations of an optimised motion are among the solutions; a scene says which of them collide."""
+    """The goal of an optimised motion is among the solutions; a scene says which collide."""
     pose = joulepath.Pose.from_rotvec([0.4, -0.2, 0.3], [np.pi, 0.0, 0.0])
     arm = problem().arm
     found = joulepath.inverse_kinematics(arm, pose)

@@ -20,8 +20,11 @@ def to_compare_response(
     failed: Mapping[MethodName, dict[str, Any]],
     answers: Mapping[MethodName, Any],
 ) -> dict[str, Any]:
-    """The answer of `POST /compare`. `failed` has the error document of every method that found no motion, `answers`
-    the complete answers that the rows are to contain."""
+    """The answer of `POST /compare`.
+
+    `failed` has the error document of every method that found no motion, `answers` the complete
+    answers that the rows are to contain.
+    """
     rows, bound = list[dict[str, Any]](), found.lower_bound
     for method, solution in ((each.method, each.solution) for each in found.methods):
         row: dict[str, Any] = dict.fromkeys(ROW_FIELDS)

@@ -1,4 +1,4 @@
-"""Public entry point: `evaluate(arm, motion)` computes the energy of a given motion, and checks its limits.
+"""Public entry point: `evaluate(arm, motion)` computes the energy and checks the limits of a motion.
 
 At a velocity step, acceleration, torque and power are infinite, and no model gives the power drawn. Energy is therefore
 summed over the open intervals between the steps. `kinetic` is the change of kinetic energy within these intervals, so
@@ -72,8 +72,8 @@ def evaluate(
 ) -> Evaluation:
     """Compute the energy of a given motion, and how far it uses every limit of the arm.
 
-    Nothing is optimised, and the motion may violate the limits. It is processed in blocks of some two
-    thousand polynomial pieces, so that memory does not grow with its length.
+    Nothing is optimised, and the motion may violate the limits. It is processed in blocks of some
+    two thousand polynomial pieces, so that memory does not grow with its length.
 
     Args:
         arm: arm that makes the motion. It may be another one than a solution was found for.

@@ -93,7 +93,7 @@ def piecewise_motion(arm: Arm, motion: Motion) -> Iterator[PiecewiseMotion]:
 
 
 def _spline(motion: Spline) -> PiecewiseMotion:
-    """The polynomials of a spline: one segment, whose pieces are the knot spans that have a length."""
+    """The polynomials of a spline: one segment with a piece for each knot span."""
     edges = np.unique(motion.knots)
     powers = [motion.curve(edges[:-1], order) / math.factorial(order) for order in range(motion.degree, -1, -1)]
     return PiecewiseMotion.of(PPoly(np.stack(powers), edges), np.zeros(len(edges) - 1, dtype=np.int64))

@@ -74,7 +74,10 @@ class Waypoints:
 
 @dataclass(frozen=True)
 class RecordedRows:
-    """Consecutive rows of a recording: t (n,) [s], q (n, nq) [rad], and v [rad/s], a [rad/s²] if they were logged."""
+    """Consecutive rows of a recording: t (n,) [s], q (n, nq) [rad], and v [rad/s], a [rad/s²].
+
+    v and a are None if they were not recorded.
+    """
 
     t: Array
     q: Array
@@ -91,9 +94,9 @@ class RecordedRows:
 class Recording:
     """A recorded motion as a stream of blocks of rows, which is read once.
 
-    `Recording.of(t, q)` makes one of arrays. All blocks have the same columns. Errors count rows from
-    `first_row`. Segments after the first one begin at `edges` [s], which increase, after the first
-    row.
+    `Recording.of(t, q)` makes one of arrays. All blocks have the same columns. Errors count rows
+    from `first_row`. Segments after the first one begin at `edges` [s], which increase, after the
+    first row.
     """
 
     blocks: Iterable[RecordedRows]
@@ -180,7 +183,7 @@ def _check_finite(block: RecordedRows, first_row: int) -> None:
 
 
 def check_joints(arm: Arm, q: Array, first_row: int = 0) -> None:
-    """Raises InvalidProblem or InvalidTable if joint positions q (k, n) [rad] cannot be those of the arm."""
+    """Raises InvalidProblem or InvalidTable for joint positions q (k, n) [rad] of another arm."""
     if q.shape[1] != arm.robot.nq:
         raise InvalidProblem("q", f"Every row must have {arm.robot.nq} joint positions, one per joint.")
     limits = arm.robot.limits

@@ -18,9 +18,9 @@ from joulepath.optimizer.solution import Certificate
 def certified(program: Program) -> list[Certificate]:
     """The certificates of all moves.
 
-    Checked are the limits of the arm, standstill at the ends and clearance; not a tool path. Raises NotCertified for
-    the first move whose certificate is not valid, and InvalidProblem for one longer than LONGEST_DURATION. Ends by
-    DeadlinePassed if the watched deadline passes.
+    Checked are the limits of the arm, standstill at the ends and clearance; not a tool path. Raises
+    NotCertified for the first move whose certificate is not valid, and InvalidProblem for one
+    longer than LONGEST_DURATION. Ends by DeadlinePassed if the watched deadline passes.
     """
     certificates = []
     for index, move in enumerate(program.moves):

@@ -1,4 +1,4 @@
-"""Public entry point: `export(motion, format)` writes a motion as a program or file for a robot controller."""
+"""Public entry point: `export(motion, format)` writes a motion for a robot controller."""
 
 from __future__ import annotations
 
@@ -105,8 +105,8 @@ def export(
 ) -> ExportedFile:
     """Write a motion as a program or file for a robot controller.
 
-    The motion is certified again at the speed at which it leaves: limits, rest at both ends of every
-    move, and clearance. A tool path is not compared again. No format was run on hardware.
+    The motion is certified again at the speed at which it leaves: limits, rest at both ends of
+    every move, and clearance. A tool path is not compared again. No format was run on hardware.
 
     Args:
         motion: solution of a problem or of a cycle, or a program of moves and rests.
@@ -121,7 +121,7 @@ def export(
         The file, with the largest value / limit of its motion.
 
     Raises:
-        InvalidProblem: the options are those of another format, or the arguments do not fit together.
+        InvalidProblem: the options are those of another format, or `problem` is missing.
         NotCertified: the motion breaks a limit at this speed, or is not one of this arm.
         FormatUnsuitable: the format is not for this robot, or the file would be too large.
         DeadlineExceeded: the deadline passed first.

@@ -15,7 +15,10 @@ _NOT_PLAIN = re.compile(r"[^A-Za-z0-9 .,:+\-/()=%_]")
 
 @dataclass(frozen=True)
 class WrittenFile:
-    """What the writer of a format makes. `notes` says in sentences how far it deviates, and what it leaves out."""
+    """What the writer of a format makes.
+
+    `notes` says in sentences how far it deviates from the motion, and what it leaves out.
+    """
 
     content: bytes
     media_type: str

@@ -142,8 +142,8 @@ LAW = ("coulomb", "viscous", "load", "curved")
 def identify(robot: Robot, logs: Sequence[Log], options: IdentificationOptions | None = None) -> Identification:
     """Identify an arm's own figures from logs of its motions.
 
-    The figures are fitted to all moves of all logs. Before that, a fit without the held-out moves is
-    validated on these, unless `options.held_out` is 0.
+    The figures are fitted to all moves of all logs. Before that, a fit without the held-out moves
+    is validated on these, unless `options.held_out` is 0.
 
     Args:
         robot: robot that the arm is one of; figures that the logs do not tell stay as they are.

@@ -1,4 +1,4 @@
-"""Public entry point: `replay(motion)` plays a motion in MuJoCo, on the planned arm and on arms that differ from it."""
+"""Public entry point: `replay(motion)` plays a motion in MuJoCo, on the planned and on other arms."""
 
 from __future__ import annotations
 

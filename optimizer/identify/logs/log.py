@@ -77,7 +77,7 @@ class Log:
 
     @property
     def segment_rows(self) -> list[int]:
-        """Rows that bound the segments: the first one, those in which the arm begins to move or to rest, the last."""
+        """Rows that bound the segments: the first, each in which motion or rest begins, the last."""
         begins = [move.start for before, move in pairwise(self.moves) if move.at_rest != before.at_rest]
         last = len(self.time) - 1
         return [0, *(row for row in begins if 0 < row < last), last]

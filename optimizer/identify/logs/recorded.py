@@ -33,7 +33,7 @@ class Measured:
 
 
 def measured(log: Log, arm: Arm) -> list[Measured]:
-    """What was measured in each segment of `log.recording()`, which `arm` has moved; empty if nothing was."""
+    """What was measured in each segment of `log.recording()` of `arm`; empty if nothing was."""
     drives = arm.drives
     torque = None
     if log.effort is not None and log.effort_meaning != "external":

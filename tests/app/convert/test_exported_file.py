@@ -1,4 +1,4 @@
-"""Options of exports: the formats of the contract are those of the library, with the same options and defaults."""
+"""The export formats of the contract are the library's, with the same options and defaults."""
 
 from __future__ import annotations
 
