@@ -13,7 +13,8 @@ from joulepath.optimizer.export.ros_messages import Encoding
 def to_options(request: ExportRequest, format: ExportFormat, preferred: Encoding) -> ExportOptions | None:
     """The options of the library for a format.
 
-    Messages have the `preferred` encoding unless the request names one. Raises InvalidRequest for options of another format.
+    Messages have the `preferred` encoding unless the request names one. Raises
+    InvalidRequest for options of another format.
     """
     own = OPTIONS_OF.get(format)
     for name in sorted(set(OPTIONS_OF.values()) - {own}):
