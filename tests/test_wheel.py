@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -18,6 +19,7 @@ from pathlib import Path
 
 import pytest
 
+from joulepath.optimizer.native.build import LIBRARY
 from tests.app.requests import move
 
 ROOT = Path(__file__).parents[1]
@@ -96,21 +98,34 @@ def clean(variables: os._Environ[str] | dict[str, str]) -> dict[str, str]:
 
 
 def test_the_wheel_holds_all_that_runs(wheel: Path) -> None:
-    """Every tracked file of the three packages, the libraries of the page, and nothing else beside the metadata."""
+    """Every tracked file of the three packages, the C library, the libraries of the page, and nothing else beside the
+    metadata."""
     tracked = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard", "joulepath", *PACKAGES],
         cwd=ROOT, capture_output=True, text=True, check=True,
     ).stdout.split()  # fmt: skip
     vendor = (ROOT / "app" / "static" / "studio" / "vendor").rglob("*")
     present = {name for name in tracked if (ROOT / name).is_file()}
-    present |= {str(each.relative_to(ROOT)) for each in vendor if each.is_file()}
+    present |= {str(each.relative_to(ROOT)) for each in (LIBRARY, *vendor) if each.is_file()}
     present = {name if name.startswith("joulepath/") else f"joulepath/{name}" for name in present}
+    assert LIBRARY.is_file()
     with zipfile.ZipFile(wheel) as archive:
         held = {name for name in archive.namelist() if ".dist-info/" not in name}
     assert held == present
     assert "joulepath/py.typed" in held
     assert "joulepath/models/ur5e/figures.yaml" in held
     assert any(name.startswith("joulepath/app/store/migrations/versions/v0001") for name in held)
+
+
+def test_the_wheel_serves_every_python_of_one_platform(wheel: Path) -> None:
+    """It holds machine code, which knows nothing of Python."""
+    platform = re.sub(r"[-.]", "_", sysconfig.get_platform())
+    assert wheel.name.endswith(f"-py3-none-{platform}.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        (metadata,) = (name for name in archive.namelist() if name.endswith(".dist-info/WHEEL"))
+        assert "Root-Is-Purelib: false" in archive.read(metadata).decode().splitlines()
+        code = next(archive.read(name) for name in archive.namelist() if name.endswith(LIBRARY.name))
+    assert b"Py_" not in code and b"PyObject" not in code
 
 
 @pytest.mark.long

@@ -30,7 +30,7 @@ from joulepath.optimizer.bounds.inertia_spectrum import InertiaSpectrum
 from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
 from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
 from joulepath.optimizer.kinematics.vectors import cross
-from joulepath.optimizer.native.shared_library import address, shared_library
+from joulepath.optimizer.native.shared_library import address, library
 from joulepath.optimizer.problem.arm import Arm
 
 # chains of which the inertia's terms, and bounds of several orders, are kept
@@ -88,7 +88,7 @@ class ChainDerivatives:
 
     @cached_property
     def as_c(self) -> tuple[ctypes.Structure, list[Array]]:
-        """The chain as the shared library has it, and the arrays that it points to."""
+        """The chain as the C library has it, and the arrays that it points to."""
         arrays = [np.ascontiguousarray(getattr(self, name), dtype=float) for name in _ARRAYS]
         return _Chain(self.nq, *map(address, arrays)), arrays
 
@@ -154,25 +154,9 @@ class ChainDerivatives:
 
     def joint_inertia(self, q: Array) -> Array:
         """M (n, nq, nq) [kg·m²] at q (n, nq) [rad], rotors included: momenta of unit speeds about the base."""
-        library = shared_library()
-        if library is None:
-            return self.joint_inertia_by_numpy(q)
         q, M = np.ascontiguousarray(q, dtype=float), np.empty((len(q), self.nq, self.nq))
         library.joint_inertias(ctypes.addressof(self.as_c[0]), len(q), address(q), address(M))
         return M
-
-    def joint_inertia_by_numpy(self, q: Array) -> Array:
-        """The same where the shared library cannot be compiled."""
-        z, o, R, c = self._frames(q)
-        about_centre = R @ self.inertia @ R.transpose(0, 1, 3, 2)
-        square = (c * c).sum(axis=-1)[..., None, None] * np.eye(3) - c[..., :, None] * c[..., None, :]
-        about_origin = _from_outside(about_centre + self.mass[:, None, None] * square)
-        outer, moment = np.cumsum(self.mass[::-1])[::-1], _from_outside(self.mass[:, None] * c)
-        speed = cross(o, z)
-        linear = outer[:, None] * speed + cross(z, moment)
-        angular = (about_origin @ z[..., None])[..., 0] + cross(moment, speed)
-        both = z @ angular.transpose(0, 2, 1) + speed @ linear.transpose(0, 2, 1)
-        return _symmetric(both) + np.diag(self.rotor)
 
     def _frames(self, q: Array) -> tuple[Array, Array, Array, Array]:
         """Axes and origins (n, nq, 3) of the joints, rotations (n, nq, 3, 3) and centres of mass (n, nq, 3)."""

@@ -7,13 +7,13 @@ increase the other's second derivatives.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
-from joulepath.optimizer.native.shared_library import address, shared_library
+from joulepath.optimizer.native.shared_library import address, library
 
 
 @dataclass(frozen=True)
@@ -62,34 +62,16 @@ class GridCells:
         """Positions (n · m, 2) [rad]."""
         return np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1).reshape(-1, 2)
 
-    def least(self, corners: Array) -> Array:
-        """The least of the corners' values (..., points) in each cell (..., cells)."""
-        return self._reduced(corners[..., None], np.minimum)[..., 0]
-
     def deviation(self, value: Array, mean: Array, curvature: Curvature, joints: Sequence[int]) -> Array:
         """Bounds (S, 2, cells, k) on how far values of k joints are from their means (S, nq), in each cell and along
         each step; `value` (S, 2, points, nq) has those of both ends of a step."""
-        library, at = shared_library(), np.array(joints)
-        if library is None:
-            return self.deviation_by_numpy(value, mean, curvature, joints)
+        at = np.array(joints)
         S, nq = mean.shape
         result = np.empty((S, 2, self.count, len(at)))
         given = *self.axes, at, value, mean, curvature.along, curvature.across
         plain = [np.ascontiguousarray(each) for each in given]
         library.cell_deviation(S, nq, *map(len, self.axes), len(at), *map(address, (*plain, result)))
         return result
-
-    def deviation_by_numpy(self, value: Array, mean: Array, curvature: Curvature, joints: Sequence[int]) -> Array:
-        """The same where the shared library cannot be compiled."""
-        away = np.abs(value - mean[:, None, None])[..., joints]
-        around = self.between(curvature.across[..., joints]) + curvature.along[:, None, joints]
-        return np.asarray(self._reduced(away, np.maximum) + around[:, None])
-
-    def between(self, second: Array) -> Array:
-        """Σ h² / 8 · second (S, 2, k) over the sides of each cell (S, cells, k)."""
-        first, other = (np.diff(axis) ** 2 / 8 for axis in self.axes)
-        both = second[:, 0, None, None] * first[:, None, None] + second[:, 1, None, None] * other[:, None]
-        return np.asarray(both.reshape(len(second), self.count, second.shape[-1]))
 
     def beyond(self, half: Array) -> Array:
         """inf for the cells (S, cells) beyond boxes of these half sides (S, 2) [rad], where no motion is, else 0."""
@@ -107,10 +89,3 @@ class GridCells:
                 rows[:, :, :-1] |= within
                 rows[:, :, 1:] |= within
         return near.reshape(len(near), -1)
-
-    def _reduced(self, corners: Array, reduce: Callable[[Array, Array], Array]) -> Array:
-        n, m = map(len, self.axes)
-        value = corners.reshape(*corners.shape[:-2], n, m, corners.shape[-1])
-        value = reduce(value[..., 1:, :, :], value[..., :-1, :, :])
-        value = reduce(value[..., 1:, :], value[..., :-1, :])
-        return value.reshape(*corners.shape[:-2], self.count, corners.shape[-1])

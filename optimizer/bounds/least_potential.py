@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.path_terms import PathTerms
 from joulepath.optimizer.bounds.weights import Weights
-from joulepath.optimizer.native.shared_library import address, shared_library
+from joulepath.optimizer.native.shared_library import address, library
 
 # τ of the proof: what the others' share of a momentum's change is weighted with
 _TAU = 1.0
@@ -26,9 +26,6 @@ class LeastPotential:
 
     def __call__(self, weights: Weights, fast: Array, slow: Array) -> Array:
         """Ψ (B, S) [W] for 1 / T from `slow` to `fast` (B,) [1/s]."""
-        library = shared_library()
-        if library is None:
-            return self.by_numpy(weights, fast, slow)
         terms, (at_terms, _) = self.terms, self._as_c
         S, nq = terms.half.shape
         result = np.empty((len(fast), S))
@@ -56,39 +53,6 @@ class LeastPotential:
         by 1 / T²."""
         moved = weights.scale * self.terms.momentum_others
         return np.asarray((1 + 1 / _TAU) * ((moved / weights.mixing) * moved.sum(axis=1, keepdims=True)).sum(axis=-1))
-
-    def by_numpy(self, weights: Weights, fast: Array, slow: Array) -> Array:
-        """The same where the shared library cannot be compiled."""
-        terms, cells, grid, scale = self.terms, self.terms.cells, list(self.terms.grid), weights.scale
-        positions, hold = cells.points(), _hold(weights)
-        square = positions**2 @ hold[grid] / 2 - scale * terms.kinetic  # by 1 / T²
-        along = terms.slope[:, grid] @ positions.T
-        excess = _excess(fast, slow)[:, None, None] * along
-        f2, s2 = (each[:, None, None, None] ** 2 for each in (fast, slow))
-        still = scale * (terms.gravity - (along + np.maximum(excess, 0.0))[:, :, None])
-        corner = still + np.minimum(f2 * square, s2 * square)
-        b2 = fast[:, None, None] ** 2
-        bend = scale * (terms.gravity_curvature.across + b2 * terms.kinetic_curvature.across) + b2 * hold[grid]
-        flat = scale * (terms.gravity_curvature.along + b2[..., 0] * terms.kinetic_curvature.along)
-        value = cells.least(corner)
-        value -= np.stack([cells.between(each[..., None])[..., 0] for each in bend])[:, :, None]
-        value -= flat[:, :, None, None] + f2 * (terms.deviation**2 @ _weight(weights))
-        value += cells.beyond(terms.half[:, grid])[:, None]
-        return np.asarray((value - self._beside(weights, fast, slow)).min(axis=-1).mean(axis=-1))
-
-    def _beside(self, weights: Weights, fast: Array, slow: Array) -> Array:
-        """What the joints beside the grid's can take from Ψ (B, S, 2, cells) [W]."""
-        terms, scale, b2, hold = self.terms, weights.scale, fast[:, None] ** 2, _hold(weights)
-        taken, cross = np.zeros((len(fast), *terms.steepness.shape[:-1])), self._cross(weights)
-        for i, joint in enumerate(terms.others):
-            stiffness = hold[joint] * slow[:, None] ** 2 - scale * terms.gravity_others[:, i] - b2 * cross[:, i]
-            more = _excess(fast, slow)[:, None] * np.abs(terms.slope[:, joint]) + b2 * terms.kinetic_others[:, i]
-            s = scale * (terms.steepness[..., i] + more[:, :, None, None])
-            stable, half = stiffness[:, :, None, None] > 0, terms.half[:, joint, None, None]
-            divisor = np.where(stable, stiffness[:, :, None, None], 1.0)
-            far = np.where(stable, np.minimum(s / divisor, half), half)
-            taken += s * far - stiffness[:, :, None, None] * far * far / 2
-        return taken
 
 
 def _hold(weights: Weights) -> Array:

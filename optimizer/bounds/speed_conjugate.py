@@ -15,7 +15,7 @@ from joulepath.optimizer.bounds.friction_conjugate import FrictionConjugate
 from joulepath.optimizer.bounds.path_terms import PathTerms
 from joulepath.optimizer.bounds.time_parts import TimeParts
 from joulepath.optimizer.bounds.weights import Weights
-from joulepath.optimizer.native.shared_library import address, shared_library
+from joulepath.optimizer.native.shared_library import address, library
 
 # halvings of the interval that holds the multiplier of a joint's displacement
 _BISECTIONS = 9
@@ -62,9 +62,6 @@ class SpeedConjugate:
 
         Speeds are those that a motion of the next duration may have, too. m is linear in 1 / T.
         """
-        library = shared_library()
-        if library is None:
-            return self.by_numpy(weights)
         structures, _ = self._as_c
         stiffness, slowness = weights.confinement + weights.mixing, self._slowness(weights)
         result = np.empty_like(self.duration), np.empty_like(self.duration)
@@ -111,48 +108,3 @@ class SpeedConjugate:
     def _slowness(self, weights: Weights) -> Array:
         """η / c (nq,)."""
         return np.asarray(weights.work / np.maximum(self.loss, _TINY))
-
-    def by_numpy(self, weights: Weights) -> tuple[Array, Array]:
-        """The same where the shared library cannot be compiled."""
-        parts, duration, terms, scale = self._parts, self.duration, self.terms, weights.scale
-        m_first, m_last = self._multiplier(weights, 0), self._multiplier(weights, -1)
-        share = (1 / duration - 1 / duration[-1]) / max(1 / duration[0] - 1 / duration[-1], _TINY)
-        m = m_last + share[:, None] * (m_first - m_last)
-        T = duration[:, None, None]
-        p = scale * T[..., None] * parts.ends(self._costate) + m[:, None, None]
-        p = p + (scale * terms.momentum / T)[:, parts.step, None]
-        b = (terms.x_rate / T)[:, parts.step, None]
-        stiffness = (weights.confinement + weights.mixing + scale * terms.spread)[parts.step, None]
-        omega = scale * parts.ends(terms.omega)
-        height = self._greatest(weights, p, omega, b, stiffness, parts.speed[:, :, None])[0]
-        along = (p.mean(axis=2) * (terms.x_rate[parts.step] * parts.length[:, None])).sum(axis=(1, 2))
-        return (height.mean(axis=2) * parts.length[:, None]).sum(axis=(1, 2)), along
-
-    def _multiplier(self, weights: Weights, which: int) -> Array:
-        """m (nq,) [N·m] for the first or last duration with which the speeds of H cover the displacement: the greatest
-        bound, near enough."""
-        terms, duration, scale = self.terms, self.duration[which], weights.scale
-        b, omega = terms.x_rate / duration, scale * (terms.omega[1:] + terms.omega[:-1]) / 2
-        p = scale * (duration * (self._costate[1:] + self._costate[:-1]) / 2 + terms.momentum / duration)
-        stiffness = weights.confinement + weights.mixing + scale * terms.spread
-        friction, displacement = self.friction, terms.x_rate.sum(axis=0)
-        torque = (friction.constant + friction.slope * friction.last)[-1]
-        reach = 4 * torque + np.abs(p).max(axis=0) + stiffness.max(axis=0) * friction.last[-1]
-        low, high = -reach, reach
-        for _ in range(_BISECTIONS):
-            m = (low + high) / 2
-            v = self._greatest(weights, p + m, omega, b, stiffness, self._mean[which])[1]
-            short = duration * v.sum(axis=0) < displacement
-            low, high = np.where(short, m, low), np.where(short, high, m)
-        return np.asarray((low + high) / 2)
-
-    def _greatest(
-        self, weights: Weights, p: Array, omega: Array, b: Array, stiffness: Array, most: Array
-    ) -> tuple[Array, Array]:
-        """H (..., nq) [W] for these p, ω, speeds b of the path, κ + μ + ν and greatest speeds, and where it is."""
-        more, slowness = 1 + 2 * weights.work, self._slowness(weights)
-        linear = p - stiffness * b + slowness * omega
-        square = stiffness / 2 + weights.work * slowness
-        # (1 + 2 η) v + ω is more · (v + ω / more)
-        value, v = self.friction.greatest(linear / more, omega / more, square / more, most)
-        return more * value - p * b + stiffness * b * b / 2, v

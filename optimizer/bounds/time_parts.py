@@ -45,8 +45,3 @@ class TimeParts:
         first = np.flatnonzero(np.diff(self.step, prepend=-1))
         weight = self.length[:, None] * len(first)
         return np.asarray(np.add.reduceat(self.speed[which] * weight, first, axis=1))
-
-    def ends(self, nodes: Array) -> Array:
-        """Values (..., P, 2, nq) at both ends of each part, of what is linear between nodes (..., steps + 1, nq)."""
-        first, last = nodes[..., self.step, None, :], nodes[..., self.step + 1, None, :]
-        return np.asarray(first + self.within[..., None] * (last - first))

@@ -99,8 +99,7 @@ class Cloud:
             return triangle_segment(self.corners[part], segments)
         centres = self.tree.centres[part]
         if self.half_size is None:
-            distance, normal, _, point = segment_segment(np.repeat(centres[:, None], 2, axis=1), segments)
-            return distance, normal, point
+            return segment_segment(np.repeat(centres[:, None], 2, axis=1), segments)
         half_size = np.broadcast_to(self.half_size, centres.shape)
         distance, normal, point = box_segment(half_size, segments - centres[:, None])
         return distance, normal, point + centres

@@ -16,7 +16,6 @@ from joulepath.models.robot import MOST_ROBOTS, Array, Mask, Robot
 from joulepath.optimizer.collision.bodies import Body, Indices, bodies_of
 from joulepath.optimizer.collision.pair_distance import PairGeometry, WitnessPoints
 from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
-from joulepath.optimizer.native.shared_library import shared_library
 from joulepath.optimizer.problem.arm import Arm
 
 # along a motion, the distances at every so many samples are computed first
@@ -56,7 +55,7 @@ class CollisionModel:
     def __init__(self, arm: Arm) -> None:
         self.bodies = bodies_of(arm)
         self.pairs = _checked_pairs(arm, self.bodies)
-        self.geometry = PairGeometry(self.bodies, self.pairs, arm.robot.nq, shared_library())
+        self.geometry = PairGeometry(self.bodies, self.pairs, arm.robot.nq)
         self.nq = arm.robot.nq
         self._placements = joint_placements(arm.robot.model)
         joints = np.arange(1, self.nq + 1)

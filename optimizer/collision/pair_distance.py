@@ -7,10 +7,8 @@ have the radii and the margins of both bodies subtracted.
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -19,7 +17,6 @@ from joulepath.optimizer.collision.bodies import Body, Indices
 from joulepath.optimizer.collision.cloud_pairs import CloudPairs
 from joulepath.optimizer.collision.coal_distance import ConvexPairs
 from joulepath.optimizer.collision.compiled_distances import CompiledDistances
-from joulepath.optimizer.collision.numpy_distances import NumpyDistances
 from joulepath.optimizer.collision.pair_arrays import PairArrays, PairKind
 
 
@@ -47,38 +44,29 @@ class WitnessPoints:
 class PairGeometry:
     """Bodies on the links of an arm of nq joints, and the `pairs` (p, 2) of them whose distances are computed.
 
-    The first body of a pair is on the link nearer to the base. A half-space may only be first, and on link 0. Without
-    the shared `library`, numpy computes all that it would.
+    The first body of a pair is on the link nearer to the base. A half-space may only be first, and on link 0.
     """
 
-    def __init__(self, bodies: Sequence[Body], pairs: Indices, nq: int, library: ctypes.CDLL | None) -> None:
+    def __init__(self, bodies: Sequence[Body], pairs: Indices, nq: int) -> None:
         self._arrays = arrays = PairArrays.of(bodies, pairs)
         self.links: Indices = arrays.links
         # pairs (p,) whose first body is a patch of a cloud
         self.is_cloud = arrays.kinds == PairKind.CLOUD
         # pairs (p,) whose distance is exact, not iterated
         self.is_closed_form = (arrays.kinds != PairKind.CONVEX) & ~self.is_cloud
-        self._compiled = None if library is None else CompiledDistances(arrays, nq, library)
+        self._compiled = CompiledDistances(arrays, nq)
         self._clouds = CloudPairs(bodies)
         self._convex = ConvexPairs([body.core for body in bodies])
-
-    @cached_property
-    def _numpy(self) -> NumpyDistances:
-        return NumpyDistances(self._arrays)
-
-    @property
-    def _fast(self) -> CompiledDistances | NumpyDistances:
-        return self._compiled or self._numpy
 
     def bounds(
         self, frames: Array, pairs: Indices, within: float, known: Array | None = None
     ) -> tuple[Array, Indices, Indices]:
-        """See `NumpyDistances.bounds`."""
-        return self._fast.bounds(frames, pairs, within, known)
+        """See `CompiledDistances.bounds`."""
+        return self._compiled.bounds(frames, pairs, within, known)
 
     def bead_bounds(self, frames: Array, configuration: Indices, pair: Indices) -> Array:
-        """See `NumpyDistances.bead_bounds`."""
-        return self._fast.bead_bounds(frames, configuration, pair)
+        """See `CompiledDistances.bead_bounds`."""
+        return self._compiled.bead_bounds(frames, configuration, pair)
 
     def witness_points(
         self, frames: Array, configuration: Indices, pair: Indices, within: float = np.inf, part: Indices | None = None
@@ -88,27 +76,19 @@ class PairGeometry:
         The distance of a patch of a cloud is that of its nearest part, infinite if above `within` [m]. Where `part`
         (k,) is not negative, it is that of this part.
         """
-        if self._compiled is None:
-            k = len(pair)
-            result, left = WitnessPoints(np.empty(k), np.empty((k, 3)), np.empty((k, 3))), np.arange(k)
-        else:
-            result = WitnessPoints(*self._compiled.witness_points(frames, configuration, pair))
-            left = np.flatnonzero(np.isnan(result.distance))
-        kinds = self._arrays.kinds[pair[left]] if left.size else left
-        for kind in PairKind if left.size else ():
-            # plain integers: comparing an array with a member of an enumeration takes five times as long
-            chosen = left[kinds == int(kind)]
+        result = WitnessPoints(*self._compiled.witness_points(frames, configuration, pair))
+        left = np.flatnonzero(~self.is_closed_form[pair])
+        of_cloud = self.is_cloud[pair[left]]
+        for chosen, is_cloud in ((left[~of_cloud], False), (left[of_cloud], True)):
             if not chosen.size:
                 continue
-            case = frames, configuration[chosen], pair[chosen]
-            if kind == PairKind.CONVEX:
-                found = self._by_coal(*case)
-            elif kind == PairKind.CLOUD:
+            case = frames, configuration[chosen]
+            if is_cloud:
                 parts = np.full(len(chosen), -1) if part is None else part[chosen]
                 beyond = within + self._arrays.growth[pair[chosen]]
-                found = self._clouds.witness_points(*case[:2], *self._bodies(pair[chosen]), beyond, parts)
+                found = self._clouds.witness_points(*case, *self._bodies(pair[chosen]), beyond, parts)
             else:
-                found = self._numpy.witness_points(kind, *case)
+                found = self._by_coal(*case, pair[chosen])
             result.distance[chosen], result.normal[chosen], result.point[chosen] = found
         result.distance[:] -= self._arrays.growth[pair]
         return result
@@ -142,9 +122,9 @@ class PairGeometry:
         normals: tuple[Array, Array],
         part: Indices,
     ) -> Array:
-        """See `NumpyDistances.separations`. Where `part` (k,) is not negative, the first body is this part of a cloud,
-        which does not move; else it is the box around the patch."""
-        result = self._fast.separations(frames, begin, end, pair, normals)
+        """See `CompiledDistances.separations`. Where `part` (k,) is not negative, the first body is this part of a
+        cloud, which does not move; else it is the box around the patch."""
+        result = self._compiled.separations(frames, begin, end, pair, normals)
         chosen = np.flatnonzero(part >= 0)
         if chosen.size:
             result[chosen] = self._of_parts(
@@ -160,13 +140,13 @@ class PairGeometry:
         best = np.full(len(pair), -np.inf)
         for normal in normals:
             highest = self._clouds.highest(first, part, normal) + self._arrays.growth[pair]
-            lowest = [self._numpy.support(frames, at, second, normal) for at in at_both]
+            lowest = [self._compiled.supports(frames, at, second, normal) for at in at_both]
             best = np.maximum(best, np.minimum(*lowest) - highest)
         return np.asarray(best)
 
     def gradients(self, frames: Array, configuration: Indices, pair: Indices, found: WitnessPoints) -> Array:
-        """See `NumpyDistances.gradients`."""
-        return self._fast.gradients(frames, configuration, pair, found.normal, found.point)
+        """See `CompiledDistances.gradients`."""
+        return self._compiled.gradients(frames, configuration, pair, found.normal, found.point)
 
     def _bodies(self, pair: Indices) -> tuple[Indices, Indices]:
         """The first and the second body of pairs (k,)."""

@@ -22,7 +22,8 @@ from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.energy.kernel_cache import compile_kernel, library_paths
 from joulepath.optimizer.energy.kernel_expressions import build
 from joulepath.optimizer.energy.kernel_functions import Compiled, Evaluation, Functions, Interpreted
-from joulepath.optimizer.native.library_cache import compiler, is_intact, mark_used, seal_path
+from joulepath.optimizer.native.build import compiler
+from joulepath.optimizer.native.library_cache import is_intact, mark_used, seal_path
 
 log = logging.getLogger(__name__)
 

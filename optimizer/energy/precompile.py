@@ -1,6 +1,6 @@
-"""`python -m joulepath.optimizer.energy.precompile [--portable] [ROBOT …]` compiles the kernels of robots, and the
-library that
-all arms share, so that no request is interpreted.
+"""`python -m joulepath.optimizer.energy.precompile [--portable] [ROBOT …]` compiles the kernels of robots, so that
+no request
+is interpreted.
 
 Without a name it compiles those of all robots. With `--portable` they serve on every processor of this kind, as in an
 image for many machines; without, they are for this one, and twice as fast.
@@ -12,7 +12,6 @@ import sys
 
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.optimizer.energy.kernel_cache import compile_kernel
-from joulepath.optimizer.native.shared_library import compile_shared
 
 if __name__ == "__main__":
     portable = "--portable" in sys.argv
@@ -20,7 +19,6 @@ if __name__ == "__main__":
     if unknown := set(wanted) - set(robot_names()):
         sys.exit(f"There is no robot named {', '.join(sorted(unknown))}: use some of {', '.join(robot_names())}.")
     try:
-        print(compile_shared())
         for name in wanted:
             print(compile_kernel(load_robot(name), portable))
     except (RuntimeError, OSError) as error:

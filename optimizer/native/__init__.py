@@ -1,1 +1,1 @@
-"""C that this machine compiles once: where its libraries are kept, and the small library that every arm shares."""
+"""The C library that all arms share, and where the kernels that this machine compiles are kept."""

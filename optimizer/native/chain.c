@@ -1,4 +1,4 @@
-/* Forward kinematics of many configurations: what optimizer/kinematics/forward.py computes by numpy. */
+/* Forward kinematics of many configurations: see optimizer/kinematics/forward.py. */
 
 /* Frames (nq + 1, 4, 4) of revolute joints about z at placements (nq, 4, 4), turned by angles of these cosines and sines
    (nq). */

@@ -1,15 +1,20 @@
 /* Distances between bodies at many configurations, one pair after the other.
 
-   What the functions compute, and the shapes of their arguments, are those of optimizer/collision/pair_distance.py,
-   which computes by numpy what is left out here. */
+   The shapes of the arguments are those of optimizer/collision/compiled_distances.py. The signed distance of two convex
+   bodies a and b is the maximum over unit vectors n of min n·x over b - max n·x over a. If they are apart, it is their
+   distance; if they overlap, minus the length of the shortest translation that separates them. The n that attains the
+   maximum is the unit normal, from a to b.
+
+   Two segments: C. Ericson, "Real-Time Collision Detection", 2005, 5.1.9. */
 
 #define BEADS 4
 
 /* the order of PairKind */
 enum { SEGMENT_SEGMENT, BOX_SEGMENT, SEGMENT_BOX, HALF_SPACE };
 
-/* cores nearer than this [m] touch, segments whose squared sine is below PARALLEL are parallel, and a vector of a squared
-   length below NONE has no direction: as in closed_form_distance.py */
+/* Cores nearer than this [m] touch: the direction from one to the other is only rounding. Segments whose squared sine is
+   below PARALLEL count as parallel: if they nearly touch, the nearest points may then be off by a ten-millionth of their
+   lengths. A vector of a squared length [m²] below NONE has no direction. */
 static const double TOUCHING = 1e-10, PARALLEL = 1e-15, NONE = 1e-24;
 
 /* Bodies b and their pairs p: see PairArrays in pair_arrays.py, and compiled_distances.py, which has the same order. */
@@ -24,12 +29,11 @@ typedef struct {
   const long *is_round;
 } Shapes;
 
-/* Length [m] of a vector between two nearest points, and its direction; NAN if they touch. */
+/* Length [m] of a vector, and its direction. */
 static double length_of(const double *across, double *normal) {
-  const double distance = sqrt(dot(across, across));
-  if (!(distance >= TOUCHING)) return NAN;
-  for (int i = 0; i < 3; ++i) normal[i] = across[i] / distance;
-  return distance;
+  const double length = sqrt(dot(across, across));
+  for (int i = 0; i < 3; ++i) normal[i] = across[i] / length;
+  return length;
 }
 
 static const double *frame_of(const Shapes *shapes, const double *frames, long configuration, long body) {
@@ -100,7 +104,26 @@ void bead_bounds(const Shapes *shapes, const double *frames, long k, const long 
     bound[j] = bead_bound(shapes, frames, configuration[j], pair[j]) - shapes->growth[pair[j]];
 }
 
-/* Distance [m] of segments (2, 3), unit normal from a to b and the nearest point of b; NAN if they touch. */
+/* A unit vector perpendicular to u and v; if these are parallel, any one perpendicular to u. */
+static void perpendicular(const double *u, const double *v, double *normal) {
+  double across[3], least[3] = {0.0, 0.0, 0.0};
+  cross(u, v, across);
+  if (dot(across, across) < NONE) {
+    int k = fabs(u[1]) < fabs(u[0]) ? 1 : 0;
+    if (fabs(u[2]) < fabs(u[k])) k = 2;
+    least[k] = 1.0;
+    cross(u, least, across);
+  }
+  if (dot(across, across) < NONE) {
+    across[0] = across[1] = 0.0;
+    across[2] = 1.0;
+  }
+  length_of(across, normal);
+}
+
+/* Distance [m] of segments (2, 3), unit normal from a to b and the nearest point of b. The point of a that is nearest to
+   the line of b, clamped, then the point of b nearest to it, clamped, and the point of a nearest to that: exact, also
+   for parallel segments, but for those that are nearly so. If they cross, the normal is the common perpendicular. */
 static double segment_segment(const double *a, const double *b, double *normal, double *point) {
   double u[3], v[3], w[3], across[3];
   for (int i = 0; i < 3; ++i) {
@@ -117,7 +140,9 @@ static double segment_segment(const double *a, const double *b, double *normal, 
     point[i] = b[i] + t * v[i];
     across[i] = point[i] - (a[i] + s * u[i]);
   }
-  return length_of(across, normal);
+  const double distance = length_of(across, normal);
+  if (distance < TOUCHING) perpendicular(u, v, normal);
+  return distance;
 }
 
 /* Derivative of half the squared distance of p + s u from a box of half size h, by s. */
@@ -130,8 +155,45 @@ static double slope(const double *p, const double *u, const double *h, double s)
   return sum;
 }
 
-/* Distance [m] of a segment b (2, 3) from a box of half size h about the origin, unit normal from the box and the
-   nearest point of the segment; NAN if they touch. */
+/* The signed distance [m] of `box_segment` where the segment meets the box. The candidates for the normal are those of
+   the facets of the box swept along the segment. */
+static double penetration(const double *h, const double *b, const double *u, double *normal, double *point) {
+  static const double unit[3][3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
+  double deepest = -INFINITY;
+  int edge = -1;
+  for (int k = 0; k < 12; ++k) {
+    /* faces, edges, and their opposites */
+    const int side = k % 3, is_edge = k % 6 >= 3;
+    double n[3];
+    if (is_edge) cross(u, unit[side], n);
+    if (!is_edge || length_of(n, n) <= 1e-9)
+      for (int i = 0; i < 3; ++i) n[i] = unit[side][i];
+    if (k >= 6)
+      for (int i = 0; i < 3; ++i) n[i] = -n[i];
+    const double first = dot(n, b), last = dot(n, b + 3);
+    const double depth = lesser(first, last) - (fabs(n[0]) * h[0] + fabs(n[1]) * h[1] + fabs(n[2]) * h[2]);
+    if (!(depth > deepest)) continue;
+    deepest = depth;
+    edge = is_edge ? side : -1;
+    for (int i = 0; i < 3; ++i) {
+      normal[i] = n[i];
+      point[i] = b[last < first ? 3 + i : i];
+    }
+  }
+  if (edge < 0) return deepest;
+  /* where segment and edge cross, seen along the normal */
+  double across[3], to_edge[3];
+  cross(normal, unit[edge], across);
+  for (int i = 0; i < 3; ++i) to_edge[i] = (normal[i] > 0 ? h[i] : normal[i] < 0 ? -h[i] : 0.0) - b[i];
+  const double slope = dot(u, across);
+  const double s = clipped(dot(to_edge, across) / (slope == 0 ? 1.0 : slope), 0, 1);
+  for (int i = 0; i < 3; ++i) point[i] = b[i] + s * u[i];
+  return deepest;
+}
+
+/* Signed distance [m] of a segment b (2, 3) from a box of half size h about the origin, unit normal from the box and the
+   nearest point of the segment. The derivative of half the squared distance along the segment is piecewise linear and
+   increasing: its root is exact. */
 static double box_segment(const double *h, const double *b, double *normal, double *point) {
   double u[3], bends[8] = {0.0, 1.0}, low = 0.0, high = 1.0;
   int many = 2;
@@ -154,7 +216,18 @@ static double box_segment(const double *h, const double *b, double *normal, doub
     point[i] = b[i] + s * u[i];
     across[i] = point[i] - clipped(point[i], -h[i], h[i]);
   }
-  return length_of(across, normal);
+  const double distance = length_of(across, normal);
+  return distance < TOUCHING ? penetration(h, b, u, normal, point) : distance;
+}
+
+/* Of k pairs of segments (k, 2, 3): their distances (k), normals (k, 3), and points of b (k, 3). */
+void segment_segments(long k, const double *a, const double *b, double *distance, double *normal, double *point) {
+  for (long j = 0; j < k; ++j) distance[j] = segment_segment(a + 6 * j, b + 6 * j, normal + 3 * j, point + 3 * j);
+}
+
+/* Of boxes about the origin with half sizes (k, 3) and segments (k, 2, 3): distances (k), normals and points (k, 3). */
+void box_segments(long k, const double *half, const double *b, double *distance, double *normal, double *point) {
+  for (long j = 0; j < k; ++j) distance[j] = box_segment(half + 3 * j, b + 6 * j, normal + 3 * j, point + 3 * j);
 }
 
 /* The ends (2, 3) of a segment in the base frame. */
@@ -174,7 +247,6 @@ static double box_and_segment(const Shapes *shapes, const double *frames, long c
     into(in_link, of_link, local + 3 * k);
   }
   const double distance = box_segment(shapes->half_sizes + 3 * box, local, n, x);
-  if (isnan(distance)) return NAN;
   turn(in_link, n, of_link);
   turn(T, of_link, normal);
   place(in_link, x, of_link);
@@ -209,8 +281,8 @@ static double half_space(const Shapes *shapes, const double *frames, long config
   return least - radius * sine;
 }
 
-/* Signed distances (k), normals and points (k, 3) of pairs (k) at configurations (k). NAN where they touch, or where
-   Coal or a cloud computes them. */
+/* Signed distances (k), normals and points (k, 3) of pairs (k) at configurations (k). NAN where Coal or a cloud computes
+   them. */
 void witness_points(const Shapes *shapes, const double *frames, long k, const long *configuration, const long *pair,
                     double *distance, double *normal, double *point) {
   for (long j = 0; j < k; ++j, normal += 3, point += 3) {
@@ -248,6 +320,12 @@ static double support(const Shapes *shapes, const double *frames, long configura
     least -= shapes->disc_radii[body] * sqrt(greater(1 - cosine * cosine, 0.0));
   }
   return least + shift;
+}
+
+/* min n·x (k) [m] over the cores of bodies (k) at configurations (k), for unit vectors n (k, 3) in the base frame. */
+void supports(const Shapes *shapes, const double *frames, long k, const long *configuration, const long *body,
+              const double *normal, double *result) {
+  for (long j = 0; j < k; ++j) result[j] = support(shapes, frames, configuration[j], body[j], normal + 3 * j);
 }
 
 /* Separation [m] of a pair along n, which is given in the frame of its first body's link. */

@@ -1,4 +1,4 @@
-/* Gravity and inertia around a path with multipliers: what optimizer/bounds/grid_points.py computes by numpy.
+/* Gravity and inertia around a path with multipliers: see optimizer/bounds/grid_points.py.
 
    Arrays of joints have nq rows; those of configurations, points or steps have them outside. */
 
@@ -12,12 +12,6 @@ typedef struct {
 typedef struct {
   double z[3], o[3], c[3], J[6];
 } Link;
-
-static void cross3(const double *a, const double *b, double *y) {
-  y[0] = a[1] * b[2] - a[2] * b[1];
-  y[1] = a[2] * b[0] - a[0] * b[2];
-  y[2] = a[0] * b[1] - a[1] * b[0];
-}
 
 static void links_of(const Chain *chain, const double *cosine, const double *sine, Link *links) {
   static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
@@ -49,9 +43,9 @@ static void gravity_torque(const Chain *chain, const Link *links, double *torque
       moment[i] += chain->mass[j] * link->c[i];
       about[i] = moment[i] - outer * link->o[i];
     }
-    cross3(link->z, about, lever[j]);
+    cross(link->z, about, lever[j]);
     torque[j] = -dot(lever[j], chain->g);
-    cross3(chain->g, link->z, across);
+    cross(chain->g, link->z, across);
     for (long k = j; k < nq; ++k) slope[nq * j + k] = slope[nq * k + j] = -dot(across, lever[k]);
   }
 }
@@ -67,10 +61,10 @@ static void joint_inertia(const Chain *chain, const Link *links, double *M) {
     outer += chain->mass[j];
     for (int i = 0; i < 3; ++i) moment[i] += chain->mass[j] * link->c[i];
     for (int i = 0; i < 6; ++i) J[i] += link->J[i];
-    cross3(link->o, z, speed);
-    cross3(z, moment, by_moment);
+    cross(link->o, z, speed);
+    cross(z, moment, by_moment);
     for (int i = 0; i < 3; ++i) linear[j][i] = outer * speed[i] + by_moment[i];
-    cross3(moment, speed, by_moment);
+    cross(moment, speed, by_moment);
     angular[j][0] = J[0] * z[0] + J[3] * z[1] + J[4] * z[2] + by_moment[0];
     angular[j][1] = J[3] * z[0] + J[1] * z[1] + J[5] * z[2] + by_moment[1];
     angular[j][2] = J[4] * z[0] + J[5] * z[1] + J[2] * z[2] + by_moment[2];

@@ -1,4 +1,4 @@
-/* The least values of a dual bound's terms of position: what optimizer/bounds/least_potential.py computes by numpy. */
+/* The least values of a dual bound's terms of position: see optimizer/bounds/least_potential.py. */
 
 /* Ψ (B, S) of LeastPotential; joints `at` (nq): the two of the grid, then the others. */
 void least_potential(long B, long S, long nq, long n, long m, const long *at, const double *first_axis,

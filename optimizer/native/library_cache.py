@@ -1,4 +1,4 @@
-"""Compiled libraries on disk: `JOULEPATH_CACHE_DIR` (default `~/.cache/joulepath`) holds them.
+"""Compiled kernels on disk: `JOULEPATH_CACHE_DIR` (default `~/.cache/joulepath`) holds their libraries.
 
 The system's C compiler makes each of them once. Beside it lies a seal, the hash of the library, so that a damaged file
 is noticed before it is loaded.
@@ -21,6 +21,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
+from joulepath.optimizer.native.build import compiler
+
 # users may bring any number of arms, each with a library of about a megabyte
 MOST_LIBRARIES = 200
 
@@ -37,8 +39,6 @@ class Patience:
     rest: float = 3600.0
     """Time [s] for which a compiler that hung is not tried again for the same library, by any process: every command
     and every new worker would wait for it."""
-    warm_up: float = 5.0
-    """Time [s] for which a worker's warm-up waits for the shared library, which takes half a second."""
     look: float = 0.05
     """Time [s] between two attempts to get the lock that another process holds while it compiles."""
 
@@ -64,11 +64,6 @@ def is_intact(path: Path) -> bool:
         return seal_path(path).read_bytes() == hashlib.sha256(path.read_bytes()).hexdigest().encode()
     except OSError:
         return False
-
-
-def compiler() -> str | None:
-    """The system's C compiler, or None."""
-    return shutil.which(os.environ.get("CC", "cc")) or shutil.which("gcc") or shutil.which("clang")
 
 
 class CompilerHangs(RuntimeError):

@@ -1,4 +1,4 @@
-/* The greatest values of a dual bound's terms of speed: what optimizer/bounds/speed_conjugate.py computes by numpy. */
+/* The greatest values of a dual bound's terms of speed: see optimizer/bounds/speed_conjugate.py. */
 
 /* A concave friction torque by intervals: the fields of FrictionConjugate, (nq, intervals), and `load` or NULL. */
 typedef struct {
@@ -6,14 +6,24 @@ typedef struct {
   const double *first, *last, *constant, *slope, *sagitta, *load;
 } Friction;
 
-/* with wider registers where the processor has them; glibc chooses */
-#if defined(__x86_64__) && defined(__GLIBC__)
+/* with wider registers where the processor has them; glibc chooses. The clang of ziglang cannot link it */
+#if defined(__x86_64__) && defined(__GLIBC__) && !defined(__clang__)
 #define WIDE __attribute__((target_clones("avx2", "default")))
 #else
 #define WIDE
 #endif
 
-/* FrictionConjugate.greatest for one joint, with 1 / (2 (slope - square)) by interval, 0 if not bent; and where it is. */
+/* An upper bound on max over |v| ≤ most of p v - (v + omega) tau_f(v) + square v² for one joint, and where it is, with
+   1 / (2 (slope - square)) by interval, 0 if not bent.
+
+   For v ≥ 0 the torque is between its chord and the chord plus the sagitta. So (v + omega) tau_f(v) ≥ (v + omega) chord -
+   max(-(first + omega), 0) sagitta, a quadratic function of v, whose greatest value on an interval is known. For v < 0
+   the same holds with -v, -p, -omega, as the torque is odd. Against p a value is at most that of p v + square v² at an
+   end, or zero, and what friction helps omega by at the greatest torque: where that is no more than the value along p,
+   it is left out.
+
+   Where friction grows with the load, ω̂ stands in the place of omega: that of all from omega / (1 + load) to omega / (1 -
+   load) at which ω̂ tau_f(v) is least. */
 WIDE static double greatest(const Friction *of, long joint, double p, double omega, double square, const double *inverse,
                        double most, double *where) {
   const long I = of->intervals;

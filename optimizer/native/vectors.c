@@ -4,6 +4,12 @@
 
 static double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
+static void cross(const double *a, const double *b, double *y) {
+  y[0] = a[1] * b[2] - a[2] * b[1];
+  y[1] = a[2] * b[0] - a[0] * b[2];
+  y[2] = a[0] * b[1] - a[1] * b[0];
+}
+
 static double lesser(double a, double b) { return a < b ? a : b; }
 
 static double greater(double a, double b) { return a > b ? a : b; }

@@ -26,7 +26,6 @@ from joulepath.optimizer.bounds.reference import Reference, half_sides
 from joulepath.optimizer.bounds.weights import Weights
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.energy.dwell import LinearDwell
-from joulepath.optimizer.native.shared_library import shared_library
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.cruise import TINY, copper_loss
@@ -44,8 +43,6 @@ SCALE, POWER, LEAST_FACTOR, MOST_FACTOR = 0.53, -0.4, 0.2, 1.0
 STARTS = (1.0, 0.85), (0.55, 0.35)
 # by how much factors are changed at first to find better ones; share μ of κ + μ, and share of the plain η
 FACTOR_STEP, MIXING, WORK = 1.6, 0.2, 0.7
-# how many times as long bounds take without compiled code, at most
-BY_NUMPY = 20
 # a joint whose gravity torque changes by less than this with any joint carries none [N·m]
 WEIGHTLESS = 1e-9
 GRID_JOINTS = 2
@@ -58,7 +55,7 @@ class Effort:
 
     `steps` of the path, ratio `cell` of the durations of a cell, `group` of cells that share their boxes, `spacing` of
     the grid, numbers of `heavy` joints that have multipliers, and `rounds` of the search for weights. A group of an arm
-    of six joints takes `time` [s] at most by compiled code, on a machine that does nothing else.
+    of six joints takes `time` [s] at most, on a machine that does nothing else.
     """
 
     steps: int
@@ -74,7 +71,7 @@ class Effort:
 
         There are joints**5 bounds on the third derivatives of the inertia.
         """
-        return self.time * max(joints / 6, 1) ** 5 * (1 if shared_library() else BY_NUMPY)
+        return self.time * max(joints / 6, 1) ** 5
 
 
 @dataclass(frozen=True)

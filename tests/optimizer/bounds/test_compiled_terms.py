@@ -1,4 +1,4 @@
-"""The terms of dual bounds by the shared library against those by numpy, and against their definitions."""
+"""The terms of dual bounds by the C library against those by numpy, and against their definitions."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from joulepath.optimizer.bounds.path_terms import path_terms
 from joulepath.optimizer.bounds.reference import Reference, half_sides
 from joulepath.optimizer.bounds.speed_conjugate import SpeedConjugate
 from joulepath.optimizer.bounds.weights import Weights
-from joulepath.optimizer.native.shared_library import shared_library
 from joulepath.optimizer.problem.arm import Arm, Payload
+from tests.optimizer.bounds import numpy_terms
 from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED
 
 STEPS = 7
@@ -67,11 +67,6 @@ def assert_same(found: Array, expected: Array, tolerance: float = SAME) -> None:
     assert np.abs(found - expected).max() <= tolerance * (1 + np.abs(expected).max())
 
 
-@pytest.fixture(autouse=True)
-def _compiled() -> None:
-    assert shared_library() is not None
-
-
 @pytest.mark.parametrize("name", ARMS)
 def test_points(name: str) -> None:
     for seed in range(3):
@@ -81,7 +76,7 @@ def test_points(name: str) -> None:
         offsets = rng.normal(size=(11, nq)) * (rng.random((11, nq)) < 0.4)
         needed = rng.random((STEPS + 1, 11)) < 0.8
         given = case.chain, case.reference.x, omega, offsets, needed
-        found, expected = GridPoints.of(*given), GridPoints.by_numpy(*given)
+        found, expected = GridPoints.of(*given), numpy_terms.grid_points(*given)
         assert_same(found.gravity, expected.gravity)
         assert_same(found.slope, expected.slope)
         for each in ("kinetic", "momentum", "rows"):
@@ -93,7 +88,7 @@ def test_points(name: str) -> None:
 def test_inertia(name: str) -> None:
     chain = ChainDerivatives.of(ARMS[name])
     q = np.random.default_rng(3).uniform(-np.pi, np.pi, (50, chain.nq))
-    assert_same(chain.joint_inertia(q), chain.joint_inertia_by_numpy(q))
+    assert_same(chain.joint_inertia(q), numpy_terms.joint_inertia(chain, q))
     assert chain.joint_inertia(q[::2]).tobytes() == chain.joint_inertia(q)[::2].tobytes()
 
 
@@ -113,10 +108,13 @@ def test_least_potential_and_greatest_speed_terms(name: str) -> None:
             weights = Weights(scale, confined, rng.uniform(0.1, 1) * stiffness, work)
             potential = LeastPotential(terms)
             for fast, slow in ((beta[:-1], beta[1:]), (beta[:1], beta[:1])):
-                assert_same(potential(weights, fast, slow), potential.by_numpy(weights, fast, slow))
+                expected = numpy_terms.least_potential(potential, weights, fast, slow)
+                assert_same(potential(weights, fast, slow), expected)
             for durations in (edges, edges[:1]):
                 conjugate = SpeedConjugate(friction, case.arm.active_limits, terms, case.loss, durations)
-                for found, expected in zip(conjugate(weights), conjugate.by_numpy(weights), strict=True):
+                for found, expected in zip(
+                    conjugate(weights), numpy_terms.speed_conjugate(conjugate, weights), strict=True
+                ):
                     assert_same(found, expected)
 
 
@@ -129,7 +127,7 @@ def test_an_arm_of_two_joints_has_none_beside_the_grid() -> None:
     potential = LeastPotential(path_terms(chain, reference, np.array([0.01, 0.01]), half, (0, 1), Spacing()))
     weights, beta = Weights(0.5, np.array([1.0, 2.0]), np.array([0.5, 0.5])), np.array([1.0, 0.8])
     found = potential(weights, beta, 0.9 * beta)
-    assert_same(found, potential.by_numpy(weights, beta, 0.9 * beta))
+    assert_same(found, numpy_terms.least_potential(potential, weights, beta, 0.9 * beta))
     assert np.isfinite(found).all()
 
 
@@ -141,7 +139,7 @@ def test_deviation_of_cells() -> None:
     curvature = Curvature(rng.random((2, 5)), rng.random((2, 2, 5)))
     joints = (0, 3, 4)
     found = cells.deviation(value, mean, curvature, joints)
-    assert_same(found, cells.deviation_by_numpy(value, mean, curvature, joints))
+    assert_same(found, numpy_terms.deviation(cells, value, mean, curvature, joints))
     # the cell of the second interval of both axes, at the end of the first step
     corners = [4 + 1, 4 + 2, 8 + 1, 8 + 2]
     expected = np.abs(value[0, 1, corners][:, joints] - mean[0, list(joints)]).max(axis=0)

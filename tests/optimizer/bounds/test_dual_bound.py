@@ -24,6 +24,7 @@ from joulepath.optimizer.search.baselines import guesses
 from joulepath.optimizer.search.lower_bound import copper_multiplier
 from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 from joulepath.optimizer.trajectories.spline import sample
+from tests.optimizer.bounds.numpy_terms import greatest
 from tests.optimizer.bounds.test_holding import NAMES, NEAR, SAMPLED, SHIFT, asked, many_motions
 from tests.optimizer.moves import GOAL, ROBOT, START, problem
 from tests.optimizer.search.test_lower_bound import CONDITIONS, QUADRATURE, Torques, ends, motions
@@ -220,7 +221,7 @@ def test_the_conjugate_is_the_greatest_value() -> None:
     for _ in range(60):
         p, omega = rng.normal(size=6) * 20, rng.normal(size=6) * 0.3
         square, most = rng.uniform(-0.5, 1.5, 6), rng.uniform(0.01, 3.0, 6)
-        value, _ = friction.greatest(p, omega, square, most)
+        value, _ = greatest(friction, p, omega, square, most)
         v = np.concatenate([np.linspace(-1, 1, 4001), np.geomspace(1e-6, 1, 400), -np.geomspace(1e-6, 1, 400)])[:, None]
         v = v * most
         exact = (p * v - (v + omega) * law.torque(v) + square * v * v).max(axis=0)
@@ -237,7 +238,7 @@ def test_the_conjugate_allows_for_the_load() -> None:
     for _ in range(40):
         p, omega = rng.normal(size=6) * 20, rng.normal(size=6) * 0.3
         square, most = rng.uniform(0, 1.5, 6), rng.uniform(0.01, 3.0, 6)
-        value, _ = friction.greatest(p, omega, square, most)
+        value, _ = greatest(friction, p, omega, square, most)
         for shift in (omega / (1 + load), omega, omega / (1 - load)):
             at = v * most
             exact = (p * at - (at + shift) * ROBOT.friction.torque(at) + square * at * at).max(axis=0)

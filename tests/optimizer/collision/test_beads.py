@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.collision.numpy_distances import NumpyDistances
 from joulepath.optimizer.collision.pair_arrays import PairArrays
 from joulepath.optimizer.nlp.clearance_constraint import COUNTED, ClearanceConstraint
 from tests.optimizer.cells import LOADS, arm_in_cell, cell
+from tests.optimizer.collision.numpy_distances import NumpyDistances
 
 # Coal ends its search within 1e-6 m
 ITERATED = 1e-5  # m

@@ -59,13 +59,19 @@ def to_segment(p: Array, s: Array) -> Array:
 @pytest.mark.parametrize("kind", KINDS)
 def test_segments(kind: str) -> None:
     a, b = segments(kind, seed=3)
-    distance, normal, p, r = segment_segment(a, b)
+    distance, normal, r = segment_segment(a, b)
     tolerance = NEARLY_PARALLEL if kind == "nearly parallel" else EXACT
     assert np.abs(distance - nearest_of_candidates(a, b)).max() < tolerance
-    assert to_segment(p, a).max() < EXACT and to_segment(r, b).max() < EXACT
     assert np.abs(np.linalg.norm(normal, axis=1) - 1).max() < EXACT
+    assert to_segment(r, b).max() < EXACT
     apart = distance > 1e-6
-    assert np.abs(r - p - distance[:, None] * normal)[apart].max(initial=0.0) < EXACT
+    assert to_segment(r - distance[:, None] * normal, a)[apart].max(initial=0.0) < EXACT
+    # the normal of those that cross is perpendicular to both
+    u, v = a[:, 1] - a[:, 0], b[:, 1] - b[:, 0]
+    crossing = (distance < 1e-10) & (np.linalg.norm(np.cross(u, v), axis=1) > 1e-3)
+    assert crossing.any() == (kind in ("crossing", "on a grid"))
+    for along in (u, v):
+        assert np.abs((normal * along).sum(axis=1))[crossing].max(initial=0.0) < EXACT
 
 
 @pytest.mark.parametrize("kind", KINDS)

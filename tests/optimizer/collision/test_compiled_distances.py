@@ -1,17 +1,20 @@
-"""The shared library's distances against those of numpy: in random cells, and where segments and boxes degenerate."""
+"""The C library's distances against those of numpy: in random cells, and where segments and boxes degenerate."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.collision.bodies import Body
+from joulepath.optimizer.collision.bodies import Body, Indices
 from joulepath.optimizer.collision.cores import Core, box_corners
 from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.collision.pair_arrays import PairArrays
 from joulepath.optimizer.collision.pair_distance import PairGeometry
-from joulepath.optimizer.native.shared_library import shared_library
 from tests.optimizer.cells import LOADS, arm_in_cell, cell
+from tests.optimizer.collision.numpy_distances import NumpyDistances
 from tests.optimizer.collision.test_closed_forms import COUNT, KINDS, NEARLY_PARALLEL, segments
 
 SAME = 1e-13  # m; both round
@@ -20,11 +23,19 @@ ON_DISC = 1e-8  # m; the root of the rounding of a squared cosine
 APART = 1e-6
 
 
+class NumpyGeometry(PairGeometry):
+    """All that the C library would compute, by numpy."""
+
+    def __init__(self, bodies: Sequence[Body], pairs: Indices, nq: int) -> None:
+        super().__init__(bodies, pairs, nq)
+        self._compiled = NumpyDistances(PairArrays.of(bodies, pairs))  # type: ignore[assignment]
+
+
 def of_pairs(first: list[Body], second: list[Body]) -> tuple[PairGeometry, PairGeometry]:
     """The geometry of pairs of bodies that stand still, by the library and by numpy."""
     bodies, k = [*first, *second], len(first)
     pairs = np.column_stack([np.arange(k), np.arange(k, 2 * k)])
-    return PairGeometry(bodies, pairs, 1, shared_library()), PairGeometry(bodies, pairs, 1, None)
+    return PairGeometry(bodies, pairs, 1), NumpyGeometry(bodies, pairs, 1)
 
 
 def standing(core: Core) -> Body:
@@ -68,7 +79,7 @@ def in_cell(seed: int) -> tuple[CollisionModel, PairGeometry, Array]:
     arm = arm_in_cell(LOADS[seed], cell(seed))
     model, limits = CollisionModel(arm), arm.active_limits
     q = np.random.default_rng(seed).uniform(limits.q_min, limits.q_max, (60, arm.robot.nq))
-    return model, PairGeometry(model.bodies, model.pairs, model.nq, None), model.frames(q)
+    return model, NumpyGeometry(model.bodies, model.pairs, model.nq), model.frames(q)
 
 
 @pytest.mark.parametrize("seed", range(4))

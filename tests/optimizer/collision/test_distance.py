@@ -13,7 +13,6 @@ from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.coal_distance import _lower_bound, coal_shape
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.collision.numpy_distances import NumpyDistances
 from joulepath.optimizer.collision.pair_arrays import PairArrays
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Arm, Payload
@@ -28,6 +27,7 @@ from joulepath.optimizer.problem.scene import (
     capsule_between,
 )
 from tests.optimizer.cells import LOADS, arm_in_cell
+from tests.optimizer.collision.numpy_distances import NumpyDistances
 from tests.optimizer.moves import ROBOT
 from tests.selection import long_but
 

@@ -13,7 +13,7 @@ from joulepath.optimizer.energy.kernel_cache import COMPILER_FLAGS
 from joulepath.optimizer.energy.kernel_expressions import SYMBOLICS, build, sizes
 from joulepath.optimizer.energy.kernel_functions import Compiled, Interpreted
 from joulepath.optimizer.energy.kernel_source import source, vectors
-from joulepath.optimizer.native.library_cache import compiler
+from joulepath.optimizer.native.build import compiler
 from tests.optimizer.energy.kernel_states import states
 from tests.optimizer.moves import ROBOT
 

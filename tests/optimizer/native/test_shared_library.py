@@ -1,89 +1,144 @@
-"""The library that all arms share: who makes it, what serves without it, and the frames that it computes."""
+"""The C library that all arms share: how it is compiled and loaded, and the frames that it computes."""
 
 from __future__ import annotations
 
 import os
+import re
+import shutil
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from joulepath.models.registry import load_robot, robot_names
-from joulepath.optimizer.kinematics.forward import joint_placements, link_frames, link_frames_by_numpy
-from joulepath.optimizer.native.shared_library import library_path
+from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
+from joulepath.optimizer.native import build
+from joulepath.optimizer.native.build import FOLDER, LIBRARY, BuildFailed, sources_digest
+from joulepath.optimizer.native.shared_library import LibraryUnusable, load
 
 FRAMES = 1e-14  # m and cosines; both round, and numpy's sine differs in the last digit
 
-# a motion among obstacles, by its energy
-MOTION = """
-import logging; logging.basicConfig()
-from tests.optimizer.moves import GOAL, START
-from joulepath import Arm, Problem, load_robot, optimize
-from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
-from joulepath.optimizer.native.shared_library import shared_library
-from tests.optimizer.cells import at
-scene = Scene([Obstacle("ball", Sphere(0.1), at([0.3, -0.5, 0.4]))])
-arm = Arm(robot=load_robot("ur5e"), scene=scene)
-answer = optimize(Problem(arm=arm, start=START, goal=GOAL, deadline=100))
-print(shared_library() is not None, answer.certificate.valid, answer.energy.electrical.total)
-"""
+
+def test_one_that_is_missing_is_told_with_its_remedy(tmp_path: Path) -> None:
+    with pytest.raises(LibraryUnusable, match=r"is missing\. `make ready` compiles it") as told:
+        load(tmp_path / "none.so")
+    assert isinstance(told.value, ImportError) and told.value.path == str(tmp_path / "none.so")
 
 
-def run(script: str = MOTION, **environment: str) -> tuple[list[str], str]:
-    """What a script prints in a process of its own, as words; and its log."""
-    found = subprocess.run(
-        [sys.executable, "-c", script], env=os.environ | environment, capture_output=True, text=True, timeout=300
-    )
-    assert found.returncode == 0, found.stderr
-    return found.stdout.split(), found.stderr
+def test_a_file_that_is_another_is_told(tmp_path: Path) -> None:
+    text, another = tmp_path / "text.so", tmp_path / "another.so"
+    text.write_text("no library", encoding="utf-8")
+    with pytest.raises(LibraryUnusable, match=r"cannot be loaded: .*text\.so"):
+        load(text)
+    code = tmp_path / "another.c"
+    code.write_text("double other(double x) { return x; }", encoding="utf-8")
+    compile_c(code, another)
+    with pytest.raises(LibraryUnusable, match=r"cannot be loaded: .*sources_digest"):
+        load(another)
 
 
-def test_the_answer_is_the_same_without_it(tmp_path: Path) -> None:
-    """Without a compiler, without a word; where the compiler fails, with one."""
-    compiled, _ = run()
-    assert compiled[:2] == ["True", "True"]
-    empty = {"JOULEPATH_CACHE_DIR": str(tmp_path)}
-    for name, log in (("no-such-compiler", ""), ("false", "numpy serves: the C compiler failed")):
-        by_numpy, said = run(**empty, CC=name, PATH="/nowhere" if not log else os.environ["PATH"])
-        assert by_numpy[:2] == ["False", "True"]
-        assert float(by_numpy[2]) == pytest.approx(float(compiled[2]), rel=1e-6)
-        assert log in said
+def compile_c(code: Path, target: Path) -> None:
+    compiler = build.compiler()
+    assert compiler is not None, "make installs a compiler where there is none"
+    subprocess.run([compiler, "-shared", "-fPIC", code, "-o", target], check=True)
 
 
-def test_nobody_waits_for_a_compiler_that_hangs(tmp_path: Path) -> None:
-    """It is started once for each library, numpy and the virtual machine serve, and the answers are the same."""
-    compiler, calls = tmp_path / "compiler", tmp_path / "calls"
-    compiler.write_text(f"#!/bin/sh\necho $$ >> {calls}\nexec sleep 1000\n", encoding="utf-8")
-    compiler.chmod(0o755)
-    script = (
-        f"{MOTION}answer = optimize(Problem(arm=arm, start=START, goal=GOAL, deadline=100))\nprint(shared_library())"
-    )
-    compiled, _ = run()
-    hung, said = run(script, CC=str(compiler), JOULEPATH_CACHE_DIR=str(tmp_path / "cache"))
-    assert (hung[0], hung[1], hung[3], said) == ("False", "True", "None", "")
-    assert float(hung[2]) == pytest.approx(float(compiled[2]), rel=1e-6)
-    # that of all arms, and that of this one
-    assert len(calls.read_text().split()) == 2
+@pytest.fixture
+def sources(tmp_path: Path) -> Path:
+    """A folder with the C files."""
+    folder = tmp_path / "native"
+    folder.mkdir()
+    for path in FOLDER.glob("*.c"):
+        shutil.copy(path, folder)
+    return folder
 
 
-def test_it_is_made_once_and_made_anew_when_damaged(tmp_path: Path) -> None:
-    environment = os.environ | {"JOULEPATH_CACHE_DIR": str(tmp_path)}
-    script = "from joulepath.optimizer.native.shared_library import shared_library; print(shared_library(60))"
+def test_one_of_other_sources_is_never_called(sources: Path) -> None:
+    """Whatever C file has changed: a structure of it may have another layout."""
+    load(build.build(sources))
+    with (sources / "vectors.c").open("a", encoding="utf-8") as file:
+        file.write("/* changed */\n")
+    # the loader of libraries takes a file that it knows for what it was
+    changed = sources.rename(sources.with_name("changed"))
+    with pytest.raises(LibraryUnusable, match="was compiled from other sources"):
+        load(build.build(changed))
 
-    def load() -> float:
-        found = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True)
-        assert found.stdout.startswith("<CDLL"), found.stderr
-        (library,) = tmp_path.glob("*.so")
-        assert library.name == library_path().name
-        return library.stat().st_ino
 
-    first = load()
-    assert load() == first
-    library = tmp_path / library_path().name
-    library.write_bytes(library.read_bytes()[:1000])
-    assert load() != first
+def test_a_clone_that_was_not_set_up_cannot_be_imported(tmp_path: Path) -> None:
+    """The error is that of the library, and what it says to do helps."""
+    library = build.__name__.removesuffix(".native.build")
+    for package in {library.partition(".")[0], load_robot.__module__.partition(".")[0]}:
+        spec = find_spec(package)
+        assert spec is not None and spec.submodule_search_locations
+        ignored = shutil.ignore_patterns("*.so", "__pycache__")
+        shutil.copytree(spec.submodule_search_locations[0], tmp_path / package, ignore=ignored)
+
+    def run(*command: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([sys.executable, *command], cwd=tmp_path, capture_output=True, text=True, timeout=300)
+
+    refused = run("-c", f"import {link_frames.__module__}")
+    assert refused.returncode == 1
+    said = refused.stderr.splitlines()[-1]
+    assert said.startswith(f"{LibraryUnusable.__module__}.LibraryUnusable: The C library {tmp_path}")
+    found = re.search("`python (.*build[.]py)`", said)
+    assert found is not None
+    assert run(found[1]).returncode == 0
+    assert run("-c", f"import {link_frames.__module__}").returncode == 0
+
+
+def test_it_is_compiled_for_every_processor_of_its_kind(tmp_path: Path) -> None:
+    """No result depends on the processor: what was compiled for this one gives the same frames, to the last bit."""
+    compiler = build.compiler()
+    assert compiler is not None
+    own = tmp_path / "own.so"
+    define = f'-DSOURCES_DIGEST="{sources_digest()}"'
+    flags = [*build.FLAGS, "-march=native", define]
+    subprocess.run([compiler, *flags, FOLDER / "library.c", "-o", own, "-lm"], check=True)
+    robot = load_robot("ur5e")
+    placements = joint_placements(robot.model)
+    q = np.random.default_rng(1).uniform(-7, 7, (500, robot.nq))
+    frames = np.empty((500, robot.nq + 1, 4, 4))
+    load(own).link_frames(500, robot.nq, placements.ctypes.data, q.ctypes.data, frames.ctypes.data)
+    assert frames.tobytes() == link_frames(placements, q).tobytes()
+
+
+def test_a_compiler_that_fails_is_told_with_its_remedy(
+    tmp_path: Path, sources: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What was there before stays."""
+    (sources / LIBRARY.name).write_bytes(b"before")
+    there = set(sources.iterdir())
+    monkeypatch.setattr(build, "find_spec", lambda _: None)
+    broken = tmp_path / "broken"
+    broken.write_text("#!/bin/sh\necho no such option >&2\nexit 1\n", encoding="utf-8")
+    broken.chmod(0o755)
+    monkeypatch.setenv("CC", str(broken))
+    with pytest.raises(BuildFailed, match=r"(?s)no such option.*Name a C compiler that works by CC"):
+        build.build(sources)
+    monkeypatch.setenv("CC", "no-such-compiler")
+    monkeypatch.setenv("PATH", os.devnull)
+    with pytest.raises(BuildFailed, match="neither a C compiler nor the package ziglang"):
+        build.build(sources)
+    assert (sources / LIBRARY.name).read_bytes() == b"before" and set(sources.iterdir()) == there
+
+
+def frames_by_numpy(placements: Array, q: Array) -> Array:
+    """T_base_link (n, nq + 1, 4, 4)."""
+    c, s = np.cos(q)[..., None], np.sin(q)[..., None]
+    x, y = placements[..., 0], placements[..., 1]
+    frames = np.empty((len(q), q.shape[1] + 1, 4, 4))
+    frames[:, 0] = np.eye(4)
+    # each joint's placement, turned about its z axis
+    steps = np.empty((*q.shape, 4, 4))
+    steps[..., 0], steps[..., 1] = c * x + s * y, c * y - s * x
+    steps[..., 2:] = placements[..., 2:]
+    for j in range(q.shape[1]):
+        np.matmul(frames[:, j], steps[:, j], out=frames[:, j + 1])
+    return frames
 
 
 @pytest.mark.parametrize("name", robot_names())
@@ -94,5 +149,4 @@ def test_frames_are_those_of_numpy(name: str) -> None:
     q = np.random.default_rng(4).uniform(-7, 7, (robot.nq, 200)).T
     assert not q.flags.c_contiguous
     for given, of in ((q, placements), (q[:0], placements), (q[:, :3], placements[:3]), (q[::7], placements)):
-        expected = link_frames_by_numpy(of, given)
-        np.testing.assert_allclose(link_frames(of, given), expected, rtol=0, atol=FRAMES)
+        np.testing.assert_allclose(link_frames(of, given), frames_by_numpy(of, given), rtol=0, atol=FRAMES)

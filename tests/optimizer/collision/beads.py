@@ -1,9 +1,4 @@
-"""Lower bounds on distances to large bodies: beads that cover one body, against the box or cylinder of the other.
-
-The ball around a board is as large as the board is long, and much of a cell lies within it. The distance from a point
-to a box or a cylinder has a closed form; so many beads, a few on a segment and one around any other core, bound the
-distance from below almost as well as the exact one, for a fraction of the time.
-"""
+"""Lower bounds on distances by numpy: beads that cover one body, against the box or cylinder of the other."""
 
 from __future__ import annotations
 
@@ -11,8 +6,8 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.bodies import Indices
-from joulepath.optimizer.collision.many_points import into, picked, placed, pose_columns
 from joulepath.optimizer.collision.pair_arrays import PairArrays
+from tests.optimizer.collision.many_points import into, picked, placed, pose_columns
 
 
 class Beads:

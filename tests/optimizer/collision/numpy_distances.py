@@ -1,23 +1,20 @@
-"""Distances of many pairs by numpy: bounds, closed forms, separations and gradients.
-
-Index arrays (k,) select cases: `configuration` is a row of `frames` (n, nq + 1, 4, 4), the T_base_link [m] of every
-link, and `pair` is one of the pairs. `CompiledDistances` computes the same where the shared library is at hand.
-"""
+"""Distances of many pairs by numpy, the reference of `CompiledDistances`."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.collision.beads import Beads
 from joulepath.optimizer.collision.bodies import Indices
-from joulepath.optimizer.collision.closed_form_distance import box_segment, segment_segment
-from joulepath.optimizer.collision.many_points import cross, into, picked, placed, pose_columns, turned
 from joulepath.optimizer.collision.pair_arrays import PairArrays, PairKind
+from joulepath.optimizer.kinematics.vectors import cross
+from tests.optimizer.collision.beads import Beads
+from tests.optimizer.collision.many_points import into, picked, placed, pose_columns, turned
+from tests.optimizer.collision.numpy_closed_forms import box_segment, segment_segment
 
 
 class NumpyDistances:
-    """Distances of the pairs of some bodies."""
+    """Distances of the pairs of some bodies, by the methods of `CompiledDistances`."""
 
     def __init__(self, arrays: PairArrays) -> None:
         self._arrays = arrays
@@ -72,13 +69,19 @@ class NumpyDistances:
         """Lower bounds (k,) [m] on the signed distances of pairs (k,) at configurations (k,); -inf if it has none."""
         return np.asarray(self._beads.distances(frames, configuration, pair) - self._arrays.growth[pair])
 
-    def witness_points(
+    def witness_points(self, frames: Array, configuration: Indices, pair: Indices) -> tuple[Array, Array, Array]:
+        """Signed distance of the cores (k,) [m], normal and point (k, 3); NaN where there is no closed form."""
+        result = np.full(len(pair), np.nan), np.full((len(pair), 3), np.nan), np.full((len(pair), 3), np.nan)
+        for kind in (PairKind.SEGMENT_SEGMENT, PairKind.BOX_SEGMENT, PairKind.SEGMENT_BOX, PairKind.HALF_SPACE):
+            chosen = np.flatnonzero(self._arrays.kinds[pair] == int(kind))
+            found = self._of_kind(kind, frames, configuration[chosen], pair[chosen])
+            for every, own in zip(result, found, strict=True):
+                every[chosen] = own
+        return result
+
+    def _of_kind(
         self, kind: PairKind, frames: Array, configuration: Indices, pair: Indices
     ) -> tuple[Array, Array, Array]:
-        """Signed distance of the cores (k,) [m], normal and point (k, 3), as of `PairGeometry.witness_points`.
-
-        All pairs (k,) are of this kind, which has a closed form.
-        """
         first, second = self._arrays.pairs[pair].T
         match kind:
             case PairKind.SEGMENT_SEGMENT:
@@ -119,10 +122,10 @@ class NumpyDistances:
         It never exceeds the signed distance, whatever n is. For a half-space, n must be its outward normal.
         """
         first, second = self._arrays.pairs[pair].T
-        apart = self.support(frames, configuration, second, normal)
-        return np.asarray(apart + self.support(frames, configuration, first, -normal) - self._arrays.growth[pair])
+        apart = self.supports(frames, configuration, second, normal)
+        return np.asarray(apart + self.supports(frames, configuration, first, -normal) - self._arrays.growth[pair])
 
-    def support(self, frames: Array, configuration: Indices, body: Indices, normal: Array) -> Array:
+    def supports(self, frames: Array, configuration: Indices, body: Indices, normal: Array) -> Array:
         """min n·x (k,) [m] over the cores of bodies (k,)."""
         arrays = self._arrays
         T = frames[configuration, arrays.links[body]]

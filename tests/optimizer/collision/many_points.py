@@ -37,11 +37,3 @@ def into(T: Array, points: Array) -> Array:
 def turned(T: Array, vectors: Array) -> Array:
     """Vectors (3, k) by the rotations of poses T (3, 4, k)."""
     return np.asarray(T[:, 0] * vectors[0] + T[:, 1] * vectors[1] + T[:, 2] * vectors[2])
-
-
-def cross(a: Array, b: Array) -> Array:
-    """Products a × b (..., 3)."""
-    result = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        result[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
-    return result
