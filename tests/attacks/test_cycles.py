@@ -14,7 +14,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from tests.optimizer.cycle.rounds import pick_and_place
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
@@ -33,6 +32,7 @@ from joulepath.optimizer.problem.free_order import FreeOrder
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stops import Stop
 from tests.optimizer.clocks import CountingClock
+from tests.optimizer.cycle.cycles import pick_and_place
 from tests.optimizer.moves import AMPLE, ROBOT, fixed
 from tests.selection import long_but
 

@@ -209,7 +209,7 @@ def seeded(seed: int) -> dict[str, Problem]:
         "pose": problem(q_start, tcp_pose(q_goal)),
         "weak motors": problem(q_start, q_goal, limits=weak),
         "payload": problem(q_start, q_goal, payload=PAYLOAD),
-        "cycle": problem(q_start, q_goal, cycle=Dwell(4.0, "brakes", 0.3)),
+        "cycle": problem(q_start, q_goal, dwell=Dwell(4.0, "brakes", 0.3)),
         "storage": problem(q_start, q_goal, payload=PAYLOAD, bus=Bus("storage", 0.9, 5.0, 200.0)),
         "isolated": problem(q_start, q_goal, bus=Bus("isolated")),
         "bounded": problem(q_start, q_goal, duration_min=1.5, duration_max=4.0),

@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from tests.optimizer.cycle.rounds import pick_and_place
 
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.pareto import pareto
@@ -15,6 +14,7 @@ from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Event, Improved, forward, nobody
 from joulepath.optimizer.search.candidates import Reason
+from tests.optimizer.cycle.cycles import pick_and_place
 from tests.optimizer.moves import GOAL, HOME, problem, tcp_pose
 from tests.selection import long_but
 

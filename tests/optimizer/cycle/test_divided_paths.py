@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.optimizer.cycle.rounds import PART
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.divided_paths import PLACES, _cheapest, _costs, with_divided_paths
@@ -25,6 +24,7 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stop_path import StopPath
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.tool_path import ToolPath
+from tests.optimizer.cycle.cycles import PART
 from tests.optimizer.cycle.test_optimize_cycle import assert_true
 from tests.optimizer.cycle.test_paths import FREE, a_cycle, down
 from tests.optimizer.moves import ROBOT

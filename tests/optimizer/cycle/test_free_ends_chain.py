@@ -9,7 +9,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tests.optimizer.cycle.rounds import HOME, PART
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
@@ -33,6 +32,7 @@ from joulepath.optimizer.problem.stop_path import StopPath
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.tool_path import ToolPath
 from joulepath.optimizer.search.lower_bound import LeastBound
+from tests.optimizer.cycle.cycles import HOME, PART
 from tests.optimizer.moves import AMPLE
 from tests.selection import long_but
 

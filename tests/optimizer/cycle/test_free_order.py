@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.optimizer.cycle.rounds import pick_and_place
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
@@ -19,6 +18,7 @@ from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.free_order import FreeOrder
 from tests.optimizer.clocks import CountingClock
+from tests.optimizer.cycle.cycles import pick_and_place
 from tests.optimizer.cycle.test_lines import with_lines
 from tests.optimizer.cycle.test_optimize_cycle import assert_true
 from tests.selection import long_but

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tests.optimizer.cycle.rounds import HOME
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle import free_orientations, ways
@@ -26,6 +25,7 @@ from joulepath.optimizer.problem.stop_path import StopPath
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.tool_path import ToolPath
 from tests.optimizer.clocks import CountingClock
+from tests.optimizer.cycle.cycles import HOME
 from tests.optimizer.cycle.test_optimize_cycle import assert_true
 from tests.optimizer.moves import AMPLE, ROBOT, tcp_pose
 from tests.selection import long_but

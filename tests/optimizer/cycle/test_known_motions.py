@@ -7,7 +7,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from tests.optimizer.cycle.rounds import HOME, pick_and_place
 
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.cycle.known_motions import KnownMotion, KnownMotions, knowing
@@ -18,6 +17,7 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.trajectories.spline import Spline
+from tests.optimizer.cycle.cycles import HOME, pick_and_place
 from tests.optimizer.cycle.test_optimize_cycle import assert_true
 from tests.optimizer.moves import ROBOT
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.optimizer.cycle.rounds import HOME, pick_and_place
 
 from joulepath.optimizer.cycle.ways import layers_of
 from joulepath.optimizer.exceptions import InvalidProblem, PathInfeasible, StopInCollision
@@ -21,6 +20,7 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
 from joulepath.optimizer.problem.stops import Stop
+from tests.optimizer.cycle.cycles import HOME, pick_and_place
 from tests.optimizer.cycle.test_optimize_cycle import assert_true
 from tests.optimizer.moves import AMPLE, ROBOT, tcp_pose
 

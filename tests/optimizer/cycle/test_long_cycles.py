@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from tests.optimizer.cycle.rounds import PART, pick_and_place
 
 from joulepath.optimizer.cycle import cycle_search, legs
 from joulepath.optimizer.cycle.cycle_search import MANY_STOPS
@@ -19,6 +18,7 @@ from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.progress import Event, Improved
 from tests.optimizer.clocks import CountingClock
+from tests.optimizer.cycle.cycles import PART, pick_and_place
 
 # a counting clock never comes to it
 ENDLESS = 1e9

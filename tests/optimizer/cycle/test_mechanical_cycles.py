@@ -8,7 +8,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from tests.optimizer.cycle.rounds import HOME, pick_and_place
 
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.cycle.ways import layers_of
@@ -21,6 +20,7 @@ from joulepath.optimizer.search.mechanical_bound import mechanical_bounds
 from joulepath.optimizer.search.priced_work import CELLS, WORKS, priced_work_bounds
 from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 from joulepath.optimizer.trajectories.time_scalings import quintic_spline
+from tests.optimizer.cycle.cycles import HOME, pick_and_place
 from tests.optimizer.moves import ROBOT
 from tests.selection import long_but
 

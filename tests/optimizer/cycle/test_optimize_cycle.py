@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.optimizer.cycle.rounds import HOME, PART, pick_and_place, poses
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
@@ -37,6 +36,7 @@ from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.ends import EndConfiguration
 from tests.optimizer.clocks import CountingClock
+from tests.optimizer.cycle.cycles import HOME, PART, pick_and_place, poses
 from tests.optimizer.moves import AMPLE, ROBOT, torques
 from tests.selection import long_but
 

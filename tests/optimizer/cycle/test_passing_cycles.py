@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.optimizer.cycle.rounds import HOME, PART, poses
 
 from joulepath.optimizer.cycle.against_stopping import as_passed, start_from
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
@@ -27,6 +26,7 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.run import Run
+from tests.optimizer.cycle.cycles import HOME, PART, poses
 from tests.optimizer.moves import AMPLE, ROBOT
 from tests.selection import long_but
 

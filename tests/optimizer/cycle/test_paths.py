@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.optimizer.cycle.rounds import HOME, PART, pick_and_place
 
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.priced_search import priced_motion
@@ -27,6 +26,7 @@ from joulepath.optimizer.problem.stop_path import StopPath
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.problem.tool_path import ToolPath
+from tests.optimizer.cycle.cycles import HOME, PART, pick_and_place
 from tests.optimizer.cycle.test_lines import INTO
 from tests.optimizer.cycle.test_optimize_cycle import assert_true
 from tests.optimizer.moves import AMPLE, ROBOT, tcp_pose

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.optimizer.cycle.rounds import HOME, pick_and_place
 
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
@@ -26,6 +25,7 @@ from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stops import Stop
 from tests.optimizer.clocks import CountingClock, still
+from tests.optimizer.cycle.cycles import HOME, pick_and_place
 from tests.optimizer.cycle.test_optimize_cycle import assert_true
 from tests.optimizer.moves import AMPLE, fixed, torques
 from tests.selection import long_but
