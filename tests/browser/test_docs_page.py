@@ -14,8 +14,7 @@ from tests.browsers import BROWSER, MISSING, chromium
 
 PATIENCE = 1000 * ANSWER  # [ms]
 
-pytestmark = [pytest.mark.long, pytest.mark.skipif(BROWSER is None, reason=MISSING)]
-
+pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
 
 POST = """([url, mode, key]) => fetch(url + "/studies", {
     method: "POST", mode, body: '{"name": "x", "threshold": 1}', headers: key ? {Authorization: "Bearer " + key} : {},
