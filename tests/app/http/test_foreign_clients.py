@@ -18,9 +18,8 @@ EVENTS, CSV = "text/event-stream", "text/csv"
 
 @pytest.fixture(scope="module")
 def service() -> Iterator[Server]:
-    """A server whose workers are not waited for: nothing is computed."""
-    with serving(warm=False, workers=1) as server:
-        server.wait_listening()
+    """A server without worker processes: nothing is computed."""
+    with serving(recorded=True) as server:
         yield server
 
 

@@ -24,10 +24,7 @@ PAGE = "https://cell4.example"
 @pytest.fixture(scope="module")
 def service() -> Iterator[Server]:
     """Open, with one name and one page that are allowed."""
-    with serving(
-        warm=False, workers=1, robots="", allowed_hosts="robots.example", cors_origins=PAGE, host="127.0.0.1"
-    ) as server:
-        server.wait_listening()
+    with serving(recorded=True, allowed_hosts="robots.example", cors_origins=PAGE, host="127.0.0.1") as server:
         yield server
 
 

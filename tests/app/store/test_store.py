@@ -248,7 +248,7 @@ def test_unknown_answer(client: TestClient, id: str) -> None:
     ],
 )
 def test_without_its_database_the_service_goes_on(url: str) -> None:
-    with serving(warm=False, workers=1, database_url=url) as server:
+    with serving(warm=False, recorded=True, database_url=url) as server:
         until_refused(server, "unreachable")
         assert server.get("/healthz").status_code == 200
         assert server.post("/optimize", move()).status_code == 200
