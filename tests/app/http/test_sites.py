@@ -170,11 +170,6 @@ def test_what_a_client_says_of_its_address_is_not_believed(service: Server) -> N
     assert service.request_logged("/robots/without_a_proxy")["client"] == "127.0.0.1"
 
 
-def test_the_log_says_that_access_is_open(service: Server) -> None:
-    (entry,) = [entry for entry in service.logged() if entry["message"] == "access is open"]
-    assert (entry["level"], entry["to"]) == ("info", "every user and program of this machine")
-
-
 def test_any_name_and_page_where_the_operator_says_so() -> None:
     client = TestClient(create_app(Settings(allowed_hosts=("*",), cors_origins=("*",))), base_url="http://evil.example")
     headers = {"Origin": "https://evil.example", "Sec-Fetch-Site": "cross-site"}

@@ -96,13 +96,6 @@ def test_a_wrong_page_is_refused(recorded: TestClient, query: str) -> None:
     problems.Validation.model_validate_json(answer.content)
 
 
-def test_the_path_is_never_looked_for_in_the_callers_texts(client: TestClient) -> None:
-    name = '","answer":"/answers/5c0a0e0f-8d1f-4f1c-9a43-2f4a3ad0d1b7"}'
-    ball = {"name": name, "shape": "sphere", "radius": 0.01, "pose": {"position": [0.0, 0.0, 1.2], "rpy": [0, 0, 0]}}
-    content = client.post("/optimize", json=move(scene={"obstacles": [ball]})).json()
-    assert client.get(content["answer"]).json()["answer"] == content
-
-
 def test_a_result_that_is_not_kept_says_so() -> None:
     name = '","id":null,"answer":"x"}'
     result = TaskResult.of_kept_json({"request": "r", "id": None, "name": name, "answer": None}, AnswerFigures())

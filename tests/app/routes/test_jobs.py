@@ -265,12 +265,6 @@ def test_a_table_is_evaluated_at_once(recorded: TestClient) -> None:
     assert (answer.status_code, "preference-applied" in answer.headers) == (200, False)
 
 
-def test_settings_beside_a_json_body_are_refused_now_or_later(recorded: TestClient) -> None:
-    for headers in (LATER, {}):
-        answer = recorded.post("/evaluate", json=evaluation()["evaluate"], params={"robot": "ur3e"}, headers=headers)
-        refused(answer, problems.Validation)
-
-
 def test_a_job_may_have_a_longer_deadline(recorded: TestClient) -> None:
     longer = move(deadline=300.0)
     refused(recorded.post("/optimize", json=longer), problems.Validation)

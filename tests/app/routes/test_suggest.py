@@ -108,18 +108,6 @@ def test_other_orientations_are_of_the_same_point(slow: Any) -> None:
     assert min(np.abs(solution.q - NEAR).max() for solution in solutions) < 1e-9
 
 
-def test_turns_are_about_the_axis_asked_for() -> None:
-    turn = np.array([0.0, 0.0, 0.5])
-    arm = Arm(robot=load_robot("ur5e"))
-    (at, before), (still_at, after) = rotated_poses(arm, np.array(HOME), [np.zeros(3), turn])
-    R_before, R_after = (
-        to_matrix(QuaternionPose(position=[0.0] * 3, quaternion=q.tolist()))[:3, :3] for q in (before, after)
-    )
-    assert np.array_equal(at, still_at)
-    c, s = np.cos(0.5), np.sin(0.5)
-    assert R_before.T @ R_after == pytest.approx(np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), abs=1e-12)
-
-
 @pytest.mark.long
 def test_the_best_motion_to_a_pose_is_hard_to_beat(client: TestClient) -> None:
     path = begin(client, threshold=10.0)

@@ -203,13 +203,6 @@ def test_positions_stay_inside_a_narrow_range() -> None:
     assert found.cost > free.cost
 
 
-def test_a_fixed_duration_is_kept() -> None:
-    mine = program(START, GOAL, **fixed(1.234))
-    for guess in (0.5, 1.234, 3.0):
-        found = solve(mine, quintic(mine), guess)
-        assert found.status is SqpStatus.SOLVED and found.duration == 1.234
-
-
 def test_durations_stay_between_their_bounds() -> None:
     """At a bound where the best duration lies beyond it; an arm that idles cheaply likes to take its time."""
     lazy = replace(ROBOT, electronics=replace(ROBOT.electronics, idle_power=3.0))
