@@ -41,10 +41,6 @@ CONTRASTS = """() => {
     }
     return found;
 }"""
-TWICE = """() => {
-    document.documentElement.style.fontSize = "32px";
-    document.body.style.fontSize = "28px";
-}"""
 # pairs of controls and headings of which one covers the other, and those that are cut at the edge of the page
 CROWDED = """() => {
     const all = [...document.querySelectorAll("h1, h2, button, .button, select, summary, label, #joules, #facts")]
