@@ -146,21 +146,21 @@ class Cycle:
         for field in (field for field, there in given.items() if there):
             raise InvalidProblem(
                 f"stops.{k}.{field}",
-                f"The arm passes through stop {stop.name!r} without a rest: leave out its {field}, or set its pass to "
+                f"The arm passes through stop {stop.name!r} without a rest: leave out its {field}, or set its via to "
                 "false.",
             )
         if self.objective == "mechanical":
             raise InvalidProblem(
-                f"stops.{k}.pass", "A cycle of least mechanical work rests at every stop: set pass to false."
+                f"stops.{k}.via", "A cycle of least mechanical work rests at every stop: set via to false."
             )
         if self.order is not None:
             raise InvalidProblem(
-                f"stops.{k}.pass",
-                "With a free order the arm rests at every stop: give the order, or set pass to false.",
+                f"stops.{k}.via",
+                "With a free order the arm rests at every stop: give the order, or set via to false.",
             )
         if not self.closed and k == len(self.stops) - 1:
             raise InvalidProblem(
-                f"stops.{k}.pass", "A cycle that is not closed ends at rest at its last stop: set its pass to false."
+                f"stops.{k}.via", "A cycle that is not closed ends at rest at its last stop: set its via to false."
             )
 
     def _check_passes(self) -> None:
@@ -169,8 +169,8 @@ class Cycle:
             passed = passed + 1 if stop.via else 0
             if passed > MOST_PASSES:
                 raise InvalidProblem(
-                    f"stops.{k}.pass",
-                    f"The arm passes through at most {MOST_PASSES} stops between two rests: set pass to false here.",
+                    f"stops.{k}.via",
+                    f"The arm passes through at most {MOST_PASSES} stops between two rests: set via to false here.",
                 )
 
     def _check_limits(self, k: int, stop: Stop) -> None:

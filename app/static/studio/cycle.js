@@ -25,12 +25,12 @@ export async function showCycle(cycle, request) {
   const answer = {
     ...first, answer: cycle.answer ?? null, arm: null, trajectory, duration: cycle.duration, status: cycle.status, energy: cycle.energy, objective: "electrical",
     baselines: cycle.baselines.map((each) => ({ ...each, mechanical: 0, reason: each.within_limits ? null : "a limit of a move" })),
-    candidates: [], candidate_counts: {}, certificate: { ...first.certificate, ...round.certificate, clearance }, warnings: cycle.warnings,
+    candidates: [], candidate_counts: {}, certificate: { ...first.certificate, ...cycle.certificate, clearance }, warnings: cycle.warnings,
     branch: { start: cycle.legs[0].start, goal: cycle.legs.at(-1).goal },
   };
   const asked = { ...first.arm, ...request };
   const cell = cellOf({ ...asked, robot: cycle.robot }, robot);
-  const shown = { ...round, loads: loadsOf(cycle.legs, moves, asked) };
+  const shown = { ...cycle, loads: loadsOf(cycle.legs, moves, asked) };
   set({ asked: request, cell, robot, answer, chosen: [], time: 0, duration: cycle.duration, arms: [{ name: "cycle", answer }], cycle: shown });
 }
 
@@ -76,7 +76,7 @@ function draw() {
   const { cycle } = state;
   $("cycle").hidden = !cycle;
   if (!cycle) return;
-  const most = Math.max(...round.legs.map(({ electrical, duration }) => electrical / (duration || Infinity)));
+  const most = Math.max(...cycle.legs.map(({ electrical, duration }) => electrical / (duration || Infinity)));
   const legs = cycle.legs.map((leg) => {
     const text = `${legName(leg)}: ${figure(leg.duration)} s, ${figure(leg.electrical)} J, ${figure(leg.payload_mass)} kg`;
     const button = el("button", { type: "button", class: `leg ${leg.kind}`, title: text, "aria-label": text, onclick: () => goTo(leg.t0) }, el("span", {}, figure(leg.electrical)));
@@ -94,7 +94,7 @@ function draw() {
 
 /** Which leg the arm is on now. */
 function mark() {
-  if (!state.round) return;
-  const now = legAt(state.round.legs, state.time);
+  if (!state.cycle) return;
+  const now = legAt(state.cycle.legs, state.time);
   for (const list of $("timeline").querySelectorAll(".legs, tbody")) [...list.children].forEach((each, k) => each.toggleAttribute("data-now", k === now));
 }

@@ -157,7 +157,7 @@ function drawBox() {
 
 /** The request with one more box, on the floor between two of its corners [x, y]. */
 function withBox(request, first, last) {
-  const cycle = (value) => Math.round(value * 1000) / 1000;
+  const round = (value) => Math.round(value * 1000) / 1000;
   const size = first.map((value, axis) => Math.max(0.01, round(Math.abs(last[axis] - value))));
   const position = first.map((value, axis) => round((value + last[axis]) / 2));
   const obstacles = request.scene?.obstacles ?? [];

@@ -10,7 +10,7 @@ let front = null; // {points, asked}
 export function createFront() {
   $("compute-front").onclick = () => ask().catch(problem);
   follow("answer", draw);
-  follow("cycle", () => { $("compute-front").disabled = Boolean(state.round); });
+  follow("cycle", () => { $("compute-front").disabled = Boolean(state.cycle); });
 }
 
 async function ask() {

@@ -44,7 +44,7 @@ async function start() {
   const given = inside ?? (await shared().catch(instead));
   if (inside) {
     robots.set(inside.robot.name, inside.robot);
-    await showAnswer(inside.answer, inside.request, inside.round);
+    await showAnswer(inside.answer, inside.request, inside.cycle);
   } else if (given?.answer) {
     await openAnswer(given.answer).catch(instead);
   } else if (given) {

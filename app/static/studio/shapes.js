@@ -28,9 +28,9 @@ export function along(from, to, make) {
 export const capsule = (from, to, radius, segments = 20) =>
   along(from, to, (length) => upright(new THREE.CapsuleGeometry(radius, length, 8, segments)));
 
-/** A cylinder along z whose edges are rounded by `cycle` [m]. */
-export function roundedCylinder(radius, length, cycle, segments = 32) {
-  const edge = Math.min(cycle, radius / 2, length / 2);
+/** A cylinder along z whose edges are rounded by `round` [m]. */
+export function roundedCylinder(radius, length, round, segments = 32) {
+  const edge = Math.min(round, radius / 2, length / 2);
   const [wide, high] = [radius - edge, length / 2 - edge];
   const profile = new THREE.Path().lineTo(0, -length / 2).absarc(wide, -high, edge, -Math.PI / 2, 0).absarc(wide, high, edge, 0, Math.PI / 2).lineTo(0, length / 2);
   return upright(new THREE.LatheGeometry(profile.getPoints(2).slice(1), segments));

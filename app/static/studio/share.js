@@ -12,7 +12,7 @@ export function createShare(view) {
   $("downloads").ontoggle = () => $("downloads").open && !$("exports") && !embedded() && offerExports().catch(problem);
   if ($("share")) $("share").onclick = () => share().catch(problem);
   const files = [
-    ["Answer (JSON)", () => save("answer.json", JSON.stringify(state.round ? { ...state.round, loads: undefined } : state.answer), "application/json"), true],
+    ["Answer (JSON)", () => save("answer.json", JSON.stringify(state.cycle ? { ...state.cycle, loads: undefined } : state.answer), "application/json"), true],
     ["Samples (CSV)", () => save("motion.csv", csv(state.answer.trajectory), "text/csv"), true],
     ["Page that stands alone (HTML)", async () => save("motion.html", await standalone(), "text/html")],
     ["Request (JSON)", () => save("request.json", JSON.stringify(state.asked ?? state.request, null, 1), "application/json"), true],

@@ -205,7 +205,7 @@ class View {
       this.parts.ghosts.add(arm.object);
     };
     ghost(answer.trajectory.q[0], START, 0.2);
-    // a round ends where it begins
+    // a cycle ends where it begins
     if (!cycle) ghost(answer.trajectory.q.at(-1), GOAL, 0.2);
     chosen.forEach(({ q_goal }, k) => ghost(q_goal, new THREE.Color(style(`--joint-${k + 2}`)).getHex(), 0.42));
     if (best?.q_goal && best.robot === answer.robot) ghost(best.q_goal, new THREE.Color(style("--good")).getHex(), 0.42);
@@ -244,7 +244,7 @@ class View {
     });
     for (const name of ["ghosts", "path", "axes"]) this.parts[name].visible = show[name];
     $("labels").toggleAttribute("data-without-axes", !show.axes);
-    // in a round the arm is elsewhere most of the time
+    // in a cycle the arm is elsewhere most of the time
     const near = this.nearest && show.nearest && (!cycle || Math.abs(time - answer.certificate.clearance.time) < NEAR);
     this.parts.nearest.visible = Boolean(near);
     if (near) this.labels.put("nearest", this.nearest.text, this.nearest.at, "near");
