@@ -10,13 +10,11 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath.app.main import create_app
 from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.jobs import Job, JobList
 from joulepath.app.schemas.response import OptimizeResponse
-from joulepath.app.settings import Settings
 from tests.app.job_clients import ended, evaluation, optimization, parsed, sent, shown
-from tests.app.live import LOCAL
+from tests.app.recorded import recorded_service
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_problems import refused
 
@@ -273,8 +271,7 @@ def test_a_job_may_have_a_longer_deadline(recorded: TestClient) -> None:
 
 
 def test_limits_of_the_service() -> None:
-    settings = Settings(workers=1, max_waiting=3, max_job_bytes=4096, max_job_deadline=5.0)
-    with TestClient(create_app(settings), base_url=LOCAL, raise_server_exceptions=False) as small:
+    with recorded_service(max_waiting=3, max_job_bytes=4096, max_job_deadline=5.0) as small:
         content = refused(small.post("/jobs", json={"requests": [evaluation()] * 4}), problems.Busy)
         assert "jobs" in content["detail"]
         answer = small.post("/jobs", json={"requests": [optimization()] * 100})

@@ -9,16 +9,14 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.convert.pose import to_matrix
-from joulepath.app.main import create_app
 from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.common import QuaternionPose
 from joulepath.app.schemas.suggestions import Suggestions
-from joulepath.app.settings import Settings
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.tcp import rotated_poses
 from joulepath.optimizer.problem.arm import Arm
-from tests.app.live import LOCAL
+from tests.app.recorded import recorded_service
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_studies import ABSENT, SECRET, added, begin
 
@@ -207,7 +205,7 @@ def test_what_cannot_be_is_listed(client: TestClient) -> None:
 def test_a_shutdown_is_told_as_one(client: TestClient) -> None:
     path = begin(client)
     added(client, path, {"optimize": move()})
-    with TestClient(create_app(Settings(workers=1)), base_url=LOCAL, raise_server_exceptions=False) as stopping:
+    with recorded_service() as stopping:
         assert stopping.portal is not None
         stopping.portal.call(stopping.app.state.engine.drain)  # type: ignore[attr-defined]
         answer = stopping.get(f"{path}/suggest")
