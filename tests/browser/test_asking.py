@@ -196,10 +196,10 @@ def test_a_cycle_is_played_as_one(browser: Browser, service: Server, page: Page)
     page.locator("#json").blur()
     page.locator("#optimise").click()
     expect(page.locator("#timeline .leg").first).to_be_visible()
-    legs = state(page, "round.legs")
+    legs = state(page, "cycle.legs")
     assert page.locator("#timeline .leg").count() == len(legs)
     t, q = np.array(state(page, "answer.trajectory.t")), np.array(state(page, "answer.trajectory.q"))
-    assert t[0] == 0 and t[-1] == pytest.approx(state(page, "round.duration")) and (np.diff(t) > -ROUNDING).all()
+    assert t[0] == 0 and t[-1] == pytest.approx(state(page, "cycle.duration")) and (np.diff(t) > -ROUNDING).all()
     assert np.abs(np.diff(q, axis=0)).max() < 0.1
     assert page.locator("#timeline tbody tr").count() == len(legs)
     for k, leg in enumerate(legs):
@@ -207,7 +207,7 @@ def test_a_cycle_is_played_as_one(browser: Browser, service: Server, page: Page)
         assert state(page, "time") == pytest.approx(leg["t0"])
         assert page.evaluate(CARRIED) == (1 if leg["payload_mass"] else 0), "what it carries on this leg is drawn"
     expect(page.locator(".label.stop", has_text="finished")).to_be_visible()
-    kept = state(page, "round.answer").removeprefix("/answers/")
+    kept = state(page, "cycle.answer").removeprefix("/answers/")
     with opened(browser, f"{service.url}/studio#answer={kept}") as other:
         until(other, SHOWN)
         assert other.locator("#timeline .leg").count() == len(legs)
@@ -223,7 +223,7 @@ def test_what_does_not_count_at_a_stop_is_faint(page: Page) -> None:
     names = page.evaluate("() => studio.view.parts.obstacles.children.map(({ userData }) => userData.name)")
     part = f"studio.view.parts.obstacles.children[{names.index('part')}]"
     faint = []
-    for k, leg in enumerate(legs := state(page, "round.legs")):
+    for k, leg in enumerate(legs := state(page, "cycle.legs")):
         page.locator("#timeline .leg").nth(k).click()
         assert state(page, "time") == pytest.approx(leg["t0"])
         page.evaluate("() => studio.view.render()")
@@ -240,7 +240,7 @@ def test_what_is_kept_opens_again(page: Page, service: Server) -> None:
     page.locator("#pane-kept li button", has_text="press").click()
     expect(page.get_by_role("button", name="← all")).to_be_visible()
     page.locator("#pane-kept li button").first.click()
-    until(page, "() => studio.state.round === null")
+    until(page, "() => studio.state.cycle === null")
     assert state(page, "answer.branch.goal.q") == pytest.approx(NEAR)
     page.get_by_role("button", name="← all").click()
     page.locator("#pane-kept li button", has_text=" J, ").nth(1).click()
