@@ -242,11 +242,6 @@ def test_a_malformed_study_is_refused(recorded: TestClient, body: dict[str, Any]
     assert SECRET not in answer.text
 
 
-def test_a_threshold_that_is_no_number_is_refused(recorded: TestClient) -> None:
-    answer = recorded.post("/studies", content=b'{"name": "A", "threshold": NaN}')
-    problems.Validation.model_validate_json(answer.content)
-
-
 def test_an_unknown_robot_is_refused(recorded: TestClient) -> None:
     answer = recorded.post("/studies", json={"name": "A study", "threshold": 50.0, "robot": "r2d2"})
     problems.UnknownRobot.model_validate_json(answer.content)
