@@ -201,8 +201,8 @@ def test_garbage_on_the_socket_is_answered_with_a_problem(server: Server, garbag
 
 def test_sigterm_answers_or_refuses_all_in_flight() -> None:
     # the grace is ample for the short ones on a busy machine, and too short for those that wait
-    with serving(workers=2, queue_size=4, shutdown_grace=4) as server, ThreadPoolExecutor(5) as pool:
-        short = start_work(server, lambda: in_background(pool, server, long_search(deadline=0.5), 2), workers=2)
+    with serving(workers=2, queue_size=4, shutdown_grace=6) as server, ThreadPoolExecutor(5) as pool:
+        short = start_work(server, lambda: in_background(pool, server, long_search(deadline=1), 2), workers=2)
         waiting = in_background(pool, server, long_search(deadline=60), 3)
         everyone = server.descendants()
         # a service manager signals every process
