@@ -83,6 +83,7 @@ def test_one_bad_local_optimum_is_not_the_shortest_duration() -> None:
     assert exact.status == "feasible"
 
 
+@pytest.mark.long
 def test_a_baseline_within_the_limits_is_no_faster_than_the_shortest_duration() -> None:
     asked = slow()
     ruckig = next(each for each in optimize(asked).baselines if each.name == "ruckig")
@@ -104,6 +105,7 @@ def test_a_front_begins_at_the_fastest_motion() -> None:
     assert len(front.points) == 5
 
 
+@pytest.mark.long
 def test_a_cycle_takes_any_time_from_the_fastest_one_on() -> None:
     start, goal = map(np.array, LOCAL)
     arm = Arm(robot=ROBOT, collisions=False)
