@@ -33,7 +33,7 @@ from joulepath.optimizer.export.npz_arrays import to_npz
 from joulepath.optimizer.export.program import Move, Program
 from joulepath.optimizer.export.quintic_points import POSITION_TOLERANCE
 from joulepath.optimizer.export.rapid import to_rapid
-from joulepath.optimizer.export.ros_messages import to_moveit, to_ros2
+from joulepath.optimizer.export.ros_messages import MoveitOptions, to_moveit, to_ros2
 from joulepath.optimizer.export.urscript import SET_POINT_ERROR, to_urscript
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.problem import Problem
@@ -78,7 +78,7 @@ def of_ros2(program: Program) -> Deviation:
 
 def of_moveit(program: Program) -> Deviation:
     """Of the quintics between the points."""
-    content = orjson.loads(to_moveit(program, "json").content)
+    content = orjson.loads(to_moveit(program, MoveitOptions("json")).content)
     return deviations(program, followed(content["joint_trajectory"]))[0], POSITION_TOLERANCE
 
 

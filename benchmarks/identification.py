@@ -35,8 +35,8 @@ from joulepath.optimizer.identify.arm.base_parameters import base_parameters
 from joulepath.optimizer.identify.estimates.estimate import Name
 from joulepath.optimizer.identify.fits.base_fit import BaseFit, base_arm, fit_base
 from joulepath.optimizer.identify.fits.fitting import fit_rows
-from joulepath.optimizer.identify.identify import fit
-from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.identify import identify
+from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.quality.interval import energy_sd, spread_of
 from joulepath.optimizer.identify.quality.validation import power_errors, torque_errors
 from joulepath.optimizer.identify.results import TorqueErrors
@@ -53,7 +53,7 @@ MOVES_OF_A_DRAW = 5
 OFTEN = 0.2
 # W, standard deviation of the power that each simulated move draws beside the model's: 1 % of a move's energy
 MOVE_EFFECT = 0.6
-TX40_OPTIONS = Options(terms=("coulomb", "viscous", "offset"), couplings=(WRIST,), held_out=0.0)
+TX40_OPTIONS = IdentificationOptions(terms=("coulomb", "viscous", "offset"), couplings=(WRIST,), held_out=0.0)
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def ur3e_power(place: Path | None, _: int) -> list[Gate]:
     assert place is not None
     robot, log = ur3e(place)
     rows = rows_of(robot, [replace(log, effort=None, effort_meaning=None)])
-    options = Options(held_out=0.0)
+    options = IdentificationOptions(held_out=0.0)
     predicted, inside, half = np.full(len(rows.power), np.nan), list[bool](), list[float]()
     for group in rows.groups:
         out = rows.group == group
@@ -109,7 +109,7 @@ def ur3e_power(place: Path | None, _: int) -> list[Gate]:
     ]
 
 
-def _draws(robot: Robot, rows: Rows, options: Options) -> float:
+def _draws(robot: Robot, rows: Rows, options: IdentificationOptions) -> float:
     """P90 [%] of the error of the energy of all other motions, predicted from five moves at random."""
     random, errors = np.random.default_rng(0), list[float]()
     moves = np.unique(rows.move)
@@ -177,7 +177,7 @@ def _of_simulated_arms(channels: str, effect: float, runs: int) -> list[Gate]:
     for seed in range(runs):
         truth = truth_of(robot, seed)
         log = off_the_model(recorded(robot, truth, moves=14, seed=seed).log(), effect, seed)
-        found = fit(robot, [replace(log, effort=None, effort_meaning=None) if channels == "power alone" else log])
+        found = identify(robot, [replace(log, effort=None, effort_meaning=None) if channels == "power alone" else log])
         assert found.validation is not None and found.validation.coverage is not None
         shares.append(found.validation.coverage)
         for each in found.parameters:
@@ -209,11 +209,14 @@ def times(_: Path | None, __: int) -> list[Gate]:
     robot = load_robot("ur10e")
     log = recorded(robot, truth_of(robot), moves=10).log()
     found = list[Gate]()
-    for what, options, most in (("without", Options(), 1.0), ("with", Options(refit=True), 3.0)):
+    for what, options, most in (
+        ("without", IdentificationOptions(), 1.0),
+        ("with", IdentificationOptions(refit=True), 3.0),
+    ):
         spent = list[float]()
         for _repeat in range(3):
             start = time.process_time()
-            fit(robot, [log], options)
+            identify(robot, [log], options)
             spent.append(time.process_time() - start)
         found.append(Gate(f"fit of {log.duration:.0f} s of log {what} inertials [s]", min(spent), 0.0, most))
     return found
@@ -229,7 +232,9 @@ def _days() -> list[Gate]:
     robot, same, unknown = load_robot("ur10e"), list[TorqueErrors](), list[TorqueErrors]()
     for unit in range(UNITS):
         truth, random = truth_of(robot, unit), np.random.default_rng(unit)
-        found = fit(robot, [log_of(robot, day_of(robot, truth, 100 + unit, 1.0, 10))], Options(held_out=0.0))
+        found = identify(
+            robot, [log_of(robot, day_of(robot, truth, 100 + unit, 1.0, 10))], IdentificationOptions(held_out=0.0)
+        )
         for day in range(DAYS):
             friction = random.normal(1.0, DAY_SD) if day else 1.0
             other = day_of(robot, truth, 200 + 10 * unit + day, friction, 6)
@@ -259,7 +264,7 @@ def _payloads() -> list[Gate]:
         truth, friction = truth_of(robot, unit), np.random.default_rng(unit).normal(1.0, DAY_SD)
         empty = log_of(robot, day_of(robot, truth, 400 + unit, 1.0, 10))
         full = log_of(robot, day_of(robot, truth, 500 + unit, friction, 10, payload))
-        carried = fit(robot, [empty, full], Options(fit=("payload",), held_out=0.0)).payload
+        carried = identify(robot, [empty, full], IdentificationOptions(fit=("payload",), held_out=0.0)).payload
         assert carried is not None
         off.append(100 * abs(carried.mass / payload.mass - 1))
         sd.append(float(np.sqrt(carried.covariance[0, 0])))
@@ -279,7 +284,7 @@ def _halves() -> list[Gate]:
         rows = rows_of(robot, [log_of(robot, recording, torque=True)], True)
         first = np.arange(len(rows.q)) < len(rows.q) // 2
         for half in (first, ~first):
-            arm = fit_rows(robot, rows.take(half), Options(held_out=0.0, refit=True)).arm
+            arm = fit_rows(robot, rows.take(half), IdentificationOptions(held_out=0.0, refit=True)).arm
             worst = np.maximum(worst, torque_errors([(arm, rows.take(~half))], 0.02).relative)
     return [
         Gate(f"stand-in of a Panda, {UNITS} units, halves: J{joint} [%]", float(worst[joint - 1]), 0.0, 1.6)

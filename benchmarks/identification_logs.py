@@ -15,7 +15,7 @@ from joulepath.models.own_arm.robots import own_robot
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.logs.reading import read_log
+from joulepath.optimizer.identify.logs.reading import LogOptions, read_log
 from joulepath.optimizer.identify.options import Coupling
 
 PLACE = "JOULEPATH_TEST_DATA"
@@ -42,7 +42,7 @@ def _directly(place: str | None) -> Path | None:
 def ur3e(place: Path) -> tuple[Robot, Log]:
     """A UR3e at 25 Hz over 19 moves, with currents and the power of its bus."""
     robot = load_robot("ur3e")
-    return robot, read_log(place / "ur3e_rad" / "ur3e_power.csv", robot, name="ur3e")
+    return robot, read_log(place / "ur3e_rad" / "ur3e_power.csv", robot, LogOptions(name="ur3e")).log
 
 
 def tx40(place: Path) -> tuple[Robot, Log]:
@@ -59,7 +59,7 @@ def tx40(place: Path) -> tuple[Robot, Log]:
     text = StringIO()
     text.write(",".join(["t", *(f"{part}{k}" for part in ("q", "tau") for k in range(1, 7))]) + "\n")
     np.savetxt(text, table, delimiter=",", fmt="%.9g")
-    return robot, read_log(text.getvalue().encode(), robot, effort="torque", name="tx40")
+    return robot, read_log(text.getvalue().encode(), robot, LogOptions(effort="torque", name="tx40")).log
 
 
 def tx40_reference(place: Path) -> dict[str, tuple[float, float]]:

@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.logs.reading import read_log
+from joulepath.optimizer.identify.logs.reading import LogOptions, read_log
 from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import Noise, Recording, Truth, csv_of, recorded, rigid_torques, with_current
 
@@ -69,7 +69,9 @@ def _of_drive(current: Array) -> Array:
 def log_of(robot: Robot, recording: Recording, payload: Payload | None = None, torque: bool = False) -> Log:
     """The recording as the reader reads it from its file, with torques or with currents."""
     body = csv_of(recording, "own", without="aP", effort="torque" if torque else "current")
-    return read_log(body, robot, payload=payload or recording.payload, effort="torque" if torque else "current")
+    return read_log(
+        body, robot, LogOptions(payload=payload or recording.payload, effort="torque" if torque else "current")
+    ).log
 
 
 def behind_the_gears(truth: Truth) -> Truth:

@@ -24,7 +24,7 @@ from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.kinematics.angles import wrapped
-from joulepath.optimizer.kinematics.ik_solutions import IKSolution
+from joulepath.optimizer.kinematics.ik_solutions import LimitedSolution
 from joulepath.optimizer.kinematics.inverse import InverseKinematics, required_inverse_kinematics
 
 # m and rad: what a solution may miss its pose by, and a configuration itself or its curve
@@ -118,7 +118,7 @@ def _seconds(inverse: InverseKinematics, poses: Sequence[Array]) -> list[float]:
     return found
 
 
-def _apart(solutions: Sequence[IKSolution]) -> float:
+def _apart(solutions: Sequence[LimitedSolution]) -> float:
     """The least distance [rad] of two solutions that are not members of one curve."""
     q = np.array([each.q for each in solutions])
     distance = np.abs(q[:, None] - q).max(axis=2)

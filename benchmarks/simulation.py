@@ -32,12 +32,10 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.replay.baseline_courses import ReportedBaseline, planned_baselines
-from joulepath.optimizer.replay.planned import PlannedMotion, PlannedTorques
-from joulepath.optimizer.replay.reference import course_of
+from joulepath.optimizer.replay.from_solution import planned_motion
+from joulepath.optimizer.replay.planned import PlannedMotion
 from joulepath.optimizer.replay.replay import Replay, replay
 from joulepath.optimizer.replay.simulated_arm import SimulatedArm
-from joulepath.optimizer.solution import Solution
 
 ROBOTS = ("ur5e", "ur10e", "panda", "kr10_r1100", "iiwa14", "ur3e", "xarm7")
 KINDS = ("joint to joint", "joint to pose", "cell")
@@ -61,23 +59,6 @@ def problem_of(seed: int, index: int) -> tuple[str, Problem]:
     goal: Array | Pose = q_goal if kind == "joint to joint" or robot.nq != 6 else Pose(flange(robot, q_goal))
     arm = Arm(robot=robot, payload=payload, gravity=gravity)
     return f"{robot.name}, {kind}", Problem(arm=arm, start=q_start, goal=goal)
-
-
-def planned(problem: Problem, found: Solution) -> PlannedMotion:
-    """An answer as a planned motion."""
-    arm, sampled, spline = problem.arm, found.trajectory, found.trajectory.spline
-    names = ReportedBaseline.__dataclass_fields__
-    reported = [ReportedBaseline(**{name: getattr(each, name) for name in names}) for each in found.baselines]
-    known = [found.goal.q, *(each.q_goal for each in found.candidates)]
-    return PlannedMotion(
-        arm=arm,
-        course=course_of(spline),
-        duration=spline.duration,
-        electrical=found.energy.electrical.total,
-        mechanical=found.energy.mechanical.total,
-        torques=PlannedTorques(sampled.q, sampled.v, sampled.a, sampled.tau),
-        baselines=planned_baselines(arm, spline.control_points[0], known, spline.duration, reported),
-    )
 
 
 def third_opinion(plan: PlannedMotion) -> float:
@@ -132,7 +113,7 @@ def main() -> int:
         name, problem = problem_of(given.seed, index)
         index += 1
         try:
-            plan = planned(problem, optimize(problem))
+            plan = planned_motion(optimize(problem), problem.arm, problem.objective)
         except JoulepathError as error:
             print(f"{index - 1:4d} {name:24s} {type(error).__name__}", flush=True)
             continue

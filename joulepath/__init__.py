@@ -1,7 +1,9 @@
-"""Finds the motion of least energy of a robot arm: `optimize(Problem(arm=…, start=…, goal=…))` returns a `Solution`.
+"""Finds the motion of least energy of a robot arm.
 
-The public names are those that `__init__.pyi` imports. Each is loaded when it is first used, so that `import joulepath`
-takes no time in processes that need a part of the package only.
+    solution = joulepath.optimize(joulepath.Problem(arm=…, start=…, goal=…))
+
+The public names are those that `__init__.pyi` imports. Each is loaded when it is first used, so
+that `import joulepath` takes no time in processes that need only a part of the package.
 """
 
 import lazy_loader

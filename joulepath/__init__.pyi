@@ -1,77 +1,271 @@
 __version__: str
 
-from .models.registry import load_robot
-from .optimizer.cycle.cycle_solution import CycleSolution
+from .models.own_arm.description import InvalidArm
+from .models.registry import load_robot, robot_names
+from .models.robot import Limits, Robot
+from .models.uncertainty.document import InvalidFigures
+from .optimizer.collision.model import ClosestPair
+from .optimizer.compare import Compared, Comparison, compare
+from .optimizer.cycle.cycle_solution import CycleBaseline, CycleMove, CycleSolution
+from .optimizer.evaluate.evaluate import Evaluation, evaluate
+from .optimizer.evaluate.interval_energy import IntervalEnergy
+from .optimizer.evaluate.limit_report import LimitReport
+from .optimizer.evaluate.nearest_contact import LeastClearance
+from .optimizer.evaluate.recording import RecordedRows, Recording, Waypoints
+from .optimizer.evaluate.sampler import Samples
 from .optimizer.exceptions import (
     ContradictoryOrder,
     CycleTooShort,
     DeadlineExceeded,
     DurationTooShort,
+    FormatUnsuitable,
+    GoalInCollision,
+    InCollision,
     InvalidProblem,
+    InvalidTable,
     JoulepathError,
+    NoCollisionFreeTrajectory,
     NoReachableTarget,
     NoSequence,
+    NotCertified,
     NoTrajectory,
     OutsideLimits,
     PathInfeasible,
     SingularPose,
+    StartInCollision,
+    StopInCollision,
     TorqueInfeasible,
     UnknownRobot,
     UnreachablePose,
 )
+from .optimizer.excitation.errors import ExcitationInfeasible
+from .optimizer.export.export import ExportedFile, export
+from .optimizer.export.franka import FrankaOptions
+from .optimizer.export.krl import KrlOptions
+from .optimizer.export.program import Move, Program, Rest
+from .optimizer.export.rapid import RapidOptions
+from .optimizer.export.ros_messages import MoveitOptions, Ros2Options
+from .optimizer.export.rows import TableOptions
+from .optimizer.export.urscript import UrscriptOptions
+from .optimizer.identify.errors import NoPowerChannel, NotExcited, NothingHeldOut, PayloadUnknown
+from .optimizer.identify.identify import Identification, identify
+from .optimizer.identify.logs.log import Log, LogMove
+from .optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
+from .optimizer.identify.logs.log_report import LogReport
+from .optimizer.identify.logs.reading import LogOptions, LogReading, read_log
+from .optimizer.identify.options import Coupling, IdentificationOptions
+from .optimizer.identify.results import Advice, Parameter, Validation
+from .optimizer.inverse_kinematics import IKSolution, IKSolutions, inverse_kinematics
 from .optimizer.optimize import optimize
 from .optimizer.optimize_many import Optimized, optimize_many
-from .optimizer.pareto import Front, pareto
+from .optimizer.pareto import Dropped, Front, pareto
 from .optimizer.plan_cycle import plan_cycle
-from .optimizer.problem.arm import Arm, Payload
+from .optimizer.problem.arm import Arm, Inverter, Payload
 from .optimizer.problem.branches import BranchFilter
+from .optimizer.problem.bus import Bus
+from .optimizer.problem.clouds import Points, TriangleMesh, Voxels
 from .optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from .optimizer.problem.cycle import Cycle
+from .optimizer.problem.dwell import Dwell
+from .optimizer.problem.free_order import FreeOrder
 from .optimizer.problem.line import Line
 from .optimizer.problem.pose import Pose
 from .optimizer.problem.problem import Problem
+from .optimizer.problem.scene import (
+    Attachment,
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    Obstacle,
+    Scene,
+    Sphere,
+    capsule_between,
+)
 from .optimizer.problem.stop_path import StopPath
 from .optimizer.problem.stops import Stop
-from .optimizer.problem.targets import AnyOf
+from .optimizer.problem.targets import AnyOf, PosesAround
+from .optimizer.problem.tool_cone import ToolCone
 from .optimizer.problem.tool_path import ToolPath
-from .optimizer.solution import Solution
+from .optimizer.progress import CandidatesFound, CandidateTried, Improved
+from .optimizer.replay.outcome import Outcome
+from .optimizer.replay.planned import PlannedBaseline, PlannedMotion, PlannedTorques
+from .optimizer.replay.play import Contact
+from .optimizer.replay.replay import Replay, ReplayedChange, SavingRange, replay
+from .optimizer.solution import (
+    Baseline,
+    Branch,
+    CandidateReport,
+    CandidateStatus,
+    Certificate,
+    Clearance,
+    ElectricalEnergy,
+    Energy,
+    EnergyInterval,
+    JointEnergy,
+    LimitsInForce,
+    MechanicalEnergy,
+    SavingInterval,
+    Solution,
+    SolverReport,
+    StorageUse,
+    Trajectory,
+    UnreachableTarget,
+)
+from .optimizer.trajectories.spline import Spline
+from .optimizer.what_if import WhatIf, what_if
 
 __all__ = [
+    "Advice",
     "AnyOf",
     "Arm",
+    "Attachment",
+    "Baseline",
+    "Box",
+    "Branch",
     "BranchFilter",
+    "Bus",
+    "CandidateReport",
+    "CandidateStatus",
+    "CandidateTried",
+    "CandidatesFound",
+    "Capsule",
+    "Certificate",
+    "Clearance",
+    "ClosestPair",
+    "Compared",
+    "Comparison",
     "ConeOrientedPose",
+    "Contact",
     "ContradictoryOrder",
+    "Coupling",
     "Cycle",
+    "CycleBaseline",
+    "CycleMove",
     "CycleSolution",
     "CycleTooShort",
+    "Cylinder",
     "DeadlineExceeded",
+    "Dropped",
     "DurationTooShort",
+    "Dwell",
+    "EffortNotUsable",
+    "ElectricalEnergy",
+    "Energy",
+    "EnergyInterval",
+    "Evaluation",
+    "ExcitationInfeasible",
+    "ExportedFile",
+    "FormatUnsuitable",
+    "FrankaOptions",
+    "FreeOrder",
     "Front",
+    "GoalInCollision",
+    "HalfSpace",
+    "IKSolution",
+    "IKSolutions",
+    "Identification",
+    "IdentificationOptions",
+    "Improved",
+    "InCollision",
+    "IntervalEnergy",
+    "InvalidArm",
+    "InvalidFigures",
     "InvalidProblem",
+    "InvalidTable",
+    "Inverter",
+    "JointEnergy",
     "JoulepathError",
+    "KrlOptions",
+    "LeastClearance",
+    "LimitReport",
+    "Limits",
+    "LimitsInForce",
     "Line",
+    "Log",
+    "LogMove",
+    "LogOptions",
+    "LogReading",
+    "LogReport",
+    "LogTooLarge",
+    "MechanicalEnergy",
+    "Mesh",
+    "Move",
+    "MoveitOptions",
+    "NoCollisionFreeTrajectory",
+    "NoPowerChannel",
     "NoReachableTarget",
     "NoSequence",
     "NoTrajectory",
+    "NotCertified",
+    "NotExcited",
+    "NothingHeldOut",
+    "Obstacle",
     "Optimized",
+    "Outcome",
     "OutsideLimits",
+    "Parameter",
     "PathInfeasible",
     "Payload",
+    "PayloadUnknown",
+    "PlannedBaseline",
+    "PlannedMotion",
+    "PlannedTorques",
+    "Points",
     "Pose",
+    "PosesAround",
     "Problem",
+    "Program",
+    "RapidOptions",
+    "RecordedRows",
+    "Recording",
+    "Replay",
+    "ReplayedChange",
+    "Rest",
+    "Robot",
+    "Ros2Options",
+    "Samples",
+    "SavingInterval",
+    "SavingRange",
+    "Scene",
     "SingularPose",
     "Solution",
+    "SolverReport",
+    "Sphere",
+    "Spline",
+    "StartInCollision",
     "Stop",
+    "StopInCollision",
     "StopPath",
+    "StorageUse",
+    "TableOptions",
+    "ToolCone",
     "ToolPath",
     "TorqueInfeasible",
+    "Trajectory",
+    "TriangleMesh",
     "UnknownRobot",
     "UnreachablePose",
-    "__version__",
+    "UnreachableTarget",
+    "UrscriptOptions",
+    "Validation",
+    "Voxels",
+    "Waypoints",
+    "WhatIf",
+    "capsule_between",
+    "compare",
+    "evaluate",
+    "export",
+    "identify",
+    "inverse_kinematics",
     "load_robot",
     "optimize",
     "optimize_many",
     "pareto",
     "plan_cycle",
+    "read_log",
+    "replay",
+    "robot_names",
+    "what_if",
 ]

@@ -23,7 +23,11 @@ DESCRIPTIONS = (".yaml", ".yml")
 
 @cache
 def robot_names() -> tuple[str, ...]:
-    """Names that `load_robot` knows: the folders beside this module that hold figures."""
+    """Names of the robots that come with the library, for `load_robot`.
+
+    Returns:
+        The names in alphabetical order.
+    """
     return tuple(sorted(folder.name for folder in files("joulepath.models").iterdir() if (folder / FIGURES).is_file()))
 
 
@@ -31,13 +35,24 @@ _LOADING = threading.Lock()
 
 
 def load_robot(robot: str | PathLike[str], figures: str | PathLike[str] | dict[str, Any] | None = None) -> Robot:
-    """The robot of that name, or of a user's own arm that a YAML file describes: see `docs/own_robot.md`.
+    """Load a robot that comes with the library, or a user's own arm.
 
-    `figures` is a document of figures identified on one arm, or the path of one in YAML: see `docs/identification.md`.
+    A robot is loaded once per process: all threads get the same object.
 
-    It is loaded once per process: all threads get the same object. Raises LookupError for a name that is not in
-    `robot_names()`; InvalidArm, which names the field, for a file that makes no robot; InvalidFigures for
-    a document that does not fit the robot; OSError if there is no such file.
+    Args:
+        robot: one of `robot_names()`, or the path of a YAML file that describes an own arm; see
+            docs/own_robot.md.
+        figures: figures identified on one arm of this robot: their document, or the path of one in
+            YAML; see docs/identification.md.
+
+    Returns:
+        The robot, with its model, limits and figures.
+
+    Raises:
+        LookupError: no robot has this name.
+        InvalidArm: the description makes no robot; the error names the field.
+        InvalidFigures: the figures do not fit the robot.
+        OSError: a file cannot be read.
     """
     if figures is not None:
         return _identified(load_robot(robot), figures)

@@ -52,6 +52,34 @@ class Deadline:
 
 NEVER = Deadline()
 
+
+class DeadlineShares:
+    """Divides the time until a deadline among runs that follow one another.
+
+    A run gets the time left divided by the number of runs left, so that the later runs get the time
+    that it does not use.
+
+    Args:
+        deadline: instant at which the last run must end.
+        runs: number of runs.
+        least: shortest share [s]; a run whose time was used up by earlier ones still says so itself.
+    """
+
+    def __init__(self, deadline: Deadline, runs: int, least: float = 1e-3) -> None:
+        self._deadline, self._runs, self._least = deadline, runs, least
+
+    @property
+    def used_up(self) -> bool:
+        """Whether no time is left."""
+        return self._deadline.passed
+
+    def next(self) -> float:
+        """Time for the next run [s]."""
+        share = self._deadline.left / self._runs
+        self._runs -= 1
+        return max(share, self._least)
+
+
 LONG_PAST = 1e6
 """Time [s] by which every deadline has passed for a computation that is stopped. It is finite, so that shares of it are
 numbers."""

@@ -19,14 +19,28 @@ from joulepath.optimizer.solution import Solution
 
 
 def optimize(problem: Problem, clock: Clock = time.perf_counter, tell: Tell = nobody) -> Solution:
-    """Find the motion of least energy between the problem's targets, certified against every limit.
+    """Find the motion of least energy between a problem's targets, certified against every limit.
 
-    `clock` gives the time [s] for the problem's deadline. `tell` gets what is found, while the search runs.
+    Args:
+        problem: arm, targets, and what is asked of the motion. Its `deadline` bounds the wall time.
+        clock: function that returns the time [s].
+        tell: gets the progress while the search runs: candidates, and the best motion so far.
 
-    Raises the errors of `joulepath.optimizer.exceptions`: UnreachablePose, SingularPose, NoReachableTarget,
-    TorqueInfeasible,
-    StartInCollision, GoalInCollision, DurationTooShort, NoTrajectory, NoCollisionFreeTrajectory, DeadlineExceeded, or
-    InvalidProblem for a payload beyond the robot's rating or ends outside the tool's cone.
+    Returns:
+        The motion with its energy, a proven lower bound on the energy of any motion, and its
+        certificate.
+
+    Raises:
+        UnreachablePose: no configuration within the limits reaches a pose.
+        SingularPose: a pose is reached only on a self-motion of unknown form.
+        NoReachableTarget: none of several targets can be reached.
+        InCollision: every configuration at the start, or at the goal, collides.
+        TorqueInfeasible: the arm cannot hold or move its load.
+        PathInfeasible: no configuration leads along the whole tool path.
+        DurationTooShort: no motion is as fast as asked for.
+        NoTrajectory: every candidate failed.
+        DeadlineExceeded: the deadline passed before any motion was certified.
+        InvalidProblem: the payload is beyond the robot's rating, or an end outside the tool's cone.
     """
     with one_thread():
         return Run(problem, clock=clock, tell=forward(tell)).solution()

@@ -45,14 +45,23 @@ class Optimized:
 def optimize_many(
     problems: Iterable[Problem], client: DaskClient | Executor | None = None, workers: int | None = None
 ) -> Iterator[Optimized]:
-    """Solves each problem as `optimize` does, and yields what becomes of them as they end, in any order.
+    """Solve many problems at a time, each as `optimize` does.
 
-    The problems are solved in `workers` processes of this machine, by default one for each CPU; with a `client`, on a
-    Dask cluster, or by any executor of `concurrent.futures`. They are taken from the iterable as they are needed. If
-    the iteration ends early, what has not begun is not solved.
+    Problems are taken from the iterable as they are needed. If the iteration ends early, what has
+    not begun is not solved. The processes import the main module of a script: it needs
+    `if __name__ == "__main__":`.
 
-    The processes import the main module of a script: it needs `if __name__ == "__main__":`. Raises BrokenProcessPool
-    if one of them dies.
+    Args:
+        problems: problems to solve.
+        client: Dask client, or an executor of `concurrent.futures`; None for processes of this
+            machine.
+        workers: number of these processes; None for one per CPU.
+
+    Yields:
+        What became of each problem, as they end, in any order.
+
+    Raises:
+        BrokenProcessPool: a process died.
     """
     if client is not None:
         yield from _solved_by(client if isinstance(client, Executor) else client.get_executor(), problems)

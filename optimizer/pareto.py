@@ -1,9 +1,7 @@
-"""Public entry point: `pareto(problem, n)` returns a `Front`, the Pareto front of energy and duration.
+"""Public entry point: `pareto(problem, points)` returns the front of energy and duration.
 
-The front begins with the fastest motion and ends with the motion of least energy: the answer of `optimize`, found as
-`optimize` finds it. A motion of another duration that needs a little less, by no more than solves from different
-initial guesses differ, is the same optimum and no point of its own. Every candidate counts, and every point is
-certified.
+The last point is the answer of `optimize`. A motion of another duration that needs less by no more than solves from
+different initial guesses differ is the same optimum and no point of its own.
 
 Between two neighbours the front lies within the rectangle that they span: a motion that is slower than the left one is
 dominated unless it needs less energy, and no motion needs less energy than the right one. Durations are therefore
@@ -43,14 +41,12 @@ from joulepath.optimizer.trajectories.spline import Spline
 LEAST_POINTS, MOST_POINTS = 2, 100
 # share of the time left for the search of the fastest motion, and for each end of the front
 SHARE_OF_AN_END = 1 / 3
-# relative distance of two durations that count as one, and of two around a jump that is located well enough
-SAME_DURATION, SAME_JUMP = 2e-4, 2e-3
-# relative distances below the duration of a jump at which the front before the jump is solved
-BEFORE_JUMP = (1e-4, 1e-3)
+# relative distance of two durations that count as one, of two around a jump that is located well enough, and below the
+# duration of a jump at which the front before the jump is solved
+SAME_DURATION, SAME_JUMP, BEFORE_JUMP = 2e-4, 2e-3, (1e-4, 1e-3)
 # least deadline of a search [s]
 LEAST_TIME = 1e-3
-# relative difference of two energies that are the same optimum: solves from different initial guesses and with knots at
-# other instants scatter by as much
+# relative difference of two energies that are the same optimum: solves from other guesses and knots scatter by as much
 CONVERGED = 1e-3
 
 
@@ -95,22 +91,28 @@ class _Node:
         return None if self.answer is None else self.answer.trajectory.spline
 
 
-def pareto(problem: Problem, n: int, clock: Clock = time.perf_counter, tell: Tell = nobody) -> Front:
-    """The front of the objective's energy over duration, from at most `n` durations (2 … 100).
+def pareto(problem: Problem, points: int = 12, clock: Clock = time.perf_counter, tell: Tell = nobody) -> Front:
+    """Find the front of energy over duration, from the fastest motion to that of least energy.
 
-    `problem` bounds the duration or leaves it free; the front ends where the objective is least. The mechanical
-    objective needs `duration_max`. `problem.deadline` [s] holds for the whole front.
-    `tell` gets what is found, while the search runs: its candidates are the durations, its best answer that of least
-    energy.
+    Args:
+        problem: problem whose duration is free or bounded. The mechanical objective needs
+            `duration_max`. Its `deadline` holds for the whole front.
+        points: largest number of motions, 2 to 100.
+        clock: function that returns the time [s].
+        tell: gets the progress, with the durations as candidates and the motion of least energy.
 
-    Raises what `optimize` does; InvalidProblem for a fixed duration or a number of points out of range.
+    Returns:
+        The motions of the front, fastest first.
+
+    Raises:
+        JoulepathError: as `optimize`; InvalidProblem also for a fixed duration, or too many points.
     """
-    if not LEAST_POINTS <= n <= MOST_POINTS:
+    if not LEAST_POINTS <= points <= MOST_POINTS:
         raise InvalidProblem("points", f"points must lie between {LEAST_POINTS} and {MOST_POINTS}.")
     if problem.duration_min is not None and problem.duration_min == problem.duration_max:
         raise InvalidProblem("duration", "A front runs over durations: leave duration out or give a range.")
     with one_thread():
-        return _Search(problem, n, clock, forward(tell)).front()
+        return _Search(problem, points, clock, forward(tell)).front()
 
 
 class _Search:

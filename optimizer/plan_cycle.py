@@ -1,4 +1,4 @@
-"""Public entry point: `plan_cycle(asked)` returns a `CycleSolution`: the configurations and motions of a cycle of
+"""Public entry point: `plan_cycle(cycle)` returns a `CycleSolution`: the configurations and motions of a cycle of
 stops that need the least energy together."""
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from joulepath.optimizer.cycle.cycle_baselines import (
     of_chain,
 )
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
-from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleSolution, Move, Needed, needed_by
+from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleMove, CycleSolution, Needed, needed_by
 from joulepath.optimizer.cycle.cycles_in_hand import CycleInHand, shared, simple_cycles
 from joulepath.optimizer.cycle.divided_paths import with_divided_paths
 from joulepath.optimizer.cycle.free_orientations import with_free_orientations
@@ -39,21 +39,32 @@ from joulepath.optimizer.progress import Improved, Tell, forward, nobody, only_i
 WELL_SHARED = 1e-3
 
 
-def plan_cycle(asked: Cycle, clock: Clock = time.perf_counter, tell: Tell = nobody) -> CycleSolution:
+def plan_cycle(cycle: Cycle, clock: Clock = time.perf_counter, tell: Tell = nobody) -> CycleSolution:
     """Find the cycle of least energy, every move of it certified against every limit.
 
-    `clock` gives the time [s] for the deadline. `tell` gets what is found, while the search runs.
+    Choosing a branch at one stop changes what the moves from there cost, so that all stops are
+    decided together, and a free order with them. A cycle that must be faster or slower than the one
+    of least energy shares its time among the moves, and waits where that costs least.
 
-    Choosing a branch at one stop changes what the moves from there cost, so that all stops are decided together, and a
-    free order with them. A cycle that must be faster or slower than the one of least energy shares its time among the
-    moves, and waits where that costs least.
+    Args:
+        cycle: stops and what is asked of the cycle. Its `deadline` bounds the wall time.
+        clock: function that returns the time [s].
+        tell: gets the progress: moves as candidates, and the best cycle so far.
 
-    Raises the errors of `optimize` for an end, with the stop named; NoSequence if no chain of configurations goes
-    cycle; CycleTooShort; DeadlineExceeded if the time is too short for any cycle.
+    Returns:
+        The moves in order, their energy, a lower bound, and other ways to go round.
+
+    Raises:
+        NoSequence: no chain of configurations leads over all stops.
+        CycleTooShort: no cycle is as fast as asked for.
+        PathInfeasible: no configuration follows the path or a line of a stop.
+        InCollision: every configuration at the start or at a stop collides.
+        DeadlineExceeded: the deadline passed before any cycle was certified.
+        JoulepathError: a stop or a move fails for another reason of `optimize`; it names the stop.
     """
     with one_thread():
         began, tell = clock(), forward(tell)
-        asked = _divided(asked, clock)
+        asked = _divided(cycle, clock)
         end = Deadline.after(asked.deadline, clock)
         found = with_free_orientations(asked, lambda other: _valued(other, clock, tell), clock)
         found = with_last_posture(asked, found, end, clock)
@@ -135,7 +146,7 @@ class _Found:
     chain of `move_by_move`; `simple` are the cycles that take no search."""
 
     nodes: list[int]
-    moves: list[Move]
+    moves: list[CycleMove]
     price: float
     bound: float
     timing: TimedSearch | None = None

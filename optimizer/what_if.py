@@ -1,4 +1,4 @@
-"""Public entry point: `what_if(base, problem)` compares a motion with the best one of a changed arm.
+"""Public entry point: `what_if(solution, problem)` compares a motion with that of another arm.
 
 The change may be lighter links, another payload or other drives. It has two effects, reported apart: the energy of the
 same motion on the changed arm (`same_motion`), and the energy of a motion optimised for it (`reoptimised`).
@@ -23,16 +23,16 @@ from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.solution import Certificate, Energy, Solution
 from joulepath.optimizer.trajectories.spline import Spline
 
-# least deadline of a search [s]; shares of the time that the first search leaves to the base motion, and of what is
+# least deadline of a search [s]; shares of the time that the first search leaves to the known motion, and of what is
 # left then for a search from it
 LEAST_TIME, KEPT, SOLVED = 1e-3, 0.05, 0.8
 
 
 @dataclass(frozen=True)
-class Changed:
+class WhatIf:
     """Result of a change.
 
-    `same_motion` is the energy [J] of the base motion on the changed arm, `certificate` says whether it is feasible
+    `same_motion` is the energy [J] of the known motion on the changed arm, `certificate` says whether it is feasible
     there. `reoptimised` is the best motion of the changed arm; None, with the `error`, if none was found.
     """
 
@@ -43,22 +43,33 @@ class Changed:
 
 
 @one_thread()
-def what_if(base: Solution, problem: Problem, clock: Clock = time.perf_counter) -> Changed:
-    """Compare the answer `base` with that of `problem`, the same motion for a changed arm with as many joints.
+def what_if(solution: Solution, problem: Problem, clock: Clock = time.perf_counter) -> WhatIf:
+    """Compare a motion with the best one of a changed arm.
 
-    The changed problem is solved on its own. If the base motion is feasible on the changed arm and needs less energy
-    than the new motion, or there is none, the problem is solved again with a warm start from it; where time is too
-    short for that, the base motion is the answer. So no answer needs more energy than a feasible base motion.
-    `problem.deadline` [s] holds for all of it. Raises DeadlineExceeded if it passes before the base motion is certified
-    on the changed arm.
+    The changed problem is solved on its own. If the known motion is feasible on the changed arm and
+    needs less energy than the new one, or there is none, the problem is solved again with a warm
+    start from it; where time is too short for that, the known motion is the answer. So no answer
+    needs more energy than a feasible known motion.
+
+    Args:
+        solution: solution of the problem without the change.
+        problem: the same problem with the change, as by `dataclasses.replace(problem, arm=…)`, of an
+            arm with as many joints. Its `deadline` holds for the whole comparison.
+        clock: function that returns the time [s].
+
+    Returns:
+        Energy of the known motion on the changed arm, and the best motion of this arm.
+
+    Raises:
+        DeadlineExceeded: the deadline passed before the known motion was certified.
     """
     deadline = Deadline.after(problem.deadline, clock)
-    spline, prepared = base.trajectory.spline, PreparedProblem.of(problem)
-    asked = narrowed(problem, base.start.target, base.goal.target)
+    spline, prepared = solution.trajectory.spline, PreparedProblem.of(problem)
+    asked = narrowed(problem, solution.start.target, solution.goal.target)
     try:
         with watch(deadline):
             energy = prepared.energy(spline)
-            certificate = certify(asked, spline, base.start.q, base.goal.q, energy)
+            certificate = certify(asked, spline, solution.start.q, solution.goal.q, energy)
             energy = with_interval(energy, prepared.sensitivity(spline), spline.duration, problem.arm)
     except DeadlinePassed:
         raise DeadlineExceeded([]) from None
@@ -73,7 +84,7 @@ def what_if(base: Solution, problem: Problem, clock: Clock = time.perf_counter) 
         again = _from_known(problem, spline, deadline)
         known = [each for each in (found, again) if each is not None]
         found = min(known, key=lambda each: each.energy.of(objective), default=None)
-    return Changed(energy, certificate, found, failure if found is None else None)
+    return WhatIf(energy, certificate, found, failure if found is None else None)
 
 
 def _from_known(problem: Problem, spline: Spline, deadline: Deadline) -> Solution | None:

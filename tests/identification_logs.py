@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.identify.logs.log import EffortMeaning, Log, Move
+from joulepath.optimizer.identify.logs.log import EffortMeaning, Log, LogMove
 from joulepath.optimizer.problem.arm import Payload
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
@@ -94,7 +94,7 @@ class Recording:
     temperature: Array
     exact_q: Array
     exact_v: Array
-    moves: tuple[Move, ...]
+    moves: tuple[LogMove, ...]
     payload: Payload
 
     def log(self, meaning: EffortMeaning = "current", name: str | None = None) -> Log:
@@ -171,7 +171,7 @@ def rigid_torques(robot: Robot, truth: Truth, q: Array, v: Array, a: Array) -> A
 
 def _motions(
     robot: Robot, count: int, rate: float, random: np.random.Generator, closed: bool
-) -> tuple[Array, Array, Array, tuple[Move, ...]]:
+) -> tuple[Array, Array, Array, tuple[LogMove, ...]]:
     """q, v, a (n, nq) of quintic moves, and the rows of moves and rests."""
     limits, nq = robot.limits, robot.nq
     low, high = np.maximum(limits.q_min, -1.5), np.minimum(limits.q_max, 1.5)
@@ -182,7 +182,7 @@ def _motions(
         ends[-1] = ends[0]
     rest = round(0.5 * rate)
     parts: list[tuple[Array, Array, Array]] = [_still(ends[0], rest)]
-    ranges, row = [Move(0, rest, True)], rest
+    ranges, row = [LogMove(0, rest, True)], rest
     for begin, end in pairwise(ends):
         # 60 % of the limits in speed, of 15/8 Δq/T and 5.774 Δq/T²; the nearest whole number of steps
         span = np.abs(end - begin)
@@ -194,7 +194,7 @@ def _motions(
         dds = 60 * x * (1 - 3 * x + 2 * x**2) * (rate / steps) ** 2
         move = end - begin
         parts += [(begin + np.outer(s, move), np.outer(ds, move), np.outer(dds, move)), _still(end, rest)]
-        ranges += [Move(row, row + steps - 1, False), Move(row + steps - 1, row + steps - 1 + rest, True)]
+        ranges += [LogMove(row, row + steps - 1, False), LogMove(row + steps - 1, row + steps - 1 + rest, True)]
         row += steps - 1 + rest
     q, v, a = (np.concatenate(each) for each in zip(*parts, strict=True))
     assert q.shape == (row, nq)

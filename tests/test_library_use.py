@@ -1,89 +1,207 @@
-"""The library as the README promises it: what `optimizer` exports, and one problem solved without HTTP."""
+"""The names of `import joulepath`: a promise, documented, and cheap to import anywhere."""
 
 from __future__ import annotations
 
+import ast
+import dataclasses
+import importlib
+import inspect
+import pkgutil
+import re
 import subprocess
 import sys
+import typing
+from collections.abc import Iterator
+from pathlib import Path
 
-import numpy as np
 import pytest
 
 import joulepath
+import joulepath.optimizer
 
-PUBLIC = {
-    "AnyOf",
-    "Arm",
-    "BranchFilter",
-    "ContradictoryOrder",
-    "DeadlineExceeded",
-    "DurationTooShort",
-    "Front",
-    "InvalidProblem",
-    "JoulepathError",
-    "Line",
-    "ConeOrientedPose",
-    "NoReachableTarget",
-    "NoSequence",
-    "NoTrajectory",
-    "Optimized",
-    "OutsideLimits",
-    "PathInfeasible",
-    "Payload",
-    "Pose",
-    "Problem",
-    "CycleSolution",
-    "CycleTooShort",
-    "SingularPose",
-    "Solution",
-    "Stop",
-    "StopPath",
-    "ToolPath",
-    "TorqueInfeasible",
-    "UnknownRobot",
-    "UnreachablePose",
-    "Cycle",
-    "load_robot",
-    "optimize",
-    "optimize_many",
-    "plan_cycle",
-    "pareto",
+ROOT = Path(__file__).parents[1]
+# fmt: off
+FUNCTIONS = {
+    "capsule_between", "compare", "evaluate", "export", "identify", "inverse_kinematics",
+    "load_robot", "optimize", "optimize_many", "pareto", "plan_cycle", "read_log", "replay",
+    "robot_names", "what_if",
 }
+ERRORS = {
+    "ContradictoryOrder", "CycleTooShort", "DeadlineExceeded", "DurationTooShort",
+    "EffortNotUsable", "ExcitationInfeasible", "FormatUnsuitable", "GoalInCollision",
+    "InCollision", "InvalidArm", "InvalidFigures", "InvalidProblem", "InvalidTable",
+    "JoulepathError", "LogTooLarge", "NoCollisionFreeTrajectory", "NoPowerChannel",
+    "NoReachableTarget", "NoSequence", "NoTrajectory", "NotCertified", "NotExcited",
+    "NothingHeldOut", "OutsideLimits", "PathInfeasible", "PayloadUnknown", "SingularPose",
+    "StartInCollision", "StopInCollision", "TorqueInfeasible", "UnknownRobot",
+    "UnreachablePose",
+}
+TYPES = {
+    "Advice", "AnyOf", "Arm", "Attachment", "Baseline", "Box", "Branch", "BranchFilter", "Bus",
+    "CandidateReport", "CandidateStatus", "CandidateTried", "CandidatesFound", "Capsule",
+    "Certificate", "Clearance", "ClosestPair", "Compared", "Comparison", "ConeOrientedPose",
+    "Contact", "Coupling", "Cycle", "CycleBaseline", "CycleMove", "CycleSolution", "Cylinder",
+    "Dropped", "Dwell", "ElectricalEnergy", "Energy", "EnergyInterval", "Evaluation",
+    "ExportedFile", "FrankaOptions", "FreeOrder", "Front", "HalfSpace", "IKSolution",
+    "IKSolutions", "Identification", "IdentificationOptions", "Improved", "IntervalEnergy",
+    "Inverter", "JointEnergy", "KrlOptions", "LeastClearance", "LimitReport", "Limits",
+    "LimitsInForce", "Line", "Log", "LogMove", "LogOptions", "LogReading", "LogReport",
+    "MechanicalEnergy", "Mesh", "Move", "MoveitOptions", "Obstacle", "Optimized", "Outcome",
+    "Parameter", "Payload", "PlannedBaseline", "PlannedMotion", "PlannedTorques", "Points",
+    "Pose", "PosesAround", "Problem", "Program", "RapidOptions", "RecordedRows", "Recording",
+    "Replay", "ReplayedChange", "Rest", "Robot", "Ros2Options", "Samples", "SavingInterval",
+    "SavingRange", "Scene", "Solution", "SolverReport", "Sphere", "Spline", "Stop", "StopPath",
+    "StorageUse", "TableOptions", "ToolCone", "ToolPath", "Trajectory", "TriangleMesh",
+    "UnreachableTarget", "UrscriptOptions", "Validation", "Voxels", "Waypoints", "WhatIf",
+}
+# fmt: on
 
 
 def test_the_public_names_are_a_promise() -> None:
-    assert set(joulepath.__all__) == PUBLIC
-    assert joulepath.__all__ == sorted(joulepath.__all__)
-    # `optimizer.optimize` is also a module, whose import must not hide the function
-    assert callable(joulepath.optimize) and callable(joulepath.optimize_many)
-    assert callable(joulepath.pareto)
-    assert callable(joulepath.plan_cycle)
+    assert set(joulepath.__all__) == FUNCTIONS | ERRORS | TYPES
+    assert all(callable(getattr(joulepath, name)) for name in FUNCTIONS)
+    assert re.fullmatch(r"\d+\.\d+\.\d+", joulepath.__version__)
+
+
+def test_the_stub_lists_each_name_once() -> None:
+    stub = ast.parse((ROOT / "joulepath" / "__init__.pyi").read_text(encoding="utf-8"))
+    imports = [each for each in stub.body if isinstance(each, ast.ImportFrom)]
+    imported = [alias.name for each in imports for alias in each.names]
+    (listed,) = (each.value for each in stub.body if isinstance(each, ast.Assign))
+    assert sorted(imported) == ast.literal_eval(listed) == sorted(joulepath.__all__)
+    assert len(set(imported)) == len(imported)
+
+
+@pytest.mark.parametrize("name", sorted(FUNCTIONS | ERRORS | TYPES))
+def test_every_name_is_documented(name: str) -> None:
+    """A dataclass without a docstring has its signature as one."""
+    text = getattr(joulepath, name).__doc__
+    assert text and not text.startswith(f"{name}(")
+
+
+@pytest.mark.parametrize("name", sorted(FUNCTIONS))
+def test_every_function_says_what_it_takes_returns_and_raises(name: str) -> None:
+    function = inspect.unwrap(getattr(joulepath, name))
+    text, parameters = inspect.getdoc(function) or "", inspect.signature(function).parameters
+    assert "Returns:" in text or "Yields:" in text
+    assert "Raises:" in text or not parameters
+    arguments = text.partition("Args:\n")[2].partition("\n\n")[0]
+    documented = [line.split(":")[0].strip() for line in arguments.splitlines() if line[4:5] not in ("", " ")]
+    assert documented == list(parameters)
 
 
 def test_one_except_clause_catches_every_error() -> None:
-    exported = [getattr(joulepath, name) for name in PUBLIC]
-    errors = [each for each in exported if isinstance(each, type) and issubclass(each, BaseException)]
-    assert len(errors) == 15
-    assert all(issubclass(error, joulepath.JoulepathError) for error in errors)
+    """But for those of a robot's files, which are wrong values to the interpreter, too."""
+    of_files = {"InvalidArm", "InvalidFigures"}
+    for name in ERRORS:
+        base = ValueError if name in of_files else joulepath.JoulepathError
+        assert issubclass(getattr(joulepath, name), base)
+    for module in pkgutil.walk_packages(joulepath.optimizer.__path__, "joulepath.optimizer."):
+        importlib.import_module(module.name)
+    assert {each.__name__ for each in subclasses(joulepath.JoulepathError)} <= ERRORS
 
 
-def test_a_motion_without_http() -> None:
-    """The ten lines of the README: joints to joints, everything else left to its default."""
-    start, goal = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]), np.array([1.0, -1.2, 1.8, -2.0, -1.3, 0.5])
-    solution = joulepath.optimize(
-        joulepath.Problem(arm=joulepath.Arm(robot=joulepath.load_robot("ur5e")), start=start, goal=goal)
+def subclasses(base: type) -> Iterator[type]:
+    for each in base.__subclasses__():
+        yield each
+        yield from subclasses(each)
+
+
+def test_the_types_of_arguments_are_public() -> None:
+    """All that a caller makes; what the library made before may have parts that are not."""
+    known = {getattr(joulepath, name) for name in TYPES}
+    made = {joulepath.Robot, joulepath.Solution, joulepath.CycleSolution}
+    # a protocol of another package's class, and parts of paths that only the library divides
+    internal = {"DaskClient", "Section"}
+    todo = [each for name in FUNCTIONS for each in argument_types(getattr(joulepath, name))]
+    seen = set[type]()
+    while todo:
+        each = todo.pop()
+        if each in seen:
+            continue
+        seen.add(each)
+        assert each in known or each.__name__ in internal, each
+        if dataclasses.is_dataclass(each) and each not in made:
+            todo += [part for hint in typing.get_type_hints(each).values() for part in own_types(hint)]
+
+
+def argument_types(function: object) -> Iterator[type]:
+    for name, hint in typing.get_type_hints(inspect.unwrap(function)).items():  # type: ignore[arg-type]
+        if name != "return":
+            yield from own_types(hint)
+
+
+def own_types(hint: object) -> Iterator[type]:
+    """The classes of the library in an annotation."""
+    if isinstance(hint, type) and hint.__module__.startswith("joulepath"):
+        yield hint
+    for part in typing.get_args(hint):
+        yield from own_types(part)
+
+
+def in_a_process(code: str, folder: Path) -> str:
+    run = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=folder,
+        env={"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        check=False,
     )
-    assert isinstance(solution, joulepath.Solution)
-    assert solution.certificate.valid
-    assert solution.trajectory.q[0] == pytest.approx(start)
-    assert solution.trajectory.q[-1] == pytest.approx(goal)
-    assert 0 < solution.lower_bound <= solution.energy.electrical.total
+    assert run.returncode == 0, run.stderr
+    return run.stdout.strip()
+
+
+def python_of(page: Path) -> list[str]:
+    """The Python code of a page or a script."""
+    text = page.read_text(encoding="utf-8")
+    return re.findall(r"```python\n(.*?)```", text, re.DOTALL) if page.suffix == ".md" else [text]
+
+
+def test_pages_and_examples_use_the_public_names() -> None:
+    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "examples" / "library").glob("*.py")]
+    imports = [
+        (page.name, each.module, alias.name)
+        for page in pages
+        for code in python_of(page)
+        for each in ast.walk(ast.parse(code))
+        if isinstance(each, ast.ImportFrom) and (each.module or "").startswith("joulepath")
+        for alias in each.names
+    ]
+    assert len(imports) > 50
+    assert [each for each in imports if each[1] != "joulepath" or each[2] not in joulepath.__all__] == []
+
+
+def test_the_import_loads_nothing() -> None:
+    heavy = ("casadi", "fastapi", "mujoco", "numpy", "pinocchio", "pydantic", "scipy", "joulepath.optimizer")
+    code = f"import sys, joulepath; print([each for each in {heavy} if each in sys.modules])"
+    assert in_a_process(code, ROOT) == "[]"
 
 
 def test_the_library_needs_no_web_framework() -> None:
-    """A fresh interpreter that imports the library has loaded nothing of the service."""
+    """With all names loaded, nothing of the service is."""
+    heavy = ("fastapi", "pydantic", "sqlalchemy", "starlette", "uvicorn", "joulepath.app")
     code = (
-        "import sys, optimizer; "
-        "print([m for m in ('app', 'fastapi', 'pydantic', 'starlette', 'uvicorn') if m in sys.modules])"
+        "import sys, joulepath; names = [n for n in joulepath.__all__ if n != 'InvalidArm'];"
+        f"[getattr(joulepath, n) for n in names]; print([each for each in {heavy} if each in sys.modules])"
     )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert run.stdout.strip() == "[]"
+    assert in_a_process(code, ROOT) == "[]"
+
+
+def test_it_works_beside_packages_of_the_same_names(tmp_path: Path) -> None:
+    """A folder may have its own `models` and `app`, and modules with the names of ours."""
+    for package in ("app", "models", "optimizer"):
+        (tmp_path / package).mkdir()
+        (tmp_path / package / "__init__.py").write_text("MINE = True\n", encoding="utf-8")
+    for module in ("compare", "evaluate", "exceptions", "problem", "robot", "solution"):
+        (tmp_path / f"{module}.py").write_text("MINE = True\n", encoding="utf-8")
+    code = """
+import app, compare, evaluate, exceptions, models, optimizer, problem, robot, solution
+import joulepath
+assert all(each.MINE for each in (app, compare, evaluate, exceptions, models, optimizer, problem, robot, solution))
+arm = joulepath.Arm(robot=joulepath.load_robot("ur5e"), collisions=False)
+motion = joulepath.Waypoints([[0.0] * 6, [0.1] * 6], 1.0)
+print(joulepath.evaluate(arm, motion).total.duration)
+"""
+    assert in_a_process(code, tmp_path) == "1.0"

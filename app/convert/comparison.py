@@ -9,36 +9,33 @@ from joulepath.app.convert.fields import fields
 from joulepath.app.convert.solution import baseline_fields, optimality_gap
 from joulepath.app.schemas import request as asked
 from joulepath.app.schemas.compare import ROW_FIELDS, CompareRequest
+from joulepath.optimizer.compare import Comparison
 from joulepath.optimizer.problem.problem import MethodName
-from joulepath.optimizer.solution import Solution
 
 
 def to_compare_response(
     request: CompareRequest,
     request_id: str,
-    found: Mapping[MethodName, Solution],
+    found: Comparison,
     failed: Mapping[MethodName, dict[str, Any]],
     answers: Mapping[MethodName, Any],
 ) -> dict[str, Any]:
-    """The answer of `POST /compare`. `found` has the solution of every method that found a motion, at least one;
-    `failed` the error document of every other method, `answers` the complete answers that the rows are to contain."""
-    energies = {method: solution.energy.of(request.objective) for method, solution in found.items()}
-    best = min(energies, key=energies.__getitem__)
-    # each holds for every motion
-    bound = max(solution.lower_bound for solution in found.values())
-    rows = []
-    for method in request.methods:
+    """The answer of `POST /compare`.
+
+    `failed` has the error document of every method that found no motion, `answers` the complete
+    answers that the rows are to contain.
+    """
+    rows, bound = list[dict[str, Any]](), found.lower_bound
+    for method, solution in ((each.method, each.solution) for each in found.methods):
         row: dict[str, Any] = dict.fromkeys(ROW_FIELDS)
-        if method in found:
-            solution = found[method]
-            own = energies[method]
+        if solution is not None:
             row |= {
                 "status": solution.status,
                 "duration": solution.duration,
                 "electrical": solution.energy.electrical.total,
                 "mechanical": solution.energy.mechanical.total,
-                "excess": own / energies[best] - 1 if energies[best] > 0 else 0.0,
-                "optimality_gap": optimality_gap(bound, own),
+                "excess": found.excess(method),
+                "optimality_gap": optimality_gap(bound, solution.energy.of(found.objective)),
                 **fields(solution.solver, "wall_time", "iterations", "nlp_solves"),
                 "valid": solution.certificate.valid,
                 "worst_ratio": max(solution.certificate.worst_ratio.values()),
@@ -51,9 +48,9 @@ def to_compare_response(
         "robot": request.robot,
         "objective": request.objective,
         "lower_bound": bound,
-        "best": best,
+        "best": found.best,
         "methods": rows,
-        "baselines": baseline_fields(found[best]),
+        "baselines": baseline_fields(found.solutions[found.best]),
     }
 
 

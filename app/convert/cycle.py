@@ -21,7 +21,7 @@ from joulepath.app.schemas.path import StopPath as StopPathRequest
 from joulepath.app.schemas.response import Clearance
 from joulepath.app.schemas.stop import StopRequest
 from joulepath.models.robot import Robot
-from joulepath.optimizer.cycle.cycle_solution import CycleSolution, Move
+from joulepath.optimizer.cycle.cycle_solution import CycleMove, CycleSolution
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.cycle import Cycle
@@ -190,7 +190,7 @@ def _divided(found: CycleSolution) -> list[tuple[str, float]]:
     return [(name, section.last) for name, section in parts if section.last < 1]
 
 
-def _legs(move: Move, objective: Objective, store: Callable[[Solution], str]) -> list[dict[str, Any]]:
+def _legs(move: CycleMove, objective: Objective, store: Callable[[Solution], str]) -> list[dict[str, Any]]:
     """The entries of a move, and of the dwell and the wait after it."""
     solution = move.solution
     start = {**fields(solution.start, *_PLACE), "stop": move.planned.start}

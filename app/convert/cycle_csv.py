@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from io import StringIO
 
-from joulepath.optimizer.cycle.cycle_solution import CycleSolution, Move
+from joulepath.optimizer.cycle.cycle_solution import CycleMove, CycleSolution
 
 Row = list[float | str]
 
@@ -32,7 +32,7 @@ def to_cycle_csv(found: CycleSolution) -> str:
     return text.getvalue()
 
 
-def _of_move(move: Move, leg: int) -> list[Row]:
+def _of_move(move: CycleMove, leg: int) -> list[Row]:
     samples, kind = move.solution.trajectory, move.planned.kind
     table = zip(
         (samples.t + move.t0).tolist(),
@@ -43,7 +43,7 @@ def _of_move(move: Move, leg: int) -> list[Row]:
     return [[t, leg, kind, *q, *v, *a, *tau, power] for t, q, v, a, tau, power in table]
 
 
-def _of_rest(move: Move, leg: int, kind: str, t: float, length: float, power: float) -> list[Row]:
+def _of_rest(move: CycleMove, leg: int, kind: str, t: float, length: float, power: float) -> list[Row]:
     q = move.solution.goal.q.tolist()
     still: Row = [0.0] * len(q)
     return [[at, leg, kind, *q, *still, *still, *[""] * len(q), power] for at in (t, t + length)]

@@ -21,10 +21,10 @@ from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest,
 from joulepath.optimizer.csv_table import FIRST_ROW
 from joulepath.optimizer.evaluate.evaluate import Evaluation
 from joulepath.optimizer.evaluate.interval_energy import IntervalEnergy
-from joulepath.optimizer.evaluate.recording import Log, Waypoints, in_blocks
+from joulepath.optimizer.evaluate.recording import Recording, Waypoints
 from joulepath.optimizer.evaluate.sampler import Samples
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identify.logs.recorded import Measured, motion_of
+from joulepath.optimizer.identify.logs.recorded import Measured
 
 
 @dataclass(frozen=True)
@@ -53,14 +53,14 @@ def own_times() -> InvalidProblem:
     return InvalidProblem("time_per_segment", message)
 
 
-def to_motion(request: EvaluateRequest) -> Waypoints | Log:
+def to_motion(request: EvaluateRequest) -> Waypoints | Recording:
     """The motion in a JSON request. Raises InvalidProblem, and UnknownLog for a log that it did not bring."""
     if request.log is not None:
-        return motion_of(reading_of(request.log).log)
+        return reading_of(request.log).log.recording()
     if request.trajectory is not None:
         given = request.trajectory
         v, a = (None if rows is None else np.array(rows) for rows in (given.v, given.a))
-        return Log(in_blocks(np.array(given.t), np.array(given.q), v, a))
+        return Recording.of(np.array(given.t), np.array(given.q), v, a)
     assert request.configurations is not None  # the schema requires one of them
     q = request.configurations
     if any(len(row) != len(q[0]) for row in q):
@@ -68,13 +68,13 @@ def to_motion(request: EvaluateRequest) -> Waypoints | Log:
     return _to_waypoints(request, np.array(q), 0)
 
 
-def to_csv_motion(settings: EvaluateCsvSettings, table: MotionCsv) -> Waypoints | Log:
+def to_csv_motion(settings: EvaluateCsvSettings, table: MotionCsv) -> Waypoints | Recording:
     """The motion in a CSV file. Raises InvalidProblem."""
     if not table.has_time:
         return _to_waypoints(settings, table.configurations(), FIRST_ROW)
     if settings.model_fields_set & {"time_per_segment", "interpolation"}:
         raise own_times()
-    return Log(table.log(), FIRST_ROW)
+    return Recording(table.log(), FIRST_ROW)
 
 
 def _to_waypoints(settings: EvaluateSettings, q: Any, first_row: int) -> Waypoints:

@@ -13,9 +13,9 @@ from joulepath.app.exceptions import InvalidRequest
 from joulepath.app.schemas.arm import ArmRequest
 from joulepath.app.schemas.common import RobotName
 from joulepath.models.robot import Array
+from joulepath.optimizer.evaluate.sample_check import check_samples
 from joulepath.optimizer.evaluate.sampler import MOST_SAMPLES
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.export.certified import check_samples
 from joulepath.optimizer.export.program import Move, Program, Rest
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cycle import LONGEST_ROUND, MOST_STOPS
@@ -150,7 +150,7 @@ def _move(answer: dict[str, Any], arm: ArmRequest | None, label: str) -> Move:
 
 def _checked(move: Move, samples: _Samples) -> Move:
     """The move. Raises NotCertified unless the samples are its own."""
-    check_samples(move, np.array(samples.t), samples.arrays())
+    check_samples(move.arm, move.spline, np.array(samples.t), samples.arrays())
     return move
 
 

@@ -11,21 +11,20 @@ import numpy as np
 
 from joulepath.app.schemas.identifications import Fraction, IdentifyRequest
 from joulepath.models.robot import Array
-from joulepath.optimizer.identify.document import document_of
 from joulepath.optimizer.identify.fits.payload_fit import Carried
 from joulepath.optimizer.identify.identify import Identification
-from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.results import Curves, Validation
 
 DECIMALS = 4
 """Of the times, torques and powers of a picture."""
 
 
-def to_options(request: IdentifyRequest) -> Options:
+def to_options(request: IdentifyRequest) -> IdentificationOptions:
     """The options of the library. Raises InvalidProblem."""
     held_out = {"moves": 1.0} if isinstance(request.validate_, str) else {}
     fraction = request.validate_.fraction if isinstance(request.validate_, Fraction) else 0.0
-    return Options(
+    return IdentificationOptions(
         fit=tuple(request.fit),
         refit=request.inertials == "refit",
         held_out=held_out.get("moves", fraction),
@@ -41,7 +40,7 @@ def identification_fields(found: Identification, validation: Validation) -> dict
     """What an answer says of an identification."""
     return {
         "robot": found.robot.name,
-        "document": document_of(found.figures(), datetime.now(UTC).date().isoformat()),
+        "document": found.document(datetime.now(UTC).date().isoformat()),
         "parameters": [asdict(each) for each in found.parameters],
         "structure": asdict(found.structure),
         "physical": None if found.physical is None else asdict(found.physical),

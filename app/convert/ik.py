@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 from joulepath.app.convert.fields import fields
+from joulepath.app.convert.pose import to_matrix
 from joulepath.app.convert.scene import to_attachment, to_scene, to_tool
 from joulepath.app.schemas.ik import IKRequest
 from joulepath.models.robot import Robot
-from joulepath.optimizer.collision.model import ClosestPair
-from joulepath.optimizer.kinematics.ik_solutions import IKSolution
+from joulepath.optimizer.inverse_kinematics import IKSolutions
 from joulepath.optimizer.problem.arm import Arm, Payload
 
 
-def to_ik_response(
-    request: IKRequest,
-    request_id: str,
-    robot: Robot,
-    solutions: Sequence[IKSolution],
-    contacts: Sequence[ClosestPair],
-    complete: bool,
-) -> dict[str, Any]:
+def to_ik_response(request: IKRequest, request_id: str, found: IKSolutions) -> dict[str, Any]:
     """The answer of `POST /ik`."""
     return {
         "request": request_id,
@@ -30,22 +22,21 @@ def to_ik_response(
         "solutions": [
             {
                 "label": str(solution.label),
-                **fields(solution, "q", "limit_distance", "smallest_singular_value", "singular"),
-                "free": [robot.joint_names[j] for j in solution.self_motion.free] if solution.self_motion else [],
-                "collides": contact.distance < 0,
-                "nearest": fields(contact, "pair", "distance"),
+                **fields(solution, "q", "limit_distance", "smallest_singular_value", "singular", "free", "collides"),
+                "nearest": None if solution.nearest is None else fields(solution.nearest, "pair", "distance"),
             }
-            for solution, contact in zip(solutions, contacts, strict=True)
+            for solution in found
         ],
-        "complete": complete,
+        "complete": found.complete,
     }
 
 
-def to_collision_arm(request: IKRequest, robot: Robot) -> Arm:
-    """The arm with its shapes, for collision checking only. Raises InvalidProblem."""
+def to_ik_arm(request: IKRequest, robot: Robot) -> Arm:
+    """The arm with its TCP, and its shapes for collision checking. Raises InvalidProblem."""
     carried = request.payload
     return Arm(
         robot=robot,
+        T_flange_tcp=to_matrix(request.tcp),
         tool=to_tool(request.tool),
         payload=Payload(shape=None if carried is None else to_attachment(carried.shape, carried.touches)),
         scene=to_scene(request.scene, robot),

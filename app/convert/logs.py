@@ -8,7 +8,7 @@ from typing import Any
 from joulepath.app.convert.arm import robot_named, to_payload
 from joulepath.app.schemas.logs import LogSettings
 from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.logs.reading import LogOptions, Reading, read_log
+from joulepath.optimizer.identify.logs.reading import LogOptions, LogReading, read_log
 
 
 def to_log_options(settings: LogSettings, most_bytes: int) -> LogOptions:
@@ -27,7 +27,7 @@ def to_log_options(settings: LogSettings, most_bytes: int) -> LogOptions:
     )
 
 
-def report_fields(reading: Reading) -> dict[str, Any]:
+def report_fields(reading: LogReading) -> dict[str, Any]:
     """What an answer says of a log beside its name and owner."""
     log, report = reading.log, reading.report
     return {
@@ -51,4 +51,4 @@ def stored_log(settings: dict[str, Any], body: bytes) -> Log:
     given = LogSettings.model_validate(settings)
     # its size was checked when it was added
     options = to_log_options(given, LogOptions.most_bytes)
-    return read_log(body, robot_named(given.robot), **vars(options))
+    return read_log(body, robot_named(given.robot), options).log

@@ -14,7 +14,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.csv_table import FIRST_ROW, header_of, line_of, numbers_of, with_points
-from joulepath.optimizer.evaluate.recording import BLOCK, LogBlock
+from joulepath.optimizer.evaluate.recording import BLOCK, RecordedRows
 from joulepath.optimizer.exceptions import InvalidTable
 
 LONGEST_LINE = 4096
@@ -50,7 +50,7 @@ class MotionCsv:
         _check_header(columns, nq)
         return MotionCsv(nq, columns, pi / 180 if units == "deg" else 1.0, _blocks(file, columns, separator))
 
-    def log(self) -> Iterator[LogBlock]:
+    def log(self) -> Iterator[RecordedRows]:
         """The rows of a log, in s, rad, rad/s, rad/s²."""
         for block in self.rows:
             parts: list[Array | None] = [
@@ -58,7 +58,7 @@ class MotionCsv:
                 for i in range(1, 1 + 3 * self.nq, self.nq)
             ]
             assert parts[0] is not None
-            yield LogBlock(block[:, 0], parts[0], *parts[1:])
+            yield RecordedRows(block[:, 0], parts[0], *parts[1:])
 
     def configurations(self) -> Array:
         """All configurations (n, nq) [rad]."""

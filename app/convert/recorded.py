@@ -19,7 +19,7 @@ from joulepath.app.schemas.logs import LogSettings
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
-from joulepath.optimizer.identify.logs.reading import LogOptions, Reading, check_header, read
+from joulepath.optimizer.identify.logs.reading import LogOptions, LogReading, check_header, read_log
 from joulepath.optimizer.problem import arm as library
 
 S = TypeVar("S", bound=EvaluateSettings)
@@ -34,11 +34,11 @@ class GivenLog:
     body: bytes
 
     @cached_property
-    def reading(self) -> Reading:
+    def reading(self) -> LogReading:
         """The log. Raises UnknownRobot if its robot is gone."""
         settings = LogSettings.model_validate(self.settings)
         # its size was checked when it was added
-        return read(self.body, robot_named(settings.robot), to_log_options(settings, LogOptions.most_bytes))
+        return read_log(self.body, robot_named(settings.robot), to_log_options(settings, LogOptions.most_bytes))
 
 
 _LOG: ContextVar[GivenLog | None] = ContextVar("stored log", default=None)
@@ -54,7 +54,7 @@ def log_given(log: GivenLog) -> Iterator[None]:
         _LOG.reset(before)
 
 
-def reading_of(id: str) -> Reading:
+def reading_of(id: str) -> LogReading:
     """The stored log of this id. Raises UnknownLog if the request did not bring it."""
     log = _LOG.get()
     if log is None or log.id != id:
@@ -67,7 +67,7 @@ def as_logged(asked: EvaluateRequest) -> EvaluateRequest:
     return asked if asked.log is None else told_by(reading_of(asked.log).log, asked)
 
 
-def read_csv(file: Path, asked: EvaluateCsvSettings, otherwise: InvalidTable) -> Reading:
+def read_csv(file: Path, asked: EvaluateCsvSettings, otherwise: InvalidTable) -> LogReading:
     """The log in a CSV file, whose header is wrong for a motion because of `otherwise`. Efforts that are not usable are
     not read: the energy needs none, and a remark says so.
 
@@ -87,9 +87,9 @@ def read_csv(file: Path, asked: EvaluateCsvSettings, otherwise: InvalidTable) ->
     except InvalidTable as error:
         raise otherwise if otherwise.column is not None or error.column is None else error from None
     try:
-        return read(file, robot, options)
+        return read_log(file, robot, options)
     except EffortNotUsable as error:
-        reading = read(file, robot, replace(options, effort=None))
+        reading = read_log(file, robot, replace(options, effort=None))
         return replace(reading, report=replace(reading.report, warnings=(*reading.report.warnings, str(error))))
 
 

@@ -81,7 +81,9 @@ class IKSolution(Response):
         ["shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_3_joint"],
     )
     collides: bool = described("Whether `nearest.distance` is negative.", None, False)
-    nearest: ClosestPair = part("The two bodies with the smallest clearance.")
+    nearest: ClosestPair | None = part(
+        "The two bodies with the smallest clearance. Null if the arm has no shapes to compare."
+    )
 
 
 class IKResponse(Answer):

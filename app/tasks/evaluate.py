@@ -31,8 +31,8 @@ from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest,
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.evaluate.evaluate import evaluate
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable, OutsideLimits
-from joulepath.optimizer.identify.logs.reading import Reading
-from joulepath.optimizer.identify.logs.recorded import measured, motion_of
+from joulepath.optimizer.identify.logs.reading import LogReading
+from joulepath.optimizer.identify.logs.recorded import measured
 
 M = TypeVar("M", EvaluateRequest, EvaluateCsvSettings)
 
@@ -110,11 +110,11 @@ def evaluated(request: EvaluateRequest, end: Deadline) -> Evaluated:
     return Evaluated(request, evaluate(arm, motion, request.sample_period, end.left))
 
 
-def evaluated_log(asked: EvaluateSettings, reading: Reading, end: Deadline) -> Evaluated:
+def evaluated_log(asked: EvaluateSettings, reading: LogReading, end: Deadline) -> Evaluated:
     """The evaluation of the motion of a log, until about `end`, and what was measured."""
     with until(end):
         arm = to_arm(asked)
-    result = evaluate(arm, motion_of(reading.log), asked.sample_period, end.left)
+    result = evaluate(arm, reading.log.recording(), asked.sample_period, end.left)
     return Evaluated(asked, result, measured(reading.log, arm), reading.report.warnings)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from pydantic import ValidationError
 
-from joulepath.app.convert.exported_file import to_file
+from joulepath.app.convert.exported_file import to_options
 from joulepath.app.convert.given_answer import paths_of_moves, to_program
 from joulepath.app.convert.until import until
 from joulepath.app.engine.result import TaskResult
@@ -14,8 +14,7 @@ from joulepath.app.http.problem_details import invalid_request
 from joulepath.app.schemas.export import ExportFormat, ExportRequest
 from joulepath.app.tasks.kept_answers import WithKeptAnswers
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.export.certified import certified
-from joulepath.optimizer.export.facts import NOT_RUN, ExportedFile
+from joulepath.optimizer.export.export import export
 from joulepath.optimizer.export.program import Program
 
 
@@ -43,32 +42,26 @@ class ExportTask(WithKeptAnswers):
 
     def run(self, deadline: float) -> ExportResult:
         """The file. Raises PartsNeeded with the answers that must be kept at hand first, and what its parts raise."""
+        end = Deadline.after(deadline)
+        options = to_options(self.asked, self.format, "json" if self.as_json else "yaml")
         try:
-            with until(Deadline.after(deadline)):
+            with until(end):
                 program = self._program()
-                certificates = certified(program)
-                file = to_file(self.asked, self.format, self.as_json, program)
         except ValidationError as error:
             raise invalid_request(error, "body", "answer") from None
-        worst = max(ratio for each in certificates for ratio in each.worst_ratio.values())
-        return _result(program, file, worst)
+        speed_scale = self.asked.speed_scale
+        file = export(program, self.format.value, options, speed_scale=speed_scale, deadline=end.left)
+        return ExportResult(
+            file.content,
+            file.media_type,
+            name=file.name,
+            speed_scale=file.speed_scale,
+            worst_ratio=file.worst_ratio,
+            notes=file.notes,
+        )
 
     def _program(self) -> Program:
         given = self.asked.answer
         answer = self.answers([given])[0] if isinstance(given, str) else given
         self.answers(paths_of_moves(answer))
-        program = to_program(answer, self.asked.arm, self.answers)
-        return program if self.asked.speed_scale == 1 else program.slowed(self.asked.speed_scale)
-
-
-def _result(program: Program, file: ExportedFile, worst: float) -> ExportResult:
-    scale = program.speed_scale
-    name = f"joulepath-{program.robot.name}{'' if scale == 1 else f'-speed-{scale:g}'}.{file.extension}"
-    return ExportResult(
-        file.content,
-        file.media_type,
-        name=name,
-        speed_scale=scale,
-        worst_ratio=worst,
-        notes=(*file.notes, NOT_RUN),
-    )
+        return to_program(answer, self.asked.arm, self.answers)

@@ -16,7 +16,7 @@ from joulepath.app.exceptions import InvalidRequest
 from joulepath.app.schemas.identifications import IdentifyRequest
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identify.identify import fit
+from joulepath.optimizer.identify.identify import identify
 
 Stored = tuple[dict[str, Any], bytes]
 """Settings and packed file of a log."""
@@ -43,7 +43,7 @@ class IdentifyTask:
         logs = [stored_log(settings, body) for settings, body in self.logs]
         count, robot = len(self.request.logs), robot_named(logs[0].robot)
         try:
-            found = fit(robot, logs[:count], to_options(self.request))
+            found = identify(robot, logs[:count], to_options(self.request))
             others = found.validate(logs[count:]) if logs[count:] else found.validation
         except InvalidProblem as error:
             raise InvalidRequest([{"loc": location(error, "body"), "msg": str(error)}]) from None

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from joulepath.app.convert.arm import robot_named
-from joulepath.app.convert.ik import to_collision_arm, to_ik_response
-from joulepath.app.convert.pose import to_base_pose, to_matrix
+from joulepath.app.convert.ik import to_ik_arm, to_ik_response
+from joulepath.app.convert.pose import to_base_pose
 from joulepath.app.convert.until import until
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.ik import IKRequest
-from joulepath.optimizer.collision.model import collision_model
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.inverse_kinematics import inverse_kinematics
 
 
 @dataclass(frozen=True)
@@ -24,18 +23,9 @@ class IKTask:
 
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /ik`, within about `deadline` seconds. Raises DeadlineExceeded."""
-        with until(Deadline.after(deadline)):
-            return self._solved()
-
-    def _solved(self) -> TaskResult:
-        request = self.request
-        robot = robot_named(request.robot)
-        kinematics = required_inverse_kinematics(robot, "pose")
-        solutions = kinematics.solve(
-            to_base_pose(request.pose, robot).T, to_matrix(request.tcp), robot.limits, request.windings, "goal"
-        )
-        model = collision_model(to_collision_arm(request, robot))
-        contacts = model.closest_pairs([solution.q for solution in solutions])
-        return TaskResult.of_json(
-            to_ik_response(request, self.request_id, robot, solutions, contacts, kinematics.complete)
-        )
+        request, end = self.request, Deadline.after(deadline)
+        with until(end):
+            robot = robot_named(request.robot)
+            arm, pose = to_ik_arm(request, robot), to_base_pose(request.pose, robot)
+        found = inverse_kinematics(arm, pose, request.windings, end.left)
+        return TaskResult.of_json(to_ik_response(request, self.request_id, found))

@@ -14,7 +14,7 @@ from joulepath.app.exceptions import InvalidRequest
 from joulepath.app.schemas.logs import LogSettings
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
-from joulepath.optimizer.identify.logs.reading import read
+from joulepath.optimizer.identify.logs.reading import read_log
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class ReadLogTask:
         try:
             robot = robot_named(self.request.robot)
             with until(Deadline.after(deadline)):
-                reading = read(Path(self.file), robot, to_log_options(self.request, self.most_bytes))
+                reading = read_log(Path(self.file), robot, to_log_options(self.request, self.most_bytes))
         except InvalidProblem as error:
             if isinstance(error, InvalidTable):
                 raise  # about the log

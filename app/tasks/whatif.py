@@ -21,16 +21,15 @@ from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.schemas.whatif import Change, WhatifRequest
 from joulepath.app.tasks.answer_collector import AnswerCollector
 from joulepath.app.tasks.certified import certified
-from joulepath.app.tasks.deadline_shares import DeadlineShares
 from joulepath.app.tasks.differences import differences, of_base
-from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.deadline import Deadline, DeadlineShares
 from joulepath.optimizer.evaluate.evaluate import Evaluation, evaluate
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, InvalidTable, OutsideLimits
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.solution import Solution
-from joulepath.optimizer.what_if import Changed, what_if
+from joulepath.optimizer.what_if import WhatIf, what_if
 
 R = TypeVar("R", OptimizeRequest, EvaluateRequest)
 T = TypeVar("T")
@@ -135,7 +134,7 @@ class _Optimized(_Work):
         return self.row(change, same_motion=same, **self._reoptimised(asked, change, content, found, best))
 
     def _reoptimised(
-        self, asked: OptimizeRequest, change: Change, content: dict[str, Any], found: Changed, best: Solution
+        self, asked: OptimizeRequest, change: Change, content: dict[str, Any], found: WhatIf, best: Solution
     ) -> dict[str, Any]:
         change_of_energy = best.energy.of(asked.objective) - found.same_motion.of(asked.objective)
         changed = _changed(asked, change)

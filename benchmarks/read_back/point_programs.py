@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.export.facts import ExportedFile
+from joulepath.optimizer.export.facts import WrittenFile
 from joulepath.optimizer.export.program import Program
 
 NUMBER = r"-?\d+\.\d+"
@@ -45,7 +45,7 @@ def values(text: str) -> Array:
     return np.deg2rad([float(each) for each in re.findall(NUMBER, re.sub(r"A\d ", "", text))])
 
 
-def read_rapid(file: ExportedFile) -> ReadBack:
+def read_rapid(file: WrittenFile) -> ReadBack:
     """The moves of a RAPID module. Raises AssertionError for a statement of another form."""
     moves, others = list[tuple[list[float], list[Array]]](), list[str]()
     last, begins, t = np.zeros(6), True, 0.0
@@ -69,7 +69,7 @@ def read_rapid(file: ExportedFile) -> ReadBack:
     return ReadBack(moves, others)
 
 
-def read_krl(file: ExportedFile) -> ReadBack:
+def read_krl(file: WrittenFile) -> ReadBack:
     """The moves of a KRL program. Raises AssertionError for a statement of another form."""
     moves, others = list[tuple[list[float], list[Array]]](), list[str]()
     last = np.zeros(6)
@@ -97,7 +97,7 @@ def read_krl(file: ExportedFile) -> ReadBack:
     return ReadBack(moves, others)
 
 
-def stated(file: ExportedFile) -> float:
+def stated(file: WrittenFile) -> float:
     """The deviation [rad] that a file states for itself."""
     found = re.search(r"within (\S+) rad", file.notes[0])
     assert found and found[0] in file.content.decode()

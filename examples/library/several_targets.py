@@ -7,33 +7,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from joulepath import AnyOf, Arm, Payload, Pose, Problem, load_robot, optimize
-from joulepath.models.robot import Array
-from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
+from joulepath import AnyOf, Arm, Box, Obstacle, Payload, Pose, Problem, Scene, load_robot, optimize
 
 
-def pointing_down(x: float, y: float, z: float) -> Array:
-    """T_base_tcp (4, 4) of a TCP whose z axis points down [m]."""
-    T = np.diag([1.0, -1.0, -1.0, 1.0])
-    T[:3, 3] = x, y, z
-    return T
+def pointing_down(x: float, y: float, z: float) -> Pose:
+    """The pose of a TCP at a position [m] whose z axis points down."""
+    return Pose.from_rotvec([x, y, z], [np.pi, 0.0, 0.0])
 
 
-def placed(x: float, y: float, z: float) -> Array:
-    """T_base_object (4, 4) of an object that is not rotated [m]."""
-    T = np.eye(4)
-    T[:3, 3] = x, y, z
-    return T
-
-
-wall = Obstacle("wall", Box(np.array([0.3, 0.04, 0.3])), placed(0.5, 0.0, 0.15), margin=0.01)
+T_base_wall = np.eye(4)
+T_base_wall[:3, 3] = 0.5, 0.0, 0.15
+wall = Obstacle("wall", Box(np.array([0.3, 0.04, 0.3])), T_base_wall, margin=0.01)
 arm = Arm(
     robot=load_robot("ur5e"),
     payload=Payload(mass=2.0, com=np.array([0.0, 0.0, 0.05])),
     scene=Scene([wall]),
 )
-start = Pose(pointing_down(0.45, 0.3, 0.2))
-places = [Pose(pointing_down(x, -0.3, 0.2)) for x in (0.35, 0.45, 0.55)]
+start = pointing_down(0.45, 0.3, 0.2)
+places = [pointing_down(x, -0.3, 0.2) for x in (0.35, 0.45, 0.55)]
 
 # without full-turn alternatives, which would make some forty times as many candidates
 problem = Problem(arm=arm, start=start, goal=AnyOf(tuple(places)), windings=False, deadline=300.0)

@@ -10,7 +10,7 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.cycle_baselines import compared
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
-from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleSolution, Move, Needed
+from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleMove, CycleSolution, Needed
 from joulepath.optimizer.cycle.layers import Layer
 from joulepath.optimizer.cycle.moves import Wait
 from joulepath.optimizer.cycle.passing_leg import PassingLeg
@@ -35,7 +35,7 @@ class Rested:
     known: Known
 
 
-def moves_between_rests(asked: Cycle, stopping: CycleSolution) -> Iterator[list[Move]]:
+def moves_between_rests(asked: Cycle, stopping: CycleSolution) -> Iterator[list[CycleMove]]:
     """For each move of the cycle, the moves of the cycle with rests that stand for it."""
     moves = iter(stopping.moves)
     for planned in asked.moves:

@@ -37,7 +37,7 @@ class Pass:
 
 
 @dataclass(frozen=True)
-class Move:
+class CycleMove:
     """One move as it was `planned`, with its `solution` and its `passes` through stops.
 
     It begins at `t0` [s] of the cycle. The dwell after it draws `dwell_energy` [J]; then it waits for `wait` [s], which
@@ -104,7 +104,7 @@ class CycleBaseline:
     saving: float
     saving_interval: SavingInterval | None
     needed: Needed = field(repr=False)
-    moves: Sequence[Move] = field(default=(), repr=False)
+    moves: Sequence[CycleMove] = field(default=(), repr=False)
 
     @property
     def electrical(self) -> float:
@@ -128,7 +128,7 @@ class CycleSolution:
     """
 
     status: Literal["optimal", "feasible"]
-    moves: list[Move]
+    moves: list[CycleMove]
     lower_bound: float
     price_of_time: float
     baselines: list[CycleBaseline]
@@ -173,7 +173,7 @@ class CycleSolution:
         return max((float(np.abs(b[0] - a[1]).max()) for a, b in pairwise(ends)), default=0.0)
 
 
-def needed_by(moves: Sequence[Move]) -> Needed:
+def needed_by(moves: Sequence[CycleMove]) -> Needed:
     """What moves and their rests need."""
     sensitivity = reduce(add, [move.sensitivity for move in moves])
     known = Known(sum(move.energy for move in moves), sensitivity, sum(move.solution.duration for move in moves))

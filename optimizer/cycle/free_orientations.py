@@ -22,7 +22,7 @@ import pinocchio as pin
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.configurations_beside import beside
 from joulepath.optimizer.cycle.cycle_baselines import compared_again
-from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleSolution, Move
+from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleMove, CycleSolution
 from joulepath.optimizer.cycle.known_motions import knowing, known_motions
 from joulepath.optimizer.cycle.move_problem import LEAST_TIME
 from joulepath.optimizer.cycle.successive_moves import successively_chosen
@@ -282,7 +282,7 @@ def _at_any_angle(error: NoReachableTarget, stops: Sequence[str]) -> JoulepathEr
     )
 
 
-def _of_one_target(move: Move, places: set[str]) -> Move:
+def _of_one_target(move: CycleMove, places: set[str]) -> CycleMove:
     """The move, of which `places` have one target: its orientations are no targets that were asked for."""
     ends = {"start": move.planned.start, "goal": move.planned.goal}
     told = {name: replace(getattr(move.solution, name), target=0) for name, place in ends.items() if place in places}

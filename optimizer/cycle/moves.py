@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
-from joulepath.optimizer.cycle.cycle_solution import Move
+from joulepath.optimizer.cycle.cycle_solution import CycleMove
 from joulepath.optimizer.cycle.layers import Layer
 from joulepath.optimizer.cycle.passing_leg import passes_of
 from joulepath.optimizer.cycle.rests import dwell_energies, rest_sensitivity
@@ -22,18 +22,18 @@ def moves_of(
     found: list[Solution],
     waits: dict[int, Wait],
     sought: Sequence[set[int]] = (),
-) -> list[Move]:
+) -> list[CycleMove]:
     """The moves of a chain, in their order, with the waits after some of them.
 
     For the kinds `sought` of each leg motions were looked for beside those of the search.
     """
-    asked, t0, moves = search.asked, 0.0, list[Move]()
+    asked, t0, moves = search.asked, 0.0, list[CycleMove]()
     for (k, s, g), solution in zip(search.pairs(nodes), found, strict=True):
         leg = search.legs[k]
         wait, wait_energy = waits.get(k, (0.0, 0.0))
         rest = asked.moves[k].dwell + wait
         moves.append(
-            Move(
+            CycleMove(
                 planned=asked.moves[k],
                 # between joint positions, the motion knows of no target
                 solution=replace(solution, start=_reached(leg.start, s), goal=_reached(leg.goal, g)),

@@ -17,8 +17,8 @@ from joulepath.optimizer.cycle.cycle_baselines import compared
 from joulepath.optimizer.cycle.cycle_solution import (
     CycleBaseline,
     CycleBaselineName,
+    CycleMove,
     CycleSolution,
-    Move,
     Needed,
     needed_by,
 )
@@ -54,7 +54,7 @@ class Valued:
     `value` [J].
     """
 
-    moves: Sequence[Move]
+    moves: Sequence[CycleMove]
     motions: list[Spline]
     demands: list[Demand]
     charges: list[float]
@@ -110,7 +110,7 @@ def _stored(asked: Cycle, move: PlannedMove, charge: float) -> PlannedMove:
     return replace(move, arm=replace(move.arm, bus=bus), arm_after=replace(move.arm_after, bus=bus))
 
 
-def _demands(asked: Cycle, move: Move, motion: Spline) -> list[Demand]:
+def _demands(asked: Cycle, move: CycleMove, motion: Spline) -> list[Demand]:
     """The demands of a motion, and of the rest after it."""
     planned, q_goal = move.planned, motion.control_points[-1]
     return [
@@ -121,7 +121,7 @@ def _demands(asked: Cycle, move: Move, motion: Spline) -> list[Demand]:
 
 
 def _valued(
-    asked: Cycle, moves: Sequence[Move], motions: list[Spline] | None = None, demands: list[Demand] | None = None
+    asked: Cycle, moves: Sequence[CycleMove], motions: list[Spline] | None = None, demands: list[Demand] | None = None
 ) -> Valued:
     """A cycle as one, with the exact charge; its motions are those of its moves unless given, with their demands."""
     if motions is None or demands is None:
@@ -155,17 +155,17 @@ def _refined(asked: Cycle, best: Valued, end: Deadline, clock: Clock) -> Valued:
     return best
 
 
-def _problem(asked: Cycle, planned: PlannedMove, move: Move, time: float) -> Problem:
+def _problem(asked: Cycle, planned: PlannedMove, move: CycleMove, time: float) -> Problem:
     problem = problem_of(asked, planned, move.solution.start.q, move.solution.goal.q, time)
     return replace(problem, passes=[each.at.q for each in move.passes])
 
 
-def _moves(asked: Cycle, best: Valued, end: Deadline, clock: Clock) -> list[Move]:
+def _moves(asked: Cycle, best: Valued, end: Deadline, clock: Clock) -> list[CycleMove]:
     """The moves with their motions, certified with the charge that they begin with.
 
     Raises DeadlineExceeded or NoTrajectory.
     """
-    found, t0 = list[Move](), 0.0
+    found, t0 = list[CycleMove](), 0.0
     for k, (move, motion) in enumerate(zip(best.moves, best.motions, strict=True)):
         charges = tuple(best.charges[PARTS * k : PARTS * (k + 1) + 1])
         planned = _stored(asked, move.planned, charges[0])

@@ -1,4 +1,4 @@
-"""evaluate(arm, motion): energy of a given motion, and the limits that it satisfies or violates.
+"""Public entry point: `evaluate(arm, motion)` computes the energy and checks the limits of a motion.
 
 At a velocity step, acceleration, torque and power are infinite, and no model gives the power drawn. Energy is therefore
 summed over the open intervals between the steps. `kinetic` is the change of kinetic energy within these intervals, so
@@ -24,14 +24,15 @@ from joulepath.optimizer.energy.sensitivity import energy_sensitivity
 from joulepath.optimizer.evaluate.interval_energy import IntervalEnergy, joined
 from joulepath.optimizer.evaluate.limit_report import LimitMonitor, LimitReport
 from joulepath.optimizer.evaluate.nearest_contact import ClearanceMonitor, LeastClearance
-from joulepath.optimizer.evaluate.piecewise_motion import Indices, PiecewiseMotion, piecewise_motion
-from joulepath.optimizer.evaluate.recording import BLOCK, Log, Waypoints
+from joulepath.optimizer.evaluate.piecewise_motion import Indices, Motion, PiecewiseMotion, piecewise_motion
+from joulepath.optimizer.evaluate.recording import BLOCK
 from joulepath.optimizer.evaluate.sampler import Sampler, Samples
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.solution import Clearance, Energy, Sensitivity
+from joulepath.optimizer.solution import Clearance, Energy, Sensitivity, Solution
 from joulepath.optimizer.trajectories.quadrature import lobatto_panels
+from joulepath.optimizer.trajectories.spline import Spline
 
 # quadrature panels: their greatest length [s], unless a polynomial piece would have more than MOST_PANELS of them
 LONGEST_PANEL, MOST_PANELS = 0.2, 256
@@ -64,21 +65,39 @@ class Evaluation:
 @one_thread()
 def evaluate(
     arm: Arm,
-    motion: Waypoints | Log,
+    motion: Motion | Solution,
     sample_period: float | None = None,
     deadline: float = np.inf,
     clock: Clock = time.perf_counter,
 ) -> Evaluation:
-    """Energy, limits and, with a `sample_period` [s], samples of a motion.
+    """Compute the energy of a given motion, and how far it uses every limit of the arm.
 
-    The motion is processed in blocks of some two thousand polynomial pieces, so that the memory does not grow with its
-    length. Raises InvalidProblem and InvalidTable for an invalid motion, DeadlineExceeded after `deadline` [s].
+    Nothing is optimised, and the motion may violate the limits. It is processed in blocks of some
+    two thousand polynomial pieces, so that memory does not grow with its length.
+
+    Args:
+        arm: arm that makes the motion. It may be another one than a solution was found for.
+        motion: joint positions with times, a recording, a spline, or the motion of a solution
+            (without the time that the arm waits after it).
+        sample_period: period of the samples in the result [s]; without one there are no samples.
+        deadline: wall time after which the computation is given up [s].
+        clock: function that returns the time [s].
+
+    Returns:
+        Energy of the whole motion and of each segment [J], the worst use of each limit, and the
+        least clearance.
+
+    Raises:
+        InvalidProblem: the motion does not fit the arm, or has too many samples.
+        InvalidTable: a row of the motion is wrong.
+        DeadlineExceeded: the deadline passed first.
     """
     end = Deadline.after(deadline, clock)
-    evaluator = _Evaluator(arm, motion, sample_period)
+    given = motion.trajectory.spline if isinstance(motion, Solution) else motion
+    evaluator = _Evaluator(arm, given, sample_period)
     try:
         with watch(end):
-            for block in piecewise_motion(arm, motion):
+            for block in piecewise_motion(arm, given):
                 checkpoint()
                 evaluator.update(block)
     except DeadlinePassed:
@@ -118,13 +137,13 @@ class _Nodes:
 class _Evaluator:
     """Sums of a motion that is processed block after block."""
 
-    def __init__(self, arm: Arm, motion: Waypoints | Log, period: float | None) -> None:
+    def __init__(self, arm: Arm, motion: Motion, period: float | None) -> None:
         self._arm, self._plant = arm, Plant(arm)
         self._data = self._plant.model.createData()
         self._limits = LimitMonitor(arm)
         self._clearance = ClearanceMonitor(arm) if arm.collisions else None
         self._sampler = None if period is None else Sampler(self._plant, period)
-        self._segment_count = motion.segments
+        self._segment_count = 1 if isinstance(motion, Spline) else motion.segments
         self._intervals: dict[int, IntervalEnergy] = {}
         self._speed_jumps = 0
         self._spread = arm_spread(arm)

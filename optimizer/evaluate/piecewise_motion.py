@@ -5,9 +5,10 @@
   baseline `trapezoid`; acceleration steps
 - `quintic`: 10 τ³ - 15 τ⁴ + 6 τ⁵ from standstill to standstill in every segment
 - `spline`: one curve of degree 5 through all configurations, with standstill (v = a = 0) at the start and at the end
-- a log: a cubic spline (not-a-knot) through q, and others through v and a if these were logged; if not, they are the
-  derivatives of the spline before. Nothing is smoothed: an error e in q, with rows h apart, becomes an error of up to
-  12 e / h² in the acceleration
+- a spline: its own polynomials
+- a recording: a cubic spline (not-a-knot) through q, and others through v and a if these were
+  recorded; if not, they are the derivatives of the spline before. Nothing is smoothed: an error e
+  in q, with rows h apart, becomes an error of up to 12 e / h² in the acceleration
 """
 
 from __future__ import annotations
@@ -21,9 +22,10 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline, PPoly, make_interp_spline
 
 from joulepath.models.robot import Array, Limits
-from joulepath.optimizer.evaluate.recording import BLOCK, Log, LogBlock, Waypoints
+from joulepath.optimizer.evaluate.recording import BLOCK, RecordedRows, Recording, Waypoints, check_joints
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.trajectories import quintic
+from joulepath.optimizer.trajectories.spline import Spline
 from joulepath.optimizer.trajectories.time_scalings import blend_time
 
 Indices = npt.NDArray[np.int64]
@@ -67,10 +69,18 @@ class PiecewiseMotion:
         return self.at(piece, t - self.breakpoints[piece])
 
 
-def piecewise_motion(arm: Arm, motion: Waypoints | Log) -> Iterator[PiecewiseMotion]:
+Motion = Waypoints | Recording | Spline
+"""A given motion."""
+
+
+def piecewise_motion(arm: Arm, motion: Motion) -> Iterator[PiecewiseMotion]:
     """The blocks of a motion in order of time. Raises InvalidTable or InvalidProblem."""
-    if isinstance(motion, Log):
+    if isinstance(motion, Recording):
         yield from _log(arm, motion)
+        return
+    if isinstance(motion, Spline):
+        check_joints(arm, motion.control_points)
+        yield _spline(motion)
         return
     motion.check(arm)
     ends = np.concatenate([[0.0], np.cumsum(motion.times)])
@@ -80,6 +90,13 @@ def piecewise_motion(arm: Arm, motion: Waypoints | Log) -> Iterator[PiecewiseMot
     for low in range(0, motion.segments, BLOCK):
         rows = slice(low, min(low + BLOCK, motion.segments))
         yield _segments(motion, arm.active_limits, rows, ends[low])
+
+
+def _spline(motion: Spline) -> PiecewiseMotion:
+    """The polynomials of a spline: one segment with a piece for each knot span."""
+    edges = np.unique(motion.knots)
+    powers = [motion.curve(edges[:-1], order) / math.factorial(order) for order in range(motion.degree, -1, -1)]
+    return PiecewiseMotion.of(PPoly(np.stack(powers), edges), np.zeros(len(edges) - 1, dtype=np.int64))
 
 
 def _smooth(motion: Waypoints, ends: Array) -> PiecewiseMotion:
@@ -126,9 +143,9 @@ def _trapezoid(T: Array, blend: Array) -> tuple[list[Array], Array]:
     return law, np.stack([blend, np.maximum(T - 2 * blend, 0.0), blend], axis=1).ravel()
 
 
-def _log(arm: Arm, log: Log) -> Iterator[PiecewiseMotion]:
+def _log(arm: Arm, log: Recording) -> Iterator[PiecewiseMotion]:
     """A log in blocks. The spline of each also passes through OVERLAP rows on either side."""
-    rows: LogBlock | None = None
+    rows: RecordedRows | None = None
     begin = 0
     for block in log.checked(arm):
         rows = block if rows is None else _joined(rows, block)
@@ -141,7 +158,7 @@ def _log(arm: Arm, log: Log) -> Iterator[PiecewiseMotion]:
     yield _between(log, rows, begin, len(rows.t) - 1)
 
 
-def _between(log: Log, rows: LogBlock, begin: int, end: int) -> PiecewiseMotion:
+def _between(log: Recording, rows: RecordedRows, begin: int, end: int) -> PiecewiseMotion:
     """The pieces from row `begin` to row `end` of the splines through all `rows` of a log."""
     q = CubicSpline(rows.t, rows.q)
     v = q.derivative() if rows.v is None else CubicSpline(rows.t, rows.v)
@@ -153,11 +170,11 @@ def _between(log: Log, rows: LogBlock, begin: int, end: int) -> PiecewiseMotion:
     return PiecewiseMotion(rows.t[begin : end + 1], segment, *curves)
 
 
-def _joined(first: LogBlock, second: LogBlock) -> LogBlock:
+def _joined(first: RecordedRows, second: RecordedRows) -> RecordedRows:
     def join(one: Array | None, other: Array | None) -> Array | None:
         return None if one is None or other is None else np.concatenate([one, other])
 
-    return LogBlock(
+    return RecordedRows(
         np.concatenate([first.t, second.t]),
         np.concatenate([first.q, second.q]),
         join(first.v, second.v),
@@ -165,10 +182,10 @@ def _joined(first: LogBlock, second: LogBlock) -> LogBlock:
     )
 
 
-def _from(block: LogBlock, row: int) -> LogBlock:
+def _from(block: RecordedRows, row: int) -> RecordedRows:
     """The rows of a block from `row` on."""
     v, a = (None if part is None else part[row:] for part in (block.v, block.a))
-    return LogBlock(block.t[row:], block.q[row:], v, a)
+    return RecordedRows(block.t[row:], block.q[row:], v, a)
 
 
 def _horner(coefficients: Array, x: Array) -> Array:

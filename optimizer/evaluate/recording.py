@@ -69,12 +69,15 @@ class Waypoints:
 
     def check(self, arm: Arm) -> None:
         """Raise InvalidProblem or InvalidTable if the joint positions cannot be those of the arm."""
-        _check_joints(arm, self.q, self.first_row)
+        check_joints(arm, self.q, self.first_row)
 
 
 @dataclass(frozen=True)
-class LogBlock:
-    """Consecutive rows of a log: t (n,) [s], q (n, nq) [rad], and v [rad/s], a [rad/s²] if they were logged."""
+class RecordedRows:
+    """Consecutive rows of a recording: t (n,) [s], q (n, nq) [rad], and v [rad/s], a [rad/s²].
+
+    v and a are None if they were not recorded.
+    """
 
     t: Array
     q: Array
@@ -88,23 +91,50 @@ class LogBlock:
 
 
 @dataclass(frozen=True)
-class Log:
-    """A logged trajectory as a stream of blocks, which is read once. All blocks have the same columns.
+class Recording:
+    """A recorded motion as a stream of blocks of rows, which is read once.
 
-    Errors count rows from `first_row`. Segments after the first one begin at `edges` [s], which increase, after the
+    `Recording.of(t, q)` makes one of arrays. All blocks have the same columns. Errors count rows
+    from `first_row`. Segments after the first one begin at `edges` [s], which increase, after the
     first row.
     """
 
-    blocks: Iterable[LogBlock]
+    blocks: Iterable[RecordedRows]
     first_row: int = 0
     edges: Sequence[float] = ()
+
+    @classmethod
+    def of(
+        cls, t: Array, q: Array, v: Array | None = None, a: Array | None = None, edges: Sequence[float] = ()
+    ) -> Recording:
+        """A recording that is in memory.
+
+        Args:
+            t: times, increasing, shape (n,) [s].
+            q: joint positions, shape (n, nq) [rad].
+            v: joint velocities if they were recorded, shape (n, nq) [rad/s].
+            a: joint accelerations if they were recorded, shape (n, nq) [rad/s²].
+            edges: times at which a new segment begins, after the first row [s].
+
+        Returns:
+            The recording, in blocks of at most BLOCK rows.
+
+        Raises:
+            InvalidProblem: the arrays have different numbers of rows.
+        """
+        columns = [None if each is None else np.asarray(each, dtype=float) for each in (t, q, v, a)]
+        if len({len(each) for each in columns if each is not None}) > 1:
+            raise InvalidProblem("trajectory", "t, q, v and a must have as many rows as each other.")
+        rows = [slice(low, high) for low, high in pairwise([*range(0, len(t), BLOCK), len(t)])]
+        blocks = [RecordedRows(*(None if each is None else each[part] for each in columns)) for part in rows]  # type: ignore[arg-type]
+        return cls(blocks, edges=edges)
 
     @property
     def segments(self) -> int:
         """Number of segments."""
         return len(self.edges) + 1
 
-    def checked(self, arm: Arm) -> Iterator[LogBlock]:
+    def checked(self, arm: Arm) -> Iterator[RecordedRows]:
         """The blocks, with times since the first row.
 
         Raises InvalidTable at the first invalid row, and InvalidProblem.
@@ -127,21 +157,14 @@ class Log:
                     row + at,
                     "t",
                 )
-            _check_joints(arm, block.q, row)
-            yield LogBlock(t, block.q, block.v, block.a)
+            check_joints(arm, block.q, row)
+            yield RecordedRows(t, block.q, block.v, block.a)
             row, last = row + len(t), float(t[-1])
         if row - self.first_row < 2:
             raise InvalidTable("A trajectory needs two or more rows: there is no motion in fewer.", None, None)
 
 
-def in_blocks(t: Array, q: Array, v: Array | None = None, a: Array | None = None) -> Iterator[LogBlock]:
-    """The blocks of a log that is in memory: t (n,) [s], q, v, a (n, nq) in rad and s."""
-    for low, high in pairwise([*range(0, len(t), BLOCK), len(t)]):
-        rows = slice(low, high)
-        yield LogBlock(t[rows], q[rows], None if v is None else v[rows], None if a is None else a[rows])
-
-
-def _check_finite(block: LogBlock, first_row: int) -> None:
+def _check_finite(block: RecordedRows, first_row: int) -> None:
     most = {"t": 1e12, "q": np.inf, "v": MOST_SPEED, "a": MOST_ACCELERATION}
     for name, values in {"t": block.t[:, None], **block.groups}.items():
         if values is None:
@@ -159,7 +182,8 @@ def _check_finite(block: LogBlock, first_row: int) -> None:
             )
 
 
-def _check_joints(arm: Arm, q: Array, first_row: int) -> None:
+def check_joints(arm: Arm, q: Array, first_row: int = 0) -> None:
+    """Raises InvalidProblem or InvalidTable for joint positions q (k, n) [rad] of another arm."""
     if q.shape[1] != arm.robot.nq:
         raise InvalidProblem("q", f"Every row must have {arm.robot.nq} joint positions, one per joint.")
     limits = arm.robot.limits

@@ -2,32 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from joulepath.models.robot import Array
 from joulepath.optimizer.certificate import certify
+from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.energy.plant import Plant
 from joulepath.optimizer.exceptions import InvalidProblem, NotCertified, OutsideLimits
-from joulepath.optimizer.export.program import Move, Program
+from joulepath.optimizer.export.program import Program
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.problem.problem import LONGEST_DURATION, Problem
 from joulepath.optimizer.solution import Certificate
-
-# largest difference of given samples from the motion: rounding of q [rad], and of v, a, tau relative to their limits
-SAMPLE_TOLERANCE = 1e-6
 
 
 @one_thread()
 def certified(program: Program) -> list[Certificate]:
     """The certificates of all moves.
 
-    Checked are the limits of the arm, standstill at the ends and clearance; not a tool path. Raises NotCertified for
-    the first move whose certificate is not valid, and InvalidProblem for one longer than LONGEST_DURATION.
+    Checked are the limits of the arm, standstill at the ends and clearance; not a tool path. Raises
+    NotCertified for the first move whose certificate is not valid, and InvalidProblem for one
+    longer than LONGEST_DURATION. Ends by DeadlinePassed if the watched deadline passes.
     """
     certificates = []
     for index, move in enumerate(program.moves):
+        checkpoint()
         if move.duration > LONGEST_DURATION:
             raise InvalidProblem(
                 "speed_scale", f"A move takes more than {LONGEST_DURATION:g} s: give a larger speed_scale."
@@ -58,20 +55,3 @@ def _reason(certificate: Certificate) -> str:
 
 def _nan_first(ratio: float) -> float:
     return np.inf if np.isnan(ratio) else ratio
-
-
-def check_samples(move: Move, t: Array, samples: Sequence[Array]) -> None:
-    """Raises NotCertified unless samples q, v, a, tau (k, nq) at times t (k,) [s] are those of the motion of the arm.
-
-    tau [N·m] is of rigid bodies and rotors: it tells whether payload, mounting and robot are those of the samples.
-    """
-    limits, duration = move.arm.active_limits, move.duration
-    if len(t) and not (t[0] >= 0 and t[-1] <= duration * (1 + SAMPLE_TOLERANCE) and np.isfinite(t).all()):
-        raise NotCertified(0, "its samples are not of its own time", {})
-    q, v, a = (move.spline.curve(np.minimum(t, duration), order) for order in range(3))
-    own = (q, v, a, Plant(move.arm).torques(q, v, a))
-    scales = (np.ones_like(limits.v_max), limits.v_max, limits.a_max, limits.tau_max)
-    names = ("joint positions", "velocities", "accelerations", "torques")
-    for name, computed, given, scale in zip(names, own, samples, scales, strict=True):
-        if given.shape != computed.shape or not (np.abs(given - computed) <= SAMPLE_TOLERANCE * scale).all():
-            raise NotCertified(0, f"the {name} of its samples are not those of its spline on this arm", {})

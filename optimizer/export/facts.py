@@ -14,8 +14,11 @@ _NOT_PLAIN = re.compile(r"[^A-Za-z0-9 .,:+\-/()=%_]")
 
 
 @dataclass(frozen=True)
-class ExportedFile:
-    """A file for a controller. `notes` says in sentences how far it deviates, and what it leaves out."""
+class WrittenFile:
+    """What the writer of a format makes.
+
+    `notes` says in sentences how far it deviates from the motion, and what it leaves out.
+    """
 
     content: bytes
     media_type: str
@@ -23,9 +26,9 @@ class ExportedFile:
     notes: tuple[str, ...] = ()
 
     @staticmethod
-    def of_text(text: str, media_type: str, extension: str, notes: tuple[str, ...] = ()) -> ExportedFile:
+    def of_text(text: str, media_type: str, extension: str, notes: tuple[str, ...] = ()) -> WrittenFile:
         """A file of text."""
-        return ExportedFile(text.encode(), media_type, extension, notes)
+        return WrittenFile(text.encode(), media_type, extension, notes)
 
 
 def comment(text: str) -> str:

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from joulepath.optimizer.exceptions import FormatUnsuitable
-from joulepath.optimizer.export.facts import ExportedFile, check_joints, header
+from joulepath.optimizer.export.facts import WrittenFile, check_joints, header
 from joulepath.optimizer.export.program import Program
 from joulepath.optimizer.export.rows import MOST_ROWS, ticks
 
@@ -28,12 +28,12 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class FrankaOptions:
-    """`form`: a table as CSV, or a C++ header with a motion generator."""
+    """Options of `franka`: the `form` is a table as CSV, or a C++ header with a motion generator."""
 
     form: Literal["csv", "cpp"] = "csv"
 
 
-def to_franka(program: Program, options: FrankaOptions | None = None) -> ExportedFile:
+def to_franka(program: Program, options: FrankaOptions | None = None) -> WrittenFile:
     """The table or the header. Raises FormatUnsuitable for another kind of robot, and if it were too large."""
     options = options or FrankaOptions()
     check_joints(program, "franka", 7, "Franka", "robots of Franka, with seven joints")
@@ -53,10 +53,10 @@ def to_franka(program: Program, options: FrankaOptions | None = None) -> Exporte
         text = StringIO()
         text.write(",".join(names) + "\n")
         np.savetxt(text, np.column_stack([t, q, v]), fmt=["%.3f"] + ["%.12f"] * 14, delimiter=",")
-        return ExportedFile.of_text(text.getvalue(), "text/csv", "csv", notes)
+        return WrittenFile.of_text(text.getvalue(), "text/csv", "csv", notes)
     rows = "\n".join("    {{" + ", ".join(f"{x:.12f}" for x in row) + "}}," for row in q)
     head = "\n".join(f"// {line}" for line in header(program, "motion generator for libfranka", notes))
-    return ExportedFile.of_text(_HEADER.format(head=head, count=len(q), rows=rows), "text/plain", "hpp", notes)
+    return WrittenFile.of_text(_HEADER.format(head=head, count=len(q), rows=rows), "text/plain", "hpp", notes)
 
 
 _HEADER = """{head}

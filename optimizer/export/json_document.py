@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from joulepath.optimizer.export.facts import NOT_RUN, ExportedFile
+from joulepath.optimizer.export.facts import NOT_RUN, WrittenFile
 from joulepath.optimizer.export.program import Move, Program, Timed
 
 
-def to_json(program: Program) -> ExportedFile:
+def to_json(program: Program) -> WrittenFile:
     """A JSON document with `robot`, `joint_names`, `duration` [s], `speed_scale` and `steps`.
 
     A step of kind `move` has a clamped B-spline (`degree`, `knots` [s] from its own start, `control_points`
@@ -23,7 +23,7 @@ def to_json(program: Program) -> ExportedFile:
         "note": NOT_RUN,
         "steps": [_step(program, timed) for timed in program.timed],
     }
-    return ExportedFile.of_text(json.dumps(content, allow_nan=False), "application/json", "json")
+    return WrittenFile.of_text(json.dumps(content, allow_nan=False), "application/json", "json")
 
 
 def _step(program: Program, timed: Timed) -> dict[str, Any]:

@@ -7,31 +7,32 @@ chapter on spline motions: `PTP_SPLINE … SPTP {A1 …} … ENDSPLINE`; in it `
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.export.axes import Axes
 from joulepath.optimizer.export.even_points import EvenPoints, even_points, smooth, straight
-from joulepath.optimizer.export.facts import ExportedFile, check_joints, comment, header, output_note
+from joulepath.optimizer.export.facts import WrittenFile, check_joints, comment, header, output_note
+from joulepath.optimizer.export.point_options import PointOptions
 from joulepath.optimizer.export.program import Move, Program, Timed
 from joulepath.optimizer.problem.arm import Payload
 
 
 @dataclass(frozen=True)
-class KrlOptions:
-    """`tolerance` [rad]: deviation that the number of points is chosen for. `axes`: those of the controller.
-    `digital_output`: number of an output that is on from grasp to release; None switches nothing."""
+class KrlOptions(PointOptions):
+    """Options of `krl`: those of `PointOptions`, and `digital_output`.
 
-    tolerance: float = 0.005
-    axes: Axes = field(default_factory=Axes)
+    `digital_output` is the number of an output that is on from each grasp to the release; None
+    switches nothing.
+    """
+
     digital_output: int | None = None
 
 
-def to_krl(program: Program, options: KrlOptions | None = None) -> ExportedFile:
+def to_krl(program: Program, options: KrlOptions | None = None) -> WrittenFile:
     """The program. Raises FormatUnsuitable for a robot without six joints or of another maker."""
     options = options or KrlOptions()
     check_joints(program, "krl", 6, "KUKA", "robots of KUKA that are programmed in KRL, with six joints")
-    options.axes.check("krl", program.robot.nq)
+    options.check("krl", program.robot.nq)
     moves = [even_points(move, (straight, smooth), options.tolerance) for move in program.moves]
     notes = (
         f"within {max(each.deviation for each in moves):.2e} rad of the spline, if the controller keeps every time",
@@ -52,7 +53,7 @@ def to_krl(program: Program, options: KrlOptions | None = None) -> ExportedFile:
             lines += _block(next(points), options)
         else:
             lines.append(f"WAIT SEC {timed.step.duration:.3f}")
-    return ExportedFile.of_text("\r\n".join([*lines, "END", ""]), "text/plain", "src", notes)
+    return WrittenFile.of_text("\r\n".join([*lines, "END", ""]), "text/plain", "src", notes)
 
 
 def _load(load: Payload) -> str:
@@ -61,7 +62,7 @@ def _load(load: Payload) -> str:
 
 
 def _axes(options: KrlOptions, q: Array) -> str:
-    values = options.axes.degrees(q)
+    values = options.degrees(q)
     return "{" + ",".join(f"A{k} {value}" for k, value in enumerate(values, 1)) + "}"
 
 

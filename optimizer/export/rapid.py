@@ -7,12 +7,12 @@ Syntax, as in ABB's technical reference manual "RAPID Instructions, Functions an
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from joulepath.optimizer.exceptions import FormatUnsuitable
-from joulepath.optimizer.export.axes import Axes
 from joulepath.optimizer.export.even_points import EvenPoints, even_points, rounded, straight
-from joulepath.optimizer.export.facts import ExportedFile, check_joints, comment, header, output_note
+from joulepath.optimizer.export.facts import WrittenFile, check_joints, comment, header, output_note
+from joulepath.optimizer.export.point_options import PointOptions
 from joulepath.optimizer.export.program import Move, Program, Timed
 from joulepath.optimizer.problem.arm import Payload
 
@@ -24,20 +24,21 @@ _LEAST_MASS = 0.001
 
 
 @dataclass(frozen=True)
-class RapidOptions:
-    """`tolerance` [rad]: deviation that the number of points is chosen for. `axes`: those of the controller.
-    `digital_output`: name of a signal that is on from grasp to release; None switches nothing."""
+class RapidOptions(PointOptions):
+    """Options of `rapid`: those of `PointOptions`, and `digital_output`.
 
-    tolerance: float = 0.005
-    axes: Axes = field(default_factory=Axes)
+    `digital_output` is the name of a signal that is on from each grasp to the release; None
+    switches nothing.
+    """
+
     digital_output: str | None = None
 
 
-def to_rapid(program: Program, options: RapidOptions | None = None) -> ExportedFile:
+def to_rapid(program: Program, options: RapidOptions | None = None) -> WrittenFile:
     """The module. Raises FormatUnsuitable for a robot without six joints or of another maker."""
     options = options or RapidOptions()
     check_joints(program, "rapid", 6, "ABB", "robots of ABB, with six joints")
-    options.axes.check("rapid", program.robot.nq)
+    options.check("rapid", program.robot.nq)
     if options.digital_output is not None and not SIGNAL.fullmatch(options.digital_output):
         raise FormatUnsuitable("rapid", "rapid.digital_output must be the name of a signal: letters, digits and _.")
     moves = [even_points(move, (straight, rounded), options.tolerance) for move in program.moves]
@@ -52,7 +53,7 @@ def to_rapid(program: Program, options: RapidOptions | None = None) -> ExportedF
     lines = ["MODULE Joulepath"]
     lines += [f"  ! {line}" for line in header(program, "module for ABB controllers", notes)]
     lines += [_tool(k, load) for k, load in enumerate(loads)]
-    lines += ["  PROC joulepath()", "    " + _instruction(options.axes.degrees(program.start), "v50", "fine", 0)]
+    lines += ["  PROC joulepath()", "    " + _instruction(options.degrees(program.start), "v50", "fine", 0)]
     tool, points = 0, iter(moves)
     for timed in program.timed:
         lines.append(f"    ! {comment(timed.step.label)}, {timed.step.duration:.4f} s")
@@ -64,7 +65,7 @@ def to_rapid(program: Program, options: RapidOptions | None = None) -> ExportedF
         else:
             lines.append(f"    WaitTime {timed.step.duration:.3f};")
     lines += ["  ENDPROC", "ENDMODULE"]
-    return ExportedFile.of_text("\n".join(lines) + "\n", "text/plain", "mod", notes)
+    return WrittenFile.of_text("\n".join(lines) + "\n", "text/plain", "mod", notes)
 
 
 def _loads(program: Program) -> list[Payload]:
@@ -84,9 +85,7 @@ def _instruction(axes: list[str], speed: str, zone: str, tool: int) -> str:
 def _moves(points: EvenPoints, options: RapidOptions, tool: int) -> list[str]:
     speed, last = f"v1000\\T:={points.period:.9f}", len(points.q) - 1
     rows = enumerate(points.q[1:], 1)
-    return [
-        "    " + _instruction(options.axes.degrees(q), speed, "fine" if k == last else "z10", tool) for k, q in rows
-    ]
+    return ["    " + _instruction(options.degrees(q), speed, "fine" if k == last else "z10", tool) for k, q in rows]
 
 
 def _switch(timed: Timed, output: str | None) -> list[str]:

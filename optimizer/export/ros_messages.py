@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import yaml
 
-from joulepath.optimizer.export.facts import ExportedFile, header
+from joulepath.optimizer.export.facts import WrittenFile, header
 from joulepath.optimizer.export.program import Program
 from joulepath.optimizer.export.quintic_points import QuinticPoints, quintic_points
 
@@ -22,18 +22,28 @@ GOAL_TOLERANCE, GOAL_TIME = 0.01, 1
 
 
 @dataclass(frozen=True)
-class RosOptions:
-    """`message`: a FollowJointTrajectory goal or a JointTrajectory. `encoding`: YAML, or JSON for rosbridge.
-    `controller` is the name of the node of the controller."""
+class Ros2Options:
+    """Options of `ros2`.
+
+    `message` is a FollowJointTrajectory goal or a JointTrajectory, `encoding` YAML, or JSON for
+    rosbridge. `controller` is the name of the controller's node.
+    """
 
     message: Literal["goal", "trajectory"] = "goal"
     encoding: Encoding = "yaml"
     controller: str = "joint_trajectory_controller"
 
 
-def to_ros2(program: Program, options: RosOptions | None = None) -> ExportedFile:
+@dataclass(frozen=True)
+class MoveitOptions:
+    """Options of `moveit`: the `encoding` is YAML or JSON."""
+
+    encoding: Encoding = "yaml"
+
+
+def to_ros2(program: Program, options: Ros2Options | None = None) -> WrittenFile:
     """The message for a joint trajectory controller. Raises FormatUnsuitable if the motion is too long."""
-    options = options or RosOptions()
+    options = options or Ros2Options()
     points = quintic_points(program, "ros2")
     trajectory = _trajectory(program, points)
     action, topic = f"/{options.controller}/follow_joint_trajectory", f"/{options.controller}/joint_trajectory"
@@ -55,9 +65,9 @@ def to_ros2(program: Program, options: RosOptions | None = None) -> ExportedFile
     return _file(program, points, options.encoding, kind, use, message, wrapped)
 
 
-def to_moveit(program: Program, encoding: Encoding = "yaml") -> ExportedFile:
+def to_moveit(program: Program, options: MoveitOptions | None = None) -> WrittenFile:
     """A RobotTrajectory for MoveIt. Raises FormatUnsuitable if the motion is too long."""
-    points = quintic_points(program, "moveit")
+    encoding, points = (options or MoveitOptions()).encoding, quintic_points(program, "moveit")
     message = {"joint_trajectory": _trajectory(program, points), "multi_dof_joint_trajectory": {"joint_names": []}}
     kind = "moveit_msgs/msg/RobotTrajectory"
     return _file(program, points, encoding, kind, "for MoveGroupInterface::execute", message, message)
@@ -87,7 +97,7 @@ def _file(
     use: str,
     message: dict[str, Any],
     wrapped: dict[str, Any],
-) -> ExportedFile:
+) -> WrittenFile:
     notes = (
         f"{len(points.nanoseconds)} points, and quintics between them are within {points.position:.1e} rad and "
         f"{points.velocity:.1e} rad/s of the spline",
@@ -99,9 +109,9 @@ def _file(
         ),
     )
     if encoding == "json":
-        return ExportedFile.of_text(json.dumps(wrapped, allow_nan=False), "application/json", "json", notes)
+        return WrittenFile.of_text(json.dumps(wrapped, allow_nan=False), "application/json", "json", notes)
     head = "".join(f"# {line}\n" for line in header(program, kind, (use, *notes)))
     # the dumper in C, where PyYAML has it: ten times as fast
     dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
     body = yaml.dump(message, Dumper=dumper, default_flow_style=None, sort_keys=False, width=1000)
-    return ExportedFile.of_text(head + body, "application/yaml", "yaml", notes)
+    return WrittenFile.of_text(head + body, "application/yaml", "yaml", notes)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +15,13 @@ MOST_ROWS = 100_000
 """Most rows of a table: some ten megabytes."""
 # what is left of the last period [s], below which its beginning counts as the end
 SHORTEST_ROW = 1e-6
+
+
+@dataclass(frozen=True)
+class TableOptions:
+    """Options of `csv` and `npz`: `period` [s] is the time between two rows."""
+
+    period: float = 0.008
 
 
 def times(program: Program, period: float, format: str, most: int = MOST_ROWS) -> Array:

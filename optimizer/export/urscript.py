@@ -17,7 +17,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import FormatUnsuitable
-from joulepath.optimizer.export.facts import ExportedFile, check_joints, comment, header, output_note
+from joulepath.optimizer.export.facts import WrittenFile, check_joints, comment, header, output_note
 from joulepath.optimizer.export.pieces import pieces
 from joulepath.optimizer.export.program import Move, Program, Timed
 from joulepath.optimizer.export.urscript_parts import CHECKS, serving
@@ -36,9 +36,12 @@ LEAST_TRACKING, TRACKING_TIME = 0.05, 0.1
 
 @dataclass(frozen=True)
 class UrscriptOptions:
-    """`rate` [Hz] of the controller: 500 for e-series, 125 for CB3. `form`: the polynomials, which the controller
-    evaluates, or all set points. `lookahead_time` [s] and `gain` are servoj's. `digital_output`, a standard output, is
-    on while the arm carries more than at the start; None switches nothing.
+    """Options of `urscript`.
+
+    `rate` [Hz] is that of the controller: 500 for e-series, 125 for CB3. The `form` is the polynomials,
+    which the controller evaluates, or all set points. `lookahead_time` [s] and `gain` are servoj's.
+    `digital_output`, a standard output, is on while the arm carries more than at the start; None
+    switches nothing.
     """
 
     rate: Literal[500, 125] = 500
@@ -48,7 +51,7 @@ class UrscriptOptions:
     digital_output: int | None = None
 
 
-def to_urscript(program: Program, options: UrscriptOptions | None = None) -> ExportedFile:
+def to_urscript(program: Program, options: UrscriptOptions | None = None) -> WrittenFile:
     """The program. Raises FormatUnsuitable for another kind of robot, and if it were too large."""
     options = options or UrscriptOptions()
     check_joints(program, "urscript", 6, "Universal Robots", "robots of Universal Robots, with six joints")
@@ -68,7 +71,7 @@ def to_urscript(program: Program, options: UrscriptOptions | None = None) -> Exp
     lines += [f"  # {line}" for line in header(program, "program for Universal Robots controllers", notes)]
     lines += [*CHECKS, *serving(options.rate, options.lookahead_time, options.gain, tracking, degree)]
     lines += [*_beginning(program), *_body(program, options, degree), "end"]
-    return ExportedFile.of_text("\n".join(lines) + "\n", "text/plain", "script", notes)
+    return WrittenFile.of_text("\n".join(lines) + "\n", "text/plain", "script", notes)
 
 
 def _numbers(values: Array) -> str:

@@ -1,9 +1,10 @@
-"""`fit(robot, logs, options)`: an arm's own figures from its logs."""
+"""Public entry point: `identify(robot, logs, options)` finds an arm's own figures from its logs."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from joulepath.models.uncertainty.parameters import LINKS
 from joulepath.optimizer.energy.link_regressor import BODY, body_parameters
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.arm.fitted_arm import own_arm
+from joulepath.optimizer.identify.document import document_of
 from joulepath.optimizer.identify.errors import NoPowerChannel, NotExcited, PayloadUnknown
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
 from joulepath.optimizer.identify.estimates.grouped import lag_one
@@ -23,7 +25,7 @@ from joulepath.optimizer.identify.fits.torque_fit import MOST_RELATIVE_SD, UNSUR
 from joulepath.optimizer.identify.fits.whole_fit import LINK, LINK_NAMES
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
-from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.quality.advice import advice_of
 from joulepath.optimizer.identify.quality.curves import curves_of
 from joulepath.optimizer.identify.quality.interval import Spread, sessions, spread_of
@@ -57,7 +59,7 @@ class Identification:
     as the figures predict them."""
 
     robot: Robot
-    options: Options
+    options: IdentificationOptions
     fitted: Fitted
     spread: Spread
     parameters: tuple[Parameter, ...]
@@ -109,6 +111,18 @@ class Identification:
             logs=self.logs,
         )
 
+    def document(self, date: str) -> dict[str, Any]:
+        """The figures as a document, which `load_robot(robot, figures=document)` computes with.
+
+        Args:
+            date: date that the sources of the figures name.
+
+        Returns:
+            Value, unit, source, trust letter and standard deviation of each figure, and their
+            covariance; see docs/identification.md.
+        """
+        return document_of(self.figures(), date)
+
     def _parameters_of_figures(self) -> Iterator[tuple[Name, Array]]:
         """The parameters of the figures that the estimate (p,) stands for, and rows (p,) that make them of it."""
         names = self.fitted.estimate.names
@@ -125,13 +139,30 @@ LAW = ("coulomb", "viscous", "load", "curved")
 
 
 @one_thread()
-def fit(robot: Robot, logs: Sequence[Log], options: Options | None = None) -> Identification:
-    """The figures of an arm from at least one log of it.
+def identify(robot: Robot, logs: Sequence[Log], options: IdentificationOptions | None = None) -> Identification:
+    """Identify an arm's own figures from logs of its motions.
 
-    They are fitted to all moves. Before that, a fit without the held-out moves is validated on these, unless `held_out`
-    is 0. Raises InvalidProblem, EffortNotUsable, NoPowerChannel, NotExcited, PayloadUnknown, and NothingHeldOut.
+    The figures are fitted to all moves of all logs. Before that, a fit without the held-out moves
+    is validated on these, unless `options.held_out` is 0.
+
+    Args:
+        robot: robot that the arm is one of; figures that the logs do not tell stay as they are.
+        logs: logs of this arm, at least one, as `read_log` reads them. Where a payload is sought,
+            the last one is the one with it.
+        options: what to find, and how.
+
+    Returns:
+        The figures with their standard deviations, their validation, and advice on what to log.
+
+    Raises:
+        InvalidProblem: the logs or options do not fit the robot or each other.
+        EffortNotUsable: the efforts of a log exclude gravity.
+        NoPowerChannel: power is asked for, and no log has it.
+        NotExcited: the logs tell nothing of what is asked for.
+        PayloadUnknown: torque constants are asked for, and nobody said what the arm carried.
+        NothingHeldOut: the logs have fewer than two different motions.
     """
-    options, last = options or Options(), len(logs) - 1
+    options, last = options or IdentificationOptions(), len(logs) - 1
     rows = _rows(robot, logs, options)
     _check(robot, rows, logs, options)
     validation, blind = None, np.zeros(len(rows.q), dtype=bool)
@@ -169,7 +200,7 @@ def fit(robot: Robot, logs: Sequence[Log], options: Options | None = None) -> Id
     )
 
 
-def _rows(robot: Robot, logs: Sequence[Log], options: Options) -> Rows:
+def _rows(robot: Robot, logs: Sequence[Log], options: IdentificationOptions) -> Rows:
     """The rows of the logs. Where a payload is sought, the last log's counts as nothing, whatever it says."""
     if "payload" not in options.fit:
         return rows_of(robot, logs, options.refit)
@@ -178,14 +209,14 @@ def _rows(robot: Robot, logs: Sequence[Log], options: Options) -> Rows:
     return rows_of(robot, [*logs[:-1], replace(logs[-1], payload=Payload())], regressor=True)
 
 
-def _carried(robot: Robot, rows: Rows, options: Options, last: int) -> Carried | None:
+def _carried(robot: Robot, rows: Rows, options: IdentificationOptions, last: int) -> Carried | None:
     """The payload of the `last` log, if it was asked for."""
     if "payload" not in options.fit:
         return None
     return payload_of(robot, rows, motor_torque(own_arm(robot), rows), last, options.velocity_threshold)
 
 
-def _fold(robot: Robot, rows: Rows, out: Mask, options: Options, last: int) -> Fold:
+def _fold(robot: Robot, rows: Rows, out: Mask, options: IdentificationOptions, last: int) -> Fold:
     """The rows that are held `out` (n,), and a fit to the others, which are of the same days."""
     seen = rows.take(~out)
     carried = _carried(robot, seen, options, last)
@@ -197,7 +228,7 @@ def _fold(robot: Robot, rows: Rows, out: Mask, options: Options, last: int) -> F
     return Fold(blind, spread, held if carried is None else loaded(held, carried))
 
 
-def _check(robot: Robot, rows: Rows, logs: Sequence[Log], options: Options) -> None:
+def _check(robot: Robot, rows: Rows, logs: Sequence[Log], options: IdentificationOptions) -> None:
     """Whether the logs have what was asked for."""
     if any(log.effort_meaning == "external" for log in logs):
         raise EffortNotUsable(
@@ -226,7 +257,7 @@ def _check(robot: Robot, rows: Rows, logs: Sequence[Log], options: Options) -> N
         raise _not_excited(["payload"], logs, options)
 
 
-def _not_excited(parameters: Sequence[str], logs: Sequence[Log], options: Options) -> NotExcited:
+def _not_excited(parameters: Sequence[str], logs: Sequence[Log], options: IdentificationOptions) -> NotExcited:
     """With the excitation that would tell them: friction always, and what the torques of the links tell."""
     links = options.refit or {"torque_constant", "payload"} & set(options.fit)
     excite = [*(["inertials"] if links else []), *(["rotor"] if "rotor" in options.targets else []), "friction"]
@@ -266,7 +297,7 @@ def _previous(robot: Robot, name: Name) -> float:
     return own_value(robot, name)
 
 
-def _residuals(fitted: Fitted, rows: Rows, options: Options) -> Residuals:
+def _residuals(fitted: Fitted, rows: Rows, options: IdentificationOptions) -> Residuals:
     """What the fit leaves over, of moving rows."""
     error = motor_torque(fitted.arm, rows) - fitted.arm.torque(rows)
     moving = np.abs(rows.v) > options.velocity_threshold

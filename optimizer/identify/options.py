@@ -41,7 +41,7 @@ class Coupling:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options:
+class IdentificationOptions:
     """`fit`: the figures to find; power is added by itself where the logs have it, friction and
     rotors where the payload of the last log is to be found. `refit`: the links' inertials, too.
 

@@ -64,7 +64,7 @@ class PrincipalSolution:
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class IKSolution:
+class LimitedSolution:
     """One configuration q (nq,) [rad] within limits that reaches a pose, and its branch: see `PrincipalSolution`.
 
     `limit_distance` [rad] is the least distance of any joint to its limits.

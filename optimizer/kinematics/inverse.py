@@ -28,7 +28,7 @@ from joulepath.optimizer.kinematics import redundant_curve, traced_curve
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.decomposition import DecomposedArm
 from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives, nearest_turns
-from joulepath.optimizer.kinematics.ik_solutions import IKSolution, PrincipalSolution, Singularities
+from joulepath.optimizer.kinematics.ik_solutions import LimitedSolution, PrincipalSolution, Singularities
 from joulepath.optimizer.kinematics.isolated import distinct
 from joulepath.optimizer.kinematics.multi_start import MultiStart
 from joulepath.optimizer.kinematics.reach import REACH, at_the_edge, out_of_reach
@@ -81,7 +81,7 @@ class InverseKinematics(Protocol):
         windings: bool = True,
         target: str = "goal",
         members: int = MEMBERS,
-    ) -> list[IKSolution]:
+    ) -> list[LimitedSolution]:
         """Every configuration inside the limits (default: the robot's) that puts the TCP at T_base_tcp (4, 4).
 
         `T_flange_tcp` (4, 4) is the pose of the TCP in the flange frame, by default the identity. With `windings` there
@@ -246,7 +246,7 @@ class ClosedFormInverseKinematics:
         windings: bool = True,
         target: str = "goal",
         members: int = MEMBERS,
-    ) -> list[IKSolution]:
+    ) -> list[LimitedSolution]:
         """Every configuration inside the limits that puts the TCP at T_base_tcp (4, 4): see `InverseKinematics`."""
         T = T_base_tcp if T_flange_tcp is None else flange_pose(T_base_tcp, T_flange_tcp)
         limits = self._limits if limits is None else limits
@@ -275,7 +275,7 @@ class ClosedFormInverseKinematics:
             )
         q.setflags(write=False)
         distances = np.minimum(q - limits.q_min, limits.q_max - q).min(axis=1).tolist()
-        return list(map(IKSolution, q, owners, distances))
+        return list(map(LimitedSolution, q, owners, distances))
 
     def _reached_beside(self, T: Array, members: int, limits: Limits, distance: float | None) -> _Reached:
         """What is reached beside a flange pose T (4, 4) that is out of reach by a `distance` [m] within `Reach`."""

@@ -159,9 +159,19 @@ class Scene:
 
 
 def capsule_between(first: Array, second: Array, radius: float, touches: Sequence[str] | None = None) -> Attachment:
-    """A capsule fixed to the flange, around the segment from `first` to `second` (3,) [m] in the flange frame.
+    """A capsule fixed to the flange around a segment: a part of a tool.
 
-    If the two points coincide, it is a sphere. `touches` is that of `Attachment`. Raises InvalidProblem.
+    Args:
+        first: one end of the segment in the flange frame, shape (3,) [m].
+        second: the other end; where both coincide, the shape is a sphere.
+        radius: radius of the capsule [m].
+        touches: names of the links that it touches by design, as in `Attachment`.
+
+    Returns:
+        The shape, for `Arm(tool=[…])`.
+
+    Raises:
+        InvalidProblem: an end is not finite, or the size is not that of a body.
     """
     ends = frozen([first, second], (2, 3), "tool.capsules")
     along = ends[1] - ends[0]

@@ -1,33 +1,36 @@
-"""replay(planned): a motion played in MuJoCo, as planned and on an arm that is not quite the one planned with."""
+"""Public entry point: `replay(motion)` plays a motion in MuJoCo, on the planned and on other arms."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, overload
 
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
 from joulepath.optimizer.energy.plant import Plant
-from joulepath.optimizer.exceptions import DeadlineExceeded
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.replay.controller import ControlName, command, gains
+from joulepath.optimizer.replay.from_solution import planned_motion
 from joulepath.optimizer.replay.outcome import Outcome, outcome
 from joulepath.optimizer.replay.planned import PlannedMotion
 from joulepath.optimizer.replay.play import play
 from joulepath.optimizer.replay.reference import Reference, reference
 from joulepath.optimizer.replay.simulated_arm import SimulatedArm, with_changes
 from joulepath.optimizer.search.baselines import saving
-from joulepath.optimizer.solution import BaselineName
+from joulepath.optimizer.solution import BaselineName, Solution
 
 Quantity = Literal["payload", "friction"]
 
 
 @dataclass(frozen=True)
-class Changed:
+class ReplayedChange:
     """The motion on an arm of which one `quantity` is multiplied by `factor`; the controller does not know.
 
     `savings` [1] are those of the simulated motion against every simulated baseline on the same arm.
@@ -68,30 +71,91 @@ class Replay:
     planned_ratio: Array
     torque_error: float | None
     runs: dict[ControlName, Outcome]
-    changes: list[Changed]
+    changes: list[ReplayedChange]
     savings: list[SavingRange]
 
 
+@overload
+def replay(
+    motion: Solution,
+    controls: Sequence[ControlName] = ...,
+    step: float = ...,
+    perturb: Mapping[Quantity, float] | None = ...,
+    deadline: float = ...,
+    clock: Clock = ...,
+    *,
+    problem: Problem,
+) -> Replay: ...
+@overload
+def replay(
+    motion: PlannedMotion,
+    controls: Sequence[ControlName] = ...,
+    step: float = ...,
+    perturb: Mapping[Quantity, float] | None = ...,
+    deadline: float = ...,
+    clock: Clock = ...,
+) -> Replay: ...
+@overload
+def replay(
+    motion: CycleSolution,
+    controls: Sequence[ControlName] = ...,
+    step: float = ...,
+    perturb: Mapping[Quantity, float] | None = ...,
+    deadline: float = ...,
+    clock: Clock = ...,
+) -> list[Replay]: ...
 @one_thread()
 def replay(
-    planned: PlannedMotion,
+    motion: Solution | CycleSolution | PlannedMotion,
     controls: Sequence[ControlName] = ("feed_forward", "pd"),
     step: float = 2.5e-4,
     perturb: Mapping[Quantity, float] | None = None,
     deadline: float = np.inf,
     clock: Clock = time.perf_counter,
-) -> Replay:
-    """A motion played under each controller, and under the first of them on changed arms.
+    *,
+    problem: Problem | None = None,
+) -> Replay | list[Replay]:
+    """Play a motion in MuJoCo under controllers, and on arms that differ from the planned one.
 
-    `step` [s] is that of simulation and controller. `perturb` has the fractions by which quantities of the arm are
-    raised and lowered, one at a time. Raises InvalidProblem if the motion takes too many steps,
-    DeadlineExceeded after `deadline` [s].
+    MuJoCo shares the figures of the robot with the optimiser, and nothing else.
+
+    Args:
+        motion: solution of a problem or of a cycle, or a planned motion.
+        controls: controllers: torques known in advance with a PD loop, or the loop alone.
+        step: step of the simulation and of its controller [s].
+        perturb: fraction by which a quantity of the arm is raised and lowered, one at a time, under
+            the first controller, which does not know of it.
+        deadline: wall time after which the replay is given up [s].
+        clock: function that returns the time [s].
+        problem: problem that a `Solution` solves, which names its arm. The others name theirs.
+
+    Returns:
+        Deviation, torques, contacts and energy under each controller and of each change, and what
+        is left of the savings; of a cycle, one replay for each of its moves.
+
+    Raises:
+        InvalidProblem: the motion takes too many steps, or `problem` is missing.
+        NotCertified: the solution is not one of this problem's arm.
+        DeadlineExceeded: the deadline passed first.
     """
     try:
         with watch(Deadline.after(deadline, clock)):
-            return _Replayer(planned, step).replay(controls, perturb or {})
+            found = [_Replayer(each, step).replay(controls, perturb or {}) for each in _planned(motion, problem)]
     except DeadlinePassed:
         raise DeadlineExceeded([]) from None
+    return found if isinstance(motion, CycleSolution) else found[0]
+
+
+def _planned(motion: Solution | CycleSolution | PlannedMotion, problem: Problem | None) -> Iterator[PlannedMotion]:
+    if isinstance(motion, CycleSolution):
+        for move in motion.moves:
+            yield planned_motion(move.solution, move.planned.arm, motion.objective)
+    elif isinstance(motion, PlannedMotion):
+        yield motion
+    elif problem is None:
+        raise InvalidProblem("problem", "A solution does not name its arm: give the problem that it solves.")
+    else:
+        yield planned_motion(motion, problem.arm, problem.objective)
 
 
 class _Replayer:
@@ -127,10 +191,10 @@ class _Replayer:
             yield quantity, 1 - fraction
             yield quantity, 1 + fraction
 
-    def _changed(self, quantity: Quantity, factor: float, control: ControlName) -> Changed:
+    def _changed(self, quantity: Quantity, factor: float, control: ControlName) -> ReplayedChange:
         self._simulated.carry(with_changes(self._planned.arm, **{quantity: factor}))
         found = self._outcome(self._motion, control)
-        return Changed(quantity, factor, found, self._savings(found, control))
+        return ReplayedChange(quantity, factor, found, self._savings(found, control))
 
     def _outcome(self, motion: Reference, control: ControlName) -> Outcome:
         checkpoint()
@@ -158,7 +222,7 @@ class _Replayer:
         found = self._simulated.torques(given.q, given.v, given.a)
         return float((np.abs(found - given.tau) / self._planned.arm.active_limits.tau_max).max())
 
-    def _ranges(self, simulated: Mapping[BaselineName, float], changes: Sequence[Changed]) -> list[SavingRange]:
+    def _ranges(self, simulated: Mapping[BaselineName, float], changes: Sequence[ReplayedChange]) -> list[SavingRange]:
         return [
             SavingRange(
                 each.name,

@@ -20,7 +20,7 @@ from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.collision.model import collision_model
 from joulepath.optimizer.energy.plant import Plant
 from joulepath.optimizer.evaluate.evaluate import evaluate
-from joulepath.optimizer.evaluate.recording import Log, Waypoints, in_blocks
+from joulepath.optimizer.evaluate.recording import Recording, Waypoints
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.path_following import follow
@@ -119,7 +119,7 @@ def replayed(interpolation: Any, arm: Arm) -> object:
 
 def replayed_log(arm: Arm) -> object:
     t = np.arange(1500) * 0.008
-    return evaluate(arm, Log(in_blocks(t, START + 0.3 * np.sin(t[:, None] * np.linspace(0.2, 0.7, 6)))))
+    return evaluate(arm, Recording.of(t, START + 0.3 * np.sin(t[:, None] * np.linspace(0.2, 0.7, 6))))
 
 
 def inverse(seed: int) -> object:

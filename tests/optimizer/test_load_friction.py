@@ -19,7 +19,7 @@ from joulepath.optimizer.energy.kernel_functions import Interpreted
 from joulepath.optimizer.energy.limited_torque import greatest_smooth_part, limited_torque
 from joulepath.optimizer.energy.losses import drawn_power, power_flow
 from joulepath.optimizer.evaluate.evaluate import evaluate
-from joulepath.optimizer.evaluate.recording import Log, LogBlock
+from joulepath.optimizer.evaluate.recording import RecordedRows, Recording
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Payload
@@ -124,7 +124,7 @@ def test_an_answer_holds_whoever_looks_at_it(method: Any) -> None:
     assert 0 < found.lower_bound <= electrical.total
     path = found.trajectory
     assert path.tau_motor - path.tau == pytest.approx(by_hand(task, path.q, path.v, path.a), abs=1e-6)
-    replayed = evaluate(task.arm, Log([LogBlock(path.t, path.q, path.v, path.a)])).total.energy
+    replayed = evaluate(task.arm, Recording([RecordedRows(path.t, path.q, path.v, path.a)])).total.energy
     assert replayed.electrical.total == pytest.approx(electrical.total, rel=2e-3)  # of samples
     # the same motion of an arm without that friction needs less, and the certificate tells the two apart
     dry = problem(payload=HEAVY, method=method)

@@ -157,9 +157,9 @@ function drawBox() {
 
 /** The request with one more box, on the floor between two of its corners [x, y]. */
 function withBox(request, first, last) {
-  const round = (value) => Math.round(value * 1000) / 1000;
-  const size = first.map((value, axis) => Math.max(0.01, round(Math.abs(last[axis] - value))));
-  const position = first.map((value, axis) => round((value + last[axis]) / 2));
+  const rounded = (value) => Math.round(value * 1000) / 1000;
+  const size = first.map((value, axis) => Math.max(0.01, rounded(Math.abs(last[axis] - value))));
+  const position = first.map((value, axis) => rounded((value + last[axis]) / 2));
   const obstacles = request.scene?.obstacles ?? [];
   let k = 1;
   while (obstacles.some(({ name }) => name === `box ${k}`)) k += 1;

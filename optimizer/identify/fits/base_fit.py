@@ -16,7 +16,7 @@ from joulepath.optimizer.identify.estimates.estimate import Name
 from joulepath.optimizer.identify.estimates.grouped import Grouped, jackknife, left_out, solve
 from joulepath.optimizer.identify.estimates.robust import weights_of
 from joulepath.optimizer.identify.fits.whole_arm import WholeArm, whole_arm
-from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
@@ -44,13 +44,13 @@ class BaseFit:
         return np.asarray(arm.columns[:, self.kept] @ self.value)
 
 
-def base_arm(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: Options) -> WholeArm:
+def base_arm(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions) -> WholeArm:
     """Rows and columns of motor torques (n, nq) [N·m], from rows with the regressor."""
     assert rows.regressor is not None
     return whole_arm(robot, rows, torque, clusters, options, rows.regressor, np.zeros(BODY * robot.nq))
 
 
-def fit_base(robot: Robot, arm: WholeArm, clusters: Clusters, options: Options) -> BaseFit:
+def fit_base(robot: Robot, arm: WholeArm, clusters: Clusters, options: IdentificationOptions) -> BaseFit:
     """The base parameters by ordinary, weighted or reweighted least squares. Those of friction are not below 0."""
     base = base_parameters(robot.model, rotors="rotor" in options.fit)
     bodies = arm.bodies.shape[1]

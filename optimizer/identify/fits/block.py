@@ -11,7 +11,7 @@ import numpy.typing as npt
 from joulepath.models.robot import Array, Mask, Robot
 from joulepath.optimizer.identify.arm.friction_columns import COUPLED, column, lower_bounds
 from joulepath.optimizer.identify.estimates.estimate import Name
-from joulepath.optimizer.identify.options import Coupling, Options
+from joulepath.optimizer.identify.options import Coupling, IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
@@ -39,7 +39,7 @@ class Block:
     speed: float
 
 
-def terms_of(options: Options) -> list[str]:
+def terms_of(options: IdentificationOptions) -> list[str]:
     """The terms of each joint that are fitted."""
     friction = options.terms if "friction" in options.targets else ()
     scale = (SCALE,) if "torque_constant" in options.targets else ()
@@ -51,7 +51,7 @@ def block_of(
     rows: Rows,
     torque: Array,
     clusters: Clusters,
-    options: Options,
+    options: IdentificationOptions,
     joints: Sequence[int],
     speed: float = 1.0,
 ) -> Block:
@@ -111,7 +111,7 @@ def own_value(robot: Robot, name: Name) -> float:
     return 0.0 if own is None else float(own[joint])
 
 
-def _known(robot: Robot, rows: Rows, options: Options) -> Array:
+def _known(robot: Robot, rows: Rows, options: IdentificationOptions) -> Array:
     """Torque (n, nq) [N·m] of what is not fitted: rigid bodies, and the robot's own friction or rotors."""
     known = np.zeros_like(rows.rigid) if "torque_constant" in options.targets else rows.rigid.copy()
     if "friction" not in options.targets:

@@ -15,7 +15,7 @@ from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, join
 from joulepath.optimizer.identify.fits.power_fit import Prior, fit_power, prior_of
 from joulepath.optimizer.identify.fits.torque_fit import fit_torques
 from joulepath.optimizer.identify.fits.whole_fit import fit_whole
-from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters, clusters_of
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
@@ -50,7 +50,7 @@ class Fitted:
     mean_power: float
 
 
-def fit_rows(robot: Robot, rows: Rows, options: Options) -> Fitted:
+def fit_rows(robot: Robot, rows: Rows, options: IdentificationOptions) -> Fitted:
     """Fits what the rows have: torques, power or both."""
     clusters, arm = clusters_of(rows), own_arm(robot, options.knee)
     torque, with_power = motor_torque(arm, rows), bool(np.isfinite(rows.power).any())
@@ -71,7 +71,9 @@ def fit_rows(robot: Robot, rows: Rows, options: Options) -> Fitted:
     return _with_power(robot, rows, fitted, errors, options) if with_power else fitted
 
 
-def _with_torque(robot: Robot, rows: Rows, torque: Array, fitted: Fitted, options: Options) -> tuple[Fitted, Array]:
+def _with_torque(
+    robot: Robot, rows: Rows, torque: Array, fitted: Fitted, options: IdentificationOptions
+) -> tuple[Fitted, Array]:
     """With the torques fitted, and the errors (k, p) of the tilted arms' parameters."""
     own, links = fitted.arm, body_parameters(robot.model)
     found = (fit_whole if options.refit else fit_torques)(robot, rows, torque, fitted.clusters, options)
@@ -108,7 +110,7 @@ def motor_torque(arm: FittedArm, rows: Rows) -> Array:
     return rows.effort * arm.torque_constant if rows.current else rows.effort
 
 
-def _with_power(robot: Robot, rows: Rows, fitted: Fitted, errors: Array, options: Options) -> Fitted:
+def _with_power(robot: Robot, rows: Rows, fitted: Fitted, errors: Array, options: IdentificationOptions) -> Fitted:
     """With the power fitted, whose figures follow the `errors` (k, p) of the tilted arms."""
     use, clusters, arm = np.isfinite(rows.power), fitted.clusters, fitted.arm
     part, of_row = rows.take(use), Clusters(clusters.of_row[use], clusters.count)

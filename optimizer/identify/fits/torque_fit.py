@@ -19,7 +19,7 @@ from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, join
 from joulepath.optimizer.identify.estimates.grouped import Grouped, jackknife, left_out, solve
 from joulepath.optimizer.identify.estimates.robust import weights_of
 from joulepath.optimizer.identify.fits.block import SCALE, Block, block_of
-from joulepath.optimizer.identify.options import Coupling, Options
+from joulepath.optimizer.identify.options import Coupling, IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
@@ -42,7 +42,9 @@ KEPT = "The joint's Coulomb friction is kept, and so is the rest of its law."
 ZERO = "The fit puts it at its bound, 0."
 
 
-def fit_torques(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: Options) -> Estimate:
+def fit_torques(
+    robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions
+) -> Estimate:
     """Friction and rotor inertia from motor torques (n, nq) [N·m], NaN where there are none."""
     found = list[Estimate]()
     for joints in _joint_sets(robot.nq, options.couplings):
@@ -89,13 +91,13 @@ def _joint_sets(nq: int, couplings: Sequence[Coupling]) -> list[list[int]]:
     return [np.flatnonzero(labels == label).tolist() for label in np.unique(labels)]
 
 
-def _misfit(block: Block, clusters: Clusters, options: Options) -> float:
+def _misfit(block: Block, clusters: Clusters, options: IdentificationOptions) -> float:
     found, _ = _weighted(block, clusters, options)
     residuals = block.values - block.columns @ found
     return float(residuals @ residuals)
 
 
-def _fit(robot: Robot, block: Block, clusters: Clusters, options: Options) -> Estimate:
+def _fit(robot: Robot, block: Block, clusters: Clusters, options: IdentificationOptions) -> Estimate:
     """The block's estimate. What is not told is held, the least told first, until all the rest is told."""
     held = _untold(robot, block)
     while True:
@@ -174,7 +176,7 @@ def _own_curve(robot: Robot, block: Block, held: dict[Name, str]) -> Array:
     return total
 
 
-def _weighted(block: Block, clusters: Clusters, options: Options) -> tuple[Array, Array]:
+def _weighted(block: Block, clusters: Clusters, options: IdentificationOptions) -> tuple[Array, Array]:
     """The solution (p,), and the weights (n,) of its rows."""
     weight = np.ones_like(block.values)
     passes = {"ols": 1, "wls": 2 if len(np.unique(block.joint)) > 1 else 1, "irls": PASSES}[options.estimator]

@@ -9,7 +9,7 @@ import numpy as np
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.energy.link_regressor import body_parameters
 from joulepath.optimizer.identify.fits.block import Block, block_of, moving
-from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
@@ -35,7 +35,13 @@ class WholeArm:
 
 
 def whole_arm(
-    robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: Options, bodies: Array, change: Array
+    robot: Robot,
+    rows: Rows,
+    torque: Array,
+    clusters: Clusters,
+    options: IdentificationOptions,
+    bodies: Array,
+    change: Array,
 ) -> WholeArm:
     """All joints, from motor torques (n, nq) [N·m]. `bodies` (n, nq, 10 bodies) is the regressor of the links, and of
     others that are to be found; `change` (10 nq,) of the links is in the rigid torques of `rows` already."""

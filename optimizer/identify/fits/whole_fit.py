@@ -21,7 +21,7 @@ from joulepath.optimizer.identify.estimates.robust import bisquare_weights
 from joulepath.optimizer.identify.fits.consistent import solve_consistent
 from joulepath.optimizer.identify.fits.torque_fit import LEAST_LOAD_SPREAD, LOAD_SDS
 from joulepath.optimizer.identify.fits.whole_arm import WholeArm, whole_arm
-from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters, shared_variance
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
@@ -35,7 +35,7 @@ LOAD_SD, OFFSET_SD, OTHER_SD, RELATIVE_SD = 0.1, 0.05, 10.0, 1.0
 NOT_LOADED = "It is below {:g} standard deviations, or the rigid torque hardly varies."
 
 
-def fit_whole(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: Options) -> Estimate:
+def fit_whole(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions) -> Estimate:
     """Friction, rotors and couplings, then the links' 10 nq parameters, from motor torques (n, nq) [N·m].
 
     `rows` have the regressor."""
@@ -68,7 +68,7 @@ def fit_whole(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, optio
     )
 
 
-def _prior(robot: Robot, arm: WholeArm, options: Options, held: frozenset[int]) -> tuple[Array, Array]:
+def _prior(robot: Robot, arm: WholeArm, options: IdentificationOptions, held: frozenset[int]) -> tuple[Array, Array]:
     """Mean (p,) and precision (p, p) of bodies and other terms; those `held` are all but fixed."""
     own, names = body_parameters(robot.model), arm.block.names
     mean = np.concatenate([own, [arm.block.own[name] for name in names]])
@@ -90,7 +90,7 @@ def _prior_sd(robot: Robot, name: Name, own: float) -> float:
 
 
 def _solve(
-    arm: WholeArm, clusters: Clusters, options: Options, mean: Array, precision: Array, links: int
+    arm: WholeArm, clusters: Clusters, options: IdentificationOptions, mean: Array, precision: Array, links: int
 ) -> tuple[Array, Grouped]:
     """The solution (p,), and the weighted normal equations."""
     block = arm.block

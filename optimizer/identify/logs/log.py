@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.evaluate.recording import Recording
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Payload
 
@@ -17,7 +19,7 @@ EffortMeaning = Literal["current", "torque", "external"]
 
 
 @dataclass(frozen=True)
-class Move:
+class LogMove:
     """Rows `start` to `end` of a log, the latter not among them; `at_rest`: no joint moves in them."""
 
     start: int
@@ -53,7 +55,7 @@ class Log:
     payload_known: bool = True
     gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
     rate: float
-    moves: tuple[Move, ...]
+    moves: tuple[LogMove, ...]
     name: str | None = None
     tags: tuple[str, ...] = ()
 
@@ -72,6 +74,19 @@ class Log:
     def joints(self) -> int:
         """Number of joints."""
         return int(self.q.shape[1])
+
+    @property
+    def segment_rows(self) -> list[int]:
+        """Rows that bound the segments: the first, each in which motion or rest begins, the last."""
+        begins = [move.start for before, move in pairwise(self.moves) if move.at_rest != before.at_rest]
+        last = len(self.time) - 1
+        return [0, *(row for row in begins if 0 < row < last), last]
+
+    def recording(self) -> Recording:
+        """The logged motion, as `evaluate` takes it, with a segment for each move and each rest."""
+        edges = (self.time[self.segment_rows[1:-1]] - self.time[0]).tolist()
+        q, v, a = (channel.astype(float) for channel in (self.q, self.v, self.a))
+        return Recording.of(self.time, q, v, a, edges)
 
     @property
     def duration(self) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.identify.logs.filters import low_passed, noise
-from joulepath.optimizer.identify.logs.log import Move
+from joulepath.optimizer.identify.logs.log import LogMove
 
 SHORTEST = 0.1
 """A shorter move [s] is noise, and rest."""
@@ -41,7 +41,7 @@ def still_by_speed(v: Array, rate: float) -> Mask:
     return still
 
 
-def cut(still: Mask, rate: float, gaps: Indices) -> tuple[Move, ...]:
+def cut(still: Mask, rate: float, gaps: Indices) -> tuple[LogMove, ...]:
     """Moves and rests of rows (n,) that are `still` or not, in their order; none reaches into one of `gaps` (k, 2)."""
     still = still.copy()
     for start, end in _runs(still, False):
@@ -52,25 +52,25 @@ def cut(still: Mask, rate: float, gaps: Indices) -> tuple[Move, ...]:
     return tuple(move for low, high in parts for move in _cut_part(still, low, min(high + 1, len(still)), rate))
 
 
-def _cut_part(still: Mask, low: int, high: int, rate: float) -> Iterator[Move]:
+def _cut_part(still: Mask, low: int, high: int, rate: float) -> Iterator[LogMove]:
     changes = [low, *(low + 1 + np.flatnonzero(np.diff(still[low:high]))).tolist(), high]
     for start, end in pairwise(changes):
         if start == end:
             continue
         if still[start] or end - start <= LONGEST * rate:
-            yield Move(start, end, bool(still[start]))
+            yield LogMove(start, end, bool(still[start]))
         else:
             yield from _blocks(start, end, rate)
 
 
-def _blocks(start: int, end: int, rate: float) -> Iterator[Move]:
+def _blocks(start: int, end: int, rate: float) -> Iterator[LogMove]:
     """Blocks of equal length, with pauses between them."""
     duration = (end - start) / rate
     count = max(2, round((duration + PAUSE) / (BLOCK + PAUSE)))
     length = (duration - (count - 1) * PAUSE) / count
     for k in range(count):
         first = start + round(k * (length + PAUSE) * rate)
-        yield Move(first, min(first + round(length * rate), end), False)
+        yield LogMove(first, min(first + round(length * rate), end), False)
 
 
 def _runs(mask: Mask, value: bool) -> list[tuple[int, int]]:

@@ -6,8 +6,9 @@ from array import array
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import pi
+from os import PathLike
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -75,7 +76,7 @@ class LogOptions:
 
 
 @dataclass(frozen=True)
-class Reading:
+class LogReading:
     """A log, and what was seen while it was read."""
 
     log: Log
@@ -98,24 +99,37 @@ class _Channels:
         return self.grid.resampled(values[self.grid.kept] if self.grid.repeated else values, group in ("q", "v"))
 
 
-def read_log(source: Path | bytes, robot: Robot, **options: Any) -> Log:
-    """The log in a CSV file, which may be gzip. `options` are those of `LogOptions`. For errors see `read`."""
-    return read(source, robot, LogOptions(**options)).log
-
-
 def check_header(source: Path | bytes, robot: Robot, options: LogOptions) -> None:
     """Raises InvalidTable unless the file begins as a log does: with names of columns that are known or mapped."""
     with Source(source, options.most_bytes) as file:
         _named(head_of(file, robot.joint_names).names, robot, options)
 
 
-def read(source: Path | bytes, robot: Robot, options: LogOptions) -> Reading:
-    """The log in a CSV file, which may be gzip, and what was seen in it.
+def read_log(source: str | PathLike[str] | bytes, robot: Robot, options: LogOptions | None = None) -> LogReading:
+    """Read a log of one arm from a CSV file into SI units on a uniform grid of time.
 
-    Without speeds or accelerations, they are derivatives of what is there, low-passed without delay.
+    Speeds and accelerations that the file does not have are derivatives of what it has, low-passed
+    without delay. The columns that are known are listed in docs/identification.md.
 
-    Raises InvalidTable, with line and column, LogTooLarge, EffortNotUsable, or InvalidProblem for wrong options.
+    Args:
+        source: path of the file, or its content. Either may be packed with gzip.
+        robot: robot that the arm is one of.
+        options: what the file does not say of itself; the defaults find out what they can.
+
+    Returns:
+        The log, and a report on its channels with warnings.
+
+    Raises:
+        InvalidTable: a row or the table as a whole is wrong; `row` and `column` say where.
+        LogTooLarge: the file has more rows, or more bytes after unpacking, than are read.
+        EffortNotUsable: the efforts exclude gravity, or it is not clear what they are.
+        InvalidProblem: an option does not fit the file or the robot.
+        OSError: the file cannot be read.
     """
+    return _read(source if isinstance(source, bytes) else Path(source), robot, options or LogOptions())
+
+
+def _read(source: Path | bytes, robot: Robot, options: LogOptions) -> LogReading:
     gravity = frozen(options.gravity, (3,), "gravity")
     remarks: list[str] = []
     channels, dropped = _channels(source, robot, options, remarks)
@@ -154,7 +168,9 @@ def read(source: Path | bytes, robot: Robot, options: LogOptions) -> Reading:
         tags=tuple(options.tags),
     )
     remarks += log_warnings(log, grid, columns)
-    return Reading(log, LogReport(rows, dropped, grid.jitter, channels_of(log, columns, named), found, tuple(remarks)))
+    return LogReading(
+        log, LogReport(rows, dropped, grid.jitter, channels_of(log, columns, named), found, tuple(remarks))
+    )
 
 
 def _efforts(

@@ -1,4 +1,4 @@
-"""A log as a motion that can be evaluated, and the energy that was measured in each part of it."""
+"""The energy that was measured in each segment of a log."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.energy.losses import breakdown
 from joulepath.optimizer.energy.plant import Plant
-from joulepath.optimizer.evaluate.recording import BLOCK, in_blocks
-from joulepath.optimizer.evaluate.recording import Log as Motion
+from joulepath.optimizer.evaluate.recording import BLOCK
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.problem.arm import Arm
 
@@ -33,14 +32,8 @@ class Measured:
         return Measured(_sum(self.electrical, other.electrical), _sum(self.by_efforts, other.by_efforts))
 
 
-def motion_of(log: Log) -> Motion:
-    """The motion of a log: a segment from each row in which the arm begins to move, or to rest, to the next one."""
-    edges = (log.time[_rows(log)[1:-1]] - log.time[0]).tolist()
-    return Motion(in_blocks(log.time, log.q.astype(float), log.v.astype(float), log.a.astype(float)), edges=edges)
-
-
 def measured(log: Log, arm: Arm) -> list[Measured]:
-    """What was measured in each segment of `motion_of(log)`, which `arm` has moved; empty if nothing was."""
+    """What was measured in each segment of `log.recording()` of `arm`; empty if nothing was."""
     drives = arm.drives
     torque = None
     if log.effort is not None and log.effort_meaning != "external":
@@ -48,7 +41,7 @@ def measured(log: Log, arm: Arm) -> list[Measured]:
     if torque is None and log.power is None:
         return []
     plant, found = Plant(arm), list[Measured]()
-    for first, last in pairwise(_rows(log)):
+    for first, last in pairwise(log.segment_rows):
         parts = [_part(log, plant, torque, slice(low, high + 1)) for low, high in _pieces(first, last)]
         whole = parts[0]
         for part in parts[1:]:
@@ -70,13 +63,6 @@ def _part(log: Log, plant: Plant, torque: Array | None, rows: slice) -> Measured
     # what is left of the measured torque when the motion is made is lost
     energy = breakdown(weights, v, a, tau, 0.0, plant.arm, lost=torque[rows] - tau)
     return Measured(drawn, energy.electrical.total)
-
-
-def _rows(log: Log) -> list[int]:
-    """The rows between which the segments are: the first one, those in which motion and rest change, the last one."""
-    begins = [move.start for before, move in pairwise(log.moves) if move.at_rest != before.at_rest]
-    last = len(log.time) - 1
-    return [0, *(row for row in begins if 0 < row < last), last]
 
 
 def _pieces(first: int, last: int) -> Iterator[tuple[int, int]]:

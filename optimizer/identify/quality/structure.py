@@ -10,7 +10,7 @@ from joulepath.optimizer.energy.link_regressor import BODY, body_parameters
 from joulepath.optimizer.identify.arm.base_parameters import base_parameters
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm
 from joulepath.optimizer.identify.arm.pseudo_inertia import pseudo_inertias
-from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.results import Physical, Structure
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
@@ -20,7 +20,7 @@ LEAST_EXCITED = 1e-3
 ROUNDED = 1e-8
 
 
-def structure_of(robot: Robot, rows: Rows, options: Options) -> Structure:
+def structure_of(robot: Robot, rows: Rows, options: IdentificationOptions) -> Structure:
     """Standard and base parameters of bodies and, if they are fitted, rotors; what the rows tell of the bodies'."""
     rotors = "rotor" in options.fit
     base = base_parameters(robot.model, rotors)

@@ -16,7 +16,7 @@ from joulepath.models.robot import Array, Mask, Robot
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.energy.link_regressor import rigid_regressor, rigid_torques
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identify.logs.log import Log, Move
+from joulepath.optimizer.identify.logs.log import Log, LogMove
 from joulepath.optimizer.identify.rows.same_motion import groups_of_motions
 
 Numbers = npt.NDArray[np.int64]
@@ -196,10 +196,10 @@ def _blocks(log: Log, size: int, every: int) -> tuple[Numbers, Numbers, Mask]:
     return np.concatenate(starts), np.concatenate(of_move), np.concatenate(rest)
 
 
-def _parts(log: Log, move: Move) -> list[Move]:
+def _parts(log: Log, move: LogMove) -> list[LogMove]:
     """The move, or the blocks of a long one."""
     if move.at_rest or move.end - move.start <= LONGEST * log.rate:
         return [move]
     length, pause = int(BLOCK * log.rate), int(PAUSE * log.rate)
     starts = range(move.start, move.end - length // 2, length + pause)
-    return [Move(start, min(start + length, move.end), False) for start in starts]
+    return [LogMove(start, min(start + length, move.end), False) for start in starts]

@@ -12,7 +12,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from joulepath.app.convert.cycle import to_cycle
-from joulepath.app.convert.ik import to_collision_arm
+from joulepath.app.convert.ik import to_ik_arm
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.cycle import CycleRequest
 from joulepath.app.schemas.ik import IKRequest
@@ -158,7 +158,7 @@ def test_obstacles_path_tool_cone_and_lines_follow_their_frames() -> None:
         assert np.abs(mine - other).max() < 4 * EXACT
 
     cell = {"pose": in_base(via), "scene": {"frame": "base_link", "obstacles": [shape | {"pose": _bare(in_ros(via))}]}}
-    arm = to_collision_arm(IKRequest.model_validate(cell), load_robot("ur5e"))
+    arm = to_ik_arm(IKRequest.model_validate(cell), load_robot("ur5e"))
     assert np.abs(arm.scene.obstacles[0].T_base_shape - base.arm.scene.obstacles[0].T_base_shape).max() < 4 * EXACT
 
     stops = [

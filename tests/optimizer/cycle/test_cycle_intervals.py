@@ -9,7 +9,7 @@ import pytest
 
 from joulepath.models.robot import Robot
 from joulepath.models.uncertainty.spread import spread_of
-from joulepath.optimizer.cycle.cycle_solution import Move
+from joulepath.optimizer.cycle.cycle_solution import CycleMove
 from joulepath.optimizer.energy.dwell import dwell_energy, holding_power
 from joulepath.optimizer.energy.losses import breakdown
 from joulepath.optimizer.energy.plant import REPORT_NODES
@@ -29,7 +29,7 @@ SAMPLES = 300
 class Replayed:
     """Energies [J] of a move and its rest with other figures, by the report's formulas and Pinocchio's torques."""
 
-    def __init__(self, asked: Cycle, move: Move) -> None:
+    def __init__(self, asked: Cycle, move: CycleMove) -> None:
         self.asked, self.planned, self.length = asked, move.planned, move.planned.dwell + move.wait
         spline, still = move.solution.trajectory.spline, np.zeros((1, 6))
         self.weights, q, self.v, self.a = fine_samples(spline, REPORT_NODES)

@@ -20,7 +20,7 @@ from joulepath.optimizer.energy.interval import Known, interval_of, saving_inter
 from joulepath.optimizer.energy.losses import breakdown
 from joulepath.optimizer.energy.plant import REPORT_NODES
 from joulepath.optimizer.evaluate.evaluate import evaluate
-from joulepath.optimizer.evaluate.recording import Log, LogBlock
+from joulepath.optimizer.evaluate.recording import RecordedRows, Recording
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Inverter
@@ -241,10 +241,12 @@ def test_a_replayed_motion_has_the_interval_of_its_answer() -> None:
     found = optimize(problem(payload=PAYLOAD, sample_period=0.001))
     path, interval = found.trajectory, found.energy.electrical.interval
     assert interval is not None
-    log = LogBlock(path.t, path.q, path.v, path.a)
-    halves = [LogBlock(*(x[part] for x in (log.t, log.q, log.v, log.a))) for part in (slice(0, 300), slice(300, None))]
+    log = RecordedRows(path.t, path.q, path.v, path.a)
+    halves = [
+        RecordedRows(*(x[part] for x in (log.t, log.q, log.v, log.a))) for part in (slice(0, 300), slice(300, None))
+    ]
     for blocks in ([log], halves):
-        again = evaluate(problem(payload=PAYLOAD).arm, Log(blocks)).total.energy.electrical.interval
+        again = evaluate(problem(payload=PAYLOAD).arm, Recording(blocks)).total.energy.electrical.interval
         assert again is not None
         assert [again.p5, again.p95, again.sd] == pytest.approx([interval.p5, interval.p95, interval.sd], rel=2e-3)
 

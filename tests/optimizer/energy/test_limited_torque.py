@@ -18,7 +18,7 @@ from joulepath.optimizer.energy.kernel_expressions import build
 from joulepath.optimizer.energy.kernel_functions import Interpreted
 from joulepath.optimizer.energy.limited_torque import limited_torque
 from joulepath.optimizer.evaluate.evaluate import evaluate
-from joulepath.optimizer.evaluate.recording import Log, LogBlock
+from joulepath.optimizer.evaluate.recording import RecordedRows, Recording
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import Problem
@@ -99,7 +99,7 @@ def test_a_limit_of_the_link_lets_the_motor_do_more(method: Any) -> None:
     assert path.spline is not None
     ends = link.start.q, link.goal.q, link.energy
     assert not certify(tasks[1], path.spline, *ends).valid
-    logs = [Log([LogBlock(path.t, path.q, path.v, path.a)]) for _ in tasks]
+    logs = [Recording([RecordedRows(path.t, path.q, path.v, path.a)]) for _ in tasks]
     replayed = [evaluate(task.arm, log) for task, log in zip(tasks, logs, strict=True)]
     reports = [{each.limit: each.ratio for each in found.limits} for found in replayed]
     assert reports[0]["torque"] == pytest.approx(at_joint.max(), abs=0.02)

@@ -14,7 +14,7 @@ import pytest
 from joulepath.models.robot import Array
 from joulepath.optimizer.energy.plant import Plant
 from joulepath.optimizer.evaluate.evaluate import MOST_SEGMENTS, Evaluation, evaluate
-from joulepath.optimizer.evaluate.recording import BLOCK, Log, LogBlock, Waypoints, in_blocks
+from joulepath.optimizer.evaluate.recording import BLOCK, RecordedRows, Recording, Waypoints
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, InvalidTable
 from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
 from joulepath.optimizer.optimize import optimize
@@ -142,8 +142,8 @@ def test_a_log_of_a_motion_needs_the_energy_of_the_motion() -> None:
     whole = evaluate(ARM, motion("spline"), sample_period=2e-3)
     s = whole.samples
     assert s is not None
-    by_q = evaluate(ARM, Log(in_blocks(s.t, s.q)))
-    by_all = evaluate(ARM, Log(in_blocks(s.t, s.q, s.v, s.a)))
+    by_q = evaluate(ARM, Recording.of(s.t, s.q))
+    by_all = evaluate(ARM, Recording.of(s.t, s.q, s.v, s.a))
     for result in (by_q, by_all):
         # splines through samples 2 ms apart
         assert total(result) == pytest.approx(total(whole), rel=1e-4)
@@ -153,16 +153,16 @@ def test_a_log_of_a_motion_needs_the_energy_of_the_motion() -> None:
 def test_speeds_that_do_not_fit_show_in_the_balance() -> None:
     t, q = log(500)
     v = np.gradient(q, t, axis=0)
-    assert evaluate(ARM, Log(in_blocks(t, q, v))).total.balance_error < 1e-3
-    assert evaluate(ARM, Log(in_blocks(t, q, 1.5 * v))).total.balance_error > 1e-3
+    assert evaluate(ARM, Recording.of(t, q, v)).total.balance_error < 1e-3
+    assert evaluate(ARM, Recording.of(t, q, 1.5 * v)).total.balance_error > 1e-3
 
 
 def test_blocks_do_not_show() -> None:
     t, q = log(2 * BLOCK + 700)
-    whole = evaluate(ARM, Log([LogBlock(t, q)]), sample_period=0.05)
+    whole = evaluate(ARM, Recording([RecordedRows(t, q)]), sample_period=0.05)
     for size in (50, 977, BLOCK + 3):
-        parts = [LogBlock(t[k : k + size], q[k : k + size]) for k in range(0, len(t), size)]
-        result = evaluate(ARM, Log(parts), sample_period=0.05)
+        parts = [RecordedRows(t[k : k + size], q[k : k + size]) for k in range(0, len(t), size)]
+        result = evaluate(ARM, Recording(parts), sample_period=0.05)
         # the spline through a block and its neighbouring rows is the spline through all rows, except for rounding
         assert total(result) == pytest.approx(total(whole), rel=1e-9)
         assert result.samples is not None and whole.samples is not None
@@ -171,22 +171,22 @@ def test_blocks_do_not_show() -> None:
 
 def test_the_start_of_time_does_not_matter() -> None:
     t, q = log(300)
-    shifted = evaluate(ARM, Log(in_blocks(t + 1.7e6, q)))
-    assert total(shifted) == pytest.approx(total(evaluate(ARM, Log(in_blocks(t, q)))), rel=1e-6)
+    shifted = evaluate(ARM, Recording.of(t + 1.7e6, q))
+    assert total(shifted) == pytest.approx(total(evaluate(ARM, Recording.of(t, q))), rel=1e-6)
     assert (shifted.total.start, shifted.total.end) == (0.0, pytest.approx(t[-1]))
 
 
 @pytest.mark.long
 def test_memory_does_not_grow_with_the_log() -> None:
-    def blocks(count: int) -> Iterator[LogBlock]:
+    def blocks(count: int) -> Iterator[RecordedRows]:
         for k in range(count):
             t = (k * BLOCK + np.arange(BLOCK)) * 0.008
-            yield LogBlock(t, START + 0.3 * np.sin(t[:, None] * np.linspace(0.2, 0.7, 6)))
+            yield RecordedRows(t, START + 0.3 * np.sin(t[:, None] * np.linspace(0.2, 0.7, 6)))
 
     def peak(count: int) -> int:
         tracemalloc.start()
         try:
-            evaluate(ARM, Log(blocks(count)))
+            evaluate(ARM, Recording(blocks(count)))
             return tracemalloc.get_traced_memory()[1]
         finally:
             tracemalloc.stop()
@@ -252,7 +252,7 @@ def test_refuses(make: Any) -> None:
 def test_refuses_a_log_without_a_motion(rows: int) -> None:
     t, q = log(rows)
     with pytest.raises(InvalidTable):
-        evaluate(ARM, Log(in_blocks(t, q)))
+        evaluate(ARM, Recording.of(t, q))
 
 
 def test_keeps_its_deadline() -> None:

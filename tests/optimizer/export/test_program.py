@@ -13,8 +13,9 @@ import pytest
 
 from benchmarks.read_back.random_motions import arm_of, one_move, random_spline
 from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.evaluate.sample_check import check_samples
 from joulepath.optimizer.exceptions import InvalidProblem, NotCertified
-from joulepath.optimizer.export.certified import certified, check_samples
+from joulepath.optimizer.export.certified import certified
 from joulepath.optimizer.export.program import Move, Program, Rest, program_of_cycle
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.arm import Payload
@@ -91,10 +92,10 @@ def test_samples_of_another_motion_are_noticed(name: str) -> None:
     move = one_move().moves[0]
     own = samples_of(move)
     samples = {each: getattr(own, each).copy() for each in ("q", "v", "a", "tau")}
-    check_samples(move, own.t, list(samples.values()))
+    check_samples(move.arm, move.spline, own.t, list(samples.values()))
     samples[name][7, 2] += 1e-3
     with pytest.raises(NotCertified, match="samples"):
-        check_samples(move, own.t, list(samples.values()))
+        check_samples(move.arm, move.spline, own.t, list(samples.values()))
 
 
 def test_another_payload_is_noticed_by_the_torques() -> None:
@@ -102,7 +103,7 @@ def test_another_payload_is_noticed_by_the_torques() -> None:
     own = samples_of(move)
     loaded = replace(move, arm=replace(move.arm, payload=Payload(0.05)))
     with pytest.raises(NotCertified, match="torques"):
-        check_samples(loaded, own.t, (own.q, own.v, own.a, own.tau))
+        check_samples(loaded.arm, loaded.spline, own.t, (own.q, own.v, own.a, own.tau))
 
 
 def test_steps_must_fit_together() -> None:

@@ -8,7 +8,6 @@ import pytest
 from benchmarks.read_back.point_programs import cut, deviation, read_krl, read_rapid, stated, through
 from benchmarks.read_back.random_motions import OWN, arm_of, one_move, random_spline
 from joulepath.optimizer.exceptions import FormatUnsuitable
-from joulepath.optimizer.export.axes import Axes
 from joulepath.optimizer.export.krl import KrlOptions, to_krl
 from joulepath.optimizer.export.program import Move, Program, Rest
 from joulepath.optimizer.export.rapid import RapidOptions, to_rapid
@@ -54,12 +53,12 @@ def test_a_cycle_in_rapid_switches_waits_and_changes_the_load() -> None:
 
 def test_axes_of_another_sense_and_zero() -> None:
     program = one_move(OWN)
-    axes = Axes((1, -1, 1, 1, -1, 1), (0.0, -90.0, 90.0, 0.0, 0.0, 180.0))
-    plain, turned = (read_rapid(to_rapid(program, RapidOptions(axes=each))).moves[0][1] for each in (Axes(), axes))
+    axes = RapidOptions(signs=(1, -1, 1, 1, -1, 1), offsets=(0.0, -90.0, 90.0, 0.0, 0.0, 180.0))
+    plain, turned = (read_rapid(to_rapid(program, each)).moves[0][1] for each in (RapidOptions(), axes))
     expected = np.array(plain) * axes.signs + np.deg2rad(axes.offsets)  # type: ignore[arg-type]
     assert np.array(turned) == pytest.approx(expected, abs=ROUNDING)
     with pytest.raises(FormatUnsuitable, match="signs must have 6"):
-        to_rapid(program, RapidOptions(axes=Axes(signs=(1,))))
+        to_rapid(program, RapidOptions(signs=(1,)))
 
 
 @pytest.mark.parametrize("label", ['pick";\n    SetDO doDoor,1;', "\u2028ENDPROC", "a\rb"])

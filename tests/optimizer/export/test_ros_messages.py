@@ -16,7 +16,7 @@ from joulepath.optimizer.exceptions import FormatUnsuitable
 from joulepath.optimizer.export import quintic_points as points_module
 from joulepath.optimizer.export.program import Move, Program
 from joulepath.optimizer.export.quintic_points import POSITION_TOLERANCE, VELOCITY_TOLERANCE
-from joulepath.optimizer.export.ros_messages import RosOptions, to_moveit, to_ros2
+from joulepath.optimizer.export.ros_messages import MoveitOptions, Ros2Options, to_moveit, to_ros2
 from joulepath.optimizer.trajectories.spline import Spline
 from tests.optimizer.export.programs import cycle_with_payload
 
@@ -81,7 +81,7 @@ def test_what_no_points_can_follow_is_refused(monkeypatch: pytest.MonkeyPatch) -
 @pytest.mark.parametrize("message", ["goal", "trajectory"])
 def test_json_is_an_operation_of_rosbridge(message: str) -> None:
     program = one_move()
-    content = json.loads(to_ros2(program, RosOptions(message, "json", "arm/jtc")).content)  # type: ignore[arg-type]
+    content = json.loads(to_ros2(program, Ros2Options(message, "json", "arm/jtc")).content)  # type: ignore[arg-type]
     if message == "goal":
         assert content["op"] == "send_action_goal" and content["action"] == "/arm/jtc/follow_joint_trajectory"
         trajectory = content["args"]["trajectory"]
@@ -94,7 +94,7 @@ def test_json_is_an_operation_of_rosbridge(message: str) -> None:
 @pytest.mark.parametrize("encoding", ["yaml", "json"])
 def test_moveit_gets_a_robot_trajectory(encoding: str) -> None:
     program = one_move()
-    content = yaml.safe_load(to_moveit(program, encoding).content)  # type: ignore[arg-type]
+    content = yaml.safe_load(to_moveit(program, MoveitOptions(encoding)).content)  # type: ignore[arg-type]
     assert content.keys() == {"joint_trajectory", "multi_dof_joint_trajectory"}
     check(program, content["joint_trajectory"])
 

@@ -14,6 +14,7 @@ from joulepath.optimizer.exceptions import FormatUnsuitable
 from joulepath.optimizer.export.csv_table import to_csv
 from joulepath.optimizer.export.json_document import to_json
 from joulepath.optimizer.export.npz_arrays import to_npz
+from joulepath.optimizer.export.rows import TableOptions
 from joulepath.optimizer.trajectories.spline import Spline
 from tests.optimizer.export.programs import LOAD, cycle_with_payload
 
@@ -24,7 +25,7 @@ ROUNDING = 1e-8
 @pytest.mark.parametrize("robot", ["ur5e", "fr3"])
 def test_csv_is_read_by_the_reader_of_evaluate(robot: str) -> None:
     program = one_move(robot)
-    table = MotionCsv.of(BytesIO(to_csv(program, 0.004).content), program.robot.nq, "rad")  # type: ignore[arg-type]
+    table = MotionCsv.of(BytesIO(to_csv(program, TableOptions(0.004)).content), program.robot.nq, "rad")  # type: ignore[arg-type]
     assert table.has_time
     (block,) = table.log()
     assert block.t[0] == 0 and block.t[-1] == pytest.approx(program.duration, abs=ROUNDING)
@@ -61,4 +62,4 @@ def test_npz_needs_no_pickle_and_has_samples_and_splines() -> None:
 @pytest.mark.parametrize("write", [to_csv, to_npz])
 def test_a_table_without_an_end_is_refused(write: object) -> None:
     with pytest.raises(FormatUnsuitable, match="longer period"):
-        write(one_move().slowed(1e-2), 1e-4)  # type: ignore[operator]
+        write(one_move().slowed(1e-2), TableOptions(1e-4))  # type: ignore[operator]

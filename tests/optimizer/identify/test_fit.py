@@ -10,18 +10,17 @@ import pytest
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identify.document import document_of
 from joulepath.optimizer.identify.errors import NoPowerChannel, NotExcited, NothingHeldOut
-from joulepath.optimizer.identify.identify import Identification, fit
-from joulepath.optimizer.identify.logs.log import Log, Move
+from joulepath.optimizer.identify.identify import Identification, identify
+from joulepath.optimizer.identify.logs.log import Log, LogMove
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
-from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.quality import curves as curves_module
 from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import GRAVITY, Noise, Recording, Truth, recorded, truth_of
 
 ROBOT = load_robot("ur10e")
-WITHOUT_SPLIT = Options(held_out=0.0)
+WITHOUT_SPLIT = IdentificationOptions(held_out=0.0)
 # of the standard deviations: what one of a thousand figures exceeds
 FAR = 4.0
 # rows of all curves together, in place of the service's number: logs are shorter, too
@@ -30,9 +29,9 @@ MOST = 100
 LOADED = (1, 2)
 
 
-def run(seed: int = 0, moves: int = 14, options: Options = WITHOUT_SPLIT) -> tuple[Truth, Identification]:
+def run(seed: int = 0, moves: int = 14, options: IdentificationOptions = WITHOUT_SPLIT) -> tuple[Truth, Identification]:
     truth = truth_of(ROBOT, seed)
-    return truth, fit(ROBOT, [recorded(ROBOT, truth, moves=moves, seed=seed).log()], options)
+    return truth, identify(ROBOT, [recorded(ROBOT, truth, moves=moves, seed=seed).log()], options)
 
 
 def true_value(truth: Truth, figure: str, joint: int | None) -> float:
@@ -55,7 +54,7 @@ def test_every_friction_figure_is_found_within_its_standard_deviations() -> None
 
 
 def test_the_fitted_figures_predict_held_out_moves_better_than_the_robots_own() -> None:
-    _, found = run(options=Options())
+    _, found = run(options=IdentificationOptions())
     errors = found.validation
     assert errors is not None and errors.fitted.torque is not None and errors.own.torque is not None
     # what is left is the noise of the current
@@ -66,7 +65,7 @@ def test_the_fitted_figures_predict_held_out_moves_better_than_the_robots_own() 
 
 def test_curves_show_each_row_by_figures_that_may_predict_it() -> None:
     """All moves, once; what is left over has the size that the validation says."""
-    _, found = run(options=Options())
+    _, found = run(options=IdentificationOptions())
     assert found.validation is not None and found.validation.fitted.torque is not None
     seen, blind = found.curves, found.validation.curves
     assert not set(seen.move) & set(blind.move) and set(seen.move) | set(blind.move) == set(range(14))
@@ -85,7 +84,7 @@ def test_curves_of_long_logs_are_thinned(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(curves_module, "MOST", MOST)
     truth = truth_of(ROBOT)
     logs = [recorded(ROBOT, truth, moves=4, seed=seed).log() for seed in (0, 1, 2)]
-    found = fit(ROBOT, logs[:2], Options(held_out=1.0))
+    found = identify(ROBOT, logs[:2], IdentificationOptions(held_out=1.0))
     assert found.validation is not None
     curves, moves = found.validation.curves, found.validation.moves
     assert MOST - moves < len(curves.time) <= MOST + moves
@@ -97,10 +96,10 @@ def test_curves_of_long_logs_are_thinned(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_what_was_not_measured_is_not_modelled() -> None:
     truth = truth_of(ROBOT)
     log = recorded(ROBOT, truth, moves=4).log()
-    curves = fit(ROBOT, [without_power(log)], WITHOUT_SPLIT).curves
+    curves = identify(ROBOT, [without_power(log)], WITHOUT_SPLIT).curves
     assert np.isnan(curves.power).all() and np.isnan(curves.modelled_power).all()
     assert np.isfinite(curves.torque).all() and 0.3 < np.isfinite(curves.modelled_torque).mean() < 1
-    curves = fit(ROBOT, [replace(log, effort=None, effort_meaning=None)], WITHOUT_SPLIT).curves
+    curves = identify(ROBOT, [replace(log, effort=None, effort_meaning=None)], WITHOUT_SPLIT).curves
     assert np.isnan(curves.modelled_torque).all() and np.isfinite(curves.modelled_power).all()
 
 
@@ -115,8 +114,8 @@ def test_another_log_validates() -> None:
 
 
 def test_load_friction_makes_the_difference_where_there_is_load() -> None:
-    _, with_load = run(options=Options())
-    _, without = run(options=Options(terms=("coulomb", "viscous", "offset")))
+    _, with_load = run(options=IdentificationOptions())
+    _, without = run(options=IdentificationOptions(terms=("coulomb", "viscous", "offset")))
     assert with_load.validation is not None and without.validation is not None
     better, worse = with_load.validation.fitted.torque, without.validation.fitted.torque
     assert better is not None and worse is not None
@@ -126,7 +125,7 @@ def test_load_friction_makes_the_difference_where_there_is_load() -> None:
 def test_power_alone_gives_idle_power_and_the_size_of_friction() -> None:
     truth = truth_of(ROBOT, 3)
     log = recorded(ROBOT, truth, moves=14, seed=3).log()
-    found = fit(ROBOT, [replace(log, effort=None, effort_meaning=None)])
+    found = identify(ROBOT, [replace(log, effort=None, effort_meaning=None)])
     idle = next(each for each in found.parameters if each.figure == "idle_power")
     assert idle.identified and abs(idle.value - truth.idle_power) <= FAR * idle.sd
     assert found.validation is not None
@@ -141,13 +140,13 @@ def test_power_alone_tells_how_heavy_the_links_are(scale: float) -> None:
     real = replace(ROBOT, model=ROBOT.loaded_model(0.0, none[0], none, GRAVITY, np.full(6, scale)))
     truth = truth_of(ROBOT, 3, Payload(mass=4.0, com=np.array([0.0, 0.0, 0.05])))
     log = replace(recorded(real, truth, moves=14, seed=3).log(), effort=None, effort_meaning=None)
-    found = fit(ROBOT, [log])
+    found = identify(ROBOT, [log])
     links = next(each for each in found.parameters if each.figure == "link_mass_scale")
     assert links.identified and links.previous == 1.0 and abs(links.value - scale) <= FAR * links.sd < 0.1
     assert found.validation is not None
     fitted, own = found.validation.fitted.power, found.validation.own.power
     assert fitted is not None and own is not None and fitted.energy_mean < 0.5 * own.energy_mean
-    document = document_of(found.figures(), "2026-01-01")
+    document = found.document("2026-01-01")
     heavier = load_robot("ur10e", figures=document).model
     for own, body in zip(list(ROBOT.model.inertias)[1:], list(heavier.inertias)[1:], strict=True):
         np.testing.assert_allclose(body.mass, links.value * own.mass)
@@ -162,7 +161,7 @@ def test_power_without_lifting_does_not_tell_how_heavy_the_links_are() -> None:
     motion = {name: np.where(first, getattr(log, name), 0.0) for name in ("q", "v", "a")}
     speed, noise = np.abs(log.v[:, 0]), np.random.default_rng(0).normal(0.0, 0.5, len(log.v))
     turned = replace(log, **motion, power=40 + 10 * speed + 9 * speed**2 + noise, effort=None, effort_meaning=None)
-    found = {(each.figure, each.joint): each for each in fit(ROBOT, [turned], WITHOUT_SPLIT).parameters}
+    found = {(each.figure, each.joint): each for each in identify(ROBOT, [turned], WITHOUT_SPLIT).parameters}
     assert found["idle_power", None].identified
     assert not found["link_mass_scale", None].identified and found["link_mass_scale", None].why
     assert not found["coulomb", 3].identified
@@ -179,7 +178,7 @@ def still(recording: Recording, joint: int) -> Log:
 
 def test_a_joint_that_does_not_move_keeps_the_robots_own_figures() -> None:
     truth = truth_of(ROBOT)
-    found = fit(ROBOT, [still(recorded(ROBOT, truth, moves=8), 5)], WITHOUT_SPLIT)
+    found = identify(ROBOT, [still(recorded(ROBOT, truth, moves=8), 5)], WITHOUT_SPLIT)
     kept = [each for each in found.parameters if each.joint == 5 and each.figure != "offset"]
     assert kept and not any(each.identified for each in kept)
     assert all(each.why and each.value == each.previous for each in kept)
@@ -191,13 +190,13 @@ def test_a_joint_that_does_not_move_keeps_the_robots_own_figures() -> None:
 def at_rest(log: Log) -> Log:
     zeros = np.zeros_like(log.v)
     still = {"q": np.tile(log.q[:1], (len(log.q), 1)), "v": zeros, "a": zeros}
-    return without_power(log, **still, moves=(Move(0, len(log.q), True),))
+    return without_power(log, **still, moves=(LogMove(0, len(log.q), True),))
 
 
 def test_a_log_at_rest_identifies_nothing() -> None:
     log = recorded(ROBOT, truth_of(ROBOT), moves=2).log()
     with pytest.raises(NotExcited) as caught:
-        fit(ROBOT, [at_rest(log)], WITHOUT_SPLIT)
+        identify(ROBOT, [at_rest(log)], WITHOUT_SPLIT)
     assert "coulomb" in caught.value.parameters
     assert caught.value.advice == {"robot": "ur10e", "parameters": ["rotor", "friction"]}
 
@@ -207,7 +206,7 @@ def test_moves_along_one_motion_are_no_validation(moves: int) -> None:
     """The second of two moves is the first one backwards."""
     log = recorded(ROBOT, truth_of(ROBOT), moves=moves).log()
     with pytest.raises(NothingHeldOut) as caught:
-        fit(ROBOT, [log])
+        identify(ROBOT, [log])
     assert caught.value.moves == moves
 
 
@@ -215,8 +214,8 @@ def test_one_long_move_is_fitted_by_its_seconds() -> None:
     """There is nothing to hold out, but other logs can validate."""
     truth = truth_of(ROBOT)
     log = without_power(recorded(ROBOT, truth, moves=6).log())
-    one = replace(log, moves=(Move(0, len(log.q), False),))
-    found = fit(ROBOT, [one], WITHOUT_SPLIT)
+    one = replace(log, moves=(LogMove(0, len(log.q), False),))
+    found = identify(ROBOT, [one], WITHOUT_SPLIT)
     assert found.validation is None
     coulomb = [each for each in found.parameters if each.figure == "coulomb" and each.joint in LOADED]
     assert all(each.identified for each in coulomb)
@@ -226,19 +225,19 @@ def test_one_long_move_is_fitted_by_its_seconds() -> None:
 def test_a_repeated_log_is_on_one_side_of_the_split() -> None:
     recording = recorded(ROBOT, truth_of(ROBOT), moves=2)
     with pytest.raises(NothingHeldOut):
-        fit(ROBOT, [recording.log(), recording.log()])
+        identify(ROBOT, [recording.log(), recording.log()])
 
 
 def test_gravity_compensated_efforts_are_refused() -> None:
     log = recorded(ROBOT, truth_of(ROBOT), moves=2).log("torque")
     with pytest.raises(EffortNotUsable):
-        fit(ROBOT, [replace(log, effort_meaning="external")])
+        identify(ROBOT, [replace(log, effort_meaning="external")])
 
 
 def test_power_is_asked_of_logs_that_have_it() -> None:
     log = without_power(recorded(ROBOT, truth_of(ROBOT), moves=2).log())
     with pytest.raises(NoPowerChannel):
-        fit(ROBOT, [log], Options(fit=("friction", "power")))
+        identify(ROBOT, [log], IdentificationOptions(fit=("friction", "power")))
 
 
 @pytest.mark.parametrize("factor", [0.0, 1e-3, 1e3, -1.0])
@@ -248,10 +247,10 @@ def test_what_is_no_power_in_watts_is_refused(factor: float) -> None:
     assert log.power is not None
     wrong = replace(log, power=factor * log.power)
     with pytest.raises(InvalidProblem, match="not the power") as caught:
-        fit(ROBOT, [wrong], WITHOUT_SPLIT)
+        identify(ROBOT, [wrong], WITHOUT_SPLIT)
     assert caught.value.field == "logs"
     with pytest.raises(InvalidProblem, match="not the power"):
-        fit(ROBOT, [log], WITHOUT_SPLIT).validate([wrong])
+        identify(ROBOT, [log], WITHOUT_SPLIT).validate([wrong])
 
 
 def with_outliers(log: Log) -> Log:
@@ -272,7 +271,7 @@ def test_reweighting_keeps_outliers_out() -> None:
         # of the offset, which one-sided outliers move most
         return np.abs(found.fitted.arm.offset - truth.offset)[list(LOADED)]
 
-    plain, robust = (fit(ROBOT, [log], replace(WITHOUT_SPLIT, estimator=each)) for each in ("wls", "irls"))
+    plain, robust = (identify(ROBOT, [log], replace(WITHOUT_SPLIT, estimator=each)) for each in ("wls", "irls"))
     assert (error(robust) < 0.2 * error(plain)).all()
 
 
@@ -281,7 +280,11 @@ def test_more_noise_gives_larger_standard_deviations() -> None:
     loud = Noise(current=0.2)
     quiet_log, loud_log = (without_power(recorded(ROBOT, truth, noise=each).log()) for each in (None, loud))
     quiet_sd, loud_sd = (
-        {(each.figure, each.joint): each.sd for each in fit(ROBOT, [log], WITHOUT_SPLIT).parameters if each.identified}
+        {
+            (each.figure, each.joint): each.sd
+            for each in identify(ROBOT, [log], WITHOUT_SPLIT).parameters
+            if each.identified
+        }
         for log in (quiet_log, loud_log)
     )
     shared = quiet_sd.keys() & loud_sd.keys()
@@ -295,7 +298,7 @@ def test_torque_constants_follow_from_gravity() -> None:
     truth = truth_of(ROBOT, 2)
     real = truth.torque_constant * np.array([1.0, 1.06, 0.95, 1.04, 1.0, 1.0])
     log = without_power(recorded(ROBOT, replace(truth, torque_constant=real), moves=14).log())
-    found = fit(ROBOT, [log], Options(fit=("friction", "rotor", "torque_constant"), held_out=0.0))
+    found = identify(ROBOT, [log], IdentificationOptions(fit=("friction", "rotor", "torque_constant"), held_out=0.0))
     constants = {each.joint: each for each in found.parameters if each.figure == "torque_constant"}
     for joint in LOADED:
         assert constants[joint].identified
@@ -309,4 +312,4 @@ def test_torque_constants_follow_from_gravity() -> None:
 def test_torque_constants_are_asked_of_currents_only() -> None:
     log = without_power(recorded(ROBOT, truth_of(ROBOT), moves=2).log("torque"))
     with pytest.raises(InvalidProblem, match="currents"):
-        fit(ROBOT, [log], Options(fit=("torque_constant",), held_out=0.0))
+        identify(ROBOT, [log], IdentificationOptions(fit=("torque_constant",), held_out=0.0))

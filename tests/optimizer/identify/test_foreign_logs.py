@@ -13,7 +13,7 @@ from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidTable
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
-from joulepath.optimizer.identify.logs.reading import LogOptions, Reading, read, read_log
+from joulepath.optimizer.identify.logs.reading import LogOptions, LogReading, read_log
 from tests.identification_logs import Recording, csv_of, recorded, truth_of, with_current
 
 ROBOT = load_robot("ur5e")
@@ -50,7 +50,7 @@ def numbered(pattern: str, words: Sequence[str], count: int) -> list[str]:
     return [pattern.format(word, k) for word in words for k in range(count)]
 
 
-def remarks(reading: Reading) -> list[str]:
+def remarks(reading: LogReading) -> list[str]:
     return [each for each in reading.report.warnings if PAYLOAD not in each]
 
 
@@ -58,7 +58,7 @@ def with_times(lines: list[str], times: list[str]) -> list[str]:
     return [lines[0], *(f"{t},{line.partition(',')[2]}" for t, line in zip(times, lines[1:], strict=True))]
 
 
-def same(reading: Reading, recording: Recording) -> None:
+def same(reading: LogReading, recording: Recording) -> None:
     np.testing.assert_allclose(reading.log.q, recording.q, atol=1e-6)
     np.testing.assert_allclose(reading.log.effort, recording.current, rtol=1e-6, atol=1e-6)
     assert reading.report.dropped == 0
@@ -88,20 +88,20 @@ SHAPES: dict[str, Callable[[list[str]], list[str]]] = {
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_shapes_of_files(recording: Recording, shape: str) -> None:
-    reading = read(joined(SHAPES[shape](lines_of(recording))), ROBOT, LogOptions())
+    reading = read_log(joined(SHAPES[shape](lines_of(recording))), ROBOT)
     same(reading, recording)
     assert remarks(reading) == (["Line 2 has no number, and is taken for units."] if shape == "line of units" else [])
 
 
 def test_byte_order_mark_and_line_ends(recording: Recording) -> None:
-    same(read(b"\xef\xbb\xbf" + joined(lines_of(recording), "\r\n"), ROBOT, LogOptions()), recording)
+    same(read_log(b"\xef\xbb\xbf" + joined(lines_of(recording), "\r\n"), ROBOT), recording)
 
 
 @pytest.mark.parametrize(("unit", "per_second"), [("ms", 1e3), ("µs", 1e6), ("ns", 1e9)])
 @pytest.mark.parametrize("begin", [0, START])
 def test_units_of_time(recording: Recording, unit: str, per_second: float, begin: int) -> None:
     times = [str(round((begin + t) * per_second)) for t in recording.time.tolist()]
-    reading = read(joined(with_times(lines_of(recording), times)), ROBOT, LogOptions())
+    reading = read_log(joined(with_times(lines_of(recording), times)), ROBOT)
     same(reading, recording)
     assert reading.log.rate == pytest.approx(125.0, rel=1e-6)
     assert [each for each in remarks(reading) if f"taken for {unit}:" in each] == remarks(reading) != []
@@ -142,7 +142,7 @@ def test_units_that_are_named_and_not_read(recording: Recording, unit: str, belo
     else:
         lines[0] = ",".join(f"{each} [{unit}]" if k == at else each for k, each in enumerate(names))
     with pytest.raises(InvalidTable, match=remedy) as caught:
-        read_log(joined(lines), ROBOT, **given)
+        read_log(joined(lines), ROBOT, LogOptions(**given))
     assert (caught.value.column, caught.value.row) == (name, 2 if below else 1)
 
 
@@ -157,7 +157,7 @@ def test_joint_states_as_ros_2_prints_them(recording: Recording) -> None:
         f"{START + int(t)},{round((t - int(t)) * 1e9)},base_link,{','.join(joints)},{','.join(f'{x:.9g}' for x in row)}"
         for t, row in zip(recording.time.tolist(), rows, strict=True)
     ]
-    reading = read(joined(lines), ROBOT, LogOptions())
+    reading = read_log(joined(lines), ROBOT)
     same(reading, recording)
     assert remarks(reading) == []
     # one line more would be a header
@@ -170,16 +170,16 @@ def test_exports_of_recorded_topics(recording: Recording) -> None:
     header = ",".join(["%time", "field.header.seq", *numbered("field.{}{}", STATE, 6)])
     stamps = [f"{(START + t) * 1e9:.0f}" for t in time.tolist()]
     body = table(header, time, np.arange(len(time)), q, v, i).decode().splitlines()
-    reading = read(joined(with_times(body, stamps)), ROBOT, LogOptions())
+    reading = read_log(joined(with_times(body, stamps)), ROBOT)
     same(reading, recording)
     # a bag as a table: seconds and nanoseconds apart
     header = ",".join(["header.stamp.secs", "header.stamp.nsecs", *numbered("{}[{}]", STATE, 6)])
     whole = np.floor(time)
     body = table(header, START + whole, np.round((time - whole) * 1e9), q, v, i).decode().splitlines()
-    same(read(joined(body), ROBOT, LogOptions()), recording)
+    same(read_log(joined(body), ROBOT), recording)
     # PlotJuggler
     header = ",".join(["__time", *numbered("/joint_states/{}[{}]", STATE, 6)])
-    same(read(table(header, START + time, q, v, i), ROBOT, LogOptions()), recording)
+    same(read_log(table(header, START + time, q, v, i), ROBOT), recording)
 
 
 def test_a_log_of_libfranka(seven: Recording) -> None:
@@ -188,7 +188,7 @@ def test_a_log_of_libfranka(seven: Recording) -> None:
     header = ["time", "success_rate", *numbered("state.{}[{}]", words, 7)]
     zeros = np.zeros_like(seven.q)
     body = table(", ".join(header), 1e3 * seven.time, zeros[:, 0], seven.q, zeros, seven.v, seven.torque, zeros, zeros)
-    reading = read(body, SEVEN, LogOptions())
+    reading = read_log(body, SEVEN)
     np.testing.assert_allclose(reading.log.q, seven.q, atol=1e-8)
     np.testing.assert_allclose(reading.log.v, seven.v, atol=1e-6)
     np.testing.assert_allclose(reading.log.effort, seven.torque, atol=1e-4)
@@ -201,14 +201,14 @@ def test_a_log_of_the_sunrise_controller(seven: Recording) -> None:
     header = " ".join(["ZeitInSec", "ZeitInNanoSec", *numbered("{}[{}]", words, 7)])
     whole = np.floor(seven.time)
     columns = (START + whole, np.round((seven.time - whole) * 1e9), seven.q, seven.torque, np.zeros_like(seven.q))
-    reading = read(table(header, *columns, separator=" "), SEVEN, LogOptions())
+    reading = read_log(table(header, *columns, separator=" "), SEVEN)
     np.testing.assert_allclose(reading.log.q, seven.q, atol=1e-8)
     np.testing.assert_allclose(reading.log.effort, seven.torque, atol=1e-4)
     assert reading.log.effort_meaning == "torque"
     # the same with names of the caller's
     named = {"time": "ZeitInSec", "nanoseconds": "ZeitInNanoSec", "q": [f"{words[0]}[{k}]" for k in range(7)]}
     np.testing.assert_allclose(
-        read_log(table(header, *columns, separator=" "), SEVEN, columns=named).q, seven.q, atol=1e-8
+        read_log(table(header, *columns, separator=" "), SEVEN, LogOptions(columns=named)).log.q, seven.q, atol=1e-8
     )
 
 
@@ -217,13 +217,13 @@ def test_positions_of_two_kinds_are_named(recording: Recording) -> None:
     twice = joined(
         [f"{lines[0]},{','.join(f'actual_q_{k}' for k in range(6))}", *(line + ",0" * 6 for line in lines[1:])]
     )
-    (words,) = [each for each in read(twice, ROBOT, LogOptions()).report.warnings if "two kinds" in each]
+    (words,) = [each for each in read_log(twice, ROBOT).report.warnings if "two kinds" in each]
     assert "like actual_q_0 are read" in words and "like q1 are not" in words
 
 
 def test_turns_of_sensors_that_count_in_circles(recording: Recording) -> None:
     wrapped = replace(recording, q=np.mod(recording.q, 2 * np.pi))
-    reading = read(csv_of(wrapped, without="va"), ROBOT, LogOptions())
+    reading = read_log(csv_of(wrapped, without="va"), ROBOT)
     np.testing.assert_allclose(reading.log.q, recording.q, atol=1e-6)
     assert any("leap by whole turns" in each for each in reading.report.warnings)
 
@@ -242,15 +242,15 @@ def test_positions_that_no_arm_reaches_in_a_step(recording: Recording) -> None:
 
 @pytest.mark.parametrize("factor", [0.0, -1.0, 180 / np.pi])
 def test_accelerations_that_are_none(recording: Recording, factor: float) -> None:
-    reading = read(csv_of(replace(recording, a=recording.a * factor)), ROBOT, LogOptions())
+    reading = read_log(csv_of(replace(recording, a=recording.a * factor)), ROBOT)
     assert any("accelerations of joints 1, 2, 3, 4, 5, 6 are not" in each for each in reading.report.warnings)
     assert np.abs(reading.log.a - recording.a).std() < 0.1 * recording.a.std()
-    assert not any("accelerations" in each for each in read(csv_of(recording), ROBOT, LogOptions()).report.warnings)
+    assert not any("accelerations" in each for each in read_log(csv_of(recording), ROBOT).report.warnings)
 
 
 def test_speeds_of_one_joint_that_are_none(recording: Recording) -> None:
     v = recording.v * (np.arange(6) != 1)
-    reading = read(csv_of(replace(recording, v=v)), ROBOT, LogOptions())
+    reading = read_log(csv_of(replace(recording, v=v)), ROBOT)
     assert any("speeds of joints 2 do not fit" in each for each in reading.report.warnings)
     assert np.abs(reading.log.v[:, 1] - recording.exact_v[:, 1]).std() < 0.02 * recording.exact_v[:, 1].std()
 
@@ -263,20 +263,20 @@ def test_efforts_of_one_joint_with_the_other_sign(robot: str) -> None:
         current = turned.current * np.where(np.arange(arm.nq) == joint, -1.0, 1.0)
         with pytest.raises(EffortNotUsable, match=rf"in i{joint + 1} have the other sign"):
             read_log(csv_of(with_current(turned, current)), arm)
-    assert read_log(csv_of(turned), arm).effort_meaning == "current"
+    assert read_log(csv_of(turned), arm).log.effort_meaning == "current"
 
 
 def test_efforts_of_small_joints_that_are_another_joints(recording: Recording) -> None:
     mixed = with_current(recording, recording.current[:, [0, 1, 2, 3, 5, 4]])
-    assert any("not what the motion makes" in each for each in read(csv_of(mixed), ROBOT, LogOptions()).report.warnings)
+    assert any("not what the motion makes" in each for each in read_log(csv_of(mixed), ROBOT).report.warnings)
     milli = with_current(recording, recording.current * np.array([1, 1, 1, 1, 1, 1000.0]))
-    words = " ".join(read(csv_of(milli), ROBOT, LogOptions()).report.warnings)
+    words = " ".join(read_log(csv_of(milli), ROBOT).report.warnings)
     assert "efforts of joints 6 are beyond 3 times the greatest torque" in words
 
 
 def test_channels_that_are_written_again_and_again(recording: Recording) -> None:
     rows = np.arange(len(recording.time)) // 25 * 25
     held = replace(with_current(recording, recording.current[rows]), power=recording.power[rows])
-    words = " ".join(read(csv_of(held), ROBOT, LogOptions()).report.warnings)
+    words = " ".join(read_log(csv_of(held), ROBOT).report.warnings)
     assert re.search(r"effort changes only every 0\.2\d? s", words), words
     assert re.search(r"power changes only every 0\.2\d? s", words), words

@@ -17,10 +17,9 @@ from joulepath.models.uncertainty.parameters import LINKS
 from joulepath.optimizer.energy.link_regressor import body_parameters, rigid_regressor, rigid_torques
 from joulepath.optimizer.identify.arm.base_parameters import base_parameters
 from joulepath.optimizer.identify.arm.pseudo_inertia import nearness, pseudo_inertias
-from joulepath.optimizer.identify.document import document_of
 from joulepath.optimizer.identify.fits.consistent import solve_consistent
-from joulepath.optimizer.identify.identify import fit
-from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.identify import identify
+from joulepath.optimizer.identify.options import IdentificationOptions
 from tests.identification_logs import recorded, truth_of
 
 ROUNDING = 1e-9
@@ -78,7 +77,9 @@ def test_links_whose_published_parameters_are_no_real_bodies_are_refitted() -> N
     robot = load_robot("panda")
     least = np.linalg.eigvalsh(pseudo_inertias(body_parameters(robot.model)))[:, 0]
     assert least.min() < -1e-4
-    found = fit(robot, [recorded(robot, truth_of(robot), moves=6).log()], Options(refit=True, held_out=0.0))
+    found = identify(
+        robot, [recorded(robot, truth_of(robot), moves=6).log()], IdentificationOptions(refit=True, held_out=0.0)
+    )
     assert found.physical is not None and found.physical.consistent
 
 
@@ -121,7 +122,7 @@ def test_a_refit_finds_links_that_the_robots_own_are_not() -> None:
     real = heavier(robot)
     truth = truth_of(real, 1)
     log = replace(recorded(real, truth, moves=12).log(), power=None)
-    kept, refitted = (fit(robot, [log], Options(refit=refit)) for refit in (False, True))
+    kept, refitted = (identify(robot, [log], IdentificationOptions(refit=refit)) for refit in (False, True))
     assert kept.validation is not None and refitted.validation is not None
     before, after = kept.validation.fitted.torque, refitted.validation.fitted.torque
     assert before is not None and after is not None
@@ -140,7 +141,11 @@ def test_a_refit_finds_links_that_the_robots_own_are_not() -> None:
 def test_a_refit_of_a_right_model_moves_nothing_that_matters() -> None:
     """The prior keeps what the log does not tell, and the log has nothing against the rest."""
     robot = load_robot("ur10e")
-    found = fit(robot, [replace(recorded(robot, truth_of(robot)).log(), power=None)], Options(refit=True, held_out=0.0))
+    found = identify(
+        robot,
+        [replace(recorded(robot, truth_of(robot)).log(), power=None)],
+        IdentificationOptions(refit=True, held_out=0.0),
+    )
     change = found.fitted.arm.bodies
     assert change is not None
     regressor = rigid_regressor(robot.model, *states(6, 50))
@@ -152,8 +157,8 @@ def test_identified_figures_become_a_robot() -> None:
     """The document is one that requests take: the robot's own figures, with the identified ones in their place."""
     robot = load_robot("ur10e")
     truth = truth_of(robot, 1)
-    found = fit(robot, [recorded(robot, truth, moves=10).log()], Options(refit=True, held_out=0.0))
-    document = document_of(found.figures(), "2025-03-14")
+    found = identify(robot, [recorded(robot, truth, moves=10).log()], IdentificationOptions(refit=True, held_out=0.0))
+    document = found.document("2025-03-14")
     figures = with_document(robot.name, robot.figures, document)
     made = robot_of("ur10e", figures)
     assert made.friction.name == "identified" and made.friction.load is not None
@@ -173,8 +178,8 @@ def test_errors_of_refitted_links_are_those_that_the_document_says() -> None:
     robot = load_robot("ur10e")
     real = heavier(robot)
     log = replace(recorded(real, truth_of(real, 1), moves=12).log(), power=None)
-    found = fit(robot, [log], Options(refit=True, held_out=0.0))
-    known = covariance_of(document_of(found.figures(), "2025-03-14"))
+    found = identify(robot, [log], IdentificationOptions(refit=True, held_out=0.0))
+    known = covariance_of(found.document("2025-03-14"))
     assert known is not None and found.fitted.arm.bodies is not None
     at = [known.names.index(f"inertials.{part}.{joint}") for joint in range(6) for part in LINKS]
     covariance = known.matrix[np.ix_(at, at)]

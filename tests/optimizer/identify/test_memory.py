@@ -22,18 +22,18 @@ import resource
 from dataclasses import replace
 import numpy as np
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.identify.identify import fit
-from joulepath.optimizer.identify.logs.log import Move
-from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.identify import identify
+from joulepath.optimizer.identify.logs.log import LogMove
+from joulepath.optimizer.identify.options import IdentificationOptions
 from tests.identification_logs import recorded, truth_of
 robot = load_robot("ur10e")
 short = recorded(robot, truth_of(robot), moves=30, rate=500.0).log()
 rows, times = len(short.q), -(-1_000_000 // len(short.q))
-moves = tuple(Move(k * rows + m.start, k * rows + m.end, m.at_rest) for k in range(times) for m in short.moves)
+moves = tuple(LogMove(k * rows + m.start, k * rows + m.end, m.at_rest) for k in range(times) for m in short.moves)
 again = {name: np.concatenate([getattr(short, name)] * times) for name in ("q", "v", "a", "effort", "power")}
 log = replace(short, **again, time=np.arange(rows * times) / short.rate, temperature=None, moves=moves)
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-fit(robot, [log], Options(refit=True))
+identify(robot, [log], IdentificationOptions(refit=True))
 print(len(log.time), (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024)
 """
 
@@ -45,12 +45,12 @@ FROM_FILE = """
 import resource, sys
 from pathlib import Path
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.identify.identify import fit
-from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.identify import identify
+from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.logs.reading import read_log
 robot = load_robot("ur10e")
-log = read_log(Path(sys.argv[1]), robot)
-fit(robot, [log], Options(refit=True))
+log = read_log(Path(sys.argv[1]), robot).log
+identify(robot, [log], IdentificationOptions(refit=True))
 print(len(log.time), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
 """
 

@@ -16,8 +16,8 @@ from joulepath.optimizer.identify.arm.base_parameters import base_parameters
 from joulepath.optimizer.identify.fits.base_wrench import base_wrench_regressor, fit_base_wrench
 from joulepath.optimizer.identify.fits.periodic import mean_period, most_likely
 from joulepath.optimizer.identify.fits.threshold import velocity_threshold
-from joulepath.optimizer.identify.identify import fit
-from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.identify import identify
+from joulepath.optimizer.identify.options import IdentificationOptions
 from tests.identification_logs import recorded, truth_of
 
 ROBOT = load_robot("ur5e")
@@ -103,7 +103,7 @@ def test_four_times_the_moves_halve_the_deviations() -> None:
     deviations = []
     for moves in (8, 32):
         log = replace(recorded(ROBOT, truth, moves=moves).log("torque"), power=None)
-        found = fit(ROBOT, [log], Options(held_out=0.0)).parameters
+        found = identify(ROBOT, [log], IdentificationOptions(held_out=0.0)).parameters
         told = {(each.figure, each.joint): each for each in found if each.identified}
         away = [abs(each.value - getattr(truth, each.figure)[each.joint]) / each.sd for each in told.values()]
         assert np.mean(np.array(away) < FAR) >= 0.95

@@ -11,17 +11,17 @@ from benchmarks.identification_logs import tx40, ur3e
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.identify.fits.fitting import fit_rows, motor_torque
 from joulepath.optimizer.identify.fits.threshold import velocity_threshold
-from joulepath.optimizer.identify.identify import fit
+from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.quality.structure import structure_of
 from joulepath.optimizer.identify.rows.fit_rows import rows_of
 
-PLAIN = Options(held_out=0.0, terms=("coulomb", "viscous", "offset"))
+PLAIN = IdentificationOptions(held_out=0.0, terms=("coulomb", "viscous", "offset"))
 REFIT = replace(PLAIN, refit=True)
 
 
-def friction_of(robot: Robot, log: Log, options: Options) -> tuple[Array, Array]:
+def friction_of(robot: Robot, log: Log, options: IdentificationOptions) -> tuple[Array, Array]:
     """Speeds and friction torques (n, nq), without what links and rotors take; NaN at rest."""
     rows = rows_of(robot, [log], options.refit)
     arm = fit_rows(robot, rows, options).arm
@@ -87,7 +87,7 @@ def test_what_a_real_log_tells_of_a_figure(place: Path) -> None:
     away = [abs(value[0][name] - value[1][name]) / np.hypot(sd[1][name], sd[2][name]) for name in told]
     assert np.mean(np.array(away) < 3.0) >= 0.8
     # wrist 3 turns by 0.06 rad
-    parameters = {(each.figure, each.joint): each for each in fit(robot, [log], PLAIN).parameters}
+    parameters = {(each.figure, each.joint): each for each in identify(robot, [log], PLAIN).parameters}
     wrist = parameters["viscous", 5]
     assert not wrist.identified and wrist.why
 
@@ -108,7 +108,7 @@ def test_the_condition_of_a_real_log(place: Path) -> None:
 def test_a_real_log_that_hardly_warms_up_tells_no_rate(place: Path) -> None:
     """Hao: over some seconds the joints stay as warm as they are."""
     robot, log = ur3e(place)
-    found = fit(robot, [log], PLAIN).temperatures
+    found = identify(robot, [log], PLAIN).temperatures
     if log.temperature is not None:
         assert (found.span < 8.0).all() and np.isfinite(found.reference).all()
     assert np.isnan(found.k).all()

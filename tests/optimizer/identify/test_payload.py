@@ -11,16 +11,16 @@ from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.errors import NotExcited, PayloadUnknown
 from joulepath.optimizer.identify.fits.payload_fit import Carried
-from joulepath.optimizer.identify.identify import fit
+from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import Noise, recorded, truth_of
 
 ROBOT = load_robot("ur10e")
 PAYLOAD = Payload(2.805, np.array([0.01, -0.02, 0.06]), np.diag([0.006, 0.006, 0.004]))
 NOTHING = Payload()
-ASKED = Options(fit=("payload",), held_out=0.0)
+ASKED = IdentificationOptions(fit=("payload",), held_out=0.0)
 NOISE = Noise(current=0.1)
 # of the standard deviations: what one of a thousand figures exceeds
 FAR = 4.0
@@ -33,8 +33,8 @@ def log_of(carried: Payload, seed: int, said: Payload, motions: int = 0) -> Log:
     return replace(log, power=None, payload=said)
 
 
-def found_in(*logs: Log, options: Options = ASKED) -> Carried:
-    found = fit(ROBOT, logs, options).payload
+def found_in(*logs: Log, options: IdentificationOptions = ASKED) -> Carried:
+    found = identify(ROBOT, logs, options).payload
     assert found is not None
     return found
 
@@ -58,7 +58,7 @@ def test_errors_of_the_links_do_not_become_payload() -> None:
     scale = np.array([1.05, 0.95, 1.04, 0.96, 1.05, 0.95])
     model = ROBOT.loaded_model(0.0, np.zeros(3), np.zeros((3, 3)), np.array([0.0, 0.0, -9.81]), scale)
     logs = [log_of(NOTHING, 2, NOTHING), log_of(PAYLOAD, 2, PAYLOAD, 52)]
-    found = fit(replace(ROBOT, model=model), logs, ASKED).payload
+    found = identify(replace(ROBOT, model=model), logs, ASKED).payload
     assert found is not None
     check(found)
 
@@ -92,7 +92,7 @@ def test_a_payload_needs_two_logs_that_differ_by_it() -> None:
 
 def test_a_payload_that_is_not_told_is_none_and_the_rest_is_found() -> None:
     without = log_of(NOTHING, 0, NOTHING)
-    found = fit(ROBOT, [without, without], Options(fit=("friction", "payload"), held_out=0.0))
+    found = identify(ROBOT, [without, without], IdentificationOptions(fit=("friction", "payload"), held_out=0.0))
     told = {each.figure for each in found.parameters if each.identified}
     assert "coulomb" in told and not any(each.startswith("payload") for each in told)
     assert found.payload is not None and found.payload.mass == 0 and found.payload.why
@@ -103,7 +103,8 @@ def test_held_out_motions_are_predicted_with_the_payload() -> None:
     """It is found without them: with what the log says, the errors are far larger."""
     logs = [log_of(NOTHING, 0, NOTHING), log_of(PAYLOAD, 0, NOTHING, 50)]
     asked, not_asked = (
-        fit(ROBOT, logs, Options(fit=each)).validation for each in (("payload",), ("friction", "rotor"))
+        identify(ROBOT, logs, IdentificationOptions(fit=each)).validation
+        for each in (("payload",), ("friction", "rotor"))
     )
     assert asked is not None and not_asked is not None
     better, worse = asked.fitted.torque, not_asked.fitted.torque
@@ -111,15 +112,15 @@ def test_held_out_motions_are_predicted_with_the_payload() -> None:
 
 
 def test_torque_constants_need_a_payload_that_is_known() -> None:
-    constants = Options(fit=("friction", "torque_constant"), held_out=0.0)
+    constants = IdentificationOptions(fit=("friction", "torque_constant"), held_out=0.0)
     log = log_of(NOTHING, 0, NOTHING)
-    assert fit(ROBOT, [log], constants).parameters
+    assert identify(ROBOT, [log], constants).parameters
     for logs, options in (
         ([replace(log, payload_known=False)], constants),
-        ([log, log], Options(fit=("torque_constant", "payload"), held_out=0.0)),
+        ([log, log], IdentificationOptions(fit=("torque_constant", "payload"), held_out=0.0)),
     ):
         with pytest.raises(PayloadUnknown) as caught:
-            fit(ROBOT, logs, options)
+            identify(ROBOT, logs, options)
         # gravity pulls at neither the first nor the last joint
         assert {0, 5} <= set(caught.value.joints) and not {1, 2} & set(caught.value.joints)
 
@@ -127,4 +128,4 @@ def test_torque_constants_need_a_payload_that_is_known() -> None:
 def test_a_payload_is_not_found_together_with_links() -> None:
     log = log_of(NOTHING, 0, NOTHING)
     with pytest.raises(InvalidProblem, match="links that are known"):
-        fit(ROBOT, [log, log], Options(fit=("payload",), refit=True))
+        identify(ROBOT, [log, log], IdentificationOptions(fit=("payload",), refit=True))

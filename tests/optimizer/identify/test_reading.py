@@ -17,7 +17,7 @@ from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.identify.logs.grid import grid_of
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
-from joulepath.optimizer.identify.logs.reading import LogOptions, read, read_log
+from joulepath.optimizer.identify.logs.reading import LogOptions, read_log
 from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import SILENT, Form, Recording, csv_of, recorded, rigid_torques, truth_of, with_current
 
@@ -39,7 +39,7 @@ def recording() -> Recording:
 @pytest.mark.parametrize("form", ["own", "rtde", "ros"])
 @pytest.mark.parametrize("first", [0, 1])
 def test_every_form_gives_the_recorded_arrays(recording: Recording, form: Form, first: int) -> None:
-    log = read_log(csv_of(recording, form, first=first), ROBOT)
+    log = read_log(csv_of(recording, form, first=first), ROBOT).log
     assert np.abs(log.q - recording.q).max() < ROUNDING
     assert np.allclose(log.v, recording.v, rtol=SINGLE, atol=0.0)
     assert log.effort is not None and np.allclose(log.effort, recording.current, rtol=SINGLE, atol=0.0)
@@ -53,7 +53,7 @@ def test_every_form_gives_the_recorded_arrays(recording: Recording, form: Form, 
 
 @pytest.mark.parametrize(("separator", "decimal"), [(";", ","), ("\t", ","), (";", "."), (" ", "."), (",", ".")])
 def test_separators_and_decimal_commas(recording: Recording, separator: str, decimal: str) -> None:
-    log = read_log(csv_of(recording, separator=separator, decimal=decimal), ROBOT)
+    log = read_log(csv_of(recording, separator=separator, decimal=decimal), ROBOT).log
     assert np.abs(log.q - recording.q).max() < ROUNDING
 
 
@@ -61,7 +61,7 @@ def test_gzip_degrees_and_milliamperes(recording: Recording, tmp_path: Path) -> 
     milli = with_current(recording, recording.current * 1e3)
     file = tmp_path / "log.csv.gz"
     file.write_bytes(gzip.compress(csv_of(milli, units="deg")))
-    log = read_log(file, ROBOT, units="deg", current_units="mA", name="cold", tags=("cold",))
+    log = read_log(file, ROBOT, LogOptions(units="deg", current_units="mA", name="cold", tags=("cold",))).log
     assert np.abs(log.q - recording.q).max() < ROUNDING
     assert log.effort is not None and np.abs(log.effort - recording.current).max() < 1e-5
     assert (log.name, log.tags) == ("cold", ("cold",))
@@ -72,16 +72,16 @@ def test_gzip_degrees_and_milliamperes(recording: Recording, tmp_path: Path) -> 
 def test_named_columns(recording: Recording) -> None:
     body = csv_of(recording).replace(b"t,q1", b"when,q1", 1).replace(b"q", b"axis_")
     names = {"time": "when", "q": [f"axis_{k}" for k in range(1, 7)], "current": [f"I{k}" for k in range(1, 7)]}
-    log = read_log(body, ROBOT, columns=names)
+    log = read_log(body, ROBOT, LogOptions(columns=names)).log
     assert np.abs(log.q - recording.q).max() < ROUNDING
     with pytest.raises(InvalidTable, match="does not have the column axis_7"):
-        read_log(body, ROBOT, columns=names | {"q": [f"axis_{k}" for k in range(4, 10)]})
+        read_log(body, ROBOT, LogOptions(columns=names | {"q": [f"axis_{k}" for k in range(4, 10)]}))
     with pytest.raises(InvalidProblem, match="columns must name"):
-        read_log(body, ROBOT, columns={"speed": "when"})
+        read_log(body, ROBOT, LogOptions(columns={"speed": "when"}))
 
 
 def test_speeds_and_accelerations_are_made_from_positions(recording: Recording) -> None:
-    log = read_log(csv_of(recording, without="vaP"), ROBOT)
+    log = read_log(csv_of(recording, without="vaP"), ROBOT).log
     # of the root mean squares of speed and acceleration of the motion
     for made, true, share in ((log.v, recording.exact_v, 1e-3), (log.a, recording.a, 0.02)):
         assert np.sqrt(((made - true) ** 2).mean()) < share * np.sqrt((true**2).mean())
@@ -95,7 +95,7 @@ def test_jitter_goes_onto_a_uniform_grid(recording: Recording) -> None:
     # the arm goes on between the nominal times: positions and speeds as they are at the shifted ones
     q = exact.q + exact.v * shift[:, None] + exact.a * shift[:, None] ** 2 / 2
     moved = Recording(**{**exact.__dict__, "q": q, "v": exact.v + exact.a * shift[:, None]})
-    reading = read(csv_of(moved, time=times + 1e6), ROBOT, LogOptions())
+    reading = read_log(csv_of(moved, time=times + 1e6), ROBOT)
     log = reading.log
     assert np.allclose(np.diff(log.time), 1 / log.rate)
     assert log.rate == pytest.approx(125, rel=3e-4)
@@ -118,7 +118,7 @@ def test_a_long_log_is_interpolated_as_by_one_spline() -> None:
 
 
 def test_moves_are_cut_at_rests_and_long_ones_into_blocks(recording: Recording) -> None:
-    log = read_log(csv_of(recording), ROBOT)
+    log = read_log(csv_of(recording), ROBOT).log
     assert [move.at_rest for move in log.moves] == [move.at_rest for move in recording.moves]
     # slow begins and ends of moves count as rest
     slow = 0.06 * recording.rate
@@ -126,7 +126,7 @@ def test_moves_are_cut_at_rests_and_long_ones_into_blocks(recording: Recording) 
         assert abs(found.start - true.start) <= slow and abs(found.end - true.end) <= slow
     _covers(log)
     for rate, seconds, blocks in ((100.0, 30.0, 6), (100.0, 9.0, 2), (100.0, 7.0, 1)):
-        log = read_log(_sine(rate, seconds), ROBOT)
+        log = read_log(_sine(rate, seconds), ROBOT).log
         assert len(log.moves) == blocks and not any(move.at_rest for move in log.moves)
         gaps = [after.start - before.end for before, after in pairwise(log.moves)]
         assert all(gap >= 0.5 * rate - 1 for gap in gaps)
@@ -147,7 +147,7 @@ def _sine(rate: float, seconds: float) -> bytes:
 
 @pytest.mark.parametrize("rate", [20.0, 500.0, 10_000.0])
 def test_rates(rate: float) -> None:
-    assert read_log(_sine(rate, max(2.0, 40 / rate)), ROBOT).rate == pytest.approx(rate)
+    assert read_log(_sine(rate, max(2.0, 40 / rate)), ROBOT).log.rate == pytest.approx(rate)
 
 
 @pytest.mark.parametrize("rate", [15.0, 20_000.0])
@@ -158,15 +158,15 @@ def test_rates_that_are_not_read(rate: float) -> None:
 
 def test_effort_tells_what_it_is(recording: Recording) -> None:
     current, torque = csv_of(recording), csv_of(recording, effort="torque")
-    reading = read(current, ROBOT, LogOptions())
+    reading = read_log(current, ROBOT)
     assert reading.report.effort is not None
     K = ROBOT.drives.torque_constant
     slope = reading.report.effort.slope
     assert slope["shoulder_lift_joint"] == pytest.approx(1 / K[1], rel=SLOPE)
     assert slope["elbow_joint"] == pytest.approx(1 / K[2], rel=SLOPE)
-    assert read_log(torque, ROBOT).effort_meaning == "torque"
+    assert read_log(torque, ROBOT).log.effort_meaning == "torque"
     # what a column is called counts less than what is in it
-    wrong = read(torque.replace(b"tau", b"i"), ROBOT, LogOptions())
+    wrong = read_log(torque.replace(b"tau", b"i"), ROBOT)
     assert wrong.log.effort_meaning == "torque" and any("current" in each for each in wrong.report.warnings)
 
 
@@ -176,10 +176,10 @@ def test_effort_without_gravity_is_not_usable(recording: Recording) -> None:
     body = csv_of(with_current(recording, bare))
     for effort in ("auto", "current"):
         with pytest.raises(EffortNotUsable, match="without gravity") as caught:
-            read_log(body, ROBOT, effort=effort)
+            read_log(body, ROBOT, LogOptions(effort=effort))
         assert caught.value.meaning == "external"
         assert all(slope is not None and abs(slope) < 0.03 for slope in caught.value.slope.values())
-    log = read_log(body, ROBOT, effort="external")
+    log = read_log(body, ROBOT, LogOptions(effort="external")).log
     assert log.effort_meaning == "external" and log.power is not None
 
 
@@ -188,12 +188,12 @@ def test_effort_of_no_known_meaning_is_not_guessed(recording: Recording) -> None
     with pytest.raises(EffortNotUsable, match=r"not clear.*another order.*payload") as caught:
         read_log(body, ROBOT)
     assert caught.value.meaning is None
-    assert read_log(body, ROBOT, effort="torque").effort_meaning == "torque"
+    assert read_log(body, ROBOT, LogOptions(effort="torque")).log.effort_meaning == "torque"
 
 
 def test_a_log_at_rest_goes_by_the_names(recording: Recording) -> None:
     lines = csv_of(recording).split(b"\n")[:60]
-    reading = read(b"\n".join(lines), ROBOT, LogOptions())
+    reading = read_log(b"\n".join(lines), ROBOT)
     assert reading.log.effort_meaning == "current"
     assert reading.report.effort is not None and reading.report.effort.confidence == 0
     assert any("does not tell" in each for each in reading.report.warnings)
@@ -207,9 +207,9 @@ def test_payload_of_the_log_or_the_caller(recording: Recording) -> None:
     lines = [lines[0] + ",payload", *(line + ",2.5" for line in lines[1:])]
     body = "\n".join(lines).encode()
     # the arm carried nothing in truth: its efforts do not fit the mass
-    assert read_log(body, ROBOT, effort="current").payload.mass == 2.5
+    assert read_log(body, ROBOT, LogOptions(effort="current")).log.payload.mass == 2.5
     given = Payload(1.0, np.array([0.0, 0.0, 0.1]))
-    assert read_log(body, ROBOT, payload=given, effort="current").payload is given
+    assert read_log(body, ROBOT, LogOptions(payload=given, effort="current")).log.payload is given
     lines[-1] = lines[-1].removesuffix("2.5") + "3.5"
     with pytest.raises(InvalidProblem, match="payload changes"):
         read_log("\n".join(lines).encode(), ROBOT)
@@ -219,7 +219,7 @@ def test_oddities_are_reported(recording: Recording) -> None:
     rows = csv_of(recording).decode().splitlines()
     # a repeated time, a cut line, a hole of 0.4 s in a rest
     broken = [*rows[:20], rows[19], rows[20][:30], *rows[20:30], *rows[80:]]
-    reading = read("\n".join(broken).encode(), ROBOT, LogOptions())
+    reading = read_log("\n".join(broken).encode(), ROBOT)
     assert reading.report.dropped == 1
     words = " ".join(reading.report.warnings)
     assert "Gaps in the log: 1," in words and "row before: 1." in words and "No payload" in words
@@ -234,7 +234,7 @@ def test_constant_saturated_and_misfitting_channels(recording: Recording) -> Non
     current[:, 5] = 0.25
     odd = replace(with_current(recording, current), power=np.full_like(recording.power, 50.0))
     swapped = csv_of(odd).replace(b"v1,v2", b"v2,v1", 1)
-    words = " ".join(read(swapped, ROBOT, LogOptions(effort="current")).report.warnings)
+    words = " ".join(read_log(swapped, ROBOT, LogOptions(effort="current")).report.warnings)
     assert "effort of joints 6 never changes" in words and "The power never changes" in words
     assert "stays at its greatest value" in words
     assert "speeds of joints 1, 2 do not fit" in words
@@ -299,7 +299,7 @@ def test_broken_files_name_the_place(recording: Recording, name: str) -> None:
 def test_bombs_are_defused(recording: Recording) -> None:
     bomb = gzip.compress(csv_of(recording) + b"0," * 6000 + b"\n" + (b"0," * 6000 + b"\n") * 999)
     with pytest.raises(LogTooLarge, match="bytes"):
-        read_log(bomb, ROBOT, most_bytes=4_000_000)
+        read_log(bomb, ROBOT, LogOptions(most_bytes=4_000_000))
     many = b"t,q1,q2,q3,q4,q5,q6\n" + b"0,0,0,0,0,0,0\n" * 1_000_001
     with pytest.raises(LogTooLarge, match="1000000 rows"):
         read_log(gzip.compress(many), ROBOT)
@@ -314,7 +314,7 @@ def real_logs() -> Path:
 
 
 def test_a_controllers_full_record(real_logs: Path) -> None:
-    reading = read(real_logs / "ur3e_rad" / "ur3e_power.csv", load_robot("ur3e"), LogOptions())
+    reading = read_log(real_logs / "ur3e_rad" / "ur3e_power.csv", load_robot("ur3e"))
     log = reading.log
     assert (len(log.time), sum(not move.at_rest for move in log.moves)) == (888, 19)
     assert log.rate == pytest.approx(25.0)

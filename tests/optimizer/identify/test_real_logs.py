@@ -9,14 +9,14 @@ import numpy as np
 
 from benchmarks.identification import tx40_torque
 from benchmarks.identification_logs import ur3e
-from joulepath.optimizer.identify.identify import fit
-from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.identify import identify
+from joulepath.optimizer.identify.options import IdentificationOptions
 
 
 def test_power_of_moves_that_no_fit_has_seen(place: Path) -> None:
     """From motion alone, each motion left out in its turn: 2.0 W, and 1.3 % of the energy, 4 % at most."""
     robot, log = ur3e(place)
-    found = fit(robot, [replace(log, effort=None, effort_meaning=None)], Options(held_out=1.0))
+    found = identify(robot, [replace(log, effort=None, effort_meaning=None)], IdentificationOptions(held_out=1.0))
     assert found.validation is not None and found.validation.moves == 19
     fitted, own, constant = found.validation.fitted.power, found.validation.own.power, found.validation.constant
     assert fitted is not None and own is not None and constant is not None
@@ -29,7 +29,7 @@ def test_power_of_moves_that_no_fit_has_seen(place: Path) -> None:
 def test_currents_tell_friction_that_the_factory_does_not_know(place: Path) -> None:
     robot, log = ur3e(place)
     assert log.effort_meaning == "current"
-    found = fit(robot, [log], Options(held_out=1.0))
+    found = identify(robot, [log], IdentificationOptions(held_out=1.0))
     assert found.validation is not None
     fitted, own = found.validation.fitted.torque, found.validation.own.torque
     assert fitted is not None and own is not None

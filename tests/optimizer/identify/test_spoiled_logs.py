@@ -12,9 +12,9 @@ from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidTable
 from joulepath.optimizer.identify.errors import NotExcited
-from joulepath.optimizer.identify.identify import fit
+from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
-from joulepath.optimizer.identify.logs.reading import LogOptions, read, read_log
+from joulepath.optimizer.identify.logs.reading import LogOptions, read_log
 from tests.identification_logs import Recording, csv_of, recorded, truth_of, with_current
 
 ROBOT = load_robot("ur10e")
@@ -41,7 +41,7 @@ def table(names: list[str], *columns: Array) -> bytes:
 
 @pytest.mark.parametrize("lag", [0.05, -0.1])
 def test_efforts_of_another_clock_are_set_right(recording: Recording, lag: float) -> None:
-    reading = read(csv_of(later(recording, lag)), ROBOT, LogOptions())
+    reading = read_log(csv_of(later(recording, lag)), ROBOT)
     (found,) = [match for each in reading.report.warnings if (match := re.search(r"comes (\d+) ms (\w+) than", each))]
     assert abs(int(found[1]) - 1e3 * abs(lag)) <= 3 and found[2] == ("later" if lag > 0 else "earlier")
     assert reading.log.effort is not None
@@ -53,7 +53,7 @@ def test_efforts_of_another_clock_are_set_right(recording: Recording, lag: float
 @pytest.mark.parametrize("lag", [0.0, 0.008])
 def test_efforts_in_time_stay_as_they_are(recording: Recording, lag: float) -> None:
     late = later(recording, lag)
-    reading = read(csv_of(late), ROBOT, LogOptions())
+    reading = read_log(csv_of(late), ROBOT)
     assert not any("ms" in each for each in reading.report.warnings)
     np.testing.assert_allclose(reading.log.effort, late.current, atol=1e-5)
 
@@ -61,7 +61,7 @@ def test_efforts_in_time_stay_as_they_are(recording: Recording, lag: float) -> N
 def test_times_of_writing_are_not_those_of_the_rows(recording: Recording) -> None:
     random = np.random.default_rng(0)
     written = recording.time + np.append(0, random.uniform(-0.3, 0.3, len(recording.time) - 1)) / recording.rate
-    reading = read(csv_of(recording, time=written, without="va"), ROBOT, LogOptions())
+    reading = read_log(csv_of(recording, time=written, without="va"), ROBOT)
     assert any("times of writing" in each for each in reading.report.warnings)
     np.testing.assert_allclose(reading.log.q, recording.q, atol=1e-7)
     assert np.abs(reading.log.a - recording.a).std() < 0.1 * recording.a.std()
@@ -71,14 +71,14 @@ def test_spikes_are_no_lag_and_are_warned_of(recording: Recording) -> None:
     random, current = np.random.default_rng(0), recording.current.copy()
     rows = random.choice(len(current), 12, replace=False)
     current[rows] += 8 * np.abs(current).max() * random.choice([-1.0, 1.0], (12, ROBOT.nq))
-    reading = read(csv_of(with_current(recording, current)), ROBOT, LogOptions())
+    reading = read_log(csv_of(with_current(recording, current)), ROBOT)
     (words,) = [each for each in reading.report.warnings if "payload" not in each]
     assert words.startswith("The effort has spikes in 12 rows") and "estimator=irls" in words
     power = recording.power.copy()
     power[rows[0]] += 5000
-    words = " ".join(read(csv_of(replace(recording, power=power)), ROBOT, LogOptions()).report.warnings)
+    words = " ".join(read_log(csv_of(replace(recording, power=power)), ROBOT).report.warnings)
     assert "The power has spikes in 1 rows" in words
-    assert "spikes" not in " ".join(read(csv_of(recording), ROBOT, LogOptions()).report.warnings)
+    assert "spikes" not in " ".join(read_log(csv_of(recording), ROBOT).report.warnings)
 
 
 @pytest.mark.parametrize(
@@ -105,11 +105,11 @@ def test_joints_go_by_their_names_in_whatever_order_they_are(recording: Recordin
     joints = sorted(ROBOT.joint_names)
     order = [ROBOT.joint_names.index(joint) for joint in joints]
     parts = [each[:, order] for each in (recording.q, recording.v, recording.current)]
-    straight = read_log(csv_of(recording, "ros"), ROBOT)
+    straight = read_log(csv_of(recording, "ros"), ROBOT).log
     words = ("position", "velocity", "effort")
     for time, pattern in (("__time", "/joint_states/{}/{}"), ("time", "{}_{}"), ("%time", "field.{1}.{0}")):
         header = [time, *(pattern.format(joint, word) for word in words for joint in joints)]
-        reading = read(table(header, recording.time, *parts), ROBOT, LogOptions())
+        reading = read_log(table(header, recording.time, *parts), ROBOT)
         np.testing.assert_allclose(reading.log.q, straight.q, atol=1e-8)
         np.testing.assert_allclose(reading.log.effort, straight.effort, atol=1e-6)
         assert not any("order" in each for each in reading.report.warnings)
@@ -117,7 +117,7 @@ def test_joints_go_by_their_names_in_whatever_order_they_are(recording: Recordin
     header = ["time", *(f"{word}{k}" for word in words for k in range(6))]
     lines = table(header, recording.time, *parts).decode().splitlines()
     names = [",".join(f"name{k}" for k in range(6)), *[",".join(joints)] * (len(lines) - 1)]
-    log = read_log("\n".join(f"{line},{name}" for line, name in zip(lines, names, strict=True)).encode(), ROBOT)
+    log = read_log("\n".join(f"{line},{name}" for line, name in zip(lines, names, strict=True)).encode(), ROBOT).log
     np.testing.assert_allclose(log.q, straight.q, atol=1e-8)
     np.testing.assert_allclose(log.v, straight.v, atol=1e-6)
     lost = table(["time", *(f"{joint}_position" for joint in joints[1:])], recording.time, parts[0][:, 1:])
@@ -129,7 +129,7 @@ def test_a_channel_that_is_empty_counts_as_not_logged(recording: Recording) -> N
     lines = csv_of(recording).decode().splitlines()
     for empty in ("nan", "", "None"):
         body = "\n".join([lines[0], *(line.rpartition(",")[0] + "," + empty for line in lines[1:])]).encode()
-        reading = read(body, ROBOT, LogOptions())
+        reading = read_log(body, ROBOT)
         assert reading.log.power is None
         assert "The columns of power are empty in the first row, and are not read." in reading.report.warnings
     # one that ends is an error, as it was
@@ -142,7 +142,7 @@ def test_a_log_of_rest_is_not_excited(recording: Recording) -> None:
     first = recording.moves[0]
     assert first.at_rest
     lines = csv_of(recording).split(b"\n")[: first.end]
-    log = read_log(b"\n".join(lines), ROBOT, effort="current")
+    log = read_log(b"\n".join(lines), ROBOT, LogOptions(effort="current")).log
     with pytest.raises(NotExcited) as caught:
-        fit(ROBOT, [log])
+        identify(ROBOT, [log])
     assert "coulomb" in caught.value.parameters and caught.value.advice["parameters"] == ["rotor", "friction"]

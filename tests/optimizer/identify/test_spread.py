@@ -10,7 +10,7 @@ import pytest
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.identify.estimates.grouped import Grouped, adjusted, jackknife, left_out
-from joulepath.optimizer.identify.identify import fit
+from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.quality.interval import own_variance
 from tests.identification_logs import off_the_model, recorded, truth_of
 
@@ -72,7 +72,7 @@ def test_energies_lie_in_their_interval_as_often_as_it_says(channels: str, effec
     for seed in range(40):
         log = off_the_model(recorded(robot, truth_of(robot, seed), moves=14, seed=seed).log(), effect, seed)
         seen = replace(log, effort=None, effort_meaning=None) if channels == "power alone" else log
-        validation = fit(robot, [seen]).validation
+        validation = identify(robot, [seen]).validation
         assert validation is not None and validation.coverage is not None
         shares.append(validation.coverage)
     # 0.85 to 0.95, with two standard deviations of forty arms

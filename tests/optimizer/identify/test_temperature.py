@@ -9,16 +9,16 @@ import pytest
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
-from joulepath.optimizer.identify.identify import fit
+from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.options import Options
+from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.quality.advice import slope as advice_slope
 from joulepath.optimizer.identify.rows.fit_rows import rows_of
 from tests.identification_logs import recorded, rigid_torques, truth_of
 
 ROBOT = load_robot("ur10e")
 TRUTH = truth_of(ROBOT)
-OPTIONS = Options(held_out=0.0)
+OPTIONS = IdentificationOptions(held_out=0.0)
 K = 0.012
 FAR = 4.0
 
@@ -35,20 +35,20 @@ def warming(span: float) -> Log:
 
 
 def test_the_rate_is_found_where_the_log_spans_enough() -> None:
-    found = fit(ROBOT, [warming(20.0)], OPTIONS).temperatures
+    found = identify(ROBOT, [warming(20.0)], OPTIONS).temperatures
     assert (np.abs(found.k - K) <= FAR * found.sd).all() and (found.sd < 0.5 * K).all()
     # over rows in motion, near the middle of the log
     assert found.reference == pytest.approx(35.0, abs=2.0)
 
 
 def test_a_smaller_span_tells_no_rate() -> None:
-    found = fit(ROBOT, [warming(6.0)], OPTIONS).temperatures
+    found = identify(ROBOT, [warming(6.0)], OPTIONS).temperatures
     assert np.isnan(found.k).all() and np.isnan(found.sd).all()
     assert found.span == pytest.approx(5.5, abs=1.0) and np.isfinite(found.reference).all()
 
 
 def test_a_log_without_temperatures_says_so() -> None:
-    found = fit(ROBOT, [replace(warming(20.0), temperature=None)], OPTIONS).temperatures
+    found = identify(ROBOT, [replace(warming(20.0), temperature=None)], OPTIONS).temperatures
     assert np.isnan(found.reference).all() and np.isnan(found.k).all()
 
 
@@ -56,7 +56,7 @@ def test_a_log_without_temperatures_says_so() -> None:
 def test_a_known_figure_takes_the_advised_share_of_the_variance_away(seed: int) -> None:
     """From power alone, where errors of figures make up for each other: their own terms are beyond the whole."""
     log = recorded(ROBOT, truth_of(ROBOT, seed), moves=8, seed=seed).log()
-    fitted = fit(ROBOT, [replace(log, effort=None, effort_meaning=None)], OPTIONS)
+    fitted = identify(ROBOT, [replace(log, effort=None, effort_meaning=None)], OPTIONS)
     advice, estimate = fitted.advice, fitted.fitted.estimate
     assert advice is not None and 0 < advice.share <= 1.0
     # the variance of the energy by the arms of the covariance's own errors, before and after the figure is known
@@ -71,7 +71,7 @@ def test_a_known_figure_takes_the_advised_share_of_the_variance_away(seed: int) 
 def test_advice_names_what_the_log_tells_least() -> None:
     """Without any rest, idle power and the losses beside it are told least."""
     log = recorded(ROBOT, TRUTH, moves=10).log()
-    advice = fit(ROBOT, [log], OPTIONS).advice
+    advice = identify(ROBOT, [log], OPTIONS).advice
     assert advice is not None and 0 < advice.share <= 1.0 and advice.do.startswith("Log ")
-    parameters = {(each.figure, each.joint) for each in fit(ROBOT, [log], OPTIONS).parameters}
+    parameters = {(each.figure, each.joint) for each in identify(ROBOT, [log], OPTIONS).parameters}
     assert (advice.figure, advice.joint) in parameters

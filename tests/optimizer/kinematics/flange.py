@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.kinematics.ik_solutions import IKSolution
+from joulepath.optimizer.kinematics.ik_solutions import LimitedSolution
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from tests.optimizer.moves import ROBOT
 
@@ -40,7 +40,7 @@ def errors(T: Array, q: Array) -> tuple[float, float]:
     return float(np.linalg.norm(reached[:3, 3] - T[:3, 3])), float(turn)
 
 
-def joints(solutions: list[IKSolution]) -> Array:
+def joints(solutions: list[LimitedSolution]) -> Array:
     return np.array([solution.q for solution in solutions])
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.kinematics.ik_solutions import IKSolution
+from joulepath.optimizer.kinematics.ik_solutions import LimitedSolution
 from joulepath.optimizer.kinematics.inverse import MEMBERS
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
 from joulepath.optimizer.kinematics.ur_closed_form import LEAST_AHEAD, URClosedForm
@@ -35,7 +35,7 @@ FORM = URClosedForm.of(ROBOT.model) or pytest.fail("the robot has a closed form"
 angles = st.lists(st.floats(-3.1, 3.1), min_size=6, max_size=6).map(np.array)
 
 
-def self_motions(solutions: list[IKSolution]) -> list[SelfMotion]:
+def self_motions(solutions: list[LimitedSolution]) -> list[SelfMotion]:
     """Every self-motion among the solutions, once."""
     return list({id(each.self_motion): each.self_motion for each in solutions if each.self_motion is not None}.values())
 

@@ -20,7 +20,7 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
-from joulepath.optimizer.replay.baseline_courses import ReportedBaseline, planned_baselines
+from joulepath.optimizer.replay.from_solution import planned_motion
 from joulepath.optimizer.replay.planned import PlannedMotion, PlannedTorques
 from joulepath.optimizer.replay.reference import MOST_STEPS, course_of
 from joulepath.optimizer.replay.replay import Replay, replay
@@ -58,14 +58,9 @@ def solution() -> Solution:
     return optimize(problem(goal=tcp_pose(GOAL), payload=PAYLOAD, windings=False))
 
 
-def answer(arm: Arm = ARM) -> PlannedMotion:
+def answer() -> PlannedMotion:
     """An optimised motion with its baselines."""
-    found, names = solution(), ReportedBaseline.__dataclass_fields__
-    spline = found.trajectory.spline
-    reported = [ReportedBaseline(**{name: getattr(each, name) for name in names}) for each in found.baselines]
-    known = [found.goal.q]
-    baselines = planned_baselines(ARM, found.start.q, known, found.duration, reported)
-    return planned(arm, spline, baselines=baselines)
+    return planned_motion(solution(), ARM, "electrical")
 
 
 def holds_promise(found: Replay, plan: PlannedMotion) -> None:
@@ -201,12 +196,8 @@ def test_a_joint_at_its_limit_saturates() -> None:
 def test_waiting_counts_in_savings() -> None:
     """A baseline that is faster waits longer, and what it draws then is in its planned energy."""
     found = optimize(problem(payload=PAYLOAD, dwell=Dwell(4.0)))
-    names = ReportedBaseline.__dataclass_fields__
-    reported = [ReportedBaseline(**{name: getattr(each, name) for name in names}) for each in found.baselines]
-    baselines = planned_baselines(ARM, START, [found.goal.q], found.duration, reported)
-    dwell = found.energy.electrical.dwell
-    plan = planned(ARM, found.trajectory.spline, baselines=baselines, waiting=dwell)
-    assert next(each.waiting for each in baselines if each.name == "ruckig") > 10
+    plan = planned_motion(found, ARM, "electrical")
+    assert next(each.waiting for each in plan.baselines if each.name == "ruckig") > 10
     for each in replay(plan, ("feed_forward",), FAST, {"payload": 0.1}).savings:
         assert each.simulated == pytest.approx(each.planned, abs=POINT)
 

@@ -200,7 +200,8 @@ def test_obstacles_of_many_parts_are_named() -> None:
 def test_only_a_replay_imports_mujoco() -> None:
     """It takes 20 MB of memory in each process, which no other request has to pay."""
     code = (
-        "import sys, joulepath.app.server, joulepath.app.tasks.replay, joulepath.optimizer.replay.replay\n"
+        "import sys, joulepath.app.main, joulepath.app.server, joulepath.app.tasks.replay\n"
+        "import joulepath.optimizer.replay.replay\n"
         "from tests.optimizer.moves import problem; from joulepath import optimize\n"
         "optimize(problem()); print('mujoco' in sys.modules)\n"
         "from joulepath.optimizer.replay.simulator import mujoco; mujoco(); print('mujoco' in sys.modules)\n"

@@ -1,4 +1,4 @@
-"""Axes of a controller: their positions in degrees, from the joint positions of a robot's model."""
+"""Options of the formats that give a controller points: how many of them, and in which axes."""
 
 from __future__ import annotations
 
@@ -11,9 +11,14 @@ from joulepath.optimizer.exceptions import FormatUnsuitable
 
 
 @dataclass(frozen=True)
-class Axes:
-    """Axis = sign · joint + offset [degrees]; one sign (1 or -1) and one offset per joint. None: all 1, all 0."""
+class PointOptions:
+    """Number of points, and the axes of the controller: axis = sign · joint + offset [degrees].
 
+    `tolerance` [rad] is the deviation from the spline that the number of points is chosen for.
+    `signs` (1 or -1) and `offsets` [degrees] have one number per joint; None stands for 1 and for 0.
+    """
+
+    tolerance: float = 0.005
     signs: tuple[int, ...] | None = None
     offsets: tuple[float, ...] | None = None
 

@@ -1,0 +1,126 @@
+"""Public entry point: `compare(problem)` solves a problem by several methods."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from joulepath.optimizer.deadline import Clock, Deadline, DeadlineShares
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, JoulepathError
+from joulepath.optimizer.methods import METHODS
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.problem import MethodName, Problem
+from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, forward, nobody
+from joulepath.optimizer.solution import Objective, Solution
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """What one `method` found: its `solution`, or the `error` that says why there is none."""
+
+    method: MethodName
+    solution: Solution | None
+    error: JoulepathError | None
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Solutions of one problem by several methods, at least one of which found a motion.
+
+    `methods` has an entry for each method, in the order in which they were asked for.
+    """
+
+    objective: Objective
+    methods: tuple[Compared, ...]
+
+    @cached_property
+    def solutions(self) -> dict[MethodName, Solution]:
+        """Solution of each method that found a motion."""
+        return {each.method: each.solution for each in self.methods if each.solution is not None}
+
+    @cached_property
+    def best(self) -> MethodName:
+        """Method whose motion needs the least energy of the objective."""
+        return min(self.solutions, key=self._energy)
+
+    @property
+    def lower_bound(self) -> float:
+        """Largest of the proven lower bounds [J]; each holds for the motions of all methods."""
+        return max(solution.lower_bound for solution in self.solutions.values())
+
+    def excess(self, method: MethodName) -> float:
+        """Relative excess of the energy of a method's motion over that of the best one [1].
+
+        Args:
+            method: method that found a motion.
+
+        Returns:
+            energy / least energy - 1; 0 where the least energy is not positive.
+        """
+        least = self._energy(self.best)
+        return self._energy(method) / least - 1 if least > 0 else 0.0
+
+    def _energy(self, method: MethodName) -> float:
+        return self.solutions[method].energy.of(self.objective)
+
+
+def compare(
+    problem: Problem,
+    methods: Sequence[MethodName] = tuple(METHODS),
+    clock: Clock = time.perf_counter,
+    tell: Tell = nobody,
+) -> Comparison:
+    """Solve one problem by several methods, one after another.
+
+    The methods run in the order of `METHODS`. Each gets an equal share of the time that the ones
+    before it have left of `problem.deadline`.
+
+    Args:
+        problem: what is asked of every method; its own `method` does not matter.
+        methods: names of the methods, each once.
+        clock: function that returns the time [s].
+        tell: gets the progress, with the methods as candidates and the best motion so far.
+
+    Returns:
+        What each method found, in the order of `methods`.
+
+    Raises:
+        InvalidProblem: `methods` is empty, names a method twice, or one that does not exist.
+        JoulepathError: no method found a motion; the error is that of the first of `methods`.
+    """
+    if not methods or len(set(methods)) < len(methods) or not set(methods) <= METHODS.keys():
+        raise InvalidProblem("methods", f"methods must name some of {', '.join(METHODS)}, each once.")
+    shares = DeadlineShares(Deadline.after(problem.deadline, clock), len(methods))
+    tell, found = forward(tell), dict[MethodName, Compared]()
+    tell(CandidatesFound(len(methods)))
+    for k, method in enumerate(each for each in METHODS if each in methods):
+        share = shares.next()
+        if shares.used_up:
+            found[method] = Compared(method, None, DeadlineExceeded([]))
+            continue
+        found[method] = _solved(replace(problem, method=method, deadline=share), clock)
+        _tell_outcome(tell, k, found[method], problem.objective)
+    first = found[methods[0]]
+    if all(each.solution is None for each in found.values()):
+        assert first.error is not None
+        raise first.error
+    return Comparison(problem.objective, tuple(found[method] for method in methods))
+
+
+def _solved(problem: Problem, clock: Clock) -> Compared:
+    try:
+        return Compared(problem.method, optimize(problem, clock), None)
+    except JoulepathError as error:
+        return Compared(problem.method, None, error)
+
+
+def _tell_outcome(tell: Tell, index: int, found: Compared, objective: Objective) -> None:
+    if found.solution is None:
+        tell(CandidateTried(index, "failed", None, None))
+        return
+    solution = found.solution
+    energy, bound = solution.energy.of(objective), solution.lower_bound
+    tell(CandidateTried(index, "solved", bound, energy))
+    tell(Improved(energy, solution.duration, bound, solution.goal.q))

@@ -1,0 +1,44 @@
+"""Whether samples of a motion are those of a spline on an arm."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.exceptions import NotCertified
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.trajectories.spline import Spline, sample
+
+# largest difference of given samples from a motion: rounding of q [rad], and of v, a, tau relative
+# to their limits
+SAMPLE_TOLERANCE = 1e-6
+
+
+def check_samples(arm: Arm, spline: Spline, t: Array, samples: Sequence[Array]) -> None:
+    """Check that samples of a motion are those of a spline on an arm.
+
+    The torques tell whether payload, mounting and robot are those that the samples are of.
+
+    Args:
+        arm: arm that is said to make the motion.
+        spline: motion of the arm.
+        t: times of the samples, shape (k,) [s].
+        samples: q [rad], v [rad/s], a [rad/s²], and tau [N·m] of rigid bodies and rotors,
+            shape (k, nq) each.
+
+    Raises:
+        NotCertified: they differ by more than rounding.
+    """
+    limits, duration = arm.active_limits, spline.duration
+    if len(t) and not (t[0] >= 0 and t[-1] <= duration * (1 + SAMPLE_TOLERANCE) and np.isfinite(t).all()):
+        raise NotCertified(0, "its samples are not of its own time", {})
+    q, v, a = sample(spline, np.minimum(t, duration))
+    own = (q, v, a, Plant(arm).torques(q, v, a))
+    scales = (np.ones_like(limits.v_max), limits.v_max, limits.a_max, limits.tau_max)
+    names = ("joint positions", "velocities", "accelerations", "torques")
+    for name, computed, given, scale in zip(names, own, samples, scales, strict=True):
+        if given.shape != computed.shape or not (np.abs(given - computed) <= SAMPLE_TOLERANCE * scale).all():
+            raise NotCertified(0, f"the {name} of its samples are not those of its spline on this arm", {})

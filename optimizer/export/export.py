@@ -1,0 +1,170 @@
+"""Public entry point: `export(motion, format)` writes a motion for a robot controller."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, overload
+
+import numpy as np
+
+from joulepath.optimizer.cycle.cycle_solution import CycleSolution
+from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
+from joulepath.optimizer.evaluate.sample_check import check_samples
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
+from joulepath.optimizer.export.certified import certified
+from joulepath.optimizer.export.csv_table import to_csv
+from joulepath.optimizer.export.facts import NOT_RUN, WrittenFile
+from joulepath.optimizer.export.franka import FrankaOptions, to_franka
+from joulepath.optimizer.export.json_document import to_json
+from joulepath.optimizer.export.krl import KrlOptions, to_krl
+from joulepath.optimizer.export.npz_arrays import to_npz
+from joulepath.optimizer.export.program import Move, Program, program_of_cycle
+from joulepath.optimizer.export.rapid import RapidOptions, to_rapid
+from joulepath.optimizer.export.ros_messages import MoveitOptions, Ros2Options, to_moveit, to_ros2
+from joulepath.optimizer.export.rows import TableOptions
+from joulepath.optimizer.export.urscript import UrscriptOptions, to_urscript
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.solution import Solution
+
+FormatName = Literal["urscript", "ros2", "moveit", "franka", "rapid", "krl", "csv", "json", "npz"]
+ExportOptions = UrscriptOptions | Ros2Options | MoveitOptions | FrankaOptions | RapidOptions | KrlOptions | TableOptions
+
+
+@dataclass(frozen=True)
+class Format:
+    """What writes a format, and the class of its options; None for a format that has none."""
+
+    write: Callable[[Program, Any], WrittenFile]
+    options: type[ExportOptions] | None
+
+
+FORMATS: dict[FormatName, Format] = {
+    "urscript": Format(to_urscript, UrscriptOptions),
+    "ros2": Format(to_ros2, Ros2Options),
+    "moveit": Format(to_moveit, MoveitOptions),
+    "franka": Format(to_franka, FrankaOptions),
+    "rapid": Format(to_rapid, RapidOptions),
+    "krl": Format(to_krl, KrlOptions),
+    "csv": Format(to_csv, TableOptions),
+    "json": Format(lambda program, _: to_json(program), None),
+    "npz": Format(to_npz, TableOptions),
+}
+"""The formats by name."""
+
+
+@dataclass(frozen=True)
+class ExportedFile:
+    """A file for a robot controller, and what is known of it.
+
+    `name` is a name for the file, `content` its bytes. The motion in it is slowed down to
+    `speed_scale` of its speed, and its largest value / limit is `worst_ratio`, by its certificate.
+    `notes` says in sentences how far the file deviates from the motion, and what it leaves out.
+    """
+
+    name: str
+    content: bytes
+    media_type: str
+    speed_scale: float
+    worst_ratio: float
+    notes: tuple[str, ...]
+
+
+@overload
+def export(
+    motion: Solution,
+    format: FormatName,
+    options: ExportOptions | None = None,
+    *,
+    problem: Problem,
+    speed_scale: float = 1.0,
+    deadline: float = np.inf,
+    clock: Clock = time.perf_counter,
+) -> ExportedFile: ...
+@overload
+def export(
+    motion: CycleSolution | Program,
+    format: FormatName,
+    options: ExportOptions | None = None,
+    *,
+    problem: None = None,
+    speed_scale: float = 1.0,
+    deadline: float = np.inf,
+    clock: Clock = time.perf_counter,
+) -> ExportedFile: ...
+def export(
+    motion: Solution | CycleSolution | Program,
+    format: FormatName,
+    options: ExportOptions | None = None,
+    *,
+    problem: Problem | None = None,
+    speed_scale: float = 1.0,
+    deadline: float = np.inf,
+    clock: Clock = time.perf_counter,
+) -> ExportedFile:
+    """Write a motion as a program or file for a robot controller.
+
+    The motion is certified again at the speed at which it leaves: limits, rest at both ends of
+    every move, and clearance. A tool path is not compared again. No format was run on hardware.
+
+    Args:
+        motion: solution of a problem or of a cycle, or a program of moves and rests.
+        format: name of the format; docs/exports.md describes each.
+        options: options of this format; None for its defaults.
+        problem: problem that a `Solution` solves, which names its arm. The others name theirs.
+        speed_scale: fraction of the speed in (0, 1]. Moves are slowed down, rests stay as they are.
+        deadline: wall time after which the certificate is given up [s].
+        clock: function that returns the time [s].
+
+    Returns:
+        The file, with the largest value / limit of its motion.
+
+    Raises:
+        InvalidProblem: the options are those of another format, or `problem` is missing.
+        NotCertified: the motion breaks a limit at this speed, or is not one of this arm.
+        FormatUnsuitable: the format is not for this robot, or the file would be too large.
+        DeadlineExceeded: the deadline passed first.
+    """
+    kind = _format(format, options)
+    if not 0 < speed_scale <= 1:
+        raise InvalidProblem("speed_scale", "speed_scale must be above 0 and at most 1.")
+    program = _program(motion, problem)
+    program = program if speed_scale == 1 else program.slowed(speed_scale)
+    try:
+        with watch(Deadline.after(deadline, clock)):
+            certificates = certified(program)
+            written = kind.write(program, options)
+    except DeadlinePassed:
+        raise DeadlineExceeded([]) from None
+    scale = program.speed_scale
+    return ExportedFile(
+        name=f"joulepath-{program.robot.name}{'' if scale == 1 else f'-speed-{scale:g}'}.{written.extension}",
+        content=written.content,
+        media_type=written.media_type,
+        speed_scale=scale,
+        worst_ratio=max(ratio for each in certificates for ratio in each.worst_ratio.values()),
+        notes=(*written.notes, NOT_RUN),
+    )
+
+
+def _format(name: FormatName, options: ExportOptions | None) -> Format:
+    kind = FORMATS.get(name)
+    if kind is None:
+        raise InvalidProblem("format", f"format must be one of {', '.join(FORMATS)}.")
+    if options is not None and type(options) is not kind.options:
+        own = "has no options" if kind.options is None else f"takes {kind.options.__name__}"
+        raise InvalidProblem("options", f"The format {name} {own}: leave out {type(options).__name__}.")
+    return kind
+
+
+def _program(motion: Solution | CycleSolution | Program, problem: Problem | None) -> Program:
+    if isinstance(motion, CycleSolution):
+        return program_of_cycle(motion)
+    if isinstance(motion, Program):
+        return motion
+    if problem is None:
+        raise InvalidProblem("problem", "A solution does not name its arm: give the problem that it solves.")
+    given = motion.trajectory
+    check_samples(problem.arm, given.spline, given.t, (given.q, given.v, given.a, given.tau))
+    return Program((Move(given.spline, problem.arm),))
