@@ -295,8 +295,6 @@ def test_a_scheduler_without_this_version_gets_nothing(
 
     if there == "another":
         other_version(tmp_path)
-    else:
-        (tmp_path / "joulepath.py").write_text("raise ImportError", encoding="utf-8")
     with scheduler_process(tmp_path) as (_, address):
         asyncio.run(run(address))
 
