@@ -1,7 +1,7 @@
 # Every target does its own set-up: nothing but Python 3.11 or newer and make has to be there.
 #   make serve      the service on http://HOST:PORT
 #   make test       every check: lint, types, architecture, tests
-#   make test-long  the same, and the tests that take minutes
+#   make test-long  the same, and the long tests: fuzzing, the studio page in a browser, more cases of other tests
 #   make bench      the benchmarks
 #   make lock       renew the lockfiles
 #   make clean      remove what these made
@@ -29,7 +29,7 @@ endif
 export PYTHONUNBUFFERED := 1
 comma := ,
 
-.PHONY: serve test test-long bench lock clean ready lint kernels pytest pytest-long
+.PHONY: serve test test-long bench lock clean ready lint mypy style kernels pytest pytest-long
 
 serve: $(VENV)/.runtime $(VENV)/.package kernels
 	JOULEPATH_HOST=$(HOST) PORT=$(PORT) exec $(PY) -m joulepath.app
@@ -39,24 +39,31 @@ ready: $(VENV)/.runtime $(NATIVE)
 	@$(MAKE) --no-print-directory --jobs=3 $(VENV)/.dev $(VENV)/.package kernels
 	@$(PY) -m compileall -q app optimizer models
 
-# the linters run beside the tests
+# The linters come first: they find in a minute what the tests find later.
 test: ready
-	@$(MAKE) --no-print-directory --jobs=2 lint pytest
+	@$(MAKE) --no-print-directory --jobs=2 lint
+	@$(MAKE) --no-print-directory pytest
 
 test-long: ready
-	@$(MAKE) --no-print-directory --jobs=2 lint pytest-long
+	@$(MAKE) --no-print-directory --jobs=2 lint
+	@$(MAKE) --no-print-directory pytest-long
 
+# `worksteal`: a process that has run its share of the tests takes some of another one's.
 pytest:
-	$(PY) -m pytest -n auto --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)
+	$(PY) -m pytest -n auto --dist worksteal $(PYTEST_ARGS)
 
-# an empty marker expression takes back the deselection in pyproject.toml
+# An empty marker expression takes back the deselection in pyproject.toml.
 pytest-long:
-	$(PY) -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "" $(PYTEST_ARGS)
+	$(PY) -m pytest -n auto --dist worksteal -m "" $(PYTEST_ARGS)
 
-lint: $(VENV)/.dev
+lint: mypy style
+
+mypy: $(VENV)/.dev
+	$(PY) -m mypy
+
+style: $(VENV)/.dev
 	$(PY) -m ruff check $(SOURCES)
 	$(PY) -m ruff format --check $(SOURCES)
-	$(PY) -m mypy
 	$(VENV)/bin/lint-imports --no-logo
 
 bench: $(VENV)/.benchmarks kernels

@@ -1,12 +1,17 @@
-"""How many processes run the tests, and which files they begin with."""
+"""How many processes run the tests, which files they begin with, and which folders `make test-long` alone runs."""
 
 from __future__ import annotations
 
 import gc
 import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
+
+TESTS = Path(__file__).parent
+LONG_FOLDERS = (TESTS / "browser", TESTS / "fuzzing")
+"""Folders whose tests are all `long`. Otherwise they are not even imported: their libraries take seconds to load."""
 
 
 def pytest_xdist_auto_num_workers() -> int:
@@ -14,8 +19,18 @@ def pytest_xdist_auto_num_workers() -> int:
     return len(os.sched_getaffinity(0)) + 1
 
 
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Skips the long folders where long tests are deselected; None leaves the decision to pytest."""
+    return True if collection_path in LONG_FOLDERS and config.option.markexpr == "not long" else None
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Files whose few tests take long come first: at the end, a process would be busy with one while others idle."""
+    """Marks the tests of the long folders, and puts the few tests that take long to the front: at the end, one process
+    would be busy with them while the others idle."""
+    for item in items:
+        if any(folder in item.path.parents for folder in LONG_FOLDERS):
+            item.add_marker("long")
     items.sort(key=lambda item: item.path.parent.name not in ("browser", "deploy", "tests"))
 
 

@@ -14,7 +14,6 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("app", "optimizer", "models")
 STOREYED = ("optimizer", "optimizer/identify", "app")  # whose floors are named
 MOST_LINES = 350  # of a file
-MOST_PAGE_LINES = 3000  # of all scripts, styles and markup of the studio page
 MOST_FUNCTION_LINES = 60  # from the first decorator to the last line, docstring included
 
 
@@ -59,7 +58,8 @@ def test_a_room_says_in_one_line_what_it_is_for(room: Path) -> None:
 
 
 def test_no_file_is_long() -> None:
-    lengths = {name(path): len(path.read_text().splitlines()) for path in all_sources()}
+    paths = [*all_sources(), *page_sources()]
+    lengths = {name(path): len(path.read_text().splitlines()) for path in paths}
     assert {path: length for path, length in lengths.items() if length > MOST_LINES} == {}
 
 
@@ -67,12 +67,6 @@ def page_sources() -> list[Path]:
     """The files of the studio page that are ours."""
     folder = ROOT / "app" / "static" / "studio"
     return sorted(path for kind in ("js", "css", "html") for path in folder.glob(f"*.{kind}"))
-
-
-def test_the_studio_page_stays_small() -> None:
-    lengths = {name(path): len(path.read_text().splitlines()) for path in page_sources()}
-    assert max(lengths.values()) <= MOST_LINES, lengths
-    assert sum(lengths.values()) <= MOST_PAGE_LINES, lengths
 
 
 def test_the_architecture_page_names_every_script_of_the_studio_page() -> None:

@@ -24,7 +24,6 @@ from tests.app.requests import move
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("app", "optimizer", "models")
-PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check")
 # a cold start of the service with one worker, on a busy machine [s]
 START = 90.0
 STOP = 30.0  # from SIGTERM to the end of the process, at most [s]

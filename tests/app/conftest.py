@@ -1,4 +1,4 @@
-"""The service as tests reach it: in this process, and as a server of its own. Both drive the real optimiser."""
+"""The service as tests reach it: in this process, with searches or with recorded ones, and as a server of its own."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from starlette.testclient import TestClient
 from joulepath.app.main import create_app
 from joulepath.app.settings import Settings
 from tests.app.live import COMPUTED, GRACE, LOCAL, WARM_UP, Server, serving
+from tests.app.recorded import recorded_service
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -37,8 +38,15 @@ def client() -> Iterator[TestClient]:
         yield client
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def server() -> Iterator[Server]:
     """`python -m joulepath.app` in a process of its own, warm."""
     with serving(workers=2, queue_size=4, deadline_grace=GRACE, stop_grace=GRACE) as server:
         yield server
+
+
+@pytest.fixture(scope="session")
+def recorded() -> Iterator[TestClient]:
+    """The service in this process, with recorded results instead of searches."""
+    with recorded_service() as client:
+        yield client

@@ -144,8 +144,12 @@ class Server:
 
 
 @contextmanager
-def serving(warm: bool = True, **settings: Any) -> Iterator[Server]:
-    """A server with these settings, by default waited for until it is warm and with an empty database of its own."""
+def serving(warm: bool = True, recorded: bool = False, **settings: Any) -> Iterator[Server]:
+    """A server with these settings, by default waited for until it is warm and with an empty database of its own.
+
+    With `recorded`, its searches are recorded (see `tests.app.recorded`): it has no worker processes.
+    """
+    module = "tests.app.recorded" if recorded else "joulepath.app"
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -156,7 +160,7 @@ def serving(warm: bool = True, **settings: Any) -> Iterator[Server]:
         environment |= {"JOULEPATH_LOG_LEVEL": "debug", "PORT": str(port)}
         with log.open("ab") as appended:
             process = subprocess.Popen(
-                [sys.executable, "-m", "joulepath.app"], cwd=ROOT, env=os.environ | environment, stderr=appended
+                [sys.executable, "-m", module], cwd=ROOT, env=os.environ | environment, stderr=appended
             )
         server = Server(process, f"http://127.0.0.1:{port}", log)
         try:

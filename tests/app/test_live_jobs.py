@@ -3,8 +3,6 @@ callers."""
 
 from __future__ import annotations
 
-import os
-import signal
 import threading
 from collections import Counter
 from collections.abc import Iterator
@@ -12,17 +10,14 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-import httpx2
 import pytest
 from sqlalchemy import text
 
-from joulepath.app.schemas.errors import WorkerDied
 from joulepath.app.store.database import create_database_engine
 from tests.app.databases import postgres, why_no_postgres
 from tests.app.job_clients import Event, KilledService, ended, evaluation, events, optimization, over, sent, shown
-from tests.app.live import GRACE, Server, processor_time, serving, until
+from tests.app.live import GRACE, Server, serving, until
 from tests.app.requests import long_search, move
-from tests.app.test_server import AT_WORK
 
 MISSING = why_no_postgres()
 LONG = {"optimize": long_search(100.0)}
@@ -90,36 +85,6 @@ def test_cancelling_stops_what_runs(single: Server) -> None:
     assert (job["state"], job["counts"]["cancelled"]) == ("cancelled", 2)
     assert single.post(f"{path}/cancel", None).json()["state"] == "cancelled"
     assert single.post("/optimize", move()).status_code == 200
-
-
-def test_deleting_stops_what_runs(single: Server) -> None:
-    until(lambda: len(single.workers()) == 1)
-    path = sent(over(single), [LONG])
-    running(single, path)
-    (worker,) = single.workers()
-    assert httpx2.delete(single.url + path).status_code == 204
-    until(single.is_idle)
-    assert single.workers() == [worker]
-    assert single.get(path).status_code == 404
-
-
-def test_a_request_that_kills_its_workers_fails(single: Server) -> None:
-    path = sent(over(single), [LONG])
-    used: dict[int, float] = {}
-    killed: list[int] = []
-
-    def has_failed() -> bool:
-        for worker in set(single.workers()) - set(killed):
-            if processor_time(worker) > used.setdefault(worker, processor_time(worker)) + AT_WORK:
-                os.kill(worker, signal.SIGKILL)
-                killed.append(worker)
-        return bool(shown(over(single), path)["state"] == "done")
-
-    until(has_failed)
-    assert len(killed) == 3
-    (only,) = shown(over(single), path)["requests"]
-    assert (only["state"], only["attempt"]) == ("failed", 3)
-    WorkerDied.model_validate(only["problem"])
 
 
 def test_a_caller_need_not_wait_for_a_job(single: Server) -> None:

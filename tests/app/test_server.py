@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import httpx2
 import pytest
 
-from joulepath.app.schemas.errors import BodyTooLarge, Busy, DeadlineExceeded, MalformedHttp, ShuttingDown
+from joulepath.app.schemas.errors import BodyTooLarge, Busy, MalformedHttp, ShuttingDown
 from joulepath.app.schemas.replay import ReplayResponse
 from joulepath.app.schemas.response import OptimizeResponse
 from tests.app.live import CLIENT, EXIT, ROOT, WARM_UP, Server, alive, processor_time, serving, until
@@ -132,19 +132,7 @@ def test_refuses_what_it_cannot_queue(server: Server) -> None:
     assert server.post("/optimize", move()).status_code == 200, "whoever hangs up leaves the queue"
 
 
-def test_a_deadline_that_passes_in_the_queue(server: Server) -> None:
-    before = server.workers()
-    with ExitStack() as connections:
-
-        def fill() -> None:
-            for _ in range(2):
-                connections.enter_context(server.open("/optimize", long_search(LONG)))
-
-        start_work(server, fill, workers=2)
-        DeadlineExceeded.model_validate_json(server.post("/optimize", move(deadline=0.5)).content)
-    until_free(server, before)
-
-
+@pytest.mark.long
 def test_a_crash_costs_no_answer(server: Server) -> None:
     before = server.workers()
     assert len(before) == 2

@@ -2,54 +2,18 @@
 
 from __future__ import annotations
 
-import asyncio
 import os
 import random
 import signal
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 
 import pytest
 
-from joulepath.app.engine.fair_queue import FairQueue
 from tests.app.live import CLIENT, GRACE, Server, serving, until
 from tests.app.requests import long_search, move
-
-
-@dataclass(eq=False)
-class StubWorker:
-    alive: bool = True
-    is_free: bool = True
-
-    def when_free(self, call: Callable[[], object]) -> None:
-        call()
-
-
-def test_a_client_that_leaves_as_another_one_ends_costs_no_worker() -> None:
-    async def test() -> None:
-        queue: FairQueue[StubWorker] = FairQueue(capacity=10, share=10)
-        queue.put(StubWorker())
-        hold = asyncio.Event()
-
-        async def use() -> str:
-            with queue.place("c") as place:
-                async with queue.worker(place):
-                    await hold.wait()
-            return "answer"
-
-        first = asyncio.create_task(use())
-        await asyncio.sleep(0)
-        second, third = asyncio.create_task(use()), asyncio.create_task(use())
-        await asyncio.sleep(0)
-        hold.set()
-        second.cancel()
-        found = await asyncio.gather(first, second, third, use(), return_exceptions=True)
-        assert [found[0], *found[2:]] == 3 * ["answer"] and isinstance(found[1], asyncio.CancelledError)
-
-    asyncio.run(test())
 
 
 @pytest.fixture(scope="module")
@@ -95,19 +59,6 @@ def test_deadlines_that_pass_in_the_queue_cost_no_worker(two: Server) -> None:
     assert two.post("/optimize", move()).status_code == 200
     until(two.is_idle)
     assert two.workers() == before and two.get("/readyz").status_code == 200
-
-
-@pytest.mark.long
-def test_a_worker_that_is_killed_costs_no_answer(two: Server) -> None:
-    before = two.workers()
-    with ThreadPoolExecutor(1) as threads:
-        asked = threads.submit(CLIENT.post, f"{two.url}/optimize", json=long_search(20.0))
-        until(lambda: not two.is_idle())
-        os.kill(before[0], signal.SIGKILL)
-        os.kill(before[1], signal.SIGKILL)
-        assert asked.result().status_code == 200
-    until(lambda: len(two.workers()) == 2)
-    assert not set(two.workers()) & set(before)
 
 
 @pytest.mark.long

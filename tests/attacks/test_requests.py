@@ -170,18 +170,6 @@ def test_the_id_in_an_answer_is_that_of_the_kept_answer(client: TestClient) -> N
         assert answer.get("answer", f"/answers/{answer['id']}") == f"/answers/{answer['id']}"
 
 
-@pytest.mark.parametrize("fields", [{}, {"method": "time_scaling"}], ids=["bspline", "time_scaling"])
-def test_an_equal_request_has_its_own_request_and_the_same_id(client: TestClient, fields: dict[str, Any]) -> None:
-    asked = {"start": {"q": HOME}, "goal": {"q": NEAR}, "gravity": [0.0, 0.0, -9.8123], **PATIENT, **fields}
-    headers = [{"Cache-Control": "max-age=0", "X-Request-ID": name} for name in ("mine", "mine.again")]
-    first, again = (client.post("/optimize", json=asked, headers=each) for each in headers)
-    assert again.headers["joulepath-cache"] == "hit"
-    assert [each.json()["request"] for each in (first, again)] == ["mine", "mine.again"]
-    assert [each.headers["x-request-id"] for each in (first, again)] == ["mine", "mine.again"]
-    assert first.json()["id"] == again.json()["id"] not in ("mine", "mine.again")
-    assert client.get(f"/answers/{again.json()['id']}").json()["answer"]["request"] == "mine", "it was computed for it"
-
-
 def test_an_id_of_the_caller_is_no_id_of_an_answer(client: TestClient) -> None:
     """Even one that has the form of an answer's, of which another is kept."""
     asked = {"start": {"q": HOME}, "goal": {"q": NEAR}, **PATIENT}

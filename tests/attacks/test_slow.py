@@ -21,6 +21,7 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.solution import Solution
 from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, fixed, limits, problem
+from tests.selection import long_but
 
 # a move of which joint 6 is limited to so many rad/s, and the least energies [J] that are known of it. These and those
 # below are from spaces of four times the answer's control points (`benchmarks.slow_moves.more_points`)
@@ -56,7 +57,7 @@ def shortest(task: Problem) -> float:
     return float(shortest_duration(task.goal - task.start, task.arm.active_limits))
 
 
-@pytest.mark.parametrize("speed", LEAST_KNOWN)
+@pytest.mark.parametrize("speed", long_but([0.3, 0.02], LEAST_KNOWN))
 def test_a_slow_joint_ramps_as_fast_as_it_can(speed: float) -> None:
     """Evenly spaced knots need 2 to 21 % more: their ramps take seconds."""
     found = optimize(slow(speed))
@@ -64,7 +65,7 @@ def test_a_slow_joint_ramps_as_fast_as_it_can(speed: float) -> None:
     assert found.status == "optimal" and found.certificate.valid
 
 
-@pytest.mark.parametrize("index", range(3))
+@pytest.mark.parametrize("index", long_but([1], range(3)))
 def test_no_duration_near_the_answers_needs_less(index: int) -> None:
     """One move of each kind: all joints slow, one joint slow, a tenth of all limits of speed."""
     _, task = slow_problem(0, index)
@@ -79,7 +80,7 @@ def test_the_excess_of_slow_moves_is_small() -> None:
     assert compare(seed=1, count=30, json=None) == 0
 
 
-@pytest.mark.parametrize("ratio", [1.0005, 1.003, 1.02, 1.1])
+@pytest.mark.parametrize("ratio", long_but([1.0005, 1.1], [1.0005, 1.003, 1.02, 1.1]))
 def test_a_duration_next_to_the_shortest_is_kept(ratio: float) -> None:
     """Half a thousandth of 40 s is less than a ramp."""
     task = slow(0.05)
@@ -97,7 +98,7 @@ def test_much_more_time_than_a_move_needs_is_used(goal: Array, duration: float, 
     assert energy(optimize(problem(START, goal, **fixed(duration)))) < least * (1 + MOST_EXCESS)
 
 
-@pytest.mark.parametrize("name", ["panda", "ur20"])
+@pytest.mark.parametrize("name", long_but(["panda"], ["panda", "ur20"]))
 def test_other_robots_ramp_as_fast_as_they_can(name: str) -> None:
     robot = load_robot(name)
     lower, upper = np.maximum(robot.limits.q_min, -2.0), np.minimum(robot.limits.q_max, 2.0)
@@ -127,7 +128,7 @@ def test_a_cycle_that_leaves_no_time_to_wait() -> None:
     assert energy(found) < LEAST_KNOWN[0.1] * (1 + MOST_EXCESS)
 
 
-@pytest.mark.parametrize("index", [0, 2])
+@pytest.mark.parametrize("index", long_but([0], [0, 2]))
 def test_a_longest_duration_beyond_the_answers_changes_little(index: int) -> None:
     _, task = slow_problem(2, index)
     found = optimize(task)
@@ -135,7 +136,7 @@ def test_a_longest_duration_beyond_the_answers_changes_little(index: int) -> Non
     assert energy(again) == pytest.approx(energy(found), rel=MOST_EXCESS)
 
 
-@pytest.mark.parametrize(("index", "speed"), [(2, 0.25), (4, 0.08), (5, 0.25)])
+@pytest.mark.parametrize(("index", "speed"), long_but([(2, 0.25)], [(2, 0.25), (4, 0.08), (5, 0.25)]))
 def test_a_slow_tcp_is_within_its_limit_in_short_spans(index: int, speed: float) -> None:
     """Evenly spaced path points missed short knot spans: no motion was confirmed, or one of half again the energy."""
     _, task = slow_problem(0, index)

@@ -217,7 +217,6 @@ def test_a_cycle_is_played_as_one(browser: Browser, service: Server, page: Page)
         assert other.url.endswith(f"#answer={kept}"), "its request is not known"
 
 
-@pytest.mark.long
 def test_what_does_not_count_at_a_stop_is_faint(page: Page) -> None:
     """The part that is grasped: at its stop and on the lines in and out of it."""
     ask(page, json.loads((ROOT / "examples" / "cycle" / "out_of_a_tray.json").read_text()))
@@ -248,7 +247,6 @@ def test_what_is_kept_opens_again(page: Page, service: Server) -> None:
     until(page, f"() => Math.abs(studio.state.answer.branch.goal.q[0] - {NEAR[0]}) > 0.01")
 
 
-@pytest.mark.long
 def test_a_page_stands_alone(browser: Browser, page: Page, tmp_path: Path) -> None:
     """Opened from a file, with no service and no network."""
     page.locator("#downloads > summary").click()

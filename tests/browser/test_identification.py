@@ -59,7 +59,6 @@ def rms(moves: list[dict[str, Any]], joint: int) -> float:
 KEYS = ("measured", "modelled")
 
 
-@pytest.mark.long
 def test_a_log_becomes_figures_that_the_next_motion_has(page: Page, service: Server, tmp_path: Path) -> None:
     file = tmp_path / "monday.csv"
     file.write_bytes(csv_of(recorded(ROBOT, TRUTH, moves=6)))

@@ -106,7 +106,6 @@ def test_the_nearest_points_are_those_of_the_certificate(page: Page) -> None:
     expect(page.locator(".label.near")).to_contain_text(" – ".join(clearance["pair"]))
 
 
-@pytest.mark.long
 def test_the_makers_meshes_are_drawn(browser: Browser, service: Server, page: Page) -> None:
     """Where the service has them; else the arm is drawn from its figures, and the page says nothing."""
     with_meshes = page.evaluate(PIXELS)
@@ -226,7 +225,6 @@ def test_branches_side_by_side(page: Page) -> None:
         expect(labels.filter(has_text=f"{energy:.3g} J")).to_have_count(1)
 
 
-@pytest.mark.long
 def test_a_point_of_the_front_takes_the_place_of_the_answer(page: Page) -> None:
     lift = json.loads((ROOT / "examples" / "pareto" / "lift.json").read_text())
     ask(page, {name: value for name, value in lift.items() if name not in ("points", "duration")})
@@ -252,7 +250,6 @@ def test_without_webgl_the_figures_are_there(browser: Browser, service: Server) 
     plain.close()
 
 
-@pytest.mark.long
 def test_behind_the_path_of_a_proxy(browser: Browser, service: Server) -> None:
     """Every address of the page is relative."""
     front = "http://cell.example/robots/energy"
@@ -297,7 +294,6 @@ def test_the_keyboard_is_enough(browser: Browser, service: Server) -> None:
         until(page, "() => studio.state.time > 0")
 
 
-@pytest.mark.long
 def test_what_stands_before_the_arm_fades(page: Page) -> None:
     """The side of the shelf, seen through it; what stands behind the arm, or is not to fade, does not."""
     faint = """show => {

@@ -71,8 +71,7 @@ def test_sqlite_under_load(tmp_path: Path) -> None:
     (tmp_path / "backup").mkdir()
     file = tmp_path / "backup" / "joulepath.db"
     url = f"sqlite:///{tmp_path}/joulepath.db"
-    with serving(warm=False, workers=1, robots="", database_url=url) as server:
-        server.wait_listening()
+    with serving(recorded=True, database_url=url) as server:
         ids = back_up_under_load(server, url, file)
         server.process.kill()
     with sqlite3.connect(file) as copy:
@@ -96,8 +95,7 @@ def test_postgresql_under_load(tmp_path: Path) -> None:
     (tmp_path / "backup").mkdir()
     file = tmp_path / "backup" / "joulepath.dump"
     with postgres() as database:
-        with serving(warm=False, workers=1, robots="", database_url=database.url) as server:
-            server.wait_listening()
+        with serving(recorded=True, database_url=database.url) as server:
             ids = back_up_under_load(server, database.url, file)
         empty = database.url.rpartition("/")[0] + "/restored"
         subprocess.run(["psql", database.url, "--quiet", "--command", "CREATE DATABASE restored"], check=True)

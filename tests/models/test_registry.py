@@ -174,16 +174,6 @@ def test_urdf_states_the_same_limits(robot: Robot) -> None:
     assert model.upperEffortLimit == pytest.approx(limits.tau_max)
 
 
-def test_inverse_dynamics_includes_the_rotors(robot: Robot) -> None:
-    bare = robot.model.copy()
-    bare.armature = np.zeros(robot.nq)
-    rng = np.random.default_rng(1)
-    for q in configurations(robot.nq, 20):
-        v, a = rng.uniform(-3, 3, (2, robot.nq))
-        extra = pin.rnea(robot.model, robot.model.createData(), q, v, a) - pin.rnea(bare, bare.createData(), q, v, a)
-        assert extra == pytest.approx(robot.drives.rotor_inertia * a, abs=TORQUE_ROUNDING)
-
-
 def test_a_robot_survives_the_way_to_another_process(robot: Robot) -> None:
     copy = pickle.loads(pickle.dumps(robot))
     assert copy.model == robot.model
@@ -212,16 +202,6 @@ def test_loading_leaves_the_robot_alone(robot: Robot) -> None:
     before = robot.model.copy()
     robot.loaded_model(5.0, np.ones(3), np.eye(3), np.array([9.81, 0.0, 0.0]))
     assert robot.model == before
-
-
-def test_tilted_gravity_is_the_gradient_of_potential_along_it(robot: Robot) -> None:
-    gravity = np.array([3.0, -8.0, 4.5])
-    tilted = robot.loaded_model(2.0, np.array([0.0, 0.0, 0.1]), np.zeros((3, 3)), gravity)
-    data = tilted.createData()
-    for q in configurations(robot.nq, 20):
-        pin.centerOfMass(tilted, data, q)
-        expected = -pin.computeTotalMass(tilted) * pin.jacobianCenterOfMass(tilted, data, q).T @ gravity
-        assert pin.computeGeneralizedGravity(tilted, data, q) == pytest.approx(expected, abs=TORQUE_ROUNDING)
 
 
 def test_shared_arrays_are_read_only(robot: Robot) -> None:

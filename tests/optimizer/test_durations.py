@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from itertools import product
 from typing import Any
@@ -17,18 +16,15 @@ from joulepath.optimizer.exceptions import (
     InvalidProblem,
     NoTrajectory,
     TorqueInfeasible,
-    UnreachablePose,
 )
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.search.reserve import RESERVE
 from joulepath.optimizer.solution import Certificate
 from tests.optimizer.answers import CONDITIONS, CONVERGED, ROUNDING, assert_true, shortest, solved
 from tests.optimizer.clocks import LAST_READINGS, CountingClock
 from tests.optimizer.moves import (
     GOAL,
-    PAYLOAD,
     ROBOT,
     START,
     fixed,
@@ -67,36 +63,6 @@ def test_duration_bounds_are_kept(method: str) -> None:
     assert 0.8 * leisurely * (1 - 0.02) < capped <= 0.8 * leisurely
 
 
-@pytest.mark.parametrize(
-    "given",
-    [
-        {},
-        {"method": "time_scaling"},
-        pytest.param({"limits": limits(v_max=0.8)}, marks=pytest.mark.long),
-        {"payload": PAYLOAD, "limits": limits(tau_max=[60, 100, 60, 14, 14, 14])},
-        pytest.param({"objective": "mechanical"}, marks=pytest.mark.long),
-        {"goal": tcp_pose(GOAL)},
-        pytest.param({"start": tcp_pose(START), "goal": tcp_pose(GOAL), "windings": False}, marks=pytest.mark.long),
-    ],
-    ids=lambda given: ", ".join(given) or "as it comes",
-)
-def test_the_shortest_duration_that_is_told_holds(given: dict[str, Any]) -> None:
-    """Asked for exactly that, or a little more, there is a motion; asked for less, there is none, told alike."""
-    with pytest.raises(DurationTooShort) as refusal:
-        optimize(problem(**given, **fixed(0.1)))
-    told = refusal.value.shortest
-    assert told is not None
-    # the duration in words is rounded up, so that it is enough as well
-    in_words = float(re.findall(r"takes ([\d.]+) s", str(refusal.value))[0])
-    assert told <= in_words < told + 1e-4
-    for share in (1.0, 1.01):
-        for durations in (fixed(told * share), {"duration_max": told * share}):
-            assert solved(problem(**given, **durations)).duration <= told * share
-    with pytest.raises(DurationTooShort) as again:
-        optimize(problem(**given, **fixed(0.98 * told)))
-    assert again.value.shortest == pytest.approx(told, rel=1e-3)
-
-
 def test_the_shortest_duration_is_nearly_the_seven_segments() -> None:
     """Where torque is ample, the arm can be told to be as fast as its slowest joint, or hardly slower."""
     for start, goal in random_moves(43, 4):
@@ -106,7 +72,8 @@ def test_the_shortest_duration_is_nearly_the_seven_segments() -> None:
         assert least * (1 - ROUNDING) <= refusal.value.shortest < 1.02 * least
 
 
-@pytest.mark.parametrize(("less", "more"), long_but([(0.8, 2.0)], [(0.8, 2.0), (0.8, 1.2), (1.2, 2.0)]))
+@pytest.mark.long
+@pytest.mark.parametrize(("less", "more"), [(0.8, 2.0), (0.8, 1.2), (1.2, 2.0)])
 def test_more_time_is_never_dearer_without_a_price_of_time(less: float, more: float) -> None:
     """The mechanical objective, which a longer duration can only help: up to 2 s is no worse than up to 1 s."""
     fast, slow = (solved(problem(objective="mechanical", duration_max=T)).energy.mechanical.total for T in (less, more))
@@ -148,14 +115,6 @@ def test_a_payload_beyond_the_rating_is_refused() -> None:
     with pytest.raises(InvalidProblem) as refusal:
         optimize(problem(payload=Payload(5.01)))
     assert refusal.value.field == "payload.mass" and "5 kg" in str(refusal.value)
-
-
-def test_poses_out_of_reach_are_refused() -> None:
-    away = tcp_pose(GOAL).T.copy()
-    away[0, 3] += 2.0
-    with pytest.raises(UnreachablePose) as far:
-        optimize(problem(goal=Pose(away)))
-    assert far.value.target == "goal" and far.value.distance is not None and 0.5 < far.value.distance < 2.5
 
 
 @pytest.mark.parametrize("refused", ["all", "the first"])

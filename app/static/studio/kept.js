@@ -83,7 +83,7 @@ export async function openAnswer(path) {
   const { answer } = await get(path.includes("/") ? path : `answers/${encodeURIComponent(path)}`);
   // what was asked for cannot be told from a cycle
   if (answer?.legs) return set({ request: null }), showCycle(answer, null);
-  if (!answer?.branch) throw new Error("Only motions and rounds are shown here: this answer is of another kind.");
+  if (!answer?.branch) throw new Error("Only motions and cycles are shown here: this answer is of another kind.");
   // the same arm between the same ends: what the answer does not say of its request stays at the defaults
   set({ request: { robot: answer.robot, ...answer.arm, start: { q: answer.branch.start.q }, goal: { q: answer.branch.goal.q } } });
   return showAnswer(answer, state.request);

@@ -64,12 +64,6 @@ def test_an_invalid_request_is_a_validation_problem(here: Here, body: str | byte
     assert [error["loc"] for error in content["errors"]] == [loc]
 
 
-def test_an_invalid_request_in_a_process_of_its_own() -> None:
-    finished = run("optimize", "-", stdin=request().replace("-1.57", "NaN", 1))
-    assert (finished.returncode, finished.stdout) == (2, b"")
-    assert json.loads(finished.stderr)["errors"][0]["loc"] == ["body", "start", "q", 1]
-
-
 def test_an_unknown_robot_is_answered_with_the_known_ones(here: Here) -> None:
     code, content = here.problem("optimize", "-", stdin=request(robot="r2d2"))
     assert (code, content["type"]) == (2, "/problems/unknown-robot")

@@ -229,7 +229,10 @@ def test_those_whose_machine_died_are_tried_one_by_one(monkeypatch: pytest.Monke
 
 @contextmanager
 def scheduler_process(folder: Path, **environment: str) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
-    """A scheduler as a process of its own, with the package that is in a folder; and its address."""
+    """A scheduler as a process of its own, with the package that is in a folder, or none; and its address."""
+    if not (folder / "joulepath").exists() and "PYTHONPATH" not in environment:
+        # the one that is installed is hidden
+        (folder / "joulepath.py").write_text("raise ImportError('there is none')\n")
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -292,8 +295,6 @@ def test_a_scheduler_without_this_version_gets_nothing(
 
     if there == "another":
         other_version(tmp_path)
-    else:
-        (tmp_path / "joulepath.py").write_text("raise ImportError", encoding="utf-8")
     with scheduler_process(tmp_path) as (_, address):
         asyncio.run(run(address))
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from pydantic import TypeAdapter
 
@@ -29,27 +28,6 @@ def matrix(**pose: Any) -> np.ndarray:
 def problem(**fields: Any) -> Any:
     request = OptimizeRequest.model_validate(move(**fields))
     return to_problem(request, request.deadline)
-
-
-@pytest.mark.parametrize("rpy", ANGLES)
-def test_rpy_turns_about_fixed_axes(rpy: list[float]) -> None:
-    T = matrix(rpy=rpy)
-    assert T[:3, :3] == pytest.approx(pin.rpy.rpyToMatrix(*rpy), abs=ROUNDING)
-    assert T[:3, 3].tolist() == [0.1, 0.2, 0.3]
-    assert T[3].tolist() == [0, 0, 0, 1]
-
-
-@pytest.mark.parametrize("rotvec", ANGLES)
-def test_rotvec_is_axis_times_angle(rotvec: list[float]) -> None:
-    assert matrix(rotvec=rotvec)[:3, :3] == pytest.approx(pin.exp3(np.array(rotvec)), abs=ROUNDING)
-
-
-def test_quaternion_is_x_y_z_w_and_normalised() -> None:
-    quaternion = np.array([0.1, -0.5, 0.3, 0.8])
-    quaternion /= np.linalg.norm(quaternion)
-    expected = pin.Quaternion(quaternion).toRotationMatrix()
-    assert matrix(quaternion=quaternion.tolist())[:3, :3] == pytest.approx(expected, abs=ROUNDING)
-    assert matrix(quaternion=(1.0005 * quaternion).tolist())[:3, :3] == pytest.approx(expected, abs=ROUNDING)
 
 
 @pytest.mark.parametrize(

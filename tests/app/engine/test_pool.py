@@ -17,11 +17,11 @@ import pytest
 from joulepath.app.engine.pool import Engine
 from joulepath.app.engine.task import outcome
 from joulepath.app.engine.work import result_of
-from joulepath.app.exceptions import Busy, InvalidRequest, ShuttingDown, TaskFailed, WorkerDied
+from joulepath.app.exceptions import Busy, InvalidRequest, ShuttingDown, TaskFailed
 from joulepath.app.settings import Settings
 from joulepath.optimizer.exceptions import DeadlineExceeded, OutsideLimits
 from joulepath.optimizer.progress import CandidatesFound, Event
-from tests.app.engine.simple_tasks import Count, Die, Fail, Hold, ProcessId, TimeLeft, failing_warm_up, no_warm_up
+from tests.app.engine.simple_tasks import Count, Fail, Hold, ProcessId, TimeLeft, failing_warm_up, no_warm_up
 from tests.app.live import alive
 
 # What a busy machine may take for anything below [s]; no test waits for it to pass.
@@ -171,17 +171,6 @@ def test_kills_a_worker_that_overruns_and_replaces_it(tmp_path: Path) -> None:
     with_engine(tmp_path, test)
 
 
-def test_cancellation_kills_the_worker_and_frees_its_place(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        (pid,) = bench.engine.worker_pids
-        (running, _), waiting = await bench.held(), await bench.queued(ProcessId())
-        running.cancel()
-        assert int((await waiting).document) != pid
-        assert not alive(pid)
-
-    with_engine(tmp_path, test)
-
-
 def test_cancellation_in_the_queue_spares_the_worker(tmp_path: Path) -> None:
     async def test(bench: Bench) -> None:
         (running, release), waiting = await bench.held(), await bench.queued(ProcessId())
@@ -217,15 +206,6 @@ def test_an_unforeseen_error_is_logged_with_the_requests_id(caplog: pytest.LogCa
     (record,) = caplog.records
     assert (record.levelno, vars(record)["request_id"]) == (logging.ERROR, "the-id")
     assert record.exc_info is not None and "caller-secret" in str(record.exc_info[1])
-
-
-def test_a_crash_fails_one_task_only(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        with pytest.raises(WorkerDied):
-            await bench.engine.run(Die(), LONG)
-        await bench.pid()
-
-    with_engine(tmp_path, test)
 
 
 def test_a_worker_killed_while_idle_is_replaced(tmp_path: Path) -> None:

@@ -60,7 +60,7 @@ def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Guarded]:
         "boss": add(file, "boss", "admin"),
     }
     settings = {"api_keys_file": file, "database_url": database, "trusted_proxies": "127.0.0.1"}
-    with serving(workers=1, robots="", **settings) as server:
+    with serving(recorded=True, **settings) as server:
         yield Guarded(server, file, keys, database)
 
 

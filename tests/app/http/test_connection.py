@@ -23,11 +23,10 @@ GET = b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"
 
 @pytest.fixture(scope="module")
 def strict() -> Iterator[Server]:
-    """A server with low ceilings. Its workers are not waited for."""
+    """A server with low ceilings."""
     limits = {"max_head_bytes": MOST_HEAD, "max_connections": MOST, "client_connections": MOST_OF_CLIENT}
     times = {"head_timeout": SHORT, "body_timeout": SHORT, "write_timeout": SHORT}
-    with serving(warm=False, workers=1, **limits, **times) as server:
-        server.wait_listening()
+    with serving(recorded=True, **limits, **times) as server:
         yield server
 
 
@@ -142,7 +141,7 @@ def test_one_client_has_its_share_of_connections(strict: Server) -> None:
 def test_sigterm_waits_for_no_client() -> None:
     # the grace is longer than the test waits: what is open has to be ended before
     with (
-        serving(workers=1, shutdown_grace=10 * EXIT, write_timeout=SHORT) as server,
+        serving(recorded=True, shutdown_grace=10 * EXIT, write_timeout=SHORT) as server,
         connected(server) as half_a_head,
         connected(server) as upload,
         connected(server) as body,

@@ -3,29 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 
 import pytest
 from starlette.requests import Request
 
 from joulepath.app.http.weights import is_wanted
-from tests.app.live import Server, serving
+from tests.app.live import Server
 from tests.app.raw import RawAnswer, answer_on, connected
 
 WRONG = b'{"sart": {"q": [0, 0, 0, 0, 0, 0]}}'
 EVENTS, CSV = "text/event-stream", "text/csv"
 
 
-@pytest.fixture(scope="module")
-def service() -> Iterator[Server]:
-    """A server whose workers are not waited for: nothing is computed."""
-    with serving(warm=False, workers=1) as server:
-        server.wait_listening()
-        yield server
-
-
-def asked(service: Server, *parts: bytes) -> RawAnswer:
-    with connected(service) as connection:
+def asked(server: Server, *parts: bytes) -> RawAnswer:
+    with connected(server) as connection:
         for part in parts:
             connection.sendall(part)
         return answer_on(connection)
@@ -37,7 +28,7 @@ def lines(*given: str) -> bytes:
 
 @pytest.mark.parametrize("offer", ["h2c", "websocket", "TLS/1.0, HTTP/1.1"])
 @pytest.mark.parametrize("cut", [0, 20, 1])
-def test_a_body_is_read_although_the_client_offers_another_protocol(service: Server, offer: str, cut: int) -> None:
+def test_a_body_is_read_although_the_client_offers_another_protocol(server: Server, offer: str, cut: int) -> None:
     head = lines(
         "POST /optimize HTTP/1.1",
         "Host: localhost",
@@ -49,21 +40,21 @@ def test_a_body_is_read_although_the_client_offers_another_protocol(service: Ser
     # in one piece, divided in the body, and divided in the head
     whole = head + WRONG
     at = {0: len(whole), 20: len(head) + 20, 1: len(head) // 2}[cut]
-    assert "`sart`" in json.dumps(asked(service, whole[:at], whole[at:]).problem)
+    assert "`sart`" in json.dumps(asked(server, whole[:at], whole[at:]).problem)
 
 
-def test_offers_one_after_another_on_one_connection(service: Server) -> None:
+def test_offers_one_after_another_on_one_connection(server: Server) -> None:
     get = lines("GET /healthz HTTP/1.1", "Host: localhost", "Upgrade: h2c", "Connection: Upgrade")
-    with connected(service) as connection:
+    with connected(server) as connection:
         connection.sendall(3 * get + lines("GET /robots HTTP/1.1", "Host: localhost"))
         assert [answer_on(connection).status for _ in range(4)] == 4 * [200]
-    assert asked(service, lines("CONNECT localhost:80 HTTP/1.1", "Host: localhost")).status == 400
+    assert asked(server, lines("CONNECT localhost:80 HTTP/1.1", "Host: localhost")).status == 400
 
 
 @pytest.mark.parametrize("path", ["/healthz", "/robots", "/robots/ur5e", "/studio", "/problems/busy", "/nowhere"])
-def test_a_head_is_that_of_the_whole_answer(service: Server, path: str) -> None:
-    whole = asked(service, lines(f"GET {path} HTTP/1.1", "Host: localhost"))
-    with connected(service) as connection:
+def test_a_head_is_that_of_the_whole_answer(server: Server, path: str) -> None:
+    whole = asked(server, lines(f"GET {path} HTTP/1.1", "Host: localhost"))
+    with connected(server) as connection:
         connection.sendall(lines(f"HEAD {path} HTTP/1.1", "Host: localhost", "Connection: close"))
         with connection.makefile("rb") as stream:
             head, _, body = stream.read().partition(b"\r\n\r\n")
@@ -75,10 +66,10 @@ def test_a_head_is_that_of_the_whole_answer(service: Server, path: str) -> None:
     assert headers["content-length"] == whole.headers["content-length"]
 
 
-def test_the_head_of_a_stream_ends(service: Server) -> None:
+def test_the_head_of_a_stream_ends(server: Server) -> None:
     """Nobody waits for what would follow it: the job has not ended."""
-    job = service.post("/jobs", {"requests": [{"optimize": {"start": {"q": [0.0] * 6}, "goal": {"q": [0.1] * 6}}}]})
-    with connected(service) as connection:
+    job = server.post("/jobs", {"requests": [{"optimize": {"start": {"q": [0.0] * 6}, "goal": {"q": [0.1] * 6}}}]})
+    with connected(server) as connection:
         path = f"{job.headers['location']}/events"
         connection.sendall(lines(f"HEAD {path} HTTP/1.1", "Host: localhost"))
         connection.sendall(lines("GET /healthz HTTP/1.1", "Host: localhost"))
@@ -90,22 +81,22 @@ def test_the_head_of_a_stream_ends(service: Server) -> None:
 
 
 @pytest.mark.parametrize("path", ["/optimize", "/jobs"])
-def test_a_method_that_a_path_has_not_is_told_so(service: Server, path: str) -> None:
+def test_a_method_that_a_path_has_not_is_told_so(server: Server, path: str) -> None:
     method = "PUT" if path == "/jobs" else "GET"
-    answer = asked(service, lines(f"{method} {path} HTTP/1.1", "Host: localhost"))
+    answer = asked(server, lines(f"{method} {path} HTTP/1.1", "Host: localhost"))
     assert answer.status == 405 and "POST" in answer.headers["allow"]
 
 
-def test_http_1_0_has_no_host(service: Server) -> None:
+def test_http_1_0_has_no_host(server: Server) -> None:
     post = lines("POST /optimize HTTP/1.0", f"Content-Length: {len(WRONG)}") + WRONG
-    assert "`sart`" in json.dumps(asked(service, post).problem)
-    assert asked(service, lines("GET /robots HTTP/1.1", "Connection: close")).problem["type"] == "/problems/wrong-host"
+    assert "`sart`" in json.dumps(asked(server, post).problem)
+    assert asked(server, lines("GET /robots HTTP/1.1", "Connection: close")).problem["type"] == "/problems/wrong-host"
 
 
 @pytest.mark.parametrize("declared", ["", " ", ";charset=utf-8"])
-def test_an_empty_content_type_is_none(service: Server, declared: str) -> None:
+def test_an_empty_content_type_is_none(server: Server, declared: str) -> None:
     head = ("POST /optimize HTTP/1.1", "Host: localhost", f"Content-Type: {declared}", f"Content-Length: {len(WRONG)}")
-    assert "`sart`" in json.dumps(asked(service, lines(*head) + WRONG).problem)
+    assert "`sart`" in json.dumps(asked(server, lines(*head) + WRONG).problem)
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from starlette.testclient import TestClient
 from joulepath.app.main import create_app
 from joulepath.app.settings import Settings
 from tests.app.live import CLIENT, GRACE, LOCAL, Server, serving, until
+from tests.app.recorded import recorded_workers
 from tests.app.requests import long_search, move
 
 
@@ -110,7 +111,7 @@ def test_the_database_and_the_process(service: Server) -> None:
 
 def test_a_database_that_does_not_answer() -> None:
     settings = Settings(workers=1, robots=(), database_url="postgresql://tester:secret-word@127.0.0.1:1/postgres")
-    with TestClient(create_app(settings), base_url=LOCAL) as client:
+    with recorded_workers(), TestClient(create_app(settings), base_url=LOCAL) as client:
         text = client.get("/metrics").text
     assert "joulepath_store_up 0.0" in text
 

@@ -7,17 +7,12 @@ from typing import Any
 
 import jsonschema_rs
 import pytest
-import schemathesis
-from hypothesis import HealthCheck, Phase, settings
-from schemathesis.checks import not_a_server_error
-from schemathesis.specs.openapi.checks import negative_data_rejection, positive_data_acceptance
 from starlette.testclient import TestClient
 
 from joulepath import __version__
 from joulepath.app.main import create_app
 from joulepath.app.schemas.errors import PROBLEMS
 from joulepath.app.settings import Settings
-from tests.app.live import GRACE, Server, serving
 
 
 @pytest.fixture(scope="module")
@@ -130,34 +125,3 @@ def test_every_deadline_is_the_services() -> None:
 
 def test_version_is_the_projects(document: dict[str, Any]) -> None:
     assert document["info"]["version"] == __version__
-
-
-# short deadlines: generated requests are valid, and some are hard
-MAX_DEADLINE = 0.1
-SHORT = {"max_deadline": MAX_DEADLINE, "max_job_deadline": MAX_DEADLINE}
-schema = schemathesis.openapi.from_dict(create_app(Settings(**SHORT)).openapi())
-
-
-@pytest.fixture(scope="module")
-def fuzzed() -> Iterator[Server]:
-    with serving(workers=2, queue_size=16, deadline_grace=GRACE, **SHORT) as server:
-        yield server
-
-
-@schema.parametrize()
-@settings(
-    max_examples=16,
-    derandomize=True,
-    deadline=None,
-    # the examples of the document have a test of their own
-    phases=[Phase.generate],
-    suppress_health_check=list(HealthCheck),
-)
-def test_holds_for_generated_requests(case: Any, fuzzed: Server) -> None:
-    # what the schema allows may still be out of reach (422), and a deadline may pass (504): both are documented
-    checks = [positive_data_acceptance, not_a_server_error]
-    answer = case.call(base_url=fuzzed.url, timeout=30)
-    # schemathesis does not count a body or a head that is too large to be read as a rejection
-    too_large = [negative_data_rejection] if answer.status_code in (413, 431) else []
-    case.validate_response(answer, excluded_checks=checks + too_large)
-    assert answer.status_code != 500, [entry for entry in fuzzed.logged() if entry["level"] == "error"]

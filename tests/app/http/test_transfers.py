@@ -21,11 +21,9 @@ OTHER, THIRD = "127.0.0.2", "127.0.0.3"
 
 @pytest.fixture(scope="module")
 def tight() -> Iterator[Server]:
-    """A server with room for three large bodies, two of them of one client. Its workers are not waited for."""
-    with serving(
-        warm=False, workers=1, max_bytes_in_flight=3 * BODY + 100_000, client_bytes_in_flight=2 * BODY + 100_000
-    ) as server:
-        server.wait_listening()
+    """A server with room for three large bodies, two of them of one client."""
+    room = {"max_bytes_in_flight": 3 * BODY + 100_000, "client_bytes_in_flight": 2 * BODY + 100_000}
+    with serving(recorded=True, **room) as server:
         yield server
 
 
@@ -87,8 +85,7 @@ def test_leaving_during_an_upload_is_one_line_in_the_log(tight: Server, path: st
 
 def test_a_killed_service_leaves_no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TMPDIR", str(tmp_path))
-    with serving(warm=False, workers=1) as server, ExitStack() as stack:
-        server.wait_listening()
+    with serving(recorded=True) as server, ExitStack() as stack:
         begun(server, stack, "/evaluate", OTHER)
         server.process.kill()
         server.process.wait()

@@ -49,46 +49,46 @@ def is_hit(answer: Any) -> bool:
     return cached
 
 
-def test_an_equal_request_has_the_same_answer(client: TestClient) -> None:
+def test_an_equal_request_has_the_same_answer(recorded: TestClient) -> None:
     body = move(method="time_scaling", payload=load(0.123))
-    first = sent(client, body, **KNOWN)
+    first = sent(recorded, body, **KNOWN)
     assert not is_hit(first)
-    again = sent(client, body, **KNOWN | {"X-Request-ID": "another-one"})
+    again = sent(recorded, body, **KNOWN | {"X-Request-ID": "another-one"})
     assert is_hit(again) and 0 <= int(again.headers["age"]) < 1000
     assert again.json()["request"] == "another-one"
     assert again.content == first.content.replace(first.json()["request"].encode(), b"another-one", 1)
     assert again.json()["id"] == first.json()["id"], "the same answer"
     spelled_out = {"windings": True, "payload": load(0.123), "goal": {"q": NEAR}, "start": {"q": HOME}}
-    assert is_hit(sent(client, spelled_out | {"method": "time_scaling", "robot": "ur5e", "deadline": 17}, **KNOWN))
-    assert not is_hit(sent(client, body | {"payload": load(0.124)}, **KNOWN))
-    assert not is_hit(sent(client, body | {"candidates": "all"}, **KNOWN))
-    events = sent(client, body, **KNOWN, Accept="text/event-stream").text
+    assert is_hit(sent(recorded, spelled_out | {"method": "time_scaling", "robot": "ur5e", "deadline": 17}, **KNOWN))
+    assert not is_hit(sent(recorded, body | {"payload": load(0.124)}, **KNOWN))
+    assert not is_hit(sent(recorded, body | {"candidates": "all"}, **KNOWN))
+    events = sent(recorded, body, **KNOWN, Accept="text/event-stream").text
     assert events.startswith("event: answer\n") and events.count("event:") == 1
 
 
-def test_it_is_computed_again_if_asked_for(client: TestClient) -> None:
+def test_it_is_computed_again_if_asked_for(recorded: TestClient) -> None:
     body = move(method="time_scaling", payload=load(0.125))
-    first = sent(client, body).json()
-    fresh = sent(client, body, **{"Cache-Control": "no-cache"})
+    first = sent(recorded, body).json()
+    fresh = sent(recorded, body, **{"Cache-Control": "no-cache"})
     assert not is_hit(fresh) and fresh.json()["answer"] != first["answer"]
-    again = sent(client, body, **KNOWN)
+    again = sent(recorded, body, **KNOWN)
     assert is_hit(again) and again.json()["answer"] == fresh.json()["answer"], "the last one"
 
 
-def test_what_is_deleted_is_computed_again(client: TestClient) -> None:
+def test_what_is_deleted_is_computed_again(recorded: TestClient) -> None:
     body = move(method="time_scaling", payload=load(0.126))
-    first = sent(client, body).json()
-    assert is_hit(sent(client, body, **KNOWN))
-    assert client.delete(first["answer"]).status_code == 204
-    assert not is_hit(sent(client, body, **KNOWN))
+    first = sent(recorded, body).json()
+    assert is_hit(sent(recorded, body, **KNOWN))
+    assert recorded.delete(first["answer"]).status_code == 204
+    assert not is_hit(sent(recorded, body, **KNOWN))
 
 
-def test_a_body_that_a_worker_reads_is_computed(client: TestClient) -> None:
+def test_a_body_that_a_worker_reads_is_computed(recorded: TestClient) -> None:
     points = [[1.0 + 1e-3 * k, 2.0, 3.0] for k in range(5000)]
     obstacle = {"name": "x", "shape": "points", "points": points, "radius": 0.01}
     body = move(method="time_scaling", scene={"obstacles": [obstacle]})
     for _ in range(2):
-        assert not is_hit(sent(client, body, **KNOWN))
+        assert not is_hit(sent(recorded, body, **KNOWN))
 
 
 def result(number: int, status: str) -> TaskResult:
@@ -194,47 +194,47 @@ def without_paths(answer: dict[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in answer.items() if name not in ("request", "id", "answer")}
 
 
-def test_jobs_have_what_was_answered_and_answer_what_comes(client: TestClient) -> None:
+def test_jobs_have_what_was_answered_and_answer_what_comes(recorded: TestClient) -> None:
     body = move(method="time_scaling", payload=load(0.127))
-    first = sent(client, body, **KNOWN).json()
+    first = sent(recorded, body, **KNOWN).json()
     spelled_out = body | {"robot": "ur5e", "deadline": 3.0}
-    lines = job(client, [{"optimize": body}, {"optimize": spelled_out}], KNOWN)
+    lines = job(recorded, [{"optimize": body}, {"optimize": spelled_out}], KNOWN)
     for line in lines:
         # the wall times of its search, too
         assert without_paths(line["result"]) == without_paths(first)
         assert line["result"]["answer"] == line["answer"] != first["answer"]
         assert line["energy"] == first["energy"]["electrical"]["total"] and line["status"] == first["status"]
     other = move(method="time_scaling", payload=load(0.128))
-    (line,) = job(client, [{"optimize": other}], KNOWN)
-    again = sent(client, other, **KNOWN)
+    (line,) = job(recorded, [{"optimize": other}], KNOWN)
+    again = sent(recorded, other, **KNOWN)
     assert is_hit(again) and without_paths(again.json()) == without_paths(line["result"])
-    (fresh,) = job(client, [{"optimize": other}], {"Cache-Control": "no-cache"})
+    (fresh,) = job(recorded, [{"optimize": other}], {"Cache-Control": "no-cache"})
     assert fresh["result"]["solver"] != line["result"]["solver"], "it has taken another time"
 
 
-def test_studies_have_what_was_answered_and_answer_what_comes(client: TestClient) -> None:
+def test_studies_have_what_was_answered_and_answer_what_comes(recorded: TestClient) -> None:
     body = move(method="time_scaling", payload=load(0.129))
-    study = client.post("/studies", json={"name": "cached", "threshold": 1.0}).headers["location"]
+    study = recorded.post("/studies", json={"name": "cached", "threshold": 1.0}).headers["location"]
 
     def step(**headers: str) -> dict[str, Any]:
-        made = client.post(f"{study}/iterations", json={"optimize": body}, headers=headers)
+        made = recorded.post(f"{study}/iterations", json={"optimize": body}, headers=headers)
         assert made.status_code == 201, made.text
         path = f"/answers/{made.json()['answer']}"
-        answer: dict[str, Any] = client.get(path).json()["answer"]
+        answer: dict[str, Any] = recorded.get(path).json()["answer"]
         assert answer["answer"] == path
         return answer
 
     first, second, fresh = step(**KNOWN), step(**KNOWN), step(**{"Cache-Control": "no-cache"})
     assert without_paths(first) == without_paths(second) and first["id"] != second["id"]
     assert fresh["solver"] != first["solver"]
-    again = sent(client, body | {"candidates": "all"}, **KNOWN)
+    again = sent(recorded, body | {"candidates": "all"}, **KNOWN)
     assert is_hit(again) and without_paths(again.json()) == without_paths(fresh), "the last one"
 
 
-def test_equal_requests_at_the_same_time_are_computed_once(client: TestClient) -> None:
+def test_equal_requests_at_the_same_time_are_computed_once(recorded: TestClient) -> None:
     body = move(payload=load(0.13))
     with ThreadPoolExecutor(4) as pool:
-        answers = list(pool.map(lambda _: sent(client, body, **KNOWN), range(4)))
+        answers = list(pool.map(lambda _: sent(recorded, body, **KNOWN), range(4)))
     assert sum(map(is_hit, answers)) == 3
     assert len({answer.json()["request"] for answer in answers}) == 4
     assert len({answer.json()["id"] for answer in answers}) == 1

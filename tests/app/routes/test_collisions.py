@@ -23,8 +23,6 @@ from tests.app.routes.test_problems import DOWN, refused
 from tests.optimizer.moves import ROBOT
 from tests.selection import long_but
 
-# a far obstacle may cost no more than this share of the energy
-FAR = 1e-3
 # forearm folded onto the upper arm
 FOLDED = [0.3, -1.4, 3.0, -1.5, -1.57, 0.2]
 # every method but the one that takes seconds
@@ -72,16 +70,6 @@ def test_out_of_a_bin_onto_a_shelf(client: TestClient) -> None:
     request = json.loads((FILES / "optimize" / "bin_to_shelf.json").read_text())
     content = answered(client, request)
     assert least_distance(request, content["trajectory"]["spline"]) >= 0
-
-
-def test_far_obstacles_cost_nothing(client: TestClient) -> None:
-    alone, with_floor = (
-        answered(client, move(**fields))
-        for fields in ({}, {"scene": floor(-1.0), "tool": EXAMPLES["over_a_post"]["tool"]})
-    )
-    ours, theirs = (content["energy"]["electrical"]["total"] for content in (alone, with_floor))
-    assert ours == pytest.approx(theirs, rel=FAR)
-    assert "floor" not in with_floor["certificate"]["clearance"]["pair"]
 
 
 def test_start_and_goal_in_collision(client: TestClient) -> None:
@@ -180,31 +168,6 @@ def test_many_points_are_answered_and_warned_of(client: TestClient) -> None:
         "/evaluate",
     )["nearest"]
     assert nearest["distance"] > 0
-
-
-@pytest.mark.parametrize(
-    ("fields", "where"),
-    [
-        ({"shape": "points", "points": [], "radius": 0.1}, ["points"]),
-        ({"shape": "points", "points": [[0.0, 0.0, 0.0]] * 100_001, "radius": 0.1}, ["points"]),
-        ({"shape": "points", "points": [[0.0, 0.0]], "radius": 0.1}, ["points", 0]),
-        ({"shape": "points", "points": [[0.5, 0.5, 0.5]], "radius": 0.0}, ["radius"]),
-        ({"shape": "points", "points": [[0.5, 0.5, 0.5]], "radius": -1.0}, ["radius"]),
-        ({"shape": "voxels", "size": 0.1}, ["cells"]),
-        ({"shape": "voxels", "size": 0.1, "bits": {"dimensions": [2, 2, 2], "data": "AA=="}}, ["cells"]),
-        ({"shape": "mesh_file", "format": "stl", "data": "AAAA"}, ["data"]),
-        ({"shape": "mesh_file", "format": "step", "data": "AAAA"}, ["format"]),
-        ({"shape": "mesh_file", "format": "glb", "data": "not base64!"}, ["data"]),
-    ],
-)
-def test_refused_worlds(client: TestClient, fields: dict[str, Any], where: list[Any]) -> None:
-    scene = {"obstacles": [{"name": "scan"} | fields]}
-    for path, request in (
-        ("/optimize", move(scene=scene)),
-        ("/evaluate", {"configurations": [HOME, HOME[::-1]], "time_per_segment": 2.0, "scene": scene}),
-    ):
-        errors = refused(client.post(path, json=request), problems.Validation)["errors"]
-        assert errors[0]["loc"] == ["body", "scene", "obstacles", 0, *where]
 
 
 def test_ends_outside_the_cone(client: TestClient) -> None:

@@ -170,6 +170,7 @@ REFUSED: dict[str, tuple[str, list[Any] | None, dict[str, Any]]] = {
     "no time": ("validation", ["body", "time"], {"time": 0.0}),
     "turned cycle": ("validation", ["body", "time"], {"time": {"min": 9.0, "max": 8.0}}),
     "text": ("validation", ["body", "time"], {"time": "long"}),
+    "work without a time": ("validation", ["body", "time"], {"objective": "mechanical"}),
 }
 
 
@@ -284,20 +285,6 @@ def test_the_cycle_as_a_table(client: TestClient, answer: dict[str, Any]) -> Non
     assert {(row["leg"], row["kind"]) for row in rows} == {
         (str(k), leg["kind"]) for k, leg in enumerate(answer["legs"])
     }
-
-
-@pytest.mark.long
-def test_a_cycle_of_least_work_has_its_own_gap(client: TestClient) -> None:
-    content = answered(client, a_cycle(objective="mechanical", time={"max": 8.0}))
-    energy = content["energy"]
-    work = energy["mechanical"]["total"]
-    assert content["objective"] == "mechanical" and energy["lower_bound"] < work
-    assert energy["optimality_gap"] == pytest.approx(1 - energy["lower_bound"] / work)
-    assert work == pytest.approx(sum(leg["mechanical"] for leg in content["legs"]), rel=ROUNDING)
-    for each in content["baselines"]:
-        assert each["saving"] == pytest.approx(1 - work / each["mechanical"]) and each["saving_interval"] is None
-    refused = client.post("/cycle", json=a_cycle(objective="mechanical"))
-    assert refused.status_code == 422 and refused.json()["errors"][0]["loc"] == ["body", "time"]
 
 
 def test_a_storage_is_charged_from_leg_to_leg(client: TestClient) -> None:

@@ -65,6 +65,7 @@ def test_a_line_that_no_configuration_follows_says_how_far_each_gets(client: Tes
     assert (reply.status_code, problem["type"]) == (422, "/problems/path-infeasible")
     assert problem["path"] == "stops/pick/retreat" and problem["length"] == pytest.approx(1.8)
     assert len(problem["attempts"]) == 8 and all(0 < each["followed"] < 1 for each in problem["attempts"])
+    assert "shorten the line" in problem["detail"]
 
 
 AROUND = {"about": [0.0, 0.0, 1.0]}
@@ -198,8 +199,3 @@ def test_a_fixed_speed_is_held_or_says_why_not(client: TestClient) -> None:
     assert 0 < reply.json()["certificate"]["worst_ratio"]["path_speed"] <= 1
     fast = client.post("/cycle", json=bead(0.9)).json()
     assert fast["type"] == "/problems/no-sequence" and "lower speed" in fast["detail"]
-
-
-def test_a_line_out_of_reach_is_not_to_be_divided(client: TestClient) -> None:
-    far = {"direction": [0.0, 0.0, 1.0], "frame": "base", "distance": 1.8}
-    assert "shorten the line" in client.post("/cycle", json=with_lines(retreat=far)).json()["detail"]

@@ -246,24 +246,6 @@ def test_a_number_that_is_none_is_named_by_row(client: TestClient) -> None:
     assert errors[0]["loc"] == ["body", "trajectory", "q", 1, 2]
 
 
-@pytest.mark.parametrize(
-    "body",
-    [b"", b"null", b"[]", b"{", b"\xff\xfe\x00", b"9" * 5000, b"[" * 60_000, b'{"a":' * 10_000, b'{"\\ud800": 1}'],
-)
-def test_survives_what_is_no_request(body: bytes, client: TestClient) -> None:
-    answer = client.post("/evaluate", content=body, headers={"content-type": "application/json"})
-    refused(answer, problems.Validation)
-
-
-def test_takes_json_and_csv_only(client: TestClient) -> None:
-    answer = client.post("/evaluate", content=b"x", headers={"content-type": "application/zip"})
-    refused(answer, problems.UnsupportedMediaType)
-
-
-def test_json_has_its_settings_in_the_body(client: TestClient) -> None:
-    refused(client.post("/evaluate?units=deg", json=through(HOME, NEAR)), problems.Validation)
-
-
 def test_unknown_robot(client: TestClient) -> None:
     refused(client.post("/evaluate", json=through(HOME, NEAR, robot="r2d2")), problems.UnknownRobot)
     refused(upload(client, f"{HEADER}\n{GOOD}\n{THEN}\n", robot="r2d2"), problems.UnknownRobot)

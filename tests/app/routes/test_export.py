@@ -163,16 +163,6 @@ def test_an_answer_altered_by_hand_is_not_exported(client: TestClient, answer: J
     refused(export(client, "urscript", altered(answer, *path, value=change(old))), problems.NotCertified)
 
 
-def test_spline_and_samples_altered_together_fail_at_the_limits(client: TestClient, answer: Json) -> None:
-    fast = copy.deepcopy(answer)
-    trajectory, factor = fast["trajectory"], 0.5
-    trajectory["t"] = [factor * t for t in trajectory["t"]]
-    trajectory["spline"]["knots"] = [factor * t for t in trajectory["spline"]["knots"]]
-    for name, power in (("v", 1), ("a", 2)):
-        trajectory[name] = [[x / factor**power for x in row] for row in trajectory[name]]
-    refused(export(client, "urscript", fast), problems.NotCertified)
-
-
 def test_an_obstacle_in_the_way_is_not_driven_through(client: TestClient, answer: Json) -> None:
     in_the_way = {"obstacles": [BOX | {"pose": {"position": [-0.5, -0.15, 0.4], "rpy": [0, 0, 0]}}]}
     told = refused(export(client, "csv", altered(answer, "arm", "scene", value=in_the_way)), problems.NotCertified)

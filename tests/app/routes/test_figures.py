@@ -12,15 +12,13 @@ import pytest
 import yaml
 from starlette.testclient import TestClient
 
-from joulepath.app.main import create_app
 from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.examples.figures import FIGURES
 from joulepath.app.schemas.figures import FiguresDetail, FiguresList
-from joulepath.app.settings import Settings
 from joulepath.models.registry import load_robot
 from joulepath.models.uncertainty.document import InvalidFigures
 from joulepath.optimizer.optimize import optimize
-from tests.app.live import LOCAL
+from tests.app.recorded import recorded_service
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_problems import refused
 from tests.optimizer.moves import problem
@@ -186,9 +184,7 @@ def test_a_document_names_its_robot() -> None:
 
 
 def test_no_more_than_the_service_holds() -> None:
-    with TestClient(
-        create_app(Settings(workers=1, max_figures=0)), base_url=LOCAL, raise_server_exceptions=False
-    ) as client:
+    with recorded_service(max_figures=0) as client:
         refused(client.put("/figures", json=FIGURES), problems.TooManyFigures)
 
 

@@ -10,13 +10,11 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath.app.main import create_app
 from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.jobs import Job, JobList
 from joulepath.app.schemas.response import OptimizeResponse
-from joulepath.app.settings import Settings
 from tests.app.job_clients import ended, evaluation, optimization, parsed, sent, shown
-from tests.app.live import LOCAL
+from tests.app.recorded import recorded_service
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_problems import refused
 
@@ -128,13 +126,13 @@ def test_events_tell_the_whole_story_and_resume(client: TestClient, mixed: Any) 
     assert list(parsed(iter(everything))) == found
 
 
-def test_jobs_are_listed(client: TestClient) -> None:
-    paths = [sent(client, [evaluation()]) for _ in range(3)]
+def test_jobs_are_listed(recorded: TestClient) -> None:
+    paths = [sent(recorded, [evaluation()]) for _ in range(3)]
     for path in paths:
-        ended(client, path)
+        ended(recorded, path)
     found, after = [], ""
     while True:
-        answer = client.get(f"/jobs?state=done&limit=2{after}")
+        answer = recorded.get(f"/jobs?state=done&limit=2{after}")
         page = JobList.model_validate_json(answer.content)
         found += [f"/jobs/{job.id}" for job in page.jobs]
         if page.next is None:
@@ -142,11 +140,11 @@ def test_jobs_are_listed(client: TestClient) -> None:
         after = f"&after={page.next}"
     assert found[:3] == paths[::-1]
     assert len(set(found)) == len(found)
-    assert client.get("/jobs?state=cancelling").json() == {"jobs": [], "next": None}
+    assert recorded.get("/jobs?state=cancelling").json() == {"jobs": [], "next": None}
 
 
-def test_a_malformed_request_refuses_the_whole_job(client: TestClient) -> None:
-    before = client.get("/jobs?limit=1").json()
+def test_a_malformed_request_refuses_the_whole_job(recorded: TestClient) -> None:
+    before = recorded.get("/jobs?limit=1").json()
     wrong: list[tuple[Any, list[Any]]] = [
         ({"requests": []}, ["requests"]),
         ({"requests": [evaluation()] * 10_001}, ["requests"]),
@@ -159,32 +157,37 @@ def test_a_malformed_request_refuses_the_whole_job(client: TestClient) -> None:
         ({"requests": [evaluation()], "name": "\n"}, ["name"]),
     ]
     for body, expected in wrong:
-        content = refused(client.post("/jobs", json=body), problems.Validation)
+        content = refused(recorded.post("/jobs", json=body), problems.Validation)
         loc = content["errors"][0]["loc"]
         assert loc[: 1 + len(expected)] == ["body", *expected], content
     for text in (b"", b"{", b"\xff", b"[" * 100_000):
-        answer = client.post("/jobs", content=text, headers={"Content-Type": "application/json"})
+        answer = recorded.post("/jobs", content=text, headers={"Content-Type": "application/json"})
         refused(answer, problems.Validation)
-    refused(client.post("/jobs", content=b"{}", headers={"Content-Type": "text/plain"}), problems.Validation)
-    assert client.get("/jobs?limit=1").json() == before, "nothing was stored"
+    refused(recorded.post("/jobs", content=b"{}", headers={"Content-Type": "text/plain"}), problems.Validation)
+    assert recorded.get("/jobs?limit=1").json() == before, "nothing was stored"
 
 
-def test_a_key_makes_one_job(client: TestClient) -> None:
+def test_a_key_makes_one_job(recorded: TestClient) -> None:
     body = {"requests": [evaluation()], "name": "once"}
-    first, again = (client.post("/jobs", json=body, headers={"Idempotency-Key": "jobs-1"}) for _ in range(2))
+    first, again = (recorded.post("/jobs", json=body, headers={"Idempotency-Key": "jobs-1"}) for _ in range(2))
     assert (first.status_code, again.status_code) == (202, 202)
     assert first.json()["id"] == again.json()["id"]
     assert "idempotency-replayed" not in first.headers
     assert again.headers["idempotency-replayed"] == "true"
     for other in ({"requests": [evaluation(2.0)], "name": "once"}, {"requests": [evaluation()]}):
-        refused(client.post("/jobs", json=other, headers={"Idempotency-Key": "jobs-1"}), problems.KeyReused)
-    refused(client.post("/optimize", json=move(), headers=LATER | {"Idempotency-Key": "jobs-1"}), problems.KeyReused)
+        refused(recorded.post("/jobs", json=other, headers={"Idempotency-Key": "jobs-1"}), problems.KeyReused)
+    refused(recorded.post("/optimize", json=move(), headers=LATER | {"Idempotency-Key": "jobs-1"}), problems.KeyReused)
 
 
-def test_unknown_jobs(client: TestClient) -> None:
+def test_unknown_jobs(recorded: TestClient) -> None:
     for path in (ABSENT, "/jobs/no%00such", "/jobs/x"):
-        answers = [client.get(path), client.get(f"{path}/events"), client.get(f"{path}/results"), client.delete(path)]
-        answers += [client.post(f"{path}/{word}") for word in ("cancel", "retry")]
+        answers = [
+            recorded.get(path),
+            recorded.get(f"{path}/events"),
+            recorded.get(f"{path}/results"),
+            recorded.delete(path),
+        ]
+        answers += [recorded.post(f"{path}/{word}") for word in ("cancel", "retry")]
         for answer in answers:
             refused(answer, problems.UnknownJob)
 
@@ -216,12 +219,12 @@ POSTS: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("path", POSTS)
-def test_any_request_may_become_a_job(path: str, client: TestClient) -> None:
-    answer = client.post(path, json=POSTS[path], headers=LATER)
+def test_any_request_may_become_a_job(path: str, recorded: TestClient) -> None:
+    answer = recorded.post(path, json=POSTS[path], headers=LATER)
     assert answer.status_code == 202, answer.text
     Job.model_validate_json(answer.content)
     assert answer.headers["preference-applied"] == "respond-async"
-    (only,) = ended(client, answer.headers["location"])["requests"]
+    (only,) = ended(recorded, answer.headers["location"])["requests"]
     assert (only["kind"], only["state"]) == (path[1:], "done")
 
 
@@ -238,44 +241,37 @@ def test_a_client_may_wait_for_the_answer_of_its_job(client: TestClient) -> None
 
 
 @pytest.mark.parametrize("prefer", ["wait=5", "respond-asynchronously", "", "respond-async=1"])
-def test_other_preferences_have_no_effect(prefer: str, client: TestClient) -> None:
-    answer = client.post("/evaluate", json=evaluation()["evaluate"], headers={"Prefer": prefer})
+def test_other_preferences_have_no_effect(prefer: str, recorded: TestClient) -> None:
+    answer = recorded.post("/evaluate", json=evaluation()["evaluate"], headers={"Prefer": prefer})
     assert answer.status_code == 200
     assert "preference-applied" not in answer.headers
 
 
 @pytest.mark.parametrize("headers", [{}, LATER])
-def test_settings_beside_a_json_body_are_refused(headers: dict[str, str], client: TestClient) -> None:
+def test_settings_beside_a_json_body_are_refused(headers: dict[str, str], recorded: TestClient) -> None:
     """They would have no effect."""
     body, query = evaluation()["evaluate"], {"drives": '{"inverter": {"constant": 1.0}}'}
-    answer = client.post("/evaluate", json=body, params=query, headers=headers)
+    answer = recorded.post("/evaluate", json=body, params=query, headers=headers)
     (error,) = refused(answer, problems.Validation)["errors"]
     assert error["loc"] == ["query"] and "JSON body" in error["msg"]
 
 
-def test_a_table_is_evaluated_at_once(client: TestClient) -> None:
+def test_a_table_is_evaluated_at_once(recorded: TestClient) -> None:
     table = "q1,q2,q3,q4,q5,q6\n0,-1.57,1.57,-1.57,-1.57,0\n0.3,-1.4,1.4,-1.5,-1.57,0.2\n"
     headers = LATER | {"Content-Type": "text/csv"}
-    answer = client.post("/evaluate", params={"time_per_segment": "1.5"}, content=table, headers=headers)
+    answer = recorded.post("/evaluate", params={"time_per_segment": "1.5"}, content=table, headers=headers)
     assert (answer.status_code, "preference-applied" in answer.headers) == (200, False)
 
 
-def test_settings_beside_a_json_body_are_refused_now_or_later(client: TestClient) -> None:
-    for headers in (LATER, {}):
-        answer = client.post("/evaluate", json=evaluation()["evaluate"], params={"robot": "ur3e"}, headers=headers)
-        refused(answer, problems.Validation)
-
-
-def test_a_job_may_have_a_longer_deadline(client: TestClient) -> None:
+def test_a_job_may_have_a_longer_deadline(recorded: TestClient) -> None:
     longer = move(deadline=300.0)
-    refused(client.post("/optimize", json=longer), problems.Validation)
-    path = client.post("/optimize", json=longer, headers=LATER).headers["location"]
-    assert ended(client, path)["counts"]["done"] == 1
+    refused(recorded.post("/optimize", json=longer), problems.Validation)
+    path = recorded.post("/optimize", json=longer, headers=LATER).headers["location"]
+    assert ended(recorded, path)["counts"]["done"] == 1
 
 
 def test_limits_of_the_service() -> None:
-    settings = Settings(workers=1, max_waiting=3, max_job_bytes=4096, max_job_deadline=5.0)
-    with TestClient(create_app(settings), base_url=LOCAL, raise_server_exceptions=False) as small:
+    with recorded_service(max_waiting=3, max_job_bytes=4096, max_job_deadline=5.0) as small:
         content = refused(small.post("/jobs", json={"requests": [evaluation()] * 4}), problems.Busy)
         assert "jobs" in content["detail"]
         answer = small.post("/jobs", json={"requests": [optimization()] * 100})

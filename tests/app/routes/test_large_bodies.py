@@ -18,7 +18,6 @@ from tests.app.requests import AMPLE, HOME, move
 POSE = {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}
 SCAN = {"name": "scan", "shape": "points", "points": [[1.5, 0.001 * k, 0.5] for k in range(5000)], "radius": 0.01}
 SCENE = {"obstacles": [SCAN]}
-CHANGE = {"name": "light", "arm": {"link_mass_scale": 0.5}}
 ANSWERED: dict[str, list[dict[str, Any]]] = {
     "/optimize": [move(), move(scene=SCENE)],
     "/ik": [{"pose": POSE}, {"pose": POSE, "scene": SCENE}],

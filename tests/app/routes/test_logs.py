@@ -12,15 +12,14 @@ from starlette.testclient import TestClient
 
 from joulepath.app.access.client import Role
 from joulepath.app.convert.logs import stored_log
-from joulepath.app.main import create_app
 from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.examples.logs import LOG_EXAMPLES
 from joulepath.app.schemas.examples.own_arm import ARM
 from joulepath.app.schemas.logs import LogDetail, LogList
-from joulepath.app.settings import Settings
 from joulepath.models.registry import load_robot
 from tests.app.access.test_key_file import add
-from tests.app.live import CLIENT, LOCAL, Server
+from tests.app.live import CLIENT, Server
+from tests.app.recorded import recorded_service
 from tests.app.routes.test_problems import refused
 from tests.identification_logs import Recording, csv_of, recorded, rigid_torques, truth_of, with_current
 
@@ -149,8 +148,8 @@ def test_limits_of_size_and_number(recording: Recording, tmp_path: Path) -> None
     most = len(body) // 2
     # a database of its own: logs of other tests would fill it
     database = f"sqlite:///{tmp_path}/logs.db"
-    settings = Settings(workers=1, max_upload_bytes=most, logs_max_bytes=10_000, database_url=database)
-    with TestClient(create_app(settings), base_url=LOCAL, raise_server_exceptions=False) as client:
+    settings = {"max_upload_bytes": most, "logs_max_bytes": 10_000, "database_url": database}
+    with recorded_service(**settings) as client:
         refused(client.post("/logs", content=body, headers=CSV), problems.BodyTooLarge)
         refused(client.post("/logs", content=packed, headers={"Content-Encoding": "gzip"}), problems.BodyTooLarge)
         # packed without saying so: unpacked by the worker
@@ -175,8 +174,7 @@ def test_only_owners_and_admins_delete(tmp_path: Path) -> None:
         ("boss", "admin"),
     )
     keys = {name: add(file, name, role) for name, role in roles}
-    settings = Settings(workers=1, api_keys_file=file, database_url=f"sqlite:///{tmp_path / 'logs.db'}")
-    with TestClient(create_app(settings), base_url=LOCAL, raise_server_exceptions=False) as client:
+    with recorded_service(api_keys_file=file, database_url=f"sqlite:///{tmp_path / 'logs.db'}") as client:
 
         def as_(name: str) -> dict[str, str]:
             return CSV | {"Authorization": f"Bearer {keys[name]}"}

@@ -11,7 +11,7 @@ from starlette.testclient import TestClient
 from joulepath.app.schemas.response import OptimizeResponse
 from joulepath.optimizer.solution import Certificate
 from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
-from tests.app.requests import EXAMPLES, long_search, move
+from tests.app.requests import EXAMPLES, move
 from tests.selection import long_but
 
 # of numbers that are computed in one place and only passed on
@@ -142,16 +142,6 @@ def test_a_quaternion_is_normalised(client: TestClient) -> None:
     exact, near = (client.post("/optimize", json=goal(scale)).json() for scale in (1.0, 1.0009))
     assert near["branch"]["goal"]["q"] == pytest.approx(exact["branch"]["goal"]["q"], abs=1e-9)
     assert client.post("/optimize", json=goal(1.0011)).status_code == 422
-
-
-@pytest.mark.parametrize("deadline", [1e-3, 0.05, 0.3])
-def test_deadline_gives_the_best_so_far_or_says_so(client: TestClient, deadline: float) -> None:
-    answer = client.post("/optimize", json=long_search(deadline))
-    if answer.status_code == 200:
-        OptimizeResponse.model_validate_json(answer.content)
-        assert answer.json()["status"] == "feasible"
-    else:
-        assert answer.status_code == 504
 
 
 def test_integers_are_numbers(client: TestClient) -> None:

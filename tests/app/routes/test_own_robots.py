@@ -12,13 +12,11 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath.app.main import create_app
 from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.examples.own_arm import ARM
 from joulepath.app.schemas.robots import RobotDetail, RobotList
-from joulepath.app.settings import Settings
 from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
-from tests.app.live import LOCAL
+from tests.app.recorded import recorded_service
 from tests.app.requests import PATIENT
 from tests.app.routes.test_problems import refused
 
@@ -162,9 +160,7 @@ def test_a_name_that_is_none(client: TestClient, name: str) -> None:
 
 
 def test_no_more_than_the_service_holds() -> None:
-    with TestClient(
-        create_app(Settings(workers=1, max_robots=0)), base_url=LOCAL, raise_server_exceptions=False
-    ) as client:
+    with recorded_service(max_robots=0) as client:
         refused(client.put("/robots/one_more", json=ARM), problems.TooManyRobots)
         refused(client.post("/robots", json={"name": "one_more", **ARM}), problems.TooManyRobots)
 

@@ -61,9 +61,9 @@ def three(client: TestClient) -> tuple[str, list[dict[str, Any]]]:
     return path, [added(client, path, body) for body in (SLOW, FREE, LINE)]
 
 
-def test_a_new_study_is_empty(client: TestClient) -> None:
-    path = begin(client, name="Größe 1 ✓", objective="mechanical")
-    study = shown(client, path)
+def test_a_new_study_is_empty(recorded: TestClient) -> None:
+    path = begin(recorded, name="Größe 1 ✓", objective="mechanical")
+    study = shown(recorded, path)
     assert (study["name"], study["objective"], study["robot"]) == ("Größe 1 ✓", "mechanical", "ur5e")
     assert (study["iterations"], study["history"], study["threshold_met"]) == (0, [], False)
     assert (study["last"], study["best"], study["threshold_met_by"]) == (None, None, None)
@@ -157,22 +157,22 @@ def test_a_failed_request_leaves_no_trace(client: TestClient) -> None:
     assert added(client, path, FREE)["number"] == 1
 
 
-def test_deleted_with_all_that_belongs_to_it(client: TestClient) -> None:
-    path = begin(client)
-    step = added(client, path, FREE)
-    assert client.delete(path).status_code == 204
-    for gone in (client.get(path), client.delete(path), client.get(f"{path}/iterations/1")):
+def test_deleted_with_all_that_belongs_to_it(recorded: TestClient) -> None:
+    path = begin(recorded)
+    step = added(recorded, path, FREE)
+    assert recorded.delete(path).status_code == 204
+    for gone in (recorded.get(path), recorded.delete(path), recorded.get(f"{path}/iterations/1")):
         problems.UnknownStudy.model_validate_json(gone.content)
-    problems.UnknownStudy.model_validate_json(client.post(f"{path}/iterations", json=FREE).content)
-    problems.UnknownAnswer.model_validate_json(client.get(f"/answers/{step['answer']}").content)
+    problems.UnknownStudy.model_validate_json(recorded.post(f"{path}/iterations", json=FREE).content)
+    problems.UnknownAnswer.model_validate_json(recorded.get(f"/answers/{step['answer']}").content)
 
 
-def test_pages_hold_every_study_once(client: TestClient) -> None:
-    made = [begin(client, name=f"Page {k}").rpartition("/")[2] for k in range(7)]
+def test_pages_hold_every_study_once(recorded: TestClient) -> None:
+    made = [begin(recorded, name=f"Page {k}").rpartition("/")[2] for k in range(7)]
     found: list[str] = []
     after = None
     while True:
-        answer = client.get("/studies", params={"limit": 3} | ({"after": after} if after else {}))
+        answer = recorded.get("/studies", params={"limit": 3} | ({"after": after} if after else {}))
         page = StudyList.model_validate_json(answer.content)
         found += [study.id for study in page.studies]
         after = page.next
@@ -181,36 +181,36 @@ def test_pages_hold_every_study_once(client: TestClient) -> None:
         assert len(page.studies) == 3
     assert found[:7] == made[::-1]
     assert len(found) == len(set(found))
-    created = [client.get(f"/studies/{id}").json()["created"] for id in found]
+    created = [recorded.get(f"/studies/{id}").json()["created"] for id in found]
     assert created == sorted(created, reverse=True)
 
 
-def test_a_repeated_request_makes_nothing_new(client: TestClient) -> None:
+def test_a_repeated_request_makes_nothing_new(recorded: TestClient) -> None:
     key = {"Idempotency-Key": "begin-once"}
     body = {"name": "Once", "threshold": 50.0}
-    first, second = (client.post("/studies", json=body, headers=key) for _ in range(2))
+    first, second = (recorded.post("/studies", json=body, headers=key) for _ in range(2))
     assert first.json() == second.json()
     assert (first.status_code, second.status_code) == (201, 201)
     assert "idempotency-replayed" not in first.headers
     assert second.headers["idempotency-replayed"] == "true"
-    reused = client.post("/studies", json=body | {"threshold": 51.0}, headers=key)
+    reused = recorded.post("/studies", json=body | {"threshold": 51.0}, headers=key)
     problems.KeyReused.model_validate_json(reused.content)
 
     path = first.headers["location"]
-    steps = [added(client, path, FREE, headers=key) for _ in range(2)]
+    steps = [added(recorded, path, FREE, headers=key) for _ in range(2)]
     assert steps[0] == steps[1]
-    problems.KeyReused.model_validate_json(client.post(f"{path}/iterations", json=LINE, headers=key).content)
-    assert added(client, begin(client), LINE, headers=key)["number"] == 1, "a key belongs to one study"
-    assert shown(client, path)["iterations"] == 1
+    problems.KeyReused.model_validate_json(recorded.post(f"{path}/iterations", json=LINE, headers=key).content)
+    assert added(recorded, begin(recorded), LINE, headers=key)["number"] == 1, "a key belongs to one study"
+    assert shown(recorded, path)["iterations"] == 1
 
 
-def test_a_request_repeated_while_it_runs_makes_one_iteration(client: TestClient) -> None:
-    path = begin(client)
+def test_a_request_repeated_while_it_runs_makes_one_iteration(recorded: TestClient) -> None:
+    path = begin(recorded)
     with ThreadPoolExecutor(4) as pool:
         headers = {"Idempotency-Key": "at-once"}
-        steps = list(pool.map(lambda _: added(client, path, FREE, headers=headers), range(4)))
+        steps = list(pool.map(lambda _: added(recorded, path, FREE, headers=headers), range(4)))
     assert all(step == steps[0] for step in steps)
-    assert shown(client, path)["iterations"] == 1
+    assert shown(recorded, path)["iterations"] == 1
 
 
 @pytest.mark.parametrize(
@@ -233,22 +233,17 @@ def test_a_request_repeated_while_it_runs_makes_one_iteration(client: TestClient
         ({f"a {SECRET}": 1}, ["body"]),
     ],
 )
-def test_a_malformed_study_is_refused(client: TestClient, body: dict[str, Any], loc: list[str]) -> None:
+def test_a_malformed_study_is_refused(recorded: TestClient, body: dict[str, Any], loc: list[str]) -> None:
     sent = body if not body else {"name": "A study", "threshold": 50.0, **body}
-    answer = client.post("/studies", json=sent)
+    answer = recorded.post("/studies", json=sent)
     assert answer.status_code == 422
     errors = problems.Validation.model_validate_json(answer.content).errors
     assert loc in [error.loc for error in errors]
     assert SECRET not in answer.text
 
 
-def test_a_threshold_that_is_no_number_is_refused(client: TestClient) -> None:
-    answer = client.post("/studies", content=b'{"name": "A", "threshold": NaN}')
-    problems.Validation.model_validate_json(answer.content)
-
-
-def test_an_unknown_robot_is_refused(client: TestClient) -> None:
-    answer = client.post("/studies", json={"name": "A study", "threshold": 50.0, "robot": "r2d2"})
+def test_an_unknown_robot_is_refused(recorded: TestClient) -> None:
+    answer = recorded.post("/studies", json={"name": "A study", "threshold": 50.0, "robot": "r2d2"})
     problems.UnknownRobot.model_validate_json(answer.content)
 
 
@@ -264,15 +259,15 @@ def test_an_unknown_robot_is_refused(client: TestClient) -> None:
         None,
     ],
 )
-def test_a_malformed_iteration_is_refused(client: TestClient, body: Any) -> None:
-    answer = client.post(f"{begin(client)}/iterations", json=body)
+def test_a_malformed_iteration_is_refused(recorded: TestClient, body: Any) -> None:
+    answer = recorded.post(f"{begin(recorded)}/iterations", json=body)
     assert problems.Validation.model_validate_json(answer.content).errors
     assert SECRET not in answer.text
 
 
 @pytest.mark.parametrize("key", ["", "x" * 129, "two words"])
-def test_a_malformed_key_is_refused(client: TestClient, key: str) -> None:
-    answer = client.post("/studies", json={"name": "A", "threshold": 1.0}, headers={"Idempotency-Key": key})
+def test_a_malformed_key_is_refused(recorded: TestClient, key: str) -> None:
+    answer = recorded.post("/studies", json={"name": "A", "threshold": 1.0}, headers={"Idempotency-Key": key})
     (error,) = problems.Validation.model_validate_json(answer.content).errors
     assert error.loc == ["header", "Idempotency-Key"]
 
@@ -280,24 +275,28 @@ def test_a_malformed_key_is_refused(client: TestClient, key: str) -> None:
 @pytest.mark.parametrize(
     "query", ["limit=0", "limit=201", "limit=x", "after=x", f"after=1_{'x' * 36}", f"a%20{SECRET}=1"]
 )
-def test_a_malformed_query_is_refused(client: TestClient, query: str) -> None:
-    answer = client.get(f"/studies?{query}")
+def test_a_malformed_query_is_refused(recorded: TestClient, query: str) -> None:
+    answer = recorded.get(f"/studies?{query}")
     assert problems.Validation.model_validate_json(answer.content).errors
     assert SECRET not in answer.text
 
 
 @pytest.mark.parametrize("id", ["none", ABSENT, "x" * 5000, "%00", "%ff", "ü"])
-def test_unknown_study(client: TestClient, id: str) -> None:
-    answers = [client.get(f"/studies/{id}"), client.delete(f"/studies/{id}"), client.get(f"/studies/{id}/iterations/1")]
-    for answer in [*answers, client.post(f"/studies/{id}/iterations", json=FREE)]:
+def test_unknown_study(recorded: TestClient, id: str) -> None:
+    answers = [
+        recorded.get(f"/studies/{id}"),
+        recorded.delete(f"/studies/{id}"),
+        recorded.get(f"/studies/{id}/iterations/1"),
+    ]
+    for answer in [*answers, recorded.post(f"/studies/{id}/iterations", json=FREE)]:
         assert answer.status_code == 404
         problems.UnknownStudy.model_validate_json(answer.content)
 
 
 @pytest.mark.parametrize(("number", "kind"), [("2", "UnknownStudy"), ("0", "Validation"), ("9" * 30, "Validation")])
-def test_unknown_iteration(client: TestClient, number: str, kind: str) -> None:
-    path = begin(client)
-    answer = client.get(f"{path}/iterations/{number}")
+def test_unknown_iteration(recorded: TestClient, number: str, kind: str) -> None:
+    path = begin(recorded)
+    answer = recorded.get(f"{path}/iterations/{number}")
     getattr(problems, kind).model_validate_json(answer.content)
 
 

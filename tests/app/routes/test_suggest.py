@@ -9,16 +9,14 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.convert.pose import to_matrix
-from joulepath.app.main import create_app
 from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.common import QuaternionPose
 from joulepath.app.schemas.suggestions import Suggestions
-from joulepath.app.settings import Settings
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.tcp import rotated_poses
 from joulepath.optimizer.problem.arm import Arm
-from tests.app.live import LOCAL
+from tests.app.recorded import recorded_service
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_studies import ABSENT, SECRET, added, begin
 
@@ -106,18 +104,6 @@ def test_other_orientations_are_of_the_same_point(slow: Any) -> None:
     pose = QuaternionPose(**branch["request"]["optimize"]["goal"]["pose"])
     solutions = inverse_kinematics_for(robot).solve(to_matrix(pose), T_tcp)
     assert min(np.abs(solution.q - NEAR).max() for solution in solutions) < 1e-9
-
-
-def test_turns_are_about_the_axis_asked_for() -> None:
-    turn = np.array([0.0, 0.0, 0.5])
-    arm = Arm(robot=load_robot("ur5e"))
-    (at, before), (still_at, after) = rotated_poses(arm, np.array(HOME), [np.zeros(3), turn])
-    R_before, R_after = (
-        to_matrix(QuaternionPose(position=[0.0] * 3, quaternion=q.tolist()))[:3, :3] for q in (before, after)
-    )
-    assert np.array_equal(at, still_at)
-    c, s = np.cos(0.5), np.sin(0.5)
-    assert R_before.T @ R_after == pytest.approx(np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), abs=1e-12)
 
 
 @pytest.mark.long
@@ -219,7 +205,7 @@ def test_what_cannot_be_is_listed(client: TestClient) -> None:
 def test_a_shutdown_is_told_as_one(client: TestClient) -> None:
     path = begin(client)
     added(client, path, {"optimize": move()})
-    with TestClient(create_app(Settings(workers=1)), base_url=LOCAL, raise_server_exceptions=False) as stopping:
+    with recorded_service() as stopping:
         assert stopping.portal is not None
         stopping.portal.call(stopping.app.state.engine.drain)  # type: ignore[attr-defined]
         answer = stopping.get(f"{path}/suggest")

@@ -126,7 +126,7 @@ def test_repeats_nothing(client: TestClient, body: str | dict[str, Any]) -> None
         b'{"\\ud800": 1}',
     ],
 )
-@pytest.mark.parametrize("path", ["/optimize", "/ik"])
+@pytest.mark.parametrize("path", ["/optimize", "/evaluate"])
 def test_survives_what_is_no_request(client: TestClient, body: bytes, path: str) -> None:
     refused(client, body, path)
 

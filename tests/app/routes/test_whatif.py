@@ -137,18 +137,6 @@ def test_a_tighter_limit_breaks_the_same_motion_only(optimized: dict[str, Any]) 
     assert several["reoptimised"]["status"] == "optimal"
 
 
-def test_an_obstacle_in_the_way_breaks_the_same_motion(client: TestClient, optimized: dict[str, Any]) -> None:
-    """A ball where the flange passes half-way."""
-    trajectory = kept(client, optimized["base"]["answer"], "optimize")["trajectory"]
-    position = tcp_pose(np.array(trajectory["q"][len(trajectory["q"]) // 2])).T[:3, 3].tolist()
-    pose = {"position": position, "rotvec": [0.0, 0.0, 0.0]}
-    scene = {"obstacles": [{"name": "ball", "shape": "sphere", "radius": 0.03, "pose": pose}]}
-    row = ask(client, {"optimize": LIFT}, ball={"scene": scene})["changes"]["ball"]
-    assert not row["same_motion"]["holds"]
-    assert row["same_motion"]["certificate"]["clearance"]["min_clearance"] < 0
-    assert row["same_motion"]["electrical"]["total"]["difference"] == 0
-
-
 def test_is_the_difference_of_two_evaluations(client: TestClient, evaluated: dict[str, Any]) -> None:
     base = client.post("/evaluate", json=GIVEN).json()
     before = figures(base["total"]["energy"], base["duration"])
@@ -163,47 +151,6 @@ def test_is_the_difference_of_two_evaluations(client: TestClient, evaluated: dic
         full = kept(client, row["same_motion"]["answer"], "evaluate")
         assert alone["id"] is None and row["same_motion"]["answer"] == f"/answers/{full['id']}"
         assert {**full, "request": "", "id": ""} == {**alone, "request": "", "id": ""}
-
-
-NOTHING: list[dict[str, Any]] = [
-    {"payload": LOAD},
-    {"link_mass_scale": [1.0] * 6},
-    {"limits": {}},
-    {"bus": {"mode": "shared"}},
-]
-
-
-def test_what_is_as_before_makes_no_difference(client: TestClient) -> None:
-    changes = {str(k): arm for k, arm in enumerate(NOTHING)}
-    for base in ({"optimize": LIFT}, {"evaluate": GIVEN}):
-        for row in ask(client, base, **changes)["changes"].values():
-            for outcome in filter(None, (row["same_motion"], row["reoptimised"])):
-                assert all(each["difference"] == 0 for each in deltas(outcome).values())
-            assert row["reoptimisation"] in (0, None)
-
-
-def test_potential_energy_goes_with_the_masses(client: TestClient) -> None:
-    """Of the same motion, it is linear in them: links times their factor, and the payload by itself."""
-    scales = (0.5, 2.0)
-    bare = {f"bare {scale}": {"payload": None, "link_mass_scale": scale} for scale in scales}
-    changes = bare | {f"loaded {scale}": {"link_mass_scale": scale} for scale in scales} | {"links": {"payload": None}}
-    for base in ({"optimize": LIFT}, {"evaluate": GIVEN}):
-        answer = ask(client, base, **changes)
-        rise = {name: row["same_motion"]["electrical"]["potential"] for name, row in answer["changes"].items()}
-        links = rise["links"]["value"]
-        load = answer["base"]["electrical"]["potential"] - links
-        assert abs(links) > 0.5
-        for scale in scales:
-            assert rise[f"bare {scale}"]["value"] == pytest.approx(scale * links, abs=ROUNDING)
-            assert rise[f"loaded {scale}"]["value"] == pytest.approx(scale * links + load, abs=ROUNDING)
-    # LIFT: m g h of the payload, by the flange's height
-    lifted = ask(client, {"optimize": LIFT}, none={"payload": None})["changes"]["none"]["same_motion"]
-    poses = [
-        client.post("/evaluate", json={"configurations": [NEAR, HOME], "time_per_segment": 1.0, "payload": load}).json()
-        for load in (LOAD, LOAD | {"mass": 3.0})
-    ]
-    per_kilogram = np.diff([pose["total"]["energy"]["electrical"]["potential"] for pose in poses])[0]
-    assert lifted["electrical"]["potential"]["difference"] == pytest.approx(-2.0 * per_kilogram, abs=ROUNDING)
 
 
 def test_what_cannot_be_moved_has_its_problem(client: TestClient) -> None:

@@ -240,7 +240,7 @@ def test_a_full_disk_is_freed_by_deleting(small_disk: Path) -> None:
 
 def test_over_http_the_fault_is_said_and_answers_go_on(tmp_path: Path) -> None:
     database = tmp_path / "joulepath.db"
-    with serving(workers=1, database_url=f"sqlite:///{database}") as server:
+    with serving(recorded=True, database_url=f"sqlite:///{database}") as server:
         study = server.post("/studies", {"name": "A study", "threshold": 50.0}).headers["location"]
         first = server.post("/optimize", move())
         assert server.get(first.json()["answer"]).json()["answer"] == first.json()

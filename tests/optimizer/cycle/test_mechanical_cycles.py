@@ -127,6 +127,6 @@ def test_it_needs_a_time_and_rests() -> None:
     passing = replace(ASKED.stops[0], dwell=0.0, payload=None, via=True)
     with pytest.raises(InvalidProblem) as refusal:
         replace(ASKED, stops=[passing, ASKED.stops[1]])
-    assert refusal.value.field == "stops.0.pass"
+    assert refusal.value.field == "stops.0.via"
     with pytest.raises(CycleTooShort):
         plan_cycle(replace(ASKED, duration_max=ASKED.dwelling + 0.2))

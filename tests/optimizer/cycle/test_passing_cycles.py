@@ -216,8 +216,8 @@ LINE = Line(direction=np.array([0.0, 0.0, 1.0]), distance=0.05)
         ("stops.0.payload", {"payload": Payload()}, {}),
         ("stops.0.approach", {"approach": LINE}, {}),
         ("stops.0.retreat", {"retreat": LINE}, {}),
-        ("stops.0.pass", {}, {"order": FreeOrder()}),
-        ("stops.1.pass", {"via": False}, {"closed": False}),
+        ("stops.0.via", {}, {"order": FreeOrder()}),
+        ("stops.1.via", {"via": False}, {"closed": False}),
         ("wait", {}, {"wait": "0", "duration_min": 20.0}),
     ],
 )
@@ -233,7 +233,7 @@ def test_a_motion_has_a_dozen_passes_at_most() -> None:
     of(*many, Stop(name="rest", target=Q[0]), *(replace(stop, name=f"again {stop.name}") for stop in many))
     with pytest.raises(InvalidProblem) as caught:
         of(*many, Stop(name="one more", target=Q[0], via=True))
-    assert caught.value.field == f"stops.{MOST_PASSES}.pass"
+    assert caught.value.field == f"stops.{MOST_PASSES}.via"
 
 
 def test_passes_at_the_same_place_are_one() -> None:

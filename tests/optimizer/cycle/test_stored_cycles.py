@@ -21,7 +21,6 @@ from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.moves import AMPLE, ROBOT
-from tests.selection import long_but
 
 ROUNDING = 1e-9
 # relative: the reported energy by quadrature, and the charge by the same intervals summed in another order
@@ -47,7 +46,8 @@ def found(bus: Bus) -> CycleSolution:
     return plan_cycle(with_bus(HURRIED, bus))
 
 
-@pytest.mark.parametrize("bus", long_but([LARGE], [LARGE, SMALL]), ids=lambda bus: f"{bus.capacity:g} J")
+@pytest.mark.long
+@pytest.mark.parametrize("bus", [LARGE, SMALL], ids=lambda bus: f"{bus.capacity:g} J")
 def test_the_cycle_is_true(bus: Bus) -> None:
     round_ = found(bus)
     electrical, use = round_.energy.electrical, round_.energy.storage
@@ -94,6 +94,7 @@ def test_it_is_never_above_choosing_move_by_move() -> None:
     assert names["move_by_move"].saving >= -ROUNDING and names["without_storage"].saving >= -ROUNDING
 
 
+@pytest.mark.long
 def test_no_motions_with_the_storage_get_below_the_bound() -> None:
     """Even paces in random shares of the time, valued with the storage from the charge that they end with."""
     asked, rng = with_bus(HURRIED, LARGE), np.random.default_rng(0)
@@ -109,7 +110,7 @@ def test_no_motions_with_the_storage_get_below_the_bound() -> None:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_a_repeated_cycle_ends_with_the_charge_with_which_it_begins(seed: int) -> None:
-    """Against going cycle and round, from any charge; and the energies add up with any cuts."""
+    """Against going round and round, from any charge; and the energies add up with any cuts."""
     rng = np.random.default_rng(seed)
     bus = Bus("storage", 0.9, float(rng.uniform(0.5, 20.0)), float(rng.uniform(10.0, 200.0)))
     demands = [Demand(rng.normal(0.3 * rng.normal(), 3.0, 12), np.full(12, 0.05)) for _ in range(3)]

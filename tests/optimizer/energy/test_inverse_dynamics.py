@@ -92,18 +92,6 @@ def test_torques_and_derivatives_agree_with_pinocchio(symbolic: ca.Function) -> 
     assert worst_derivative < DERIVATIVE_TOLERANCE
 
 
-def test_rotor_inertia_adds_to_the_diagonal(symbolic: ca.Function) -> None:
-    """Without load and motion, a unit acceleration of joint j costs M's column j, whose diagonal holds the rotor."""
-    load = (0.0, np.zeros(3), np.zeros((3, 3)))
-    z = np.zeros(ROBOT.nq)
-    M = evaluate(symbolic, z, z, z, load, np.zeros(3))[3]
-    bare = ROBOT.model.copy()
-    bare.armature = z
-    expected = pin.crba(bare, bare.createData(), z, pin.Convention.WORLD)
-    expected = np.triu(expected) + np.triu(expected, 1).T + np.diag(ROBOT.drives.rotor_inertia)
-    assert np.abs(M - expected).max() < TORQUE_TOLERANCE
-
-
 def test_payload_hangs_from_the_flange(symbolic: ca.Function) -> None:
     """Holding a point mass costs the moment of its weight: m (p - o_j) × (-g) along joint j's axis, by hand from FK."""
     rng = np.random.default_rng(2)

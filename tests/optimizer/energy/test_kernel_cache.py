@@ -68,10 +68,9 @@ def test_the_digest_covers_every_source_that_runs_while_the_c_is_written() -> No
         source(build(ROBOT), 2)
     finally:
         sys.setprofile(None)
-    sources = {Path(str(module.__file__)) for module in SOURCES}
-    assert {
-        path for path in ran if any(path.is_relative_to(ours / part) for part in ("optimizer", "models"))
-    } == sources
+    sources = {Path(str(module.__file__)).resolve() for module in SOURCES}
+    rooms = [ours / part for part in ("optimizer", "models")]
+    assert {path.resolve() for path in ran if any(path.resolve().is_relative_to(room) for room in rooms)} == sources
 
 
 @dataclass
@@ -143,14 +142,11 @@ def test_a_portable_kernel_is_used_where_there_is_no_other(
 
 def test_the_virtual_machine_serves_while_the_compiler_runs(workshop: Workshop) -> None:
     """The first call does not wait; when the library is there, it is swapped in, and it has been compiled once."""
-    began = time.perf_counter()
     first = kernel_for(workshop.robot)
-    waited = time.perf_counter() - began
     assert not first.compiled
     assert_right(first)
     assert kernel_for(workshop.robot) is first or kernel_for(workshop.robot).compiled
     swapped = wait_until_compiled(workshop.robot)
-    assert waited < time.perf_counter() - began
     assert_right(swapped)
     assert kernel_for(workshop.robot) is swapped
     assert workshop.compilations == 1 and workshop.leftovers() == []
@@ -236,7 +232,7 @@ def test_what_a_killed_process_left_is_deleted(workshop: Workshop) -> None:
 def test_a_short_script_with_an_empty_cache_ends_well(workshop: Workshop) -> None:
     """It has its answer from the virtual machine and does not wait for the compiler, nor stumble over it."""
     code = (
-        "from optimizer import Arm, Problem, load_robot, optimize\n"
+        "from joulepath import Arm, Problem, load_robot, optimize\n"
         f"arm, start, goal = Arm(robot=load_robot('ur5e')), {START.tolist()}, {GOAL.tolist()}\n"
         "print(optimize(Problem(arm=arm, start=start, goal=goal, deadline=100)).certificate.valid)\n"
     )

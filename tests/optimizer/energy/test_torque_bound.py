@@ -18,6 +18,7 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.trajectories import bspline
 from joulepath.optimizer.trajectories.quadrature import grid
 from joulepath.optimizer.trajectories.spline import Spline, sample, spline_of
+from tests.selection import long_but
 
 # relative; the bound stops at 1e-6 of the limit, and these motions use a third of a limit or more
 SHARP = 4e-6
@@ -57,9 +58,10 @@ def prepared_for(robot: str, side: str = "motor") -> PreparedProblem:
     return PreparedProblem.of(Problem(arm=arm, start=middle, goal=middle + 0.1))
 
 
-@pytest.mark.parametrize(
-    ("robot", "side"), [("ur5e", "motor"), ("ur5e", "link"), ("panda", "motor"), ("ur20", "motor")]
-)
+SIDES = [("ur5e", "motor"), ("ur5e", "link"), ("panda", "motor"), ("ur20", "motor")]
+
+
+@pytest.mark.parametrize(("robot", "side"), long_but(SIDES[:2], SIDES))
 def test_no_torque_between_samples_is_above_the_bound(robot: str, side: str) -> None:
     prepared, missed = prepared_for(robot, side), []
     for seed in range(4):

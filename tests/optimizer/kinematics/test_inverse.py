@@ -12,9 +12,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for, required_inverse_kinematics
-from tests.optimizer.chains import serial_chain
 from tests.optimizer.kinematics.flange import (
     ACCURACY,
     DATA,
@@ -211,14 +209,6 @@ def test_a_rotation_rounded_to_nine_digits_is_met_to_as_many() -> None:
     solutions = IK.solve(T)
     assert len({str(solution.label) for solution in solutions}) == 8
     assert all(max(errors(T, solution.q)) < ACCURACY for solution in solutions)
-
-
-def test_an_arm_without_inverse_kinematics_is_refused() -> None:
-    robot = serial_chain(5)
-    assert inverse_kinematics_for(robot) is None
-    with pytest.raises(InvalidProblem, match="give joint positions") as refusal:
-        required_inverse_kinematics(robot, "goal.any_of.0.pose")
-    assert refusal.value.field == "goal.any_of.0.pose"
 
 
 def test_is_built_once() -> None:

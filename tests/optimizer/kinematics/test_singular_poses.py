@@ -30,8 +30,6 @@ from tests.optimizer.moves import ROBOT
 
 # next to an edge of the reach, a rounding of the pose by 1e-16 m moves elbow and shoulder by its square root [rad]
 FOUND_ON_AN_EDGE = 2e-6
-# distance [m] of the last axis from the first, at which the shoulder is singular
-OFFSET = 0.1333
 FORM = URClosedForm.of(ROBOT.model) or pytest.fail("the robot has a closed form")
 
 angles = st.lists(st.floats(-3.1, 3.1), min_size=6, max_size=6).map(np.array)

@@ -65,7 +65,7 @@ def test_an_excursion_of_the_path_cannot_be_left_out() -> None:
 def test_a_course_that_turns_back_between_two_of_its_points_is_compared() -> None:
     """Two points of the course's grid are the same then."""
     out = 0.1
-    for cell in range(50, 150, 2):
+    for cell in range(50, 150, 10):
         back = out * (200 / (cell + 0.5) - 1)
         goal = moved([0.0, out - back, 0.0]).T
         course = ToolCourse.of(ToolPath(via=[moved([0.0, out, 0.0])], blend=0.001), tcp_pose(HOME).T, goal)

@@ -7,21 +7,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.interpolate import BSpline
 from scipy.optimize import nnls
 
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.energy.kernel_cache import compile_kernel
-from joulepath.optimizer.energy.plant import KNEE
 from joulepath.optimizer.nlp.coordinates import Coordinates
 from joulepath.optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
 from joulepath.optimizer.nlp.sqp import PROGRESS, Result, SqpStatus, solve
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.trajectories import bspline
-from joulepath.optimizer.trajectories.bspline import DEGREE, Basis
+from joulepath.optimizer.trajectories.bspline import Basis
 from joulepath.optimizer.trajectories.seven_segment import shortest_duration
-from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, fixed, limits, problem, random_moves, torques
+from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, fixed, limits, problem, random_moves
 from tests.optimizer.nlp.ipopt_peer import Peer
 from tests.selection import long_but
 
@@ -164,27 +162,6 @@ def test_the_conditions_are_not_met_elsewhere() -> None:
     assert unexplained(mine, guess) > 0.5
 
 
-@pytest.mark.parametrize("kind", ["joints", "line"])
-def test_limits_are_held(kind: str) -> None:
-    """Sampled densely by SciPy in real time; torques at the nodes, where they are asked of the solver."""
-    for k, (start, goal) in enumerate(random_moves(13, 6)):
-        given = conditions(k)
-        own = given["own"]
-        mine = program(start, goal, kind=kind, **given)
-        found = solve(mine, quintic(mine), 2 * shortest(start, goal, own))
-        assert found.status is SqpStatus.SOLVED and found.violation <= FEASIBILITY
-        curve = BSpline(COARSE.knots * found.duration, mine.joint_points(found.free), DEGREE)
-        t = np.linspace(0.0, found.duration, 4001)
-        for d, maxima in enumerate((own.v_max, own.a_max, own.j_max)):
-            assert (np.abs(curve(t, d + 1)) <= maxima * (1 + FEASIBILITY + GRID)).all()
-        assert (curve(t) >= own.q_min).all() and (curve(t) <= own.q_max).all()
-        task = problem(start, goal, limits=own, **{name: each for name, each in given.items() if name != "own"})
-        t = COARSE.nodes * found.duration
-        q, v, a = curve(t), curve(t, 1), curve(t, 2)
-        tau_motor = torques(task, q, v, a) + replace(task.arm.friction_law, knee=KNEE).torque(v)
-        assert (np.abs(tau_motor) <= own.tau_max * (1 + FEASIBILITY + 1e-9)).all()
-
-
 def test_positions_stay_inside_a_narrow_range() -> None:
     """Mechanical energy would swing the arm far out; the elbow may not."""
     given: dict[str, Any] = {"objective": "mechanical", **fixed(2.5)}
@@ -201,26 +178,6 @@ def test_positions_stay_inside_a_narrow_range() -> None:
     assert found.status is SqpStatus.SOLVED
     assert (q >= q_min - 1e-9).all() and (q <= q_max + 1e-9).all()
     assert found.cost > free.cost
-
-
-def test_a_fixed_duration_is_kept() -> None:
-    mine = program(START, GOAL, **fixed(1.234))
-    for guess in (0.5, 1.234, 3.0):
-        found = solve(mine, quintic(mine), guess)
-        assert found.status is SqpStatus.SOLVED and found.duration == 1.234
-
-
-def test_durations_stay_between_their_bounds() -> None:
-    """At a bound where the best duration lies beyond it; an arm that idles cheaply likes to take its time."""
-    lazy = replace(ROBOT, electronics=replace(ROBOT.electronics, idle_power=3.0))
-    best = solve(mine := program(START, GOAL, robot=lazy), quintic(mine), 1.0).duration
-    assert best > 1.5 * shortest(START, GOAL)
-    for t_min, t_max in ((1.2 * best, 2 * best), (0.01, 0.9 * best)):
-        mine = program(START, GOAL, robot=lazy, duration_min=t_min, duration_max=t_max)
-        found = solve(mine, quintic(mine), best)
-        assert found.status is SqpStatus.SOLVED
-        assert found.duration == pytest.approx(t_min if t_min > best else t_max, rel=1e-9)
-        assert t_min <= found.duration <= t_max
 
 
 @pytest.mark.parametrize("share", [0.3, 0.9, 0.99])

@@ -26,7 +26,6 @@ from joulepath.optimizer.search.baselines import (
     saving,
 )
 from joulepath.optimizer.solution import Baseline
-from joulepath.optimizer.trajectories import quadrature
 from joulepath.optimizer.trajectories.ruckig_motion import time_optimal
 from joulepath.optimizer.trajectories.time_scalings import SampledMotion, controller_default, quintic, trapezoid
 from tests.optimizer.moves import problem_with
@@ -35,7 +34,6 @@ EXACT = 1e-12  # relative; closed forms in double precision
 # rad; Ruckig solves its phases from polynomial roots and accepts a position within 1e-8 of the target
 RUCKIG_POSITION = 1e-7
 RATE = 1e-9  # relative; Ruckig's states are cubic polynomials evaluated in double precision
-QUADRATURE = 1e-4  # relative; corners of |x| fall inside quadrature panels of a seventieth of the duration
 BALANCE = 1e-6  # relative; shaft power is smooth within panels, but for friction's steep rise near rest
 
 ROBOT = load_robot("ur5e")
@@ -109,15 +107,6 @@ def test_durations(name: str) -> None:
     assert motion.duration == pytest.approx(expected, rel=EXACT)
 
 
-def test_quintic_peaks() -> None:
-    """1.875 Δ/T, 5.7735 Δ/T², 60 Δ/T³."""
-    motion, displacement = quintic(START, GOAL, DURATION), np.abs(GOAL - START)
-    assert motion.peak_v == pytest.approx(1.875 * displacement / DURATION, rel=EXACT)
-    assert motion.peak_a == pytest.approx(5.773502691896258 * displacement / DURATION**2, rel=EXACT)
-    assert motion.peak_jerk == pytest.approx(60 * displacement / DURATION**3, rel=EXACT)
-    assert np.abs(motion.a[[0, -1]]).max() == 0
-
-
 def test_trapezoid_in_thirds() -> None:
     """Unless a limit objects: 1.5 Δ/T and 4.5 Δ/T²; its jerk is unbounded where a joint moves."""
     goal = GOAL.copy()
@@ -140,14 +129,6 @@ def test_trapezoid_keeps_to_limits_where_it_can() -> None:
         assert motion.peak_v.max() == pytest.approx(1.5, rel=EXACT)
 
 
-def test_ruckig_takes_its_textbook_time() -> None:
-    """One joint that reaches all three limits: T = Δ/v + v/a + a/j."""
-    motion = time_optimal(problem().arm.active_limits, START, one_joint(2.5))
-    v, a, j = math.pi, 10.0, 200.0
-    assert motion.duration == pytest.approx(2.5 / v + v / a + a / j, rel=RATE)
-    assert (motion.peak_v[2], motion.peak_a[2], motion.peak_jerk[2]) == pytest.approx((v, a, j), rel=RATE)
-
-
 def test_ruckig_keeps_its_limits_and_its_word() -> None:
     """Over random moves and limits: no rate above its limit, the leading joint on one, and Ruckig's own duration."""
     rng = np.random.default_rng(5)
@@ -164,16 +145,6 @@ def test_ruckig_keeps_its_limits_and_its_word() -> None:
         theirs = ruckig.Trajectory(6)
         ruckig.Ruckig(6).calculate(given, theirs)
         assert motion.duration == theirs.duration
-
-
-def test_slowing_scales_the_rates() -> None:
-    """Twice the duration: v/2, a/4, jerk/8 on the same path."""
-    motion = time_optimal(problem().arm.active_limits, START, GOAL)
-    retimed = motion.scaled_to(2 * motion.duration)
-    for name, factor in {"q": 1, "t": 2, "weights": 2, "v": 1 / 2, "a": 1 / 4}.items():
-        assert getattr(retimed, name) == pytest.approx(getattr(motion, name) * factor, rel=EXACT)
-    for name, factor in {"peak_v": 1 / 2, "peak_a": 1 / 4, "peak_jerk": 1 / 8}.items():
-        assert getattr(retimed, name) == pytest.approx(getattr(motion, name) * factor, rel=EXACT)
 
 
 @pytest.mark.parametrize(
@@ -236,22 +207,6 @@ def test_energies_are_of_the_friction_law_asked_for(friction: str) -> None:
     energy = motion_energy(task, motion, torques(motion.q, motion.v, motion.a), potential)
     loss = motion.weights @ (motion.v * ROBOT.friction_laws[friction].torque(motion.v))
     assert energy.per_joint.friction == pytest.approx(loss, rel=EXACT)
-
-
-@pytest.mark.long
-def test_energies_are_converged(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Against twenty times as many quadrature panels, over random moves."""
-    rng = np.random.default_rng(6)
-    for _ in range(5):
-        start, goal = rng.uniform(-3.0, 3.0, (2, 6))
-        task = problem(start, goal)
-        coarse = compare(task, 2.0)
-        with monkeypatch.context() as patch:
-            patch.setattr(quadrature, "PANELS", 20 * quadrature.PANELS)
-            fine = compare(task, 2.0)
-        for name in NAMES:
-            assert coarse[name].electrical == pytest.approx(fine[name].electrical, rel=QUADRATURE)
-            assert coarse[name].mechanical == pytest.approx(fine[name].mechanical, rel=QUADRATURE)
 
 
 @pytest.mark.parametrize("objective", ["electrical", "mechanical"])

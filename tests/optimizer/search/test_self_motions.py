@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,17 +12,10 @@ from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
 from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.dwell import Dwell
-from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import AnyOf
-from joulepath.optimizer.search.candidates import bound, pairs
-from joulepath.optimizer.search.ends import ends
-from joulepath.optimizer.search.holding_cells import HoldingCells
-from joulepath.optimizer.search.self_motion_bound import self_motion_bound
 from joulepath.optimizer.solution import Solution
 from tests.optimizer.moves import ROBOT, problem, tcp_pose
 from tests.selection import long_but
@@ -99,53 +91,6 @@ def test_answers_next_to_a_singularity_are_those_beside_them(joint: int) -> None
     assert on_it <= min(beside) * (1 + REFINED)
     if joint == 2:
         assert on_it >= min(beside) * (1 - CONTINUOUS)
-
-
-@pytest.mark.parametrize(
-    "given",
-    [
-        {},
-        pytest.param({"dwell": Dwell(time=4.0, hold="motors")}, marks=pytest.mark.long),
-        pytest.param({"objective": "mechanical", "duration_max": 2.0}, marks=pytest.mark.long),
-        pytest.param({"bus": Bus(mode="isolated")}, marks=pytest.mark.long),
-    ],
-    ids=["electrical", "dwell", "mechanical", "isolated"],
-)
-def test_no_member_of_a_curve_has_a_lower_bound_below_the_curves(
-    given: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The bound of the curve is one over boxes; that of a pair is exact in displacement and potential energy. Here none
-    has the copper loss of holding."""
-    monkeypatch.setattr(HoldingCells, "of", lambda prepared: None)
-    rng = np.random.default_rng(9)
-    for q in rng.uniform(-2.5, 2.5, (6, 6)):
-        q[4] = 0.0
-        for asked in (problem(START, tcp_pose(q), **given), problem(tcp_pose(q), START, **given)):
-            whole = family_of(asked)
-            for motion in curves(q):
-                for lower, upper in motion.arcs:
-                    for member in motion.at(rng.uniform(lower, upper, 20)):
-                        alone = bound_to(asked, member)
-                        assert alone is None or alone >= whole * (1 - ROUNDING)
-
-
-def family_of(asked: Problem) -> float:
-    """The bound over the whole curve."""
-    prepared = PreparedProblem.of(asked)
-    candidates = pairs(prepared, ends(prepared, "start")[0], ends(prepared, "goal")[0])
-    return self_motion_bound(prepared, candidates)
-
-
-def bound_to(asked: Problem, member: Array) -> float | None:
-    """The bound of the motion from or to one member; None if the arm cannot be there."""
-    end = "start" if not isinstance(asked.start, np.ndarray) else "goal"
-    prepared = PreparedProblem.of(replace(asked, **{end: member}))
-    candidates = pairs(prepared, ends(prepared, "start")[0], ends(prepared, "goal")[0])
-    try:
-        bound(prepared, candidates)
-    except JoulepathError:
-        return None
-    return min(each.lower_bound for each in candidates)
 
 
 @pytest.mark.long

@@ -14,8 +14,7 @@ from tests.browsers import BROWSER, MISSING, chromium
 
 PATIENCE = 1000 * ANSWER  # [ms]
 
-pytestmark = [pytest.mark.long, pytest.mark.skipif(BROWSER is None, reason=MISSING)]
-
+pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
 
 POST = """([url, mode, key]) => fetch(url + "/studies", {
     method: "POST", mode, body: '{"name": "x", "threshold": 1}', headers: key ? {Authorization: "Bearer " + key} : {},
@@ -27,8 +26,7 @@ def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, 
     """A service that needs keys, and a key."""
     file: Path = tmp_path_factory.mktemp("keys") / "keys.yaml"
     secret = add(file, "press")
-    with serving(warm=False, workers=1, robots="", api_keys_file=file) as server:
-        server.wait_listening()
+    with serving(recorded=True, api_keys_file=file) as server:
         yield server, secret
 
 
@@ -69,8 +67,7 @@ def test_authorize(guarded: tuple[Server, str], page: Page) -> None:
 def test_a_page_of_another_site_reaches_nothing(guarded: tuple[Server, str], page: Page) -> None:
     """A real browser on a page of another port: neither a form nor a script gets through, with the key or without."""
     server, secret = guarded
-    with serving(warm=False, workers=1, robots="") as other:
-        other.wait_listening()
+    with serving(recorded=True) as other:
         page.goto(f"{other.url}/healthz")
         assert page.evaluate(POST, [server.url, "no-cors", ""]) == "opaque"
         assert page.evaluate(POST, [server.url, "cors", secret]) == "refused"

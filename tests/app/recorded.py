@@ -1,0 +1,190 @@
+"""The service with recorded results: what searches for motions answers at once, so that tests of HTTP need no search.
+
+`python -m tests.app.recorded` is such a service, `python -m tests.app.recorded record` writes the recordings anew.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import re
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from pathlib import Path
+from typing import Any
+
+import orjson
+import pytest
+from starlette.testclient import TestClient
+
+from joulepath.app.engine import forkserver, pool
+from joulepath.app.engine.result import AnswerFigures, StoredAnswer, TaskResult
+from joulepath.app.engine.task import Task, outcome
+from joulepath.app.engine.work import Ended, Take, Work
+from joulepath.app.main import create_app
+from joulepath.app.schemas.compare import CompareRequest
+from joulepath.app.schemas.cycle import CycleRequest
+from joulepath.app.schemas.pareto import ParetoRequest
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.app.settings import Settings
+from joulepath.app.tasks.compare import CompareTask
+from joulepath.app.tasks.cycle import CycleTask
+from joulepath.app.tasks.optimize import OptimizeTask
+from joulepath.app.tasks.pareto import ParetoTask
+from joulepath.optimizer.deadline import Stopped
+from joulepath.optimizer.progress import Tell, nobody
+from tests.app.live import COMPUTED, LOCAL, WARM_UP
+from tests.app.requests import HOME, NEAR, PATIENT
+
+FOLDER = Path(__file__).parent / "recordings"
+SENT = "recorded"
+"""Id of the recorded requests."""
+MOVE: dict[str, Any] = {"start": {"q": HOME}, "goal": {"q": NEAR}, "candidates": "none", "sample_period": 0.25}
+CYCLE: dict[str, Any] = {"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], "candidates": "none"}
+TASKS: dict[str, Task] = {
+    "optimize": OptimizeTask(OptimizeRequest.model_validate(MOVE), SENT),
+    "compare": CompareTask(CompareRequest.model_validate(MOVE | {"methods": ["time_scaling"]}), SENT),
+    "pareto": ParetoTask(ParetoRequest.model_validate(MOVE | {"points": 2}), SENT, "json"),
+    "cycle": CycleTask(CycleRequest.model_validate(CYCLE | {"sample_period": 0.25}), SENT),
+}
+"""What is recorded, by the endpoint."""
+_ID = re.compile(rb"[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}")
+_is_recorded: ContextVar[bool] = ContextVar("is_recorded", default=False)
+_count = itertools.count(1)
+
+
+def record(kind: str) -> dict[str, Any]:
+    """The recording of a kind, made by the optimiser."""
+    result = TASKS[kind].run(PATIENT["deadline"])
+    return {
+        "document": orjson.loads(result.document),
+        "stored": [orjson.loads(each.body) for each in result.stored],
+        "figures": vars(result.figures),
+    }
+
+
+def recorded(kind: str, request_id: str) -> TaskResult:
+    """The recorded result as that of a request. All ids are new, and the wall time is another one each time."""
+    text = (FOLDER / f"{kind}.json").read_bytes()
+    for number, old in enumerate(dict.fromkeys(_ID.findall(text))):
+        text = text.replace(old, b"%08x%s" % (next(_count) * 64 + number, old[8:]))
+    content = orjson.loads(text)
+    document, stored = content["document"], content["stored"]
+    for each in (document, *stored):
+        each["request"] = request_id
+        if "solver" in each:
+            each["solver"]["wall_time"] = next(_count) * 1e-4
+    figures = AnswerFigures(**content["figures"])
+    if figures.energy is None:
+        return TaskResult.of_json(document, tuple(map(_stored, stored)))
+    return TaskResult.of_kept_json(document, figures, tuple(map(_stored, stored)))
+
+
+def _stored(document: dict[str, Any]) -> StoredAnswer:
+    return StoredAnswer(document["id"], orjson.dumps(document))
+
+
+def _instead_of(kind: str, run: Callable[[Any, float], TaskResult]) -> Callable[[Any, float], TaskResult]:
+    def instead(task: Any, deadline: float) -> TaskResult:
+        return recorded(kind, task.request_id) if _is_recorded.get() else run(task, deadline)
+
+    return instead
+
+
+class RecordedWorker:
+    """A worker in a thread of the service, whose searches have been recorded. Other tasks are run."""
+
+    alive, is_free, pid = True, True, None
+
+    def __init__(self, *_: object) -> None:
+        self.ended = asyncio.Event()
+
+    async def start(self) -> None:
+        """It is warm at once."""
+
+    def when_free(self, call: Callable[[], object]) -> None:
+        call()
+
+    async def ask(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
+        ended = await asyncio.to_thread(_ended, task, deadline)
+        if isinstance(ended, TaskResult):
+            return ended
+        raise ended
+
+    async def ask_all(self, first: Work, take: Take, turn: Callable[[Work, Ended, Work | None], object]) -> None:
+        work: Work | None = first
+        while work is not None:
+            ended = await asyncio.to_thread(_ended, work.task, work.deadline)
+            last, work = work, take()
+            turn(last, ended, work)
+
+    def stop(self) -> None:
+        """Its tasks end by themselves."""
+
+    def kill(self) -> None:
+        self.ended.set()
+
+
+def _ended(task: Task, deadline: float) -> Ended:
+    # a thread of its own has a copy of the context
+    _is_recorded.set(True)
+    ended = outcome(task, deadline)
+    assert not isinstance(ended, Stopped), "nothing is told to stop"
+    return ended
+
+
+@contextmanager
+def recorded_workers() -> Iterator[None]:
+    """A context in which services start with recorded workers; those that have started keep them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pool, "Worker", RecordedWorker)
+        for module in (pool, forkserver):
+            patch.setattr(module, "start_forkserver", lambda: None)
+        yield
+
+
+def _use_recordings() -> None:
+    """Gives the tasks their recordings, for recorded workers only: jobs make tasks of their own."""
+    for kind, task in TASKS.items():
+        searching: Any = type(task)
+        searching.run = _instead_of(kind, searching.run)
+
+
+_use_recordings()
+
+
+@contextmanager
+def recorded_service(**settings: Any) -> Iterator[TestClient]:
+    """A service with recorded results in this process."""
+    app = create_app(Settings(workers=2, queue_size=4, **settings))
+    client = TestClient(app, base_url=LOCAL, raise_server_exceptions=False, headers=COMPUTED)
+    with recorded_workers():
+        client.__enter__()
+        end = time.monotonic() + WARM_UP
+        while client.get("/readyz").status_code != 200:
+            assert time.monotonic() < end
+            time.sleep(0.01)
+    try:
+        yield client
+    finally:
+        client.__exit__()
+
+
+def main() -> None:
+    """Serves, or records."""
+    if sys.argv[1:] == ["record"]:
+        FOLDER.mkdir(exist_ok=True)
+        for kind in TASKS:
+            (FOLDER / f"{kind}.json").write_bytes(orjson.dumps(record(kind)) + b"\n")
+        return
+    from joulepath.app import __main__
+
+    with recorded_workers():
+        __main__.main()
+
+
+if __name__ == "__main__":
+    main()
