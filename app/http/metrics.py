@@ -9,7 +9,6 @@ from prometheus_client import CollectorRegistry, Counter, Histogram, ProcessColl
 from prometheus_client.exposition import choose_encoder
 from prometheus_client.metrics_core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
-from starlette.types import ASGIApp, Receive, Scope, Send
 
 from joulepath.app.engine.pool import Engine
 
@@ -80,18 +79,3 @@ class _Now(Collector):
         for name, (text, value) in gauges.items():
             yield GaugeMetricFamily(name, text, value=float(value))
         yield CounterMetricFamily("joulepath_worker_restarts", "Workers that were replaced.", value=census.restarts)
-
-
-class RouteNote:
-    """ASGI middleware, the innermost: the template of the route's path goes to `request.state.route`."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes the request on."""
-        try:
-            await self._app(scope, receive, send)
-        finally:
-            if scope["type"] == "http":
-                scope["state"]["route"] = getattr(scope.get("route"), "path", None)

@@ -236,7 +236,7 @@ def test_sigterm_answers_or_refuses_all_in_flight() -> None:
 @pytest.mark.long
 def test_sigterm_while_the_workers_warm_up() -> None:
     with serving(warm=False, workers=1) as server:
-        until(lambda: any("running" in entry["message"] for entry in server.logged()), WARM_UP)
+        until(lambda: any(entry["message"] == "listening" for entry in server.logged()), WARM_UP)
         everyone = server.descendants()
         assert server.terminate() == 0
         until(lambda: not any(alive(pid) for pid in everyone))

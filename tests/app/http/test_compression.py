@@ -14,10 +14,11 @@ import zstandard
 from starlette.responses import Response, StreamingResponse
 from starlette.types import Message, Receive, Scope, Send
 
-from joulepath.app.http import content_coding
-from joulepath.app.http.accept_encoding import preferred
+from joulepath.app.exceptions import NotAcceptable
+from joulepath.app.http.bodies import Bodies
 from joulepath.app.http.compression import Compression
-from joulepath.app.http.content_coding import ContentCoding
+from joulepath.app.http.request_context import RequestContext
+from joulepath.app.http.transfers import Transfers
 from joulepath.app.schemas import errors as problems
 from tests.app.live import ANSWER, ROOT, Server
 from tests.app.requests import move

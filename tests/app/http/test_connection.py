@@ -8,7 +8,14 @@ from contextlib import ExitStack
 
 import pytest
 
-from joulepath.app.schemas.errors import Busy, HeadTooLarge, RequestTimeout, ShuttingDown, TooManyRequests
+from joulepath.app.schemas.errors import (
+    Busy,
+    HeadTooLarge,
+    MalformedHttp,
+    RequestTimeout,
+    ShuttingDown,
+    TooManyRequests,
+)
 from tests.app.live import EXIT, Server, serving, until
 from tests.app.raw import answer_on, connected, ends, is_reset, post
 from tests.selection import long_but
@@ -50,12 +57,11 @@ def _nobody_is_connected(strict: Server) -> None:
     [
         b"GET /healthz HTTP/1.1\r\nX: " + b"a" * (MOST_HEAD + 1),
         b"GET /healthz HTTP/1.1\r\n" + b"X: y\r\n" * MOST_HEAD,
-        b"GET /healthz HTTP/1.1\r\nX: " + b"a" * MOST_HEAD + b"\r\n\r\n",
+        b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nX: " + b"a" * MOST_HEAD + b"\r\n\r\n",
         b"GET /" + b"a" * MOST_HEAD + b" HTTP/1.1\r\nHost: localhost\r\n\r\n",
-        b"\r\n" * MOST_HEAD,
         GET + b"GET /healthz HTTP/1.1\r\nX: " + b"a" * 300_000,
     ],
-    ids=["one line", "many lines", "complete", "path", "empty lines", "after another request"],
+    ids=["one line", "many lines", "complete", "path", "after another request"],
 )
 def test_a_large_head_is_refused(strict: Server, head: bytes) -> None:
     with connected(strict) as connection:
@@ -79,19 +85,25 @@ def test_large_trailers_are_refused(strict: Server) -> None:
 
 def test_a_head_of_the_largest_size_is_taken(strict: Server) -> None:
     with connected(strict) as connection:
-        value = b"a" * (MOST_HEAD - len("/healthz") - len("X: \r\n"))
-        connection.sendall(b"GET /healthz HTTP/1.1\r\nX: " + value + b"\r\n\r\n")
+        value = b"a" * (MOST_HEAD - len("/healthz") - len("Host: localhost\r\n") - len("X: \r\n"))
+        connection.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nX: " + value + b"\r\n\r\n")
         assert answer_on(connection).status == 200
 
 
-@pytest.mark.parametrize("sent", [b"", b"G", b"GET / HTTP/1.1\r\nX: y\r\n", b"\r\n", GET + b"GET /h"])
+@pytest.mark.parametrize("sent", [b"", b"G", b"GET / HTTP/1.1\r\nX: y\r\n"])
 def test_half_a_head_is_not_waited_for(strict: Server, sent: bytes) -> None:
     with connected(strict) as connection:
         connection.sendall(sent)
-        if sent.startswith(GET):
-            assert answer_on(connection).status == 200
         RequestTimeout.model_validate(answer_on(connection).problem)
         assert ends(connection)
+
+
+def test_half_a_head_after_an_answer_is_not_waited_for(strict: Server) -> None:
+    with connected(strict) as connection:
+        connection.sendall(GET + b"GET /h")
+        assert answer_on(connection).status == 200
+        connection.sendall(b"ea")
+        assert is_reset(connection)
 
 
 @pytest.mark.parametrize("path", long_but(["/optimize"], ["/optimize", "/evaluate", "/robots"]))
@@ -108,6 +120,23 @@ def test_a_body_that_nobody_reads_is_not_waited_for(strict: Server) -> None:
         connection.sendall(post("/nowhere", b"{", declared=1000))
         assert answer_on(connection).status == 404
         assert ends(connection)
+
+
+@pytest.mark.parametrize("is_answered", [False, True])
+def test_a_malformed_body_ends_the_connection(strict: Server, is_answered: bool) -> None:
+    path = "/nowhere" if is_answered else "/optimize"
+    head = f"POST {path} HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n".encode()
+    with connected(strict) as connection:
+        connection.sendall(head + b"1\r\n{\r\n")
+        if is_answered:
+            assert answer_on(connection).status == 404
+            connection.sendall(b"no chunk\r\n")
+            assert is_reset(connection)
+        else:
+            connection.sendall(b"no chunk\r\n")
+            MalformedHttp.model_validate(answer_on(connection).problem)
+            assert ends(connection)
+    assert not [entry for entry in strict.logged() if entry["level"] == "error"]
 
 
 def test_an_answer_that_is_not_read_is_thrown_away(strict: Server) -> None:

@@ -57,7 +57,7 @@ def test_offers_one_after_another_on_one_connection(service: Server) -> None:
     with connected(service) as connection:
         connection.sendall(3 * get + lines("GET /robots HTTP/1.1", "Host: localhost"))
         assert [answer_on(connection).status for _ in range(4)] == 4 * [200]
-    assert asked(service, lines("CONNECT localhost:80 HTTP/1.1", "Host: localhost")).status == 400
+    assert asked(service, lines("CONNECT localhost:80 HTTP/1.1", "Host: localhost")).status == 404
 
 
 @pytest.mark.parametrize("path", ["/healthz", "/robots", "/robots/ur5e", "/studio", "/problems/busy", "/nowhere"])
@@ -99,7 +99,9 @@ def test_a_method_that_a_path_has_not_is_told_so(service: Server, path: str) -> 
 def test_http_1_0_has_no_host(service: Server) -> None:
     post = lines("POST /optimize HTTP/1.0", f"Content-Length: {len(WRONG)}") + WRONG
     assert "`sart`" in json.dumps(asked(service, post).problem)
-    assert asked(service, lines("GET /robots HTTP/1.1", "Connection: close")).problem["type"] == "/problems/wrong-host"
+    assert (
+        asked(service, lines("GET /robots HTTP/1.1", "Connection: close")).problem["type"] == "/problems/malformed-http"
+    )
 
 
 @pytest.mark.parametrize("declared", ["", " ", ";charset=utf-8"])
