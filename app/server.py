@@ -28,7 +28,7 @@ _SETTLING_TIME = 0.05
 """Time [s] to read requests that have arrived on open connections, before idle connections are closed."""
 _M_MMAP_THRESHOLD = -3
 """Parameter of glibc's `mallopt`: the size [byte] from which a block is mapped by itself."""
-_LARGE_BLOCK = 1 << 16
+_LARGE_BLOCK = 1 << 20
 _BACKLOG = 2048
 """Connections that wait to be accepted: as uvicorn has it."""
 _REMEDIES = {

@@ -11,7 +11,7 @@ from functools import partial
 from typing import Any
 
 import zstandard
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import Request
 from starlette.types import Message, Receive
 
 from joulepath.app.exceptions import (
@@ -36,6 +36,9 @@ class Bodies:
     """
 
     settings: Settings
+    small: int = 1 << 16
+    """Largest body without turns: of larger ones, one part in all is read in one turn of the event loop [byte]."""
+    turn: asyncio.Lock = field(default_factory=asyncio.Lock)
     slice: int = 128
     piece: int = 1 << 16
     window: int = 1 << 23
@@ -105,6 +108,9 @@ class Body:
         self._admit(size)
         until, received, more = asyncio.get_running_loop().time() + time, 0, True
         while more:
+            if max(received, size) > self._bodies.small:
+                async with self._bodies.turn:
+                    await asyncio.sleep(0)
             try:
                 async with asyncio.timeout_at(until) as limit:
                     self._bodies.reading.add(limit)
@@ -115,7 +121,8 @@ class Body:
             except TimeoutError:
                 raise (RequestTimeout(time) if limit.when() == until else ShuttingDown()) from None
             if message["type"] == "http.disconnect":
-                raise ClientDisconnect
+                self._is_whole = True  # the server repeats the message, which comes after the body
+                return
             received += len(message.get("body", b""))
             self._admit(max(received, self._declared))
             yield message.get("body", b"")

@@ -49,8 +49,10 @@ class Connections:
     linger: float = 1.0
     """Time for which the connection of a refused client stays open, so that it can read the reason [s].
 
-    Everything that it still sends is thrown away. If the connection were closed at once, these bytes would reset it.
+    What it still sends is thrown away. If the connection were closed at once, these bytes would reset it.
     """
+    most_discarded: int = 1 << 23
+    """Bytes after which the connection of a refused client is reset before that."""
     open: set[Connection] = field(default_factory=set)
 
     def refusal(self, peer: str) -> ServiceError | None:
@@ -87,7 +89,7 @@ class Connection(asyncio.Protocol):
         self._connections, self._settings = connections, connections.settings
         self.inner = H11Protocol(app_state={**app_state, "connection": self}, **given)
         self.is_refused = False
-        self._in_hand = 0
+        self._in_hand = self._discarded = 0
         self._loop = asyncio.get_running_loop()
         self._until = self._read_until = self._loop.call_later(self._settings.head_timeout, self._miss_head)
 
@@ -113,11 +115,15 @@ class Connection(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Passes bytes on, unless the connection is refused."""
-        if not self.is_refused:
-            try:
-                self.inner.data_received(data)
-            except h11.ProtocolError:  # of a body whose answer has begun
+        if self.is_refused:
+            self._discarded += len(data)
+            if self._discarded > self._connections.most_discarded:
                 self.reset()
+            return
+        try:
+            self.inner.data_received(data)
+        except h11.ProtocolError:  # of a body whose answer has begun
+            self.reset()
 
     def pause_writing(self) -> None:
         """The client does not read as fast as it is answered."""

@@ -196,6 +196,8 @@ def test_logs_one_line_per_request(server: Server) -> None:
         b"POST /optimize HTTP/1.1\r\nHost: x\r\nContent-Length: two\r\n\r\n",
         b"POST /optimize HTTP/1.1\r\nHost: x\r\nContent-Length: 2\r\nContent-Length: 3\r\n\r\n{}",
         b"GET /healthz HTTP/1.1\r\nHo st: x\r\n\r\n",
+        b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nHost: evil.example\r\n\r\n",
+        b"GET /healthz HTTP/1.1\r\n\r\n",
     ],
 )
 def test_garbage_on_the_socket_is_answered_with_a_problem(server: Server, garbage: bytes) -> None:
