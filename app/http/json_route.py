@@ -12,8 +12,8 @@ from starlette.datastructures import Headers, MutableHeaders
 from joulepath.app.convert.json_text import parsed_json
 from joulepath.app.http.weights import JSON
 
-FORM = "application/x-www-form-urlencoded"
-TEXT = "text/plain"
+UNDECLARED = ("", "application/x-www-form-urlencoded", "text/plain")
+"""Media types of clients that were told nothing: curl's `-d @file` declares a form, some clients plain text."""
 
 
 class JsonRequest(Request):
@@ -42,13 +42,12 @@ class JsonRequest(Request):
 def strictly(request: Request) -> JsonRequest:
     """The same request, read strictly. Its body must not have been read, unless it is one already.
 
-    A body that is declared as a form, as plain text, or not at all is declared as JSON: curl's `-d @file` declares a
-    form, and some clients plain text if they are told nothing, but no JSON route takes either.
+    A body of one of the types `UNDECLARED` becomes JSON: no JSON route takes forms or plain text.
     """
     if isinstance(request, JsonRequest):
         return request
     headers = MutableHeaders(scope=request.scope)
-    if media_type(headers) in ("", FORM, TEXT):
+    if media_type(headers) in UNDECLARED:
         headers["content-type"] = JSON
     return JsonRequest(request.scope, request.receive)
 

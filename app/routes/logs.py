@@ -12,7 +12,7 @@ from fastapi.concurrency import run_in_threadpool
 
 from joulepath.app.exceptions import UnsupportedMediaType
 from joulepath.app.http.disconnect import unless_disconnected
-from joulepath.app.http.json_route import FORM, TEXT, media_type
+from joulepath.app.http.json_route import UNDECLARED, media_type
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
 from joulepath.app.routes.parameters import LOCATION_HEADER, set_location
@@ -29,7 +29,7 @@ from joulepath.app.tasks.read_log import ReadLogTask
 router = APIRouter(prefix="/logs", tags=["logs"])
 
 LogId = Annotated[str, Path(description="The log's id.", examples=[LOG_ID])]
-_TAKEN = ("text/csv", "application/octet-stream", "application/gzip", "application/x-gzip", "", FORM, TEXT)
+_TAKEN = ("text/csv", "application/octet-stream", "application/gzip", "application/x-gzip", *UNDECLARED)
 _GZIP = b"\x1f\x8b"
 _SHOWN = tuple(name for name in LogSummary.model_fields if name not in ("tags", "rows", "duration"))
 

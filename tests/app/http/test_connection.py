@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
+import inspect
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
+from typing import Any
+from unittest.mock import Mock
 
+import h11
 import pytest
+from starlette.types import Receive, Scope, Send
+from uvicorn import Config
+from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.server import ServerState
 
 from joulepath.app.schemas.errors import (
     Busy,
@@ -151,6 +161,33 @@ def test_requests_far_ahead_of_their_answers_are_refused(strict: Server) -> None
         connection.sendall(GET * 1000)
         assert ends(connection)
     assert strict.get("/healthz").status_code == 200
+
+
+def test_uvicorn_has_what_a_connection_needs() -> None:
+    """The arguments of its protocol, the state of a request, and h11's error while it answers a malformed request."""
+    assert list(inspect.signature(H11Protocol).parameters) == ["config", "server_state", "app_state", "_loop"]
+    states: list[Any] = []
+    written: list[BaseException | None] = []
+
+    async def app(scope: Scope, receive: Receive, send: Send) -> None:
+        states.append(scope["state"])
+        await send({"type": "http.response.start", "status": 204})
+        await send({"type": "http.response.body"})
+
+    async def run() -> None:
+        transport = Mock(asyncio.Transport, is_closing=lambda: False, get_extra_info=lambda _: None)
+        transport.write = lambda _: written.append(sys.exception())
+        config = Config(app, lifespan="off", log_config=None)
+        protocol = H11Protocol(config=config, server_state=ServerState(), app_state={"connection": 1})
+        protocol.connection_made(transport)
+        protocol.data_received(GET)
+        await asyncio.gather(*protocol.tasks)
+        assert states == [{"connection": 1}] and set(written) == {None}
+        written.clear()
+        protocol.data_received(b"GET /" + b"x" * 100_000)
+        assert [each.error_status_hint for each in written if isinstance(each, h11.RemoteProtocolError)][:1] == [431]
+
+    asyncio.run(run())
 
 
 def test_one_client_has_its_share_of_connections(strict: Server) -> None:
