@@ -43,7 +43,7 @@ class Engine:
         self.census = Census()
         self._settings = settings
         self._warm = warm
-        self._queue: FairQueue[Worker] = FairQueue(
+        self._queue: FairQueue = FairQueue(
             capacity=settings.workers + settings.queue_size, share=settings.client_requests
         )
         self._in_flight: set[asyncio.Timeout] = set()
@@ -134,7 +134,7 @@ class Engine:
             raise (ShuttingDown() if self._draining.is_set() else DeadlineExceeded([])) from None
 
     async def _run_in_worker(
-        self, task: Task, end: float, limit: asyncio.Timeout, place: Place[Worker], tell: Tell
+        self, task: Task, end: float, limit: asyncio.Timeout, place: Place, tell: Tell
     ) -> TaskResult:
         deaths = 0
         while True:

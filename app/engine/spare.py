@@ -45,7 +45,7 @@ class _Run:
 class SpareWorkers:
     """Lends idle workers of an engine. `grace` [s] is the time after a deadline at which a work is stopped."""
 
-    def __init__(self, queue: FairQueue[Worker], workers: set[Worker], census: Census, grace: float) -> None:
+    def __init__(self, queue: FairQueue, workers: set[Worker], census: Census, grace: float) -> None:
         self._queue, self._workers, self._census, self._grace = queue, workers, census, grace
         self._runs: dict[Worker, _Run] = {}
 

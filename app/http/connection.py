@@ -15,13 +15,12 @@ import sys
 import uuid
 from dataclasses import dataclass, field
 from http import HTTPStatus
-from ipaddress import ip_address
 from typing import Any, cast
 
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from joulepath.app.access.client import Client
+from joulepath.app.access.client import Client, address_of
 from joulepath.app.engine.result import json_document
 from joulepath.app.exceptions import (
     HeadTooLarge,
@@ -55,19 +54,15 @@ class Connections:
     """Bytes after which the connection of a refused client is reset before that."""
     open: set[Connection] = field(default_factory=set)
 
-    def refusal(self, peer: str) -> ServiceError | None:
+    def refusal(self, connection: Connection) -> ServiceError | None:
         """The error for one connection too many; None within the ceilings."""
         if len(self.open) > self.settings.max_connections:
             return TooManyConnections()
-        of_peer = sum(each.peer == peer for each in self.open)
-        if of_peer > self.settings.client_connections and not self._is_proxy(peer):
-            return TooManyConnectionsOfClient()
-        return None
-
-    def _is_proxy(self, peer: str) -> bool:
-        with contextlib.suppress(ValueError):  # a network of IPv6, or no address
-            return any(ip_address(peer) in network for network in self.settings.trusted_proxies)
-        return False
+        if sum(each.peer == connection.peer for each in self.open) <= self.settings.client_connections:
+            return None
+        address = address_of(connection.client.address)
+        is_proxy = address is not None and any(address in network for network in self.settings.trusted_proxies)
+        return None if is_proxy else TooManyConnectionsOfClient()
 
     def reset(self) -> None:
         """Ends all connections at once."""
@@ -96,10 +91,11 @@ class Connection(asyncio.Protocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Refuses the connection above a ceiling."""
         self.transport = transport
-        self.peer = Client((transport.get_extra_info("peername") or ["unknown"])[0]).name
+        self.client = Client((transport.get_extra_info("peername") or ["unknown"])[0])
+        self.peer = self.client.name
         self._connections.open.add(self)
         self.inner.connection_made(cast(asyncio.Transport, _Wire(self)))
-        if refusal := self._connections.refusal(self.peer):
+        if refusal := self._connections.refusal(self):
             self.refuse(refusal)
         # refused connections count, too: beyond as many again, nobody is told the reason
         if len(self._connections.open) > 2 * self._settings.max_connections:
