@@ -23,9 +23,13 @@ from joulepath.app.settings import Settings, WrongSettings
 logger = logging.getLogger(__name__)
 
 _REFUSING_TIME = 0.25
-"""Time [s] in which new requests still get a response (`shutting-down`), until load balancers know of the shutdown."""
+"""Time [s] in which new requests still get a response (`shutting-down`), until load balancers know
+of the shutdown.
+"""
 _SETTLING_TIME = 0.05
-"""Time [s] to read requests that have arrived on open connections, before idle connections are closed."""
+"""Time [s] to read requests that have arrived on open connections, before idle connections are
+closed.
+"""
 _M_MMAP_THRESHOLD = -3
 """Parameter of glibc's `mallopt`: the size [byte] from which a block is mapped by itself."""
 _LARGE_BLOCK = 1 << 20
@@ -40,8 +44,9 @@ _REMEDIES = {
 
 
 class _Server(uvicorn.Server):
-    """Drains the service when a shutdown begins: the lifespan ends only after the last response, or when the time for
-    it is over."""
+    """Drains the service when a shutdown begins: the lifespan ends only after the last response, or
+    when the time for it is over.
+    """
 
     def __init__(self, config: uvicorn.Config, app: FastAPI, connections: Connections) -> None:
         super().__init__(config)
@@ -63,7 +68,9 @@ class _Server(uvicorn.Server):
 
 
 def listen(host: str, port: int) -> list[socket.socket]:
-    """Sockets that listen on every address of a host. Raises WrongSettings if nobody can listen there."""
+    """Sockets that listen on every address of a host. Raises WrongSettings if nobody can listen
+    there.
+    """
     sockets = list[socket.socket]()
     try:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
@@ -80,7 +87,9 @@ def listen(host: str, port: int) -> list[socket.socket]:
 
 
 def serve(settings: Settings) -> None:
-    """Serves in this process until a signal arrives. Raises WrongSettings if nobody can listen on its address."""
+    """Serves in this process until a signal arrives. Raises WrongSettings if nobody can listen on
+    its address.
+    """
     sockets = listen(settings.host, settings.port)
     _give_memory_back()
     app = create_app(settings)
@@ -111,7 +120,8 @@ def serve(settings: Settings) -> None:
 def _give_memory_back() -> None:
     """Has the C library return every large block to the system when it is freed.
 
-    Otherwise it keeps the more, the larger the blocks were that it saw: 300 bodies of 4 MiB would never be given back.
+    Otherwise it keeps the more, the larger the blocks were that it saw: 300 bodies of 4 MiB would
+    never be given back.
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:  # glibc has it

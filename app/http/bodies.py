@@ -1,4 +1,6 @@
-"""Bodies of requests: unpacked by `Content-Encoding`, within a size and a time, and counted as bytes in flight."""
+"""Bodies of requests: unpacked by `Content-Encoding`, within a size and a time, and counted as
+bytes in flight.
+"""
 
 from __future__ import annotations
 
@@ -31,13 +33,15 @@ _DAMAGED = "The body is not complete or not what its `Content-Encoding` says: se
 class Bodies:
     """The bodies that are being read, and their limits.
 
-    `slice`, `piece`: bytes that are unpacked at a time, and that are passed on at a time. A zstd block of 4 bytes
-    unpacks to 128 KiB, so that one slice may become some 4 MiB.
+    `slice`, `piece`: bytes that are unpacked at a time, and that are passed on at a time. A zstd
+    block of 4 bytes unpacks to 128 KiB, so that one slice may become some 4 MiB.
     """
 
     settings: Settings
     small: int = 1 << 16
-    """Largest body without turns: of larger ones, one part in all is read in one turn of the event loop [byte]."""
+    """Largest body without turns: of larger ones, one part in all is read in one turn of the event
+    loop [byte].
+    """
     turn: asyncio.Lock = field(default_factory=asyncio.Lock)
     slice: int = 128
     piece: int = 1 << 16
@@ -48,7 +52,7 @@ class Bodies:
 
     def drain(self) -> None:
         """Refuses bodies that are still being sent."""
-        for limit in self.reading:
+        for limit in [each for each in self.reading if not each.expired()]:  # one that has just run out ends by itself
             limit.reschedule(0)
 
     def most(self, path: str) -> int:
@@ -62,7 +66,9 @@ class Bodies:
         return next((most for paths, most in uploads.items() if re.fullmatch(paths, path)), settings.max_body_bytes)
 
     def stream(self, coding: str) -> Any:
-        """What unpacks one member of a body, with the interface of `zlib.decompressobj`. Raises UnsupportedCoding."""
+        """What unpacks one member of a body, with the interface of `zlib.decompressobj`. Raises
+        UnsupportedCoding.
+        """
         if coding in ("gzip", "x-gzip", "deflate"):
             return zlib.decompressobj(zlib.MAX_WBITS | 32)
         if coding == "zstd":
@@ -73,8 +79,8 @@ class Bodies:
 class Body:
     """The body of one request.
 
-    Reading it raises BodyTooLarge, RequestTimeout, TooManyBytes or TooManyBytesOfClient beyond a limit,
-    UnsupportedCoding, InvalidRequest if it is damaged, and ShuttingDown.
+    Reading it raises BodyTooLarge, RequestTimeout, TooManyBytes or TooManyBytesOfClient beyond a
+    limit, UnsupportedCoding, InvalidRequest if it is damaged, and ShuttingDown.
     """
 
     def __init__(self, bodies: Bodies, request: Request, receive: Receive, held: Held) -> None:
@@ -103,7 +109,9 @@ class Body:
         self._held.hold(size)
 
     async def _arriving(self) -> AsyncIterator[bytes]:
-        """The parts of the body as they are sent. A declared size counts before the first one is read."""
+        """The parts of the body as they are sent. A declared size counts before the first one is
+        read.
+        """
         size, time = self._declared, self._bodies.settings.body_timeout
         self._admit(size)
         until, received, more = asyncio.get_running_loop().time() + time, 0, True

@@ -15,7 +15,9 @@ class BytesInFlight:
     most: int
     most_of_client: int
     small: int = 1 << 16
-    """Largest body or answer that does not count: small requests find room whatever others hold [byte]."""
+    """Largest body or answer that does not count: small requests find room whatever others hold
+    [byte].
+    """
     held: Counter[str] = field(default_factory=Counter)
     """Bytes by client."""
 
@@ -27,7 +29,9 @@ class Held:
         self._in_flight, self._client, self._size = in_flight, client, 0
 
     def hold(self, size: int) -> None:
-        """Holds `size` bytes from now on, if that is more. Raises TooManyBytes or TooManyBytesOfClient."""
+        """Holds `size` bytes from now on, if that is more. Raises TooManyBytes or
+        TooManyBytesOfClient.
+        """
         limits, further = self._in_flight, size - self._size
         if size <= max(self._size, limits.small):
             return

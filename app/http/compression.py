@@ -1,6 +1,7 @@
 """Compression of answers by `Accept-Encoding` (RFC 9110, section 12.5.3).
 
-Starlette's own middleware ignores the weights, knows no zstd, and leaves a strong entity tag as it is.
+Starlette's own middleware ignores the weights, knows no zstd, and leaves a strong entity tag as it
+is.
 """
 
 from __future__ import annotations
@@ -42,7 +43,8 @@ class Compression:
     """Beginnings of the media types that are compressed."""
 
     def preferred(self, header: str) -> Coding:
-        """The coding of greatest weight, `identity` for none. A malformed member of the header is passed over.
+        """The coding of greatest weight, `identity` for none. A malformed member of the header is
+        passed over.
 
         Raises NotAcceptable if the header allows no coding that is offered.
         """
@@ -59,7 +61,9 @@ class Compression:
         return "identity"
 
     async def encoded(self, start: Message, first: Message, coding: Coding) -> Message:
-        """The first message of a body, compressed if it is the whole body, and in `start` the headers that fit it."""
+        """The first message of a body, compressed if it is the whole body, and in `start` the
+        headers that fit it.
+        """
         headers = MutableHeaders(scope=start)
         if not headers.get("content-type", "").startswith(self.kinds) or "content-encoding" in headers:
             return first

@@ -1,7 +1,9 @@
-"""Connections below HTTP: how many there may be, and how long each may take to send a head and to read an answer.
+"""Connections below HTTP: how many there may be, and how long each may take to send a head and to
+read an answer.
 
-uvicorn's protocol on h11 bounds the size of a head and takes one request of a connection at a time, but it waits for
-ever for a head, and for a client that does not read its answer. `Connection` stands between it and the socket.
+uvicorn's protocol on h11 bounds the size of a head and takes one request of a connection at a time,
+but it waits for ever for a head, and for a client that does not read its answer. `Connection`
+stands between it and the socket.
 """
 
 from __future__ import annotations
@@ -46,9 +48,11 @@ class Connections:
 
     settings: Settings
     linger: float = 1.0
-    """Time for which the connection of a refused client stays open, so that it can read the reason [s].
+    """Time for which the connection of a refused client stays open, so that it can read the reason
+    [s].
 
-    What it still sends is thrown away. If the connection were closed at once, these bytes would reset it.
+    What it still sends is thrown away. If the connection were closed at once, these bytes would
+    reset it.
     """
     most_discarded: int = 1 << 23
     """Bytes after which the connection of a refused client is reset before that."""
@@ -71,7 +75,8 @@ class Connections:
 
 
 class Connection(asyncio.Protocol):
-    """One connection of a client. As a context manager, it has a request in hand, and does not wait for a head.
+    """One connection of a client. As a context manager, it has a request in hand, and does not wait
+    for a head.
 
     Args:
         connections: all connections of the service.
@@ -154,7 +159,9 @@ class Connection(asyncio.Protocol):
         self._end_after(self._connections.linger)
 
     def close(self) -> None:
-        """Closes the connection as soon as the client has read everything, within its time for that."""
+        """Closes the connection as soon as the client has read everything, within its time for
+        that.
+        """
         if not (self.is_refused or self.transport.is_closing()):
             self.transport.close()
             self._end_after(self._settings.write_timeout)

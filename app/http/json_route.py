@@ -13,7 +13,9 @@ from joulepath.app.convert.json_text import parsed_json
 from joulepath.app.http.weights import JSON
 
 UNDECLARED = ("", "application/x-www-form-urlencoded", "text/plain")
-"""Media types of clients that were told nothing: curl's `-d @file` declares a form, some clients plain text."""
+"""Media types of clients that were told nothing: curl's `-d @file` declares a form, some clients
+plain text.
+"""
 
 
 class JsonRequest(Request):

@@ -1,4 +1,6 @@
-"""The outermost layer: gives each request an id and its client, logs it, and answers every exception."""
+"""The outermost layer: gives each request an id and its client, logs it, and answers every
+exception.
+"""
 
 from __future__ import annotations
 
@@ -27,14 +29,18 @@ METRICS = "/metrics"
 REQUEST_ID_HEADER = "X-Request-ID"
 _SANE_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 _CLIENT_CLOSED_REQUEST = 499
-"""Status in the log, never sent, of a request whose client closed the connection: nginx's convention."""
+"""Status in the log, never sent, of a request whose client closed the connection: nginx's
+convention.
+"""
 
 
 class RequestContext:
-    """ASGI middleware: the id goes to `request.state.id`, the header of the response and the log. Requests are counted.
+    """ASGI middleware: the id goes to `request.state.id`, the header of the response and the log.
+    Requests are counted.
 
-    The client goes to `request.state.client` and the log; a layer inside adds its key. `HEAD` is answered as `GET`, and
-    the server leaves out the body. Requests that no page of another site may send are refused.
+    The client goes to `request.state.client` and the log; a layer inside adds its key. `HEAD` is
+    answered as `GET`, and the server leaves out the body. Requests that no page of another site may
+    send are refused.
     """
 
     def __init__(self, app: ASGIApp, settings: Settings, metrics: Metrics) -> None:
@@ -78,7 +84,9 @@ class RequestContext:
                 self._note(exchange)
 
     def _check_head(self, request: Request) -> None:
-        """Raises HeadTooLarge for a head that arrived at once: the server bounds those that it waits for."""
+        """Raises HeadTooLarge for a head that arrived at once: the server bounds those that it
+        waits for.
+        """
         headers = sum(len(name) + len(value) + len(b": \r\n") for name, value in request.scope["headers"])
         if headers + len(request.scope.get("raw_path", b"")) + len(request.scope["query_string"]) > self._most:
             raise HeadTooLarge(self._most)
@@ -101,7 +109,9 @@ class _HeadSent(Exception):
 
 
 class _Exchange:
-    """A request and its answer, observed. `status` is 0 before the answer; `left`: the client left before it."""
+    """A request and its answer, observed. `status` is 0 before the answer; `left`: the client left
+    before it.
+    """
 
     def __init__(self, scope: Scope, receive: Receive, send: Send) -> None:
         self._receive, self._send = receive, send

@@ -19,8 +19,8 @@ from joulepath.app.http.handlers import problem_response
 class Transfers:
     """ASGI middleware: bodies within their limits, and answers compressed and sent piece by piece.
 
-    A request without a valid key among `keys`, or whose answer could not be encoded, is refused before its body is
-    read.
+    A request without a valid key among `keys`, or whose answer could not be encoded, is refused
+    before its body is read.
     """
 
     def __init__(self, app: ASGIApp, bodies: Bodies, keys: KeyRing | None) -> None:
@@ -52,11 +52,14 @@ class Transfers:
 class _Answer:
     """The answer to one request. One for which there is no room becomes a problem.
 
-    To send an event of a stream for which there is no room raises TooManyBytes or TooManyBytesOfClient.
+    To send an event of a stream for which there is no room raises TooManyBytes or
+    TooManyBytesOfClient.
     """
 
     piece: int = 1 << 18
-    """Bytes that are handed to the connection at a time: the next ones wait until the client has read."""
+    """Bytes that are handed to the connection at a time: the next ones wait until the client has
+    read.
+    """
 
     def __init__(
         self, request: Request, receive: Receive, send: Send, held: Held, compression: Compression, coding: Coding
