@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections import Counter, deque
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
@@ -36,6 +37,8 @@ class Place:
     def __init__(self, client: str) -> None:
         self.client = client
         self.state = State.IDLE
+        self.since = 0.0
+        """When it began to wait, by the monotonic clock [s]."""
         self.gave_back = False
         """Whether it had to give its worker back. Then it waits until its client has no other worker."""
         self.begins_again = False
@@ -121,10 +124,27 @@ class FairQueue:
         return bool(self._waiting)
 
     @property
+    def waiting(self) -> list[Place]:
+        """Places that wait for a worker."""
+        return [place for line in self._waiting.values() for place in line]
+
+    @property
+    def oldest(self) -> float:
+        """Time for which the oldest of them has waited; 0 if none waits [s]."""
+        now = time.monotonic()
+        return max((now - place.since for place in self.waiting), default=0.0)
+
+    @property
+    def busy(self) -> int:
+        """Workers that are at a task."""
+        return sum(loan is not None and loan.worker.alive for loan in self._loans.values())
+
+    @property
     def is_stuck(self) -> bool:
         """Whether a request waits for a worker, and none is at work."""
-        waits = any(place.waits for line in self._waiting.values() for place in line)
-        return waits and not any(loan is not None and loan.worker.alive for loan in self._loans.values())
+        return any(place.waits for place in self.waiting) and not any(
+            loan is not None and loan.worker.alive for loan in self._loans.values()
+        )
 
     def put(self, worker: Worker) -> None:
         """Takes a new worker, which has nothing to do. One that has ended is left out."""
@@ -167,7 +187,7 @@ class FairQueue:
 
     async def _turn(self, place: Place) -> Loan:
         loop = asyncio.get_running_loop()
-        place.granted, place.state = loop.create_future(), State.WAITING
+        place.granted, place.state, place.since = loop.create_future(), State.WAITING, time.monotonic()
         line = self._waiting.setdefault(place.client, deque())
         line.insert(0 if place.begins_again else len(line), place)
         self._serve()

@@ -67,15 +67,17 @@ class _Now(Collector):
 
     def collect(self) -> Iterator[Metric]:
         """One sample each."""
-        census = self._engine.census
+        queue = self._engine.queue
         gauges = {
-            "joulepath_queue_length": ("Requests that wait for a worker.", census.waiting),
-            "joulepath_queue_oldest_seconds": ("Time for which the oldest of them has waited.", census.oldest),
+            "joulepath_queue_length": ("Requests that wait for a worker.", len(queue.waiting)),
+            "joulepath_queue_oldest_seconds": ("Time for which the oldest of them has waited.", queue.oldest),
             "joulepath_workers_warm": ("Workers that run a request or could run one.", self._engine.warm_workers),
-            "joulepath_workers_busy": ("Workers that run a request.", census.busy),
+            "joulepath_workers_busy": ("Workers that run a request.", queue.busy),
             "joulepath_ready": ("Whether /readyz says ready.", self._engine.ready),
             "joulepath_store_up": ("Whether the database answers.", self._store_up),
         }
         for name, (text, value) in gauges.items():
             yield GaugeMetricFamily(name, text, value=float(value))
-        yield CounterMetricFamily("joulepath_worker_restarts", "Workers that were replaced.", value=census.restarts)
+        yield CounterMetricFamily(
+            "joulepath_worker_restarts", "Workers that were replaced.", value=self._engine.restarts
+        )
