@@ -33,6 +33,7 @@ closed.
 _M_MMAP_THRESHOLD = -3
 """Parameter of glibc's `mallopt`: the size [byte] from which a block is mapped by itself."""
 _LARGE_BLOCK = 1 << 20
+"""Such a size [byte]: smaller ones would make the pages of every piece of a body be mapped anew."""
 _BACKLOG = 2048
 """Connections that wait to be accepted: as uvicorn has it."""
 _REMEDIES = {
