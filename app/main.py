@@ -16,20 +16,12 @@ from joulepath.app.access.start import key_ring
 from joulepath.app.cluster.link import Cluster
 from joulepath.app.engine.pool import Engine
 from joulepath.app.engine.warm_up import warm
-from joulepath.app.http.authentication import authenticated
-from joulepath.app.http.body_limit import BodyLimit
-from joulepath.app.http.client import sender
-from joulepath.app.http.compression import Compression
-from joulepath.app.http.content_coding import ContentCoding
-from joulepath.app.http.gate import Gate
+from joulepath.app.http.bodies import Bodies
 from joulepath.app.http.handlers import install_handlers
-from joulepath.app.http.head import Head
-from joulepath.app.http.json_body import JsonBody
-from joulepath.app.http.metrics import Metrics, RouteNote
+from joulepath.app.http.metrics import Metrics
 from joulepath.app.http.openapi import install_openapi
 from joulepath.app.http.request_context import RequestContext
-from joulepath.app.http.sites import known_host, same_site
-from joulepath.app.http.transfers import Answers, Bodies, BytesInFlight
+from joulepath.app.http.transfers import Transfers
 from joulepath.app.jobs.dispatcher import Dispatcher
 from joulepath.app.jobs.executor import ClusterExecutor, Executor, LocalExecutor
 from joulepath.app.jobs.jobs import Jobs
@@ -116,6 +108,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     app.state.settings = settings
     app.state.metrics = Metrics()
+    app.state.bodies = Bodies(settings)
     app.state.in_flight = InFlight()
     keys = key_ring(settings)
     _add_middleware(app, settings, keys)
@@ -154,21 +147,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
 
 def _add_middleware(app: FastAPI, settings: Settings, keys: KeyRing | None) -> None:
     """Adds the middleware, the innermost first."""
-    uploads = {
-        "/evaluate|/logs|/robots|/robots/[^/]+": settings.max_upload_bytes,
-        "/jobs": settings.max_job_bytes,
-        "/studies/[^/]+/iterations|/whatif": settings.max_iteration_bytes,
-    }
-    app.add_middleware(RouteNote)
-    in_flight = BytesInFlight(settings.max_bytes_in_flight, settings.client_bytes_in_flight)
-    # the inner ones count the body as it is unpacked
-    app.add_middleware(Bodies, in_flight=in_flight, time=settings.body_timeout)
-    app.add_middleware(BodyLimit, most=settings.max_body_bytes, uploads=uploads)
-    app.add_middleware(ContentCoding)
-    app.add_middleware(BodyLimit, most=settings.max_body_bytes, uploads=uploads)
-    app.add_middleware(JsonBody)
-    if keys is not None:
-        app.add_middleware(Gate, check=authenticated(keys))
+    app.add_middleware(Transfers, bodies=app.state.bodies, keys=keys)
     if settings.cors_origins:
         # no cookies are used, so that a page may send any header, which is its own
         app.add_middleware(
@@ -178,13 +157,4 @@ def _add_middleware(app: FastAPI, settings: Settings, keys: KeyRing | None) -> N
             allow_headers=["*"],
             expose_headers=["*"],
         )
-    app.add_middleware(Gate, check=same_site(settings.cors_origins))
-    app.add_middleware(Gate, check=known_host(settings.allowed_hosts, settings.host))
-    app.add_middleware(Compression)
-    app.add_middleware(Answers, in_flight=in_flight)
-    app.add_middleware(Head)
-    app.add_middleware(
-        RequestContext,
-        sender=partial(sender, proxies=settings.trusted_proxies, header=settings.proxy_header),
-        metrics=app.state.metrics,
-    )
+    app.add_middleware(RequestContext, settings=settings, metrics=app.state.metrics)

@@ -10,11 +10,20 @@ from ipaddress import IPv4Network, IPv6Network
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AliasChoices, Field, ValidationError, field_validator
+from pydantic import AliasChoices, Field, ValidationError, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
-_HOST_NAME = re.compile(r"[A-Za-z0-9._-]+")
-_ORIGIN = re.compile(r"https?://([A-Za-z0-9._-]+|\[[0-9A-Fa-f:.]+\])(:[0-9]{1,5})?")
+_NAMES = {
+    "allowed_hosts": (
+        re.compile(r"[A-Za-z0-9._-]+"),
+        "no name of a host: give names without scheme and port, as `robots.example`",
+    ),
+    "cors_origins": (
+        re.compile(r"https?://([A-Za-z0-9._-]+|\[[0-9A-Fa-f:.]+\])(:[0-9]{1,5})?"),
+        "no origin: give scheme, name and port only, as `https://cell4.example`",
+    ),
+}
+"""Settings that list names: the form of each name, and the end of the message about another one."""
 _SCHEDULER = re.compile(r"(tcp|tls)://[A-Za-z0-9._:\[\]-]+:[0-9]{1,5}")
 LONGEST_DEADLINE = 3600.0
 """Longest deadline [s] that any setting allows."""
@@ -189,25 +198,14 @@ class Settings(BaseSettings):
     def _listed(cls, given: Any) -> Any:
         return tuple(name.strip() for name in given.split(",") if name.strip()) if isinstance(given, str) else given
 
-    @field_validator("allowed_hosts")
+    @field_validator("allowed_hosts", "cors_origins")
     @classmethod
-    def _host_names(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+    def _names(cls, names: tuple[str, ...], field: ValidationInfo) -> tuple[str, ...]:
+        pattern, remedy = _NAMES[str(field.field_name)]
         for name in names:
-            if name != "*" and not _HOST_NAME.fullmatch(name):
-                raise ValueError(
-                    f"{name!r} is no name of a host: give names without scheme and port, as `robots.example`"
-                )
+            if name != "*" and not pattern.fullmatch(name):
+                raise ValueError(f"{name!r} is {remedy}")
         return tuple(name.lower() for name in names)
-
-    @field_validator("cors_origins")
-    @classmethod
-    def _origins(cls, origins: tuple[str, ...]) -> tuple[str, ...]:
-        for origin in origins:
-            if origin != "*" and not _ORIGIN.fullmatch(origin):
-                raise ValueError(
-                    f"{origin!r} is no origin: give scheme, name and port only, as `https://cell4.example`"
-                )
-        return tuple(origin.lower() for origin in origins)
 
     @field_validator("cluster")
     @classmethod

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from ipaddress import IPv6Address, ip_address
+from ipaddress import IPv4Address, IPv6Address, ip_address
 from typing import Literal
 
+Address = IPv4Address | IPv6Address
 Role = Literal["read", "compute", "admin"]
 """What a client may do. Each role includes those before it."""
 
@@ -38,13 +39,17 @@ OPERATOR = Client("console")
 """Who uses the database by the console command."""
 
 
-def _network(address: str) -> str:
+def address_of(text: str) -> Address | None:
+    """The IP address in a text, None if it is something else. IPv4 that is mapped into IPv6 is IPv4."""
     try:
-        parsed = ip_address(address)
+        parsed = ip_address(text)
     except ValueError:
-        return address
-    if not isinstance(parsed, IPv6Address):
-        return address
-    if parsed.ipv4_mapped is not None:
-        return str(parsed.ipv4_mapped)
-    return f"{IPv6Address(int(parsed) >> _IPV6_PREFIX << _IPV6_PREFIX)}/{_IPV6_PREFIX}"
+        return None
+    return (parsed.ipv4_mapped or parsed) if isinstance(parsed, IPv6Address) else parsed
+
+
+def _network(text: str) -> str:
+    address = address_of(text)
+    if isinstance(address, IPv6Address):
+        return f"{IPv6Address(int(address) >> _IPV6_PREFIX << _IPV6_PREFIX)}/{_IPV6_PREFIX}"
+    return text if address is None else str(address)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import logging
-from ipaddress import ip_address
 
+from joulepath.app.access.client import address_of
 from joulepath.app.access.key_file import WrongKeyFile
 from joulepath.app.access.key_ring import KeyRing
 from joulepath.app.settings import Settings, WrongSettings
@@ -51,7 +51,5 @@ def log_access(settings: Settings) -> None:
 
 def is_loopback(host: str) -> bool:
     """Whether only this machine reaches an address to listen on."""
-    try:
-        return ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
+    address = address_of(host)
+    return host == "localhost" if address is None else address.is_loopback

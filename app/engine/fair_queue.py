@@ -3,31 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections import Counter, deque
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from enum import Enum, auto
-from typing import Generic, Protocol, TypeVar
 
+from joulepath.app.engine.worker import Worker
 from joulepath.app.exceptions import Busy, TooManyRequests
-
-
-class Usable(Protocol):
-    """What tasks wait for."""
-
-    @property
-    def alive(self) -> bool:
-        """Whether it can run a task, now or once the one that it is at has ended."""
-
-    @property
-    def is_free(self) -> bool:
-        """Whether it is at no task. One that is stopped takes some time until it has ended."""
-
-    def when_free(self, call: Callable[[], object]) -> None:
-        """Calls once it is at no task, at once or later."""
-
-
-W = TypeVar("W", bound=Usable)
 
 PATIENCE = 2.0
 """Time [s] that a client without a worker waits, before a client that has several gives one back."""
@@ -48,19 +31,21 @@ class State(Enum):
     """Its request has the worker and must give it back."""
 
 
-class Place(Generic[W]):
+class Place:
     """A request's place in the queue, from its arrival to its answer."""
 
     def __init__(self, client: str) -> None:
         self.client = client
         self.state = State.IDLE
+        self.since = 0.0
+        """When it began to wait, by the monotonic clock [s]."""
         self.gave_back = False
         """Whether it had to give its worker back. Then it waits until its client has no other worker."""
         self.begins_again = False
         """Whether its worker was taken or has died. Then it comes before the others of its client."""
         self.give_back: Callable[[], object] | None = None
         """Has the task end soon. Set while it is in a worker and may be stopped."""
-        self.granted: asyncio.Future[Loan[W]] | None = None
+        self.granted: asyncio.Future[Loan] | None = None
 
     @property
     def waits(self) -> bool:
@@ -68,17 +53,17 @@ class Place(Generic[W]):
         return self.state is State.WAITING and self.granted is not None and not self.granted.done()
 
 
-class Loan(Generic[W]):
+class Loan:
     """A worker that is lent to a place, or to work that can wait (None), until it is given back and at no task."""
 
-    def __init__(self, worker: W, place: Place[W] | None) -> None:
+    def __init__(self, worker: Worker, place: Place | None) -> None:
         self.worker, self.place = worker, place
         self.counts = place is not None
         """Whether it counts as a worker that the place's client has."""
         self.is_returned = False
 
 
-class FairQueue(Generic[W]):
+class FairQueue:
     """Hands workers to those who wait: first to the client that has the fewest, among equals in turn.
 
     `capacity`: most requests in workers and waiting. `share`: most of one client.
@@ -90,13 +75,13 @@ class FairQueue(Generic[W]):
     def __init__(self, capacity: int, share: int) -> None:
         self._capacity, self._share = capacity, share
         self._places: Counter[str] = Counter()
-        self._waiting: dict[str, deque[Place[W]]] = {}
-        self._loans: dict[W, Loan[W] | None] = {}
+        self._waiting: dict[str, deque[Place]] = {}
+        self._loans: dict[Worker, Loan | None] = {}
         self._changed = asyncio.Event()
-        self._suspects: dict[W | Loan[W] | Place[W], str] = {}
+        self._suspects: dict[Worker | Loan | Place, str] = {}
 
     @contextmanager
-    def place(self, client: str) -> Iterator[Place[W]]:
+    def place(self, client: str) -> Iterator[Place]:
         """A place in the queue. Raises TooManyRequests or Busy."""
         if self._places[client] >= self._share:
             raise TooManyRequests
@@ -111,7 +96,7 @@ class FairQueue(Generic[W]):
                 del self._places[client]
 
     @asynccontextmanager
-    async def worker(self, place: Place[W]) -> AsyncIterator[W]:
+    async def worker(self, place: Place) -> AsyncIterator[Worker]:
         """A worker, when it is the place's turn."""
         loan = await self._turn(place)
         place.state = State.WORKING
@@ -122,7 +107,7 @@ class FairQueue(Generic[W]):
             self._return(loan)
 
     @asynccontextmanager
-    async def spare(self) -> AsyncIterator[W]:
+    async def spare(self) -> AsyncIterator[Worker]:
         """A worker that nobody waits for, as soon as there is one."""
         while self._next() is not None or (worker := self._idle_worker()) is None:
             self._changed.clear()
@@ -139,22 +124,39 @@ class FairQueue(Generic[W]):
         return bool(self._waiting)
 
     @property
+    def waiting(self) -> list[Place]:
+        """Places that wait for a worker."""
+        return [place for line in self._waiting.values() for place in line]
+
+    @property
+    def oldest(self) -> float:
+        """Time for which the oldest of them has waited; 0 if none waits [s]."""
+        now = time.monotonic()
+        return max((now - place.since for place in self.waiting), default=0.0)
+
+    @property
+    def busy(self) -> int:
+        """Workers that are at a task."""
+        return sum(loan is not None and loan.worker.alive for loan in self._loans.values())
+
+    @property
     def is_stuck(self) -> bool:
         """Whether a request waits for a worker, and none is at work."""
-        waits = any(place.waits for line in self._waiting.values() for place in line)
-        return waits and not any(loan is not None and loan.worker.alive for loan in self._loans.values())
+        return any(place.waits for place in self.waiting) and not any(
+            loan is not None and loan.worker.alive for loan in self._loans.values()
+        )
 
-    def put(self, worker: W) -> None:
+    def put(self, worker: Worker) -> None:
         """Takes a new worker, which has nothing to do. One that has ended is left out."""
         if worker.alive:
             self._loans[worker] = None
         self._serve()
 
-    def remove(self, worker: W) -> None:
+    def remove(self, worker: Worker) -> None:
         """Forgets a worker that has ended."""
         self._loans.pop(worker, None)
 
-    def mend(self, workers: set[W]) -> list[str]:
+    def mend(self, workers: set[Worker]) -> list[str]:
         """Puts right what can only be wrong by a defect of the queue, and tells it: `workers` are all that are alive.
 
         A worker that the queue does not know is new to it; one that is lent to nobody is idle; one that is idle while a
@@ -171,9 +173,9 @@ class FairQueue(Generic[W]):
             self._serve()
         return found
 
-    def _wrong(self, workers: set[W]) -> dict[W | Loan[W] | Place[W], str]:
+    def _wrong(self, workers: set[Worker]) -> dict[Worker | Loan | Place, str]:
         """What is not as it should be, unless it is under way."""
-        wrong: dict[W | Loan[W] | Place[W], str] = {}
+        wrong: dict[Worker | Loan | Place, str] = {}
         wrong |= dict.fromkeys(workers - self._loans.keys(), "a worker was neither idle nor lent")
         for loan in [each for each in self._loans.values() if each is not None]:
             is_over = loan.is_returned or (loan.place is not None and loan.place.state is State.IDLE)
@@ -183,9 +185,9 @@ class FairQueue(Generic[W]):
             wrong[place] = "a request waited while a worker was idle"
         return wrong
 
-    async def _turn(self, place: Place[W]) -> Loan[W]:
+    async def _turn(self, place: Place) -> Loan:
         loop = asyncio.get_running_loop()
-        place.granted, place.state = loop.create_future(), State.WAITING
+        place.granted, place.state, place.since = loop.create_future(), State.WAITING, time.monotonic()
         line = self._waiting.setdefault(place.client, deque())
         line.insert(0 if place.begins_again else len(line), place)
         self._serve()
@@ -213,22 +215,22 @@ class FairQueue(Generic[W]):
             place.granted.set_result(self._lend(worker, place))
         self._changed.set()
 
-    def _lend(self, worker: W, place: Place[W] | None) -> Loan[W]:
+    def _lend(self, worker: Worker, place: Place | None) -> Loan:
         del self._loans[worker]  # the last of those that are lent
         loan = self._loans[worker] = Loan(worker, place)
         return loan
 
-    def _return(self, loan: Loan[W]) -> None:
+    def _return(self, loan: Loan) -> None:
         """The borrower is done with its worker, which may have to end its task first."""
         loan.is_returned = True
         loan.worker.when_free(lambda: self._take_back(loan))
 
-    def _take_back(self, loan: Loan[W]) -> None:
+    def _take_back(self, loan: Loan) -> None:
         if self._loans.get(loan.worker) is loan:
             del self._loans[loan.worker]  # the last of the idle ones
             self.put(loan.worker)
 
-    def _idle_worker(self) -> W | None:
+    def _idle_worker(self) -> Worker | None:
         return next((worker for worker, loan in self._loans.items() if loan is None and worker.alive), None)
 
     def _working(self) -> Counter[str]:
@@ -236,14 +238,14 @@ class FairQueue(Generic[W]):
         loans = [loan for loan in self._loans.values() if loan is not None and loan.counts and loan.worker.alive]
         return Counter(loan.place.client for loan in loans if loan.place is not None)
 
-    def _next(self) -> Place[W] | None:
+    def _next(self) -> Place | None:
         """Whose turn it is. The order of `_waiting` is that of the turns."""
         working = self._working()
         heads = [next((place for place in line if place.waits), None) for line in self._waiting.values()]
         allowed = [place for place in heads if place and not (place.gave_back and working[place.client])]
         return min(allowed, key=lambda place: working[place.client], default=None)
 
-    def _leave(self, place: Place[W]) -> None:
+    def _leave(self, place: Place) -> None:
         """The place stands in line no longer."""
         line = self._waiting[place.client]
         line.remove(place)
@@ -251,7 +253,7 @@ class FairQueue(Generic[W]):
             del self._waiting[place.client]
         self._changed.set()
 
-    def _claim(self, place: Place[W]) -> None:
+    def _claim(self, place: Place) -> None:
         """Lets the client with the most workers give one back, if it has several and the place's client has none."""
         working = self._working()
         if working[place.client] or not place.waits:

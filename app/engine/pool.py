@@ -11,7 +11,6 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
 
-from joulepath.app.engine.census import Census
 from joulepath.app.engine.fair_queue import FairQueue, Place
 from joulepath.app.engine.forkserver import start_forkserver
 from joulepath.app.engine.result import TaskResult
@@ -40,17 +39,18 @@ class Engine:
     """
 
     def __init__(self, settings: Settings, warm: Callable[[], None]) -> None:
-        self.census = Census()
+        self.restarts = 0
+        """Workers that had to be replaced since the start: they were killed, or ended by themselves."""
         self._settings = settings
         self._warm = warm
-        self._queue: FairQueue[Worker] = FairQueue(
+        self.queue: FairQueue = FairQueue(
             capacity=settings.workers + settings.queue_size, share=settings.client_requests
         )
         self._in_flight: set[asyncio.Timeout] = set()
         self._threads = ThreadPoolExecutor(2 * settings.workers, thread_name_prefix="worker-pipe")
         self._workers: set[Worker] = set()
         self._keepers: list[asyncio.Task[None]] = []
-        self.spare = SpareWorkers(self._queue, self._workers, self.census, settings.deadline_grace)
+        self.spare = SpareWorkers(self.queue, self._workers, settings.deadline_grace)
         self._first_warm = asyncio.Event()
         self._was_ready = False
         self._draining = asyncio.Event()
@@ -70,7 +70,7 @@ class Engine:
     def ready(self) -> bool:
         """Whether all workers have been warm once, one is now, no request waits while none is at work, and the service
         is not stopping."""
-        is_served = self.warm_workers > 0 and not self._queue.is_stuck
+        is_served = self.warm_workers > 0 and not self.queue.is_stuck
         return self._was_ready and is_served and not self._draining.is_set()
 
     @property
@@ -123,7 +123,7 @@ class Engine:
             raise ShuttingDown
         end = asyncio.get_running_loop().time() + deadline
         try:
-            with self._queue.place(client) as place:
+            with self.queue.place(client) as place:
                 async with asyncio.timeout_at(end) as limit:
                     self._in_flight.add(limit)
                     try:
@@ -134,15 +134,14 @@ class Engine:
             raise (ShuttingDown() if self._draining.is_set() else DeadlineExceeded([])) from None
 
     async def _run_in_worker(
-        self, task: Task, end: float, limit: asyncio.Timeout, place: Place[Worker], tell: Tell
+        self, task: Task, end: float, limit: asyncio.Timeout, place: Place, tell: Tell
     ) -> TaskResult:
         deaths = 0
         while True:
             limit.reschedule(min(end, self._latest_end))
             async with AsyncExitStack() as turn:
-                with self.census.waits(), self.spare.someone_waits():
-                    worker = await turn.enter_async_context(self._queue.worker(place))
-                turn.enter_context(self.census.works())
+                with self.spare.someone_waits():
+                    worker = await turn.enter_async_context(self.queue.worker(place))
                 # the optimiser watches the deadline and returns its best motion: the grace is for that
                 limit.reschedule(min(end + self._settings.deadline_grace, self._latest_end))
                 left = end - asyncio.get_running_loop().time()
@@ -185,19 +184,19 @@ class Engine:
             self._has_warmed(worker)
             await worker.ended.wait()
             self._workers.discard(worker)
-            self._queue.remove(worker)
-            self.census.restarts += 1
+            self.queue.remove(worker)
+            self.restarts += 1
 
     async def _check(self) -> None:
         """Mends what a defect of the queue has broken, so that it costs no worker."""
         while True:
             await asyncio.sleep(_CHECK_PERIOD)
-            for fault in self._queue.mend({worker for worker in self._workers if worker.alive}):
+            for fault in self.queue.mend({worker for worker in self._workers if worker.alive}):
                 logger.error("mended the queue", extra={"fault": fault})
 
     def _has_warmed(self, worker: Worker) -> None:
         self._workers.add(worker)
-        self._queue.put(worker)
+        self.queue.put(worker)
         self._first_warm.set()
         logger.info("worker warm", extra={"pid": worker.pid})
         if not self._was_ready and self.warm_workers == self._settings.workers:

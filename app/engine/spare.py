@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from joulepath.app.engine.census import Census
 from joulepath.app.engine.fair_queue import PATIENCE, FairQueue
 from joulepath.app.engine.work import Ended, Take, Work
 from joulepath.app.engine.worker import Worker
@@ -45,8 +44,8 @@ class _Run:
 class SpareWorkers:
     """Lends idle workers of an engine. `grace` [s] is the time after a deadline at which a work is stopped."""
 
-    def __init__(self, queue: FairQueue[Worker], workers: set[Worker], census: Census, grace: float) -> None:
-        self._queue, self._workers, self._census, self._grace = queue, workers, census, grace
+    def __init__(self, queue: FairQueue, workers: set[Worker], grace: float) -> None:
+        self._queue, self._workers, self._grace = queue, workers, grace
         self._runs: dict[Worker, _Run] = {}
 
     async def run(self, take: Take) -> None:
@@ -79,9 +78,8 @@ class SpareWorkers:
             return None if self._queue.someone_waits else take()
 
         try:
-            with self._census.works():
-                async with asyncio.timeout(first.deadline + self._grace) as limit:
-                    await worker.ask_all(first, following, turn)
+            async with asyncio.timeout(first.deadline + self._grace) as limit:
+                await worker.ask_all(first, following, turn)
         except TimeoutError:
             run.end(DeadlineExceeded([]))
         except (WorkerDied, Preempted) as error:

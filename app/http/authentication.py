@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 from starlette.requests import Request
@@ -16,29 +15,25 @@ SCHEME = "Bearer"
 REALM = "joulepath"
 
 
-def authenticated(keys: KeyRing) -> Callable[[Request], None]:
-    """A check of the header Authorization, which puts the key's name and role into the request's client.
+def authenticate(request: Request, keys: KeyRing) -> None:
+    """Checks the header Authorization, and puts the key's name and role into the request's client.
 
-    It raises NoKey, WrongKey or RoleTooLow.
+    Raises NoKey, WrongKey or RoleTooLow.
     """
-
-    def check(request: Request) -> None:
-        # without a key, a client may read at most
-        client = request.state.client = replace(client_of(request), role="read")
-        needed = needed_role(request.method, request.scope["path"])
-        if needed is None:
-            return
-        given = request.headers.getlist("authorization")
-        scheme, _, secret = given[0].partition(" ") if len(given) == 1 else ("", "", "")
-        if scheme.lower() != SCHEME.lower() or not secret.strip():
-            raise NoKey
-        key = keys.find(secret.strip())
-        if key is None:
-            raise WrongKey
-        client = request.state.client = replace(client, key=key.name, role=key.role)
-        check_role(client, needed)
-
-    return check
+    # without a key, a client may read at most
+    client = request.state.client = replace(client_of(request), role="read")
+    needed = needed_role(request.method, request.scope["path"])
+    if needed is None:
+        return
+    given = request.headers.getlist("authorization")
+    scheme, _, secret = given[0].partition(" ") if len(given) == 1 else ("", "", "")
+    if scheme.lower() != SCHEME.lower() or not secret.strip():
+        raise NoKey
+    key = keys.find(secret.strip())
+    if key is None:
+        raise WrongKey
+    client = request.state.client = replace(client, key=key.name, role=key.role)
+    check_role(client, needed)
 
 
 def challenge(error: NoKey) -> str:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address
+from ipaddress import IPv4Network, IPv6Network
 from typing import Literal
 
 from starlette.datastructures import Headers
 from starlette.requests import HTTPConnection
 from starlette.types import Scope
 
-from joulepath.app.access.client import Client
+from joulepath.app.access.client import Address, Client, address_of
 
-Address = IPv4Address | IPv6Address
 ProxyHeader = Literal["X-Forwarded-For", "Forwarded"]
 
 _NOBODY = "unknown"
@@ -62,9 +61,4 @@ def _address(text: str) -> Address | None:
         text = text[1:].partition("]")[0]
     elif text.count(":") == 1:
         text = text.partition(":")[0]
-    try:
-        parsed = ip_address(text)
-    except ValueError:
-        return None
-    # a socket for both families shows IPv4 peers as IPv6
-    return (parsed.ipv4_mapped or parsed) if isinstance(parsed, IPv6Address) else parsed
+    return address_of(text)

@@ -1,99 +1,87 @@
-"""Compresses answers by `Accept-Encoding`.
+"""Compression of answers by `Accept-Encoding` (RFC 9110, section 12.5.3).
 
-Starlette's own middleware ignores weights and compresses in the event loop, which an answer of megabytes would hold up.
+Starlette's own middleware ignores the weights, knows no zstd, and leaves a strong entity tag as it
+is.
 """
 
 from __future__ import annotations
 
 import asyncio
 import gzip
-from collections.abc import Mapping
-from functools import lru_cache
+from dataclasses import dataclass
+from typing import Literal
 
 import zstandard
-from starlette.datastructures import Headers, MutableHeaders
-from starlette.requests import Request
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.datastructures import MutableHeaders
+from starlette.types import Message
 
 from joulepath.app.exceptions import NotAcceptable
-from joulepath.app.http.accept_encoding import Coding, preferred
-from joulepath.app.http.handlers import problem_response
+from joulepath.app.http.weights import weights
 
-_LEAST = 1024
-"""Smaller bodies [byte] fit into one packet anyway."""
-_INSTANT = 1 << 15
-"""Bodies below this size [byte] are compressed in less time than it takes to pass them to a thread."""
-_LEVELS = {"zstd": 3, "gzip": 5}
-_FILE_LEVELS = {"zstd": 12, "gzip": 9}
-"""Of files, which have an entity tag: they are compressed once and sent often."""
-_MOST_FILES = 64
-_COMPRESSIBLE = ("text/", "application/json", "application/problem+json", "application/javascript", "model/")
-_STREAM = "text/event-stream"
+Coding = Literal["zstd", "gzip", "identity"]
 
 
+@dataclass(frozen=True)
 class Compression:
-    """ASGI middleware: compresses answers that are sent as a whole. Streams pass unchanged, event by event.
+    """What is compressed, and how."""
 
-    A header that allows no coding that the service has is the problem `not-acceptable`, before anything is computed.
-    """
+    offered: tuple[Coding, ...] = ("zstd", "gzip")
+    """In the order in which equal weights are decided."""
+    zstd_level: int = 3
+    gzip_level: int = 5
+    least: int = 1024
+    """Smaller bodies fit into one packet anyway [byte]."""
+    instant: int = 1 << 15
+    """Smaller bodies are compressed in less time than it takes to pass them to a thread [byte]."""
+    kinds: tuple[str, ...] = (
+        "text/",
+        "application/json",
+        "application/problem+json",
+        "application/javascript",
+        "model/",
+    )
+    """Beginnings of the media types that are compressed."""
 
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
+    def preferred(self, header: str) -> Coding:
+        """The coding of greatest weight, `identity` for none. A malformed member of the header is
+        passed over.
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes the request on, and its answer back compressed."""
-        if scope["type"] != "http":
-            await self._app(scope, receive, send)
-            return
-        given = Headers(scope=scope).getlist("accept-encoding")
-        coding = preferred(",".join(given))
-        if coding is None:
-            response = await problem_response(Request(scope), NotAcceptable())
-            await response(scope, receive, send)
-            return
-        start: Message | None = None
+        Raises NotAcceptable if the header allows no coding that is offered.
+        """
+        given = {{"x-gzip": "gzip"}.get(name, name): weight for name, weight in weights(header).items()}
+        anything = given.get("*")
+        # no coding is allowed unless it is excluded, and the least wanted unless it is named
+        plain = given.get("identity", 0.0 if anything == 0 else None)
+        wanted = {coding: given.get(coding, anything or 0.0) for coding in self.offered}
+        best = max(self.offered, key=wanted.__getitem__)
+        if wanted[best] > 0 and (plain is None or plain <= wanted[best]):
+            return best
+        if plain == 0:
+            raise NotAcceptable
+        return "identity"
 
-        async def compressed(message: Message) -> None:
-            nonlocal start
-            if message["type"] == "http.response.start":
-                start = message
-                return
-            if start is not None:
-                begun, start = start, None
-                message = await _encoded(begun, message, coding)
-                await send(begun)
-            await send(message)
+    async def encoded(self, start: Message, first: Message, coding: Coding) -> Message:
+        """The first message of a body, compressed if it is the whole body, and in `start` the
+        headers that fit it.
+        """
+        headers = MutableHeaders(scope=start)
+        if not headers.get("content-type", "").startswith(self.kinds) or "content-encoding" in headers:
+            return first
+        headers.add_vary_header("Accept-Encoding")
+        body: bytes = first.get("body", b"")
+        if coding == "identity" or first.get("more_body", False) or len(body) < self.least:
+            return first
+        if len(body) < self.instant:
+            body = self._compressed(body, coding)
+        else:
+            body = await asyncio.to_thread(self._compressed, body, coding)
+        headers["Content-Encoding"] = coding
+        headers["Content-Length"] = str(len(body))
+        if headers.get("etag", "").startswith('"'):  # the same answer, but not the same bytes
+            headers["ETag"] = f"W/{headers['etag']}"
+        return {**first, "body": body}
 
-        await self._app(scope, receive, compressed)
-
-
-async def _encoded(start: Message, message: Message, coding: Coding) -> Message:
-    """The first message of a body, and in `start` the headers that fit it."""
-    headers = MutableHeaders(scope=start)
-    kind = headers.get("content-type", "")
-    if not kind.startswith(_COMPRESSIBLE) or kind.startswith(_STREAM) or "content-encoding" in headers:
-        return message
-    headers.add_vary_header("Accept-Encoding")
-    body: bytes = message.get("body", b"")
-    if coding == "identity" or message.get("more_body", False) or len(body) < _LEAST:
-        return message
-    compress = _compressed_file if "etag" in headers else _compress
-    body = compress(body, coding) if len(body) < _INSTANT else await asyncio.to_thread(compress, body, coding)
-    headers["Content-Encoding"] = coding
-    headers["Content-Length"] = str(len(body))
-    if headers.get("etag", "").startswith('"'):
-        # the same answer, but not the same bytes
-        headers["ETag"] = f"W/{headers['etag']}"
-    return {**message, "body": body}
-
-
-@lru_cache(_MOST_FILES)
-def _compressed_file(body: bytes, coding: Coding) -> bytes:
-    return _compress(body, coding, _FILE_LEVELS)
-
-
-def _compress(body: bytes, coding: Coding, levels: Mapping[str, int] = _LEVELS) -> bytes:
-    if coding == "zstd":
-        # a compressor may not be shared by threads
-        return zstandard.ZstdCompressor(level=levels[coding]).compress(body)
-    return gzip.compress(body, levels[coding], mtime=0)
+    def _compressed(self, body: bytes, coding: Coding) -> bytes:
+        if coding == "zstd":  # a compressor may not be shared by threads
+            return zstandard.ZstdCompressor(level=self.zstd_level).compress(body)
+        return gzip.compress(body, self.gzip_level, mtime=0)

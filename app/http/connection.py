@@ -1,7 +1,9 @@
-"""uvicorn's HTTP protocol with ceilings: on connections, and on the bytes and the time of what they carry.
+"""Connections below HTTP: how many there may be, and how long each may take to send a head and to
+read an answer.
 
-uvicorn waits for ever for a head, for a body, and for a client that does not read its answer. Here the server calls
-`Connection.check` every half second, which ends what takes too long.
+uvicorn's protocol on h11 bounds the size of a head and takes one request of a connection at a time,
+but it waits for ever for a head, and for a client that does not read its answer. `Connection`
+stands between it and the socket.
 """
 
 from __future__ import annotations
@@ -11,286 +13,205 @@ import contextlib
 import logging
 import socket
 import struct
+import sys
 import uuid
-from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from http import HTTPStatus
-from ipaddress import IPv4Network, IPv6Network, ip_address
-from typing import Any, ClassVar
+from typing import Any, cast
 
-import httptools
-from uvicorn._types import ASGI3Application
-from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
+import h11
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from joulepath.app.access.client import Client
+from joulepath.app.access.client import Client, address_of
 from joulepath.app.engine.result import json_document
 from joulepath.app.exceptions import (
     HeadTooLarge,
     MalformedHttp,
     RequestTimeout,
     ServiceError,
-    ShuttingDown,
     TooManyConnections,
     TooManyConnectionsOfClient,
 )
 from joulepath.app.http.handlers import PROBLEM_MEDIA_TYPE
 from joulepath.app.http.problem_details import problem_content, problem_type
+from joulepath.app.settings import Settings
 
 logger = logging.getLogger("app.connection")
 
-_NO_LINGER = struct.pack("ii", 1, 0)
-_LINGER = 1.0
-"""Time [s] in which a refused client may read why. What it still sends is thrown away."""
-_MOST_DISCARDED = 1 << 23
-"""Most bytes of that."""
-_MOST_AHEAD = 16
-"""Most requests that a client may send on one connection before it is answered (pipelining)."""
-_BODY_SLACK = 2.0
-"""Time [s] after which a body is cut that nobody reads; one that a route reads has been answered by then."""
+_RESET = struct.pack("ii", 1, 0)
+"""The socket option that throws away what the client has not read."""
 
 
 @dataclass(frozen=True)
-class Ceilings:
-    """Limits of connections, and the connections that there are.
+class Connections:
+    """The open connections of a service, and their ceilings."""
 
-    `head_time`, `body_time`: for a whole head, a whole body [s]. `write_time`: for the next 64 KiB of an answer [s].
+    settings: Settings
+    linger: float = 1.0
+    """Time for which the connection of a refused client stays open, so that it can read the reason
+    [s].
+
+    What it still sends is thrown away. If the connection were closed at once, these bytes would
+    reset it.
+    """
+    most_discarded: int = 1 << 23
+    """Bytes after which the connection of a refused client is reset before that."""
+    open: set[Connection] = field(default_factory=set)
+
+    def refusal(self, connection: Connection) -> ServiceError | None:
+        """The error for one connection too many; None within the ceilings."""
+        if len(self.open) > self.settings.max_connections:
+            return TooManyConnections()
+        if sum(each.peer == connection.peer for each in self.open) <= self.settings.client_connections:
+            return None
+        address = address_of(connection.client.address)
+        is_proxy = address is not None and any(address in network for network in self.settings.trusted_proxies)
+        return None if is_proxy else TooManyConnectionsOfClient()
+
+    def reset(self) -> None:
+        """Ends all connections at once."""
+        for connection in list(self.open):
+            connection.reset()
+
+
+class Connection(asyncio.Protocol):
+    """One connection of a client. As a context manager, it has a request in hand, and does not wait
+    for a head.
+
+    Args:
+        connections: all connections of the service.
+        app_state: state of the application, as uvicorn gives it to its protocols. The state of every request is a copy
+            of it, with the connection added.
+        given: further arguments for uvicorn's protocol.
     """
 
-    connections: int
-    connections_of_client: int
-    head_bytes: int
-    head_time: float
-    body_time: float
-    write_time: float
-    proxies: Sequence[IPv4Network | IPv6Network] = ()
-    """Addresses that many clients share: only the limit in all counts for them."""
-    open: Counter[str] = field(default_factory=Counter)
-    """Number of open connections by client."""
-
-    def refusal(self, peer: str) -> ServiceError | None:
-        """Why one more connection is refused; None if it is not."""
-        if self.open.total() > self.connections:
-            return TooManyConnections()
-        if self.open[peer] > self.connections_of_client and not self._is_proxy(peer):
-            return TooManyConnectionsOfClient()
-        return None
-
-    def _is_proxy(self, peer: str) -> bool:
-        try:
-            return any(ip_address(peer) in network for network in self.proxies)
-        except ValueError:  # a network of IPv6, or no address
-            return False
-
-
-class Connection(HttpToolsProtocol):
-    """One connection of a client."""
-
-    ceilings: ClassVar[Ceilings]
+    def __init__(self, connections: Connections, app_state: dict[str, Any], **given: Any) -> None:
+        self._connections, self._settings = connections, connections.settings
+        self.inner = H11Protocol(app_state={**app_state, "connection": self}, **given)
+        self.is_refused = False
+        self._in_hand = self._discarded = 0
+        self._loop = asyncio.get_running_loop()
+        self._until = self._read_until = self._loop.call_later(self._settings.head_timeout, self._miss_head)
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Refuses the connection above a ceiling."""
-        super().connection_made(transport)
-        self._refused_at: float | None = None
-        self._head_at: float | None = self.loop.time()
-        self._body_at: float | None = None
-        self._blocked_at: float | None = None
-        self._closing_at: float | None = None
-        self._unparsed = self._head = self._discarded = 0
-        self._running: RequestResponseCycle | None = None
-        self._peer = Client(self.client[0] if self.client else "unknown").name
-        self.ceilings.open[self._peer] += 1
-        refusal = self.ceilings.refusal(self._peer)
-        if refusal is not None:
-            # those that are being refused count, too: beyond as many again, nobody is told why
-            if self.ceilings.open.total() > 2 * self.ceilings.connections:
-                self._refused_at = self.loop.time()
-                self.reset()
-            else:
-                self._refuse(refusal)
+        self.transport = transport
+        self.client = Client((transport.get_extra_info("peername") or ["unknown"])[0])
+        self.peer = self.client.name
+        self._connections.open.add(self)
+        self.inner.connection_made(cast(asyncio.Transport, _Wire(self)))
+        if refusal := self._connections.refusal(self):
+            self.refuse(refusal)
+        # refused connections count, too: beyond as many again, nobody is told the reason
+        if len(self._connections.open) > 2 * self._settings.max_connections:
+            self.reset()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Frees the connection's place."""
-        self.ceilings.open[self._peer] -= 1
-        if not self.ceilings.open[self._peer]:
-            del self.ceilings.open[self._peer]
-        self.pipeline.clear()
-        self._disconnect(self._unanswered)  # uvicorn tells the newest request only
-        super().connection_lost(exc)
+        self._connections.open.discard(self)
+        self._until.cancel()
+        self._read_until.cancel()
+        if not self.is_refused:
+            self.inner.connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """Feeds the parser, unless the connection is refused."""
-        if self._refused_at is not None:
+        """Passes bytes on, unless the connection is refused."""
+        if self.is_refused:
             self._discarded += len(data)
-            if self._discarded > _MOST_DISCARDED:
+            if self._discarded > self._connections.most_discarded:
                 self.reset()
             return
-        if self._head_at is None and self._body_at is None and self._unanswered is None:
-            self._head_at = self.loop.time()  # empty lines before a head are part of it
-        self._unparsed += len(data)
-        self._unset_keepalive_if_required()
-        self._feed(data)
-        if self._head_at is None and self._body_at is None:
-            self._unparsed = 0
-        elif self._unparsed > self.ceilings.head_bytes:
-            self._refuse(HeadTooLarge(self.ceilings.head_bytes))
-
-    def _feed(self, data: bytes) -> None:
-        """Has bytes parsed. What is no HTTP is refused.
-
-        An offer to speak another protocol, as curl's `--http2` and Java's client make it, is passed over. The parser
-        takes no body after it: the request is parsed again without the offer.
-        """
         try:
-            self.parser.feed_data(data)
-        except httptools.HttpParserError:
-            self._refuse(MalformedHttp())
-        except httptools.HttpParserUpgrade as offer:
-            method, version = self.parser.get_method(), self.parser.get_http_version().encode()
-            if self._refused_at is not None or method == b"CONNECT":
-                self._refuse(MalformedHttp())
-                return
-            line = b"%s %s HTTP/%s" % (method, self.url, version)
-            kept = [b"%s: %s" % each for each in self.headers if each[0] != b"upgrade"]
-            self.parser = httptools.HttpRequestParser(self)
-            self.parser.set_dangerous_leniencies(lenient_data_after_close=True)  # as uvicorn does
-            self._feed(b"\r\n".join([line, *kept, b"", data[offer.args[0] :]]))
-
-    def on_message_begin(self) -> None:
-        """A head begins; that of a further request may come before the answer."""
-        self._head = 0
-        if self._head_at is None:
-            self._head_at, self._unparsed = self.loop.time(), 0
-        super().on_message_begin()
-
-    def on_url(self, url: bytes) -> None:
-        """Counts the bytes of the head."""
-        self._head += len(url)
-        super().on_url(url)
-
-    def on_header(self, name: bytes, value: bytes) -> None:
-        """Counts the bytes of the head, with `: ` and the end of the line; keeps none above the ceiling."""
-        self._head += len(name) + len(value) + 4
-        if self._head <= self.ceilings.head_bytes:
-            super().on_header(name, value)
-
-    def on_headers_complete(self) -> None:
-        """The head is complete, the body begins."""
-        if self._head > self.ceilings.head_bytes:
-            self._refuse(HeadTooLarge(self.ceilings.head_bytes))
-        elif len(self.pipeline) >= _MOST_AHEAD:
-            self._refuse(TooManyConnectionsOfClient())
-        if self._refused_at is None and not self.parser.should_upgrade():
-            self._head_at, self._body_at = None, self.loop.time()
-            super().on_headers_complete()
-
-    def on_body(self, body: bytes) -> None:
-        """Passes a part of the body on. What comes after it, as trailers, has the ceiling of a head."""
-        self._unparsed = 0
-        if self._refused_at is None:
-            super().on_body(body)
-
-    def on_message_complete(self) -> None:
-        """The request has been received."""
-        if self._refused_at is None and not self.parser.should_upgrade():
-            self._body_at = None
-            super().on_message_complete()
+            self.inner.data_received(data)
+        except h11.ProtocolError:  # of a body whose answer has begun
+            self.reset()
 
     def pause_writing(self) -> None:
         """The client does not read as fast as it is answered."""
-        self._blocked_at = self.loop.time()
-        super().pause_writing()
+        self._read_until = self._loop.call_later(self._settings.write_timeout, self.reset)
+        self.inner.pause_writing()
 
     def resume_writing(self) -> None:
         """The client has read."""
-        self._blocked_at = None
-        super().resume_writing()
+        self._read_until.cancel()
+        self.inner.resume_writing()
 
-    def shutdown(self) -> None:
-        """Refuses a request that is still being sent, and closes the connection after an answer that is on its way."""
-        cycle = self._unanswered
-        if self._body_at is not None and cycle is self.cycle and not cycle.response_started:
-            self._refuse(ShuttingDown())
-        else:
-            super().shutdown()
+    def __enter__(self) -> None:
+        self._in_hand += 1
+        self._until.cancel()
+
+    def __exit__(self, *_: object) -> None:
+        self._in_hand -= 1
+        if not self._in_hand:
+            # uvicorn closes an idle connection before that, but not one on which half a head arrives
+            self._end_after(max(self._settings.head_timeout, self._settings.write_timeout))
+
+    def refuse(self, error: ServiceError) -> None:
+        """Answers with a problem, and ends the connection."""
+        if self.is_refused or self.transport.is_closing():
+            return
+        logger.info("refused", extra={"client": self.peer, "reason": type(error).__name__})
+        self.is_refused = True
+        self._loop.call_soon(self.inner.connection_lost, None)
+        self.transport.resume_reading()
+        self.transport.write(_response(error))
+        self.transport.write_eof()
+        self._end_after(self._connections.linger)
+
+    def close(self) -> None:
+        """Closes the connection as soon as the client has read everything, within its time for
+        that.
+        """
+        if not (self.is_refused or self.transport.is_closing()):
+            self.transport.close()
+            self._end_after(self._settings.write_timeout)
 
     def reset(self) -> None:
         """Ends the connection at once. The kernel, too, throws away what was not read."""
         with contextlib.suppress(OSError):  # it has just ended by itself
-            self.transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_LINGER)
+            self.transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
         self.transport.abort()
 
-    def check(self) -> None:
-        """Ends the connection if its client takes too long for anything."""
-        limits = self.ceilings
-        if self.transport.is_closing() and self._closing_at is None:
-            self._closing_at = self.loop.time()
-        if (
-            self._over(self._refused_at, _LINGER)
-            or self._over(self._blocked_at, limits.write_time)
-            or self._over(self._closing_at, limits.write_time)
-        ):
-            self.reset()
-        elif self._refused_at is not None:
-            pass
-        elif self._over(self._head_at, limits.head_time):
-            self._refuse(RequestTimeout(limits.head_time))
-        elif self._over(self._body_at, limits.body_time + _BODY_SLACK):
-            self._refuse(RequestTimeout(limits.body_time))
+    def _end_after(self, time: float) -> None:
+        self._until.cancel()
+        self._until = self._loop.call_later(time, self.reset)
 
-    def _start_asgi_task(self, cycle: RequestResponseCycle, app: ASGI3Application) -> None:
-        self._running = cycle
-        super()._start_asgi_task(cycle, app)
+    def _miss_head(self) -> None:
+        self.refuse(RequestTimeout(self._settings.head_timeout))
 
-    @staticmethod
-    def _disconnect(cycle: RequestResponseCycle | None) -> None:
-        """Tells a request that its client is gone."""
-        if cycle is not None:
-            cycle.disconnected = True
-            cycle.message_event.set()
 
-    @property
-    def _unanswered(self) -> RequestResponseCycle | None:
-        """The request that is being worked on. Further ones may wait behind it."""
-        return None if self._running is None or self._running.response_complete else self._running
+class _Wire:
+    """The transport of a connection, as uvicorn's protocol has it."""
 
-    def _over(self, began: float | None, time: float) -> bool:
-        return began is not None and self.loop.time() - began >= time
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self.close = connection.close
 
-    def _refuse(self, error: ServiceError) -> None:
-        """Answers with a problem, unless an answer has begun, and ends the connection.
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._connection.transport, name)
 
-        Closed at once, the connection would be reset by what the client still sends, and it would not read the answer.
-        """
-        if self._refused_at is not None or self.transport.is_closing():
-            return
-        self._refused_at = self.loop.time()
-        self._unset_keepalive_if_required()
-        logger.info("refused", extra={"client": self._peer, "reason": type(error).__name__})
-        cycle = self._unanswered
-        if cycle is not None:
-            self._disconnect(cycle)
-            if cycle.response_started or self.pipeline:
-                self.reset()
-                return
-        self.flow.resume_reading()
-        self.transport.write(_response(error))
-        self.transport.write_eof()
+    def write(self, data: bytes) -> None:
+        """Sends bytes. uvicorn's answer in plain text to a malformed request becomes a problem."""
+        error = sys.exception()
+        if isinstance(error, h11.RemoteProtocolError):
+            is_large = error.error_status_hint == HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE
+            most = self._connection.inner.config.h11_max_incomplete_event_size or 0
+            self._connection.refuse(HeadTooLarge(most) if is_large else MalformedHttp())
+        elif not self._connection.is_refused:
+            self._connection.transport.write(data)
 
 
 def _response(error: ServiceError) -> bytes:
     """A whole response with a problem, after which the connection is closed."""
-    problem = problem_type(error)
+    problem, request_id = problem_type(error), str(uuid.uuid4())
     status = HTTPStatus(problem.model_fields["status"].default)
-    request_id = str(uuid.uuid4())
     body = json_document(problem_content(error, request_id))
-    headers: dict[str, Any] = {
-        "Content-Type": PROBLEM_MEDIA_TYPE,
-        "Content-Length": len(body),
-        "X-Request-ID": request_id,
-        "Connection": "close",
-    }
-    if problem.retry_after is not None:
-        headers["Retry-After"] = problem.retry_after
-    lines = [f"HTTP/1.1 {status} {status.phrase}", *(f"{name}: {value}" for name, value in headers.items()), "", ""]
-    return "\r\n".join(lines).encode() + body
+    lines = [
+        f"HTTP/1.1 {status} {status.phrase}",
+        f"Content-Type: {PROBLEM_MEDIA_TYPE}",
+        f"Content-Length: {len(body)}",
+        f"X-Request-ID: {request_id}",
+        "Connection: close",
+        *([] if problem.retry_after is None else [f"Retry-After: {problem.retry_after}"]),
+    ]
+    return "\r\n".join([*lines, "", ""]).encode() + body

@@ -18,7 +18,7 @@ async def unless_disconnected(request: Request, work: Coroutine[Any, Any, T]) ->
 
     The body of the request must have been read.
     """
-    working, listening = asyncio.create_task(work), asyncio.create_task(disconnected(request))
+    working, listening = asyncio.create_task(work), asyncio.create_task(_disconnected(request))
     try:
         await asyncio.wait({working, listening}, return_when=asyncio.FIRST_COMPLETED)
         if working.done():
@@ -30,7 +30,7 @@ async def unless_disconnected(request: Request, work: Coroutine[Any, Any, T]) ->
         await asyncio.gather(working, listening, return_exceptions=True)
 
 
-async def disconnected(request: Request) -> None:
+async def _disconnected(request: Request) -> None:
     """Returns when the client closes the connection. The body of the request must have been read."""
     # the body has been read: the next message is the end of the connection
     while (await request.receive())["type"] != "http.disconnect":

@@ -15,8 +15,8 @@ from starlette.types import Message, Receive, Scope, Send
 
 from joulepath.app.convert.progress import to_event
 from joulepath.app.engine.result import TaskResult, json_document
-from joulepath.app.exceptions import ClientDisconnected, ServiceError, TooManyBytes, TooManyBytesOfClient
-from joulepath.app.http.disconnect import disconnected
+from joulepath.app.exceptions import ServiceError
+from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import problem_response
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.progress import Event, Tell, forward
@@ -49,6 +49,9 @@ class EventStream(StreamingResponse):
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Sends the events. Raises ClientDisconnected, and what the work raises before the first event."""
+        await unless_disconnected(self._request, self._answer(send))
+
+    async def _answer(self, send: Send) -> None:
         waiting: deque[Event] = deque(maxlen=_MOST_WAITING)
         bell = asyncio.Event()
 
@@ -58,22 +61,17 @@ class EventStream(StreamingResponse):
 
         # a request that gave its worker back begins again: its client need not know
         working = asyncio.create_task(self._work(forward(told)))
-        leaving = asyncio.create_task(disconnected(self._request))
-        for task in (working, leaving):
-            task.add_done_callback(lambda _: bell.set())
+        working.add_done_callback(lambda _: bell.set())
         try:
             while not working.done() or waiting:
                 await self._rung(bell, send)
-                if leaving.done():
-                    raise ClientDisconnected
                 while waiting:
                     name, content = to_event(waiting.popleft())
                     await self._send(send, name, json_document(content))
             await self._conclude(working, send)
         finally:
             working.cancel()
-            leaving.cancel()
-            await asyncio.gather(working, leaving, return_exceptions=True)
+            await asyncio.gather(working, return_exceptions=True)
 
     async def _rung(self, bell: asyncio.Event, send: Send) -> None:
         """Waits until the bell rings, and silences it."""
@@ -89,18 +87,14 @@ class EventStream(StreamingResponse):
         """Sends the last event."""
         try:
             await self._send(send, "answer", working.result().document)
-        except (TooManyBytes, TooManyBytesOfClient) as error:
-            await self._fail(error, send)
         except Exception as error:
             if not self._begun:
                 raise
             if not isinstance(error, JoulepathError | ServiceError):
                 logger.exception("unforeseen error", extra={"request_id": self._request.state.id})
-            await self._fail(error, send)
+            response = await problem_response(self._request, error)
+            await self._send(send, "problem", bytes(response.body))
         await send({"type": "http.response.body", "body": b"", "more_body": False})
-
-    async def _fail(self, error: Exception, send: Send) -> None:
-        await self._send(send, "problem", bytes((await problem_response(self._request, error)).body))
 
     async def _send(self, send: Send, name: str, document: bytes) -> None:
         if not self._begun:

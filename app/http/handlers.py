@@ -11,7 +11,6 @@ from starlette.routing import Match
 
 from joulepath.app.engine.result import TaskResult, json_document
 from joulepath.app.exceptions import (
-    BodyTooLarge,
     InvalidRequest,
     MethodNotAllowed,
     NoKey,
@@ -21,7 +20,6 @@ from joulepath.app.exceptions import (
 )
 from joulepath.app.http.authentication import challenge
 from joulepath.app.http.problem_details import invalid_request, problem_content, problem_type
-from joulepath.app.http.refused_body import RefusedBody
 from joulepath.optimizer.exceptions import JoulepathError
 
 CACHE_HEADER = "Joulepath-Cache"
@@ -87,10 +85,10 @@ def _allowed(request: Request) -> list[str]:
 
 def _from_framework(error: HTTPException) -> Exception:
     """The service's error for one of the framework."""
-    if isinstance(error, RefusedBody):
-        return error.error
+    if isinstance(error.__cause__, ServiceError):  # it was raised while the body was read
+        return error.__cause__
     if error.status_code == 400:  # the body could not be read: not UTF-8, nested too deep, ...
         return InvalidRequest([{"loc": ["body"], "msg": "The body cannot be read as JSON"}])
-    errors: dict[int, type[ServiceError]] = {404: NotFound, 405: MethodNotAllowed, 413: BodyTooLarge}
+    errors: dict[int, type[ServiceError]] = {404: NotFound, 405: MethodNotAllowed}
     kind = errors.get(error.status_code)
     return error if kind is None else kind()

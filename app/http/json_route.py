@@ -7,10 +7,15 @@ from typing import Any
 
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
+from starlette.datastructures import Headers, MutableHeaders
 
 from joulepath.app.convert.json_text import parsed_json
-from joulepath.app.exceptions import InvalidRequest
-from joulepath.app.http.refused_body import RefusedBody
+from joulepath.app.http.weights import JSON
+
+UNDECLARED = ("", "application/x-www-form-urlencoded", "text/plain")
+"""Media types of clients that were told nothing: curl's `-d @file` declares a form, some clients
+plain text.
+"""
 
 
 class JsonRequest(Request):
@@ -32,16 +37,26 @@ class JsonRequest(Request):
         return self._whole
 
     async def json(self) -> Any:
-        """The body. Raises RefusedBody."""
-        try:
-            return parsed_json(await self.body())
-        except InvalidRequest as error:
-            raise RefusedBody(error) from None
+        """The body. Raises InvalidRequest."""
+        return parsed_json(await self.body())
 
 
 def strictly(request: Request) -> JsonRequest:
-    """The same request, read strictly. Its body must not have been read, unless it is one already."""
-    return request if isinstance(request, JsonRequest) else JsonRequest(request.scope, request.receive)
+    """The same request, read strictly. Its body must not have been read, unless it is one already.
+
+    A body of one of the types `UNDECLARED` becomes JSON: no JSON route takes forms or plain text.
+    """
+    if isinstance(request, JsonRequest):
+        return request
+    headers = MutableHeaders(scope=request.scope)
+    if media_type(headers) in UNDECLARED:
+        headers["content-type"] = JSON
+    return JsonRequest(request.scope, request.receive)
+
+
+def media_type(headers: Headers) -> str:
+    """The media type of the body as it is declared, in small letters and without parameters."""
+    return headers.get("content-type", "").partition(";")[0].strip().lower()
 
 
 class JsonRoute(APIRoute):

@@ -9,7 +9,6 @@ from prometheus_client import CollectorRegistry, Counter, Histogram, ProcessColl
 from prometheus_client.exposition import choose_encoder
 from prometheus_client.metrics_core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
-from starlette.types import ASGIApp, Receive, Scope, Send
 
 from joulepath.app.engine.pool import Engine
 
@@ -68,30 +67,17 @@ class _Now(Collector):
 
     def collect(self) -> Iterator[Metric]:
         """One sample each."""
-        census = self._engine.census
+        queue = self._engine.queue
         gauges = {
-            "joulepath_queue_length": ("Requests that wait for a worker.", census.waiting),
-            "joulepath_queue_oldest_seconds": ("Time for which the oldest of them has waited.", census.oldest),
+            "joulepath_queue_length": ("Requests that wait for a worker.", len(queue.waiting)),
+            "joulepath_queue_oldest_seconds": ("Time for which the oldest of them has waited.", queue.oldest),
             "joulepath_workers_warm": ("Workers that run a request or could run one.", self._engine.warm_workers),
-            "joulepath_workers_busy": ("Workers that run a request.", census.busy),
+            "joulepath_workers_busy": ("Workers that run a request.", queue.busy),
             "joulepath_ready": ("Whether /readyz says ready.", self._engine.ready),
             "joulepath_store_up": ("Whether the database answers.", self._store_up),
         }
         for name, (text, value) in gauges.items():
             yield GaugeMetricFamily(name, text, value=float(value))
-        yield CounterMetricFamily("joulepath_worker_restarts", "Workers that were replaced.", value=census.restarts)
-
-
-class RouteNote:
-    """ASGI middleware, the innermost: the template of the route's path goes to `request.state.route`."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes the request on."""
-        try:
-            await self._app(scope, receive, send)
-        finally:
-            if scope["type"] == "http":
-                scope["state"]["route"] = getattr(scope.get("route"), "path", None)
+        yield CounterMetricFamily(
+            "joulepath_worker_restarts", "Workers that were replaced.", value=self._engine.restarts
+        )

@@ -1,4 +1,6 @@
-"""The outermost layer: gives each request an id and its client, logs it, and answers every exception."""
+"""The outermost layer: gives each request an id and its client, logs it, and answers every
+exception.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +8,20 @@ import logging
 import re
 import time
 import uuid
-from collections.abc import Callable
+from contextlib import nullcontext
+from functools import partial
+from typing import Any
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from joulepath.app.access.client import Client
-from joulepath.app.exceptions import ClientDisconnected
+from joulepath.app.exceptions import ClientDisconnected, HeadTooLarge, ServiceError
+from joulepath.app.http.client import sender
 from joulepath.app.http.handlers import problem_response
 from joulepath.app.http.metrics import Metrics
-from joulepath.app.http.sites import PROBES
+from joulepath.app.http.sites import PROBES, known_host, same_site
+from joulepath.app.settings import Settings
 
 logger = logging.getLogger("app.request")
 
@@ -24,19 +29,29 @@ METRICS = "/metrics"
 REQUEST_ID_HEADER = "X-Request-ID"
 _SANE_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 _CLIENT_CLOSED_REQUEST = 499
-"""Status in the log, never sent, of a request whose client closed the connection: nginx's convention."""
+"""Status in the log, never sent, of a request whose client closed the connection: nginx's
+convention.
+"""
 
 
 class RequestContext:
-    """ASGI middleware: the id goes to `request.state.id`, the header of the response and the log. Requests are counted.
+    """ASGI middleware: the id goes to `request.state.id`, the header of the response and the log.
+    Requests are counted.
 
-    The client, as `sender` finds it, goes to `request.state.client` and the log. Layers inside may put another there.
+    The client goes to `request.state.client` and the log; a layer inside adds its key. `HEAD` is
+    answered as `GET`, and the server leaves out the body. Requests that no page of another site may
+    send are refused.
     """
 
-    def __init__(self, app: ASGIApp, sender: Callable[[Scope], Client], metrics: Metrics) -> None:
-        self._app = app
-        self._sender = sender
-        self._metrics = metrics
+    def __init__(self, app: ASGIApp, settings: Settings, metrics: Metrics) -> None:
+        self._app, self._metrics = app, metrics
+        self._sender = partial(sender, proxies=settings.trusted_proxies, header=settings.proxy_header)
+        self._most = settings.max_head_bytes
+        self._checks = (
+            self._check_head,
+            known_host(settings.allowed_hosts, settings.host),
+            same_site(settings.cors_origins),
+        )
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answers the request, also if an exception comes from inside."""
@@ -44,51 +59,86 @@ class RequestContext:
             await self._app(scope, receive, send)
             return
         given = Headers(scope=scope).get(REQUEST_ID_HEADER, "")
-        request_id = given if _SANE_ID.fullmatch(given) else str(uuid.uuid4())
         state = scope.setdefault("state", {})
-        state["id"], state["client"] = request_id, self._sender(scope)
-        status = 0
+        state["id"] = given if _SANE_ID.fullmatch(given) else str(uuid.uuid4())
+        state["client"] = self._sender(scope)
+        exchange = _Exchange(scope, receive, send)
+        logger.debug("received", extra=exchange.asked)
+        with state.get("connection") or nullcontext():
+            try:
+                for check in self._checks:
+                    check(Request(exchange.scope))
+                await self._app(exchange.scope, exchange.receive, exchange.send)
+            except (ClientDisconnected, ClientDisconnect):  # the other one: while its body was read
+                exchange.left = True
+            except _HeadSent:
+                pass
+            except Exception as error:
+                if not isinstance(error, ServiceError):
+                    logger.exception("unforeseen error", extra={"request_id": state["id"]})
+                if exchange.status:
+                    raise  # the server closes the connection, so that the client sees that the response is incomplete
+                response = await problem_response(Request(exchange.scope), error)
+                await response(exchange.scope, receive, exchange.send)
+            finally:
+                self._note(exchange)
 
-        async def send_with_id(message: Message) -> None:
-            nonlocal status
-            if message["type"] == "http.response.start":
-                status = message["status"]
-                MutableHeaders(scope=message)[REQUEST_ID_HEADER] = request_id
-            await send(message)
+    def _check_head(self, request: Request) -> None:
+        """Raises HeadTooLarge for a head that arrived at once: the server bounds those that it
+        waits for.
+        """
+        headers = sum(len(name) + len(value) + len(b": \r\n") for name, value in request.scope["headers"])
+        if headers + len(request.scope.get("raw_path", b"")) + len(request.scope["query_string"]) > self._most:
+            raise HeadTooLarge(self._most)
 
-        left = False
+    def _note(self, exchange: _Exchange) -> None:
+        """Counts and logs the request."""
+        scope, state = exchange.scope, exchange.scope["state"]
+        status = _CLIENT_CLOSED_REQUEST if exchange.left else exchange.status
+        duration, problem = time.perf_counter() - exchange.began, state.get("problem")
+        route = getattr(scope.get("route"), "path", None)
+        self._metrics.observe(exchange.asked["method"], route, status, problem, duration)
+        told = {"client": state["client"].address, "key": state["client"].key, "status": status, "problem": problem}
+        # probes come every few seconds
+        level = logging.DEBUG if scope["path"] in (*PROBES, METRICS) else logging.INFO
+        logger.log(level, "request", extra=exchange.asked | told | {"duration": round(duration, 6)})
 
-        async def receive_until_left() -> Message:
-            nonlocal left
-            message = await receive()
-            left = left or (message["type"] == "http.disconnect" and not status)
-            return message
 
-        began = time.perf_counter()
-        asked = {"request_id": request_id, "method": scope["method"], "path": scope["path"]}
-        logger.debug("received", extra=asked)
-        try:
-            await self._app(scope, receive_until_left, send_with_id)
-        except (ClientDisconnected, ClientDisconnect):  # the other one: while its body was read
-            left = True
-        except Exception as error:
-            logger.exception("unforeseen error", extra={"request_id": request_id})
-            if status:
-                raise  # the server closes the connection, so that the client sees that the response is incomplete
-            response = await problem_response(Request(scope), error)
-            await response(scope, receive, send_with_id)
-        finally:
-            if left:
-                status = _CLIENT_CLOSED_REQUEST
-            duration = time.perf_counter() - began
-            problem = state.get("problem")
-            self._metrics.observe(scope["method"], state.get("route"), status, problem, duration)
-            client: Client = state["client"]
-            logger.log(
-                # these come every few seconds
-                logging.DEBUG if scope["path"] in (*PROBES, METRICS) else logging.INFO,
-                "request",
-                extra=asked
-                | {"client": client.address, "key": client.key}
-                | {"status": status, "problem": problem, "duration": round(duration, 6)},
-            )
+class _HeadSent(Exception):
+    """The head of a stream was sent, which is the whole answer to `HEAD`."""
+
+
+class _Exchange:
+    """A request and its answer, observed. `status` is 0 before the answer; `left`: the client left
+    before it.
+    """
+
+    def __init__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        self._receive, self._send = receive, send
+        self.began = time.perf_counter()
+        self.asked: dict[str, Any] = {
+            "request_id": scope["state"]["id"],
+            "method": scope["method"],
+            "path": scope["path"],
+        }
+        self._is_head = scope["method"] == "HEAD"
+        # a copy: the server leaves out the body by the method, too
+        self.scope: Scope = {**scope, "method": "GET" if self._is_head else scope["method"]}
+        self.status = 0
+        self.left = False
+
+    async def receive(self) -> Message:
+        """The next message from the client."""
+        message = await self._receive()
+        self.left = self.left or (message["type"] == "http.disconnect" and not self.status)
+        return message
+
+    async def send(self, message: Message) -> None:
+        """Sends a message. Raises _HeadSent in place of the rest of a stream."""
+        if message["type"] == "http.response.start":
+            self.status = message["status"]
+            MutableHeaders(scope=message)[REQUEST_ID_HEADER] = self.asked["request_id"]
+        elif self._is_head and message.get("more_body", False):
+            await self._send({"type": "http.response.body"})
+            raise _HeadSent
+        await self._send(message)

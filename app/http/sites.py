@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 import socket
 from collections.abc import Callable, Collection
-from ipaddress import ip_address
 from urllib.parse import urlsplit
 
 from starlette.requests import Request
 
+from joulepath.app.access.client import address_of
 from joulepath.app.access.rules import needed_role
 from joulepath.app.exceptions import CrossSite, WrongHost
 
@@ -34,7 +34,7 @@ def known_host(names: Collection[str], own: str) -> Callable[[Request], None]:
         if EVERYONE in known or request.scope["path"] in PROBES or without:
             return
         name = _host_name(hosts[0]) if len(hosts) == 1 else None
-        if name is None or not (name in known or _is_address(name)):
+        if name is None or not (name in known or address_of(name) is not None):
             raise WrongHost
 
     return check
@@ -74,11 +74,3 @@ def _host_name(host: str) -> str | None:
     """The name or address in `name:port`, `[address]:port`; None if it has another form."""
     found = _HOST.fullmatch(host)
     return None if found is None else found["address"] or found["name"].lower().removesuffix(".")
-
-
-def _is_address(name: str) -> bool:
-    try:
-        ip_address(name)
-    except ValueError:
-        return False
-    return True

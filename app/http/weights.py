@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 from starlette.requests import Request
 
 JSON = "application/json"
@@ -12,9 +14,11 @@ def weights(header: str) -> dict[str, float]:
     found = {}
     for member in header.split(","):
         name, *parameters = (part.strip().lower() for part in member.split(";"))
-        weight = _weight(parameters)
-        if name and weight is not None:
-            found[name] = weight
+        given = dict(parameter.partition("=")[::2] for parameter in parameters)
+        with suppress(ValueError):
+            weight = float(given.get("q", 1))
+            if name and 0 <= weight <= 1:
+                found[name] = weight
     return found
 
 
@@ -23,16 +27,3 @@ def is_wanted(request: Request, media_type: str) -> bool:
     accepted = weights(", ".join(request.headers.getlist("accept")))
     weight = accepted.get(media_type, 0.0)
     return weight > 0 and weight >= accepted.get(JSON, 0.0)
-
-
-def _weight(parameters: list[str]) -> float | None:
-    """The weight q of a member, 1 if it has none; None if it is malformed."""
-    for parameter in parameters:
-        name, _, text = parameter.partition("=")
-        if name.strip() == "q":
-            try:
-                weight = float(text.strip())
-            except ValueError:
-                return None
-            return weight if 0 <= weight <= 1 else None
-    return 1.0

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Request, Response
 from joulepath.app.exceptions import InvalidRequest, UnsupportedMediaType
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
-from joulepath.app.http.json_body import FORM, TEXT
+from joulepath.app.http.json_route import UNDECLARED, media_type
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from joulepath.app.routes.later import ACCEPTED, ServiceLater, deadlines
@@ -27,8 +27,6 @@ router = APIRouter(tags=["motion"])
 
 _Kind = Literal["json", "csv"]
 _KINDS: dict[str, _Kind] = {"application/json": "json", "text/csv": "csv"}
-_ANY = ("", FORM, TEXT)
-"""Declared by clients that were told nothing: the first character tells JSON from CSV."""
 _BEGINNING = 4096
 _REF = "#/components/schemas/{model}"
 
@@ -84,9 +82,9 @@ async def evaluate(
     configurations with the times between them, a trajectory, or a log of the arm, whose measured energies stand beside
     the model's. It is sent as JSON, or as CSV with the settings as query parameters: any file that `POST /logs` reads.
     `Accept: text/csv` returns the table of energies as CSV."""
-    declared = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    declared = media_type(request.headers)
     kind = _KINDS.get(declared)
-    if kind is None and declared not in _ANY:
+    if kind is None and declared not in UNDECLARED:
         raise UnsupportedMediaType
     longest = settings.max_deadline
     with upload() as (file, path):

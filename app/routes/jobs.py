@@ -11,7 +11,9 @@ from fastapi.responses import StreamingResponse
 from joulepath.app.exceptions import UnsupportedMediaType
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.event_stream import EVENT_SCHEMA, EVENT_STREAM, EVENT_STREAM_HEADERS
+from joulepath.app.http.json_route import UNDECLARED, media_type
 from joulepath.app.http.openapi import problem_responses
+from joulepath.app.http.weights import JSON
 from joulepath.app.jobs.answers import as_csv, as_lines, detail, summary
 from joulepath.app.jobs.events import events_after
 from joulepath.app.routes.dependencies import (
@@ -84,7 +86,7 @@ async def create(
     """Takes up to 10,000 requests, and computes them while the client does not wait. Every request is validated now: a
     malformed one refuses the whole job. The job survives a restart of the service. Requests that somebody waits for
     come first."""
-    if request.headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
+    if media_type(request.headers) not in (JSON, *UNDECLARED):
         raise UnsupportedMediaType
     with upload() as (file, path):
         async for chunk in request.stream():

@@ -12,7 +12,8 @@ from fastapi.routing import APIRoute
 from pydantic import BaseModel
 
 from joulepath.app.http.disconnect import unless_disconnected
-from joulepath.app.http.json_route import JsonRoute, strictly
+from joulepath.app.http.json_route import JsonRoute, media_type, strictly
+from joulepath.app.http.weights import JSON
 from joulepath.app.routes.dependencies import ServiceClientEngine, ServiceSettings
 from joulepath.app.tasks.read_body import HeldBody, ReadBodyTask, held
 
@@ -43,14 +44,10 @@ class LargeBodyRoute(JsonRoute):
 
         async def handle_either(request: Request) -> Response:
             request = strictly(request)
-            is_large = _is_json(request) and sum(map(len, await request.parts())) > LARGE
+            is_large = media_type(request.headers) == JSON and sum(map(len, await request.parts())) > LARGE
             return await (handle_large if is_large else handle)(request)
 
         return handle_either
-
-
-def _is_json(request: Request) -> bool:
-    return request.headers.get("content-type", "").partition(";")[0].strip().lower() == "application/json"
 
 
 def _taking_held(

@@ -12,7 +12,7 @@ from fastapi.concurrency import run_in_threadpool
 
 from joulepath.app.exceptions import UnsupportedMediaType
 from joulepath.app.http.disconnect import unless_disconnected
-from joulepath.app.http.json_body import FORM, TEXT
+from joulepath.app.http.json_route import UNDECLARED, media_type
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
 from joulepath.app.routes.parameters import LOCATION_HEADER, set_location
@@ -29,7 +29,7 @@ from joulepath.app.tasks.read_log import ReadLogTask
 router = APIRouter(prefix="/logs", tags=["logs"])
 
 LogId = Annotated[str, Path(description="The log's id.", examples=[LOG_ID])]
-_TAKEN = ("text/csv", "application/octet-stream", "application/gzip", "application/x-gzip", "", FORM, TEXT)
+_TAKEN = ("text/csv", "application/octet-stream", "application/gzip", "application/x-gzip", *UNDECLARED)
 _GZIP = b"\x1f\x8b"
 _SHOWN = tuple(name for name in LogSummary.model_fields if name not in ("tags", "rows", "duration"))
 
@@ -65,7 +65,7 @@ async def add(
 ) -> LogDetail:
     """Adds a log of one arm, from which its friction, rotors and powers can be identified: a CSV file, plain or packed
     with gzip. The columns are those of RTDE, of ROS `JointState`, of this service, or what `columns` says."""
-    declared = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    declared = media_type(request.headers)
     if declared not in _TAKEN:
         raise UnsupportedMediaType
     asked = settings_of(LogSettings, request)

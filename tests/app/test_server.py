@@ -184,6 +184,8 @@ def test_logs_one_line_per_request(server: Server) -> None:
         b"POST /optimize HTTP/1.1\r\nHost: x\r\nContent-Length: two\r\n\r\n",
         b"POST /optimize HTTP/1.1\r\nHost: x\r\nContent-Length: 2\r\nContent-Length: 3\r\n\r\n{}",
         b"GET /healthz HTTP/1.1\r\nHo st: x\r\n\r\n",
+        b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nHost: evil.example\r\n\r\n",
+        b"GET /healthz HTTP/1.1\r\n\r\n",
     ],
 )
 def test_garbage_on_the_socket_is_answered_with_a_problem(server: Server, garbage: bytes) -> None:
@@ -224,7 +226,7 @@ def test_sigterm_answers_or_refuses_all_in_flight() -> None:
 @pytest.mark.long
 def test_sigterm_while_the_workers_warm_up() -> None:
     with serving(warm=False, workers=1) as server:
-        until(lambda: any("running" in entry["message"] for entry in server.logged()), WARM_UP)
+        until(lambda: any(entry["message"] == "listening" for entry in server.logged()), WARM_UP)
         everyone = server.descendants()
         assert server.terminate() == 0
         until(lambda: not any(alive(pid) for pid in everyone))

@@ -48,6 +48,25 @@ def test_clients_are_served_in_turn(tmp_path: Path) -> None:
     with_engine(tmp_path, test, queue_size=10)
 
 
+def test_who_waits_and_who_works_is_counted(tmp_path: Path) -> None:
+    async def test(bench: Bench) -> None:
+        ended: list[str] = []
+        queue = bench.engine.queue
+        assert (queue.waiting, queue.oldest, queue.busy) == ([], 0.0, 0)
+        running, release = await held(bench, tmp_path / "a", "a")
+        tasks = [await waiting(bench, "b", f"b{k}", ended) for k in range(2)]
+        assert [place.client for place in queue.waiting] == ["b", "b"] and queue.busy == 1
+        assert queue.oldest > 0
+        tasks[0].cancel()
+        await asyncio.wait(tasks[:1])
+        assert len(queue.waiting) == 1, "who leaves waits no more"
+        release.touch()
+        await asyncio.gather(running, tasks[1])
+        assert (queue.waiting, queue.oldest, queue.busy) == ([], 0.0, 0)
+
+    with_engine(tmp_path, test, queue_size=10)
+
+
 def test_a_client_without_a_worker_comes_before_one_that_has_some(tmp_path: Path) -> None:
     async def test(bench: Bench) -> None:
         ended: list[str] = []

@@ -64,16 +64,16 @@ class StubWorker:
 class Request:
     """A request, from its arrival to its answer, as the engine has it."""
 
-    def __init__(self, queue: FairQueue[StubWorker], client: str, name: str, limit: float) -> None:
+    def __init__(self, queue: FairQueue, client: str, name: str, limit: float) -> None:
         self.client, self.name = client, name
-        self.place: Place[StubWorker] | None = None
+        self.place: Place | None = None
         self.worker: StubWorker | None = None
         self.over = asyncio.Event()
         """Its task has ended, was stopped, or its worker has died."""
         self.given_back = False
         self.running = asyncio.create_task(self._run(queue, limit))
 
-    async def _run(self, queue: FairQueue[StubWorker], limit: float) -> str:
+    async def _run(self, queue: FairQueue, limit: float) -> str:
         with queue.place(self.client) as self.place:
             async with asyncio.timeout(limit):
                 while True:
@@ -104,12 +104,12 @@ class Request:
 class SpareWork:
     """Work that can wait, on a worker that no request waits for."""
 
-    def __init__(self, queue: FairQueue[StubWorker]) -> None:
+    def __init__(self, queue: FairQueue) -> None:
         self.worker: StubWorker | None = None
         self.over = asyncio.Event()
         self.running = asyncio.create_task(self._run(queue))
 
-    async def _run(self, queue: FairQueue[StubWorker]) -> None:
+    async def _run(self, queue: FairQueue) -> None:
         async with queue.spare() as worker:
             self.worker = worker
             worker.begin("spare")
@@ -143,7 +143,7 @@ class QueueMachine(RuleBasedStateMachine):
         self.loop.run_until_complete(self._begin())
 
     async def _begin(self) -> None:
-        self.queue: FairQueue[StubWorker] = fair_queue.FairQueue(CAPACITY, SHARE)
+        self.queue: FairQueue = fair_queue.FairQueue(CAPACITY, SHARE)
         for _ in range(WORKERS - 1):
             self._new_worker()
 

@@ -167,7 +167,7 @@ def test_a_service_is_not_ready_while_requests_wait_and_none_runs(tmp_path: Path
         assert bench.engine.ready, "one is at work"
         # as a defect would leave it: the worker is alive, and nobody has it
         (worker,) = bench.engine._workers
-        del bench.engine._queue._loans[worker]
+        del bench.engine.queue._loans[worker]
         assert not bench.engine.ready
         release.touch()
         await running
@@ -258,10 +258,10 @@ def test_workers_killed_at_random_beside_everything(tmp_path: Path) -> None:
         assert all(isinstance(each, asyncio.CancelledError) for each in results), results
         assert any(found)
         await until(lambda: engine.warm_workers == 2)
-        assert set(engine._queue._loans) == engine._workers
-        await until(lambda: all(loan is None for loan in engine._queue._loans.values()))
-        assert (engine.census.waiting, engine.census.busy) == (0, 0)
-        assert not engine._queue.someone_waits and not engine._queue._places
+        assert set(engine.queue._loans) == engine._workers
+        await until(lambda: all(loan is None for loan in engine.queue._loans.values()))
+        assert (engine.queue.waiting, engine.queue.busy) == ([], 0)
+        assert not engine.queue.someone_waits and not engine.queue._places
         assert await bench.pid() in engine.worker_pids
 
     with_engine(tmp_path, test, workers=2, queue_size=200, client_requests=100)

@@ -2,13 +2,30 @@
 
 from __future__ import annotations
 
+import asyncio
+import inspect
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
+from typing import Any
+from unittest.mock import Mock
 
+import h11
 import pytest
+from starlette.types import Receive, Scope, Send
+from uvicorn import Config
+from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.server import ServerState
 
-from joulepath.app.schemas.errors import Busy, HeadTooLarge, RequestTimeout, ShuttingDown, TooManyRequests
+from joulepath.app.schemas.errors import (
+    Busy,
+    HeadTooLarge,
+    MalformedHttp,
+    RequestTimeout,
+    ShuttingDown,
+    TooManyRequests,
+)
 from tests.app.live import EXIT, Server, serving, until
 from tests.app.raw import answer_on, connected, ends, is_reset, post
 from tests.selection import long_but
@@ -49,12 +66,11 @@ def _nobody_is_connected(strict: Server) -> None:
     [
         b"GET /healthz HTTP/1.1\r\nX: " + b"a" * (MOST_HEAD + 1),
         b"GET /healthz HTTP/1.1\r\n" + b"X: y\r\n" * MOST_HEAD,
-        b"GET /healthz HTTP/1.1\r\nX: " + b"a" * MOST_HEAD + b"\r\n\r\n",
+        b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nX: " + b"a" * MOST_HEAD + b"\r\n\r\n",
         b"GET /" + b"a" * MOST_HEAD + b" HTTP/1.1\r\nHost: localhost\r\n\r\n",
-        b"\r\n" * MOST_HEAD,
         GET + b"GET /healthz HTTP/1.1\r\nX: " + b"a" * 300_000,
     ],
-    ids=["one line", "many lines", "complete", "path", "empty lines", "after another request"],
+    ids=["one line", "many lines", "complete", "path", "after another request"],
 )
 def test_a_large_head_is_refused(strict: Server, head: bytes) -> None:
     with connected(strict) as connection:
@@ -78,19 +94,25 @@ def test_large_trailers_are_refused(strict: Server) -> None:
 
 def test_a_head_of_the_largest_size_is_taken(strict: Server) -> None:
     with connected(strict) as connection:
-        value = b"a" * (MOST_HEAD - len("/healthz") - len("X: \r\n"))
-        connection.sendall(b"GET /healthz HTTP/1.1\r\nX: " + value + b"\r\n\r\n")
+        value = b"a" * (MOST_HEAD - len("/healthz") - len("Host: localhost\r\n") - len("X: \r\n"))
+        connection.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nX: " + value + b"\r\n\r\n")
         assert answer_on(connection).status == 200
 
 
-@pytest.mark.parametrize("sent", [b"", b"G", b"GET / HTTP/1.1\r\nX: y\r\n", b"\r\n", GET + b"GET /h"])
+@pytest.mark.parametrize("sent", [b"", b"G", b"GET / HTTP/1.1\r\nX: y\r\n"])
 def test_half_a_head_is_not_waited_for(strict: Server, sent: bytes) -> None:
     with connected(strict) as connection:
         connection.sendall(sent)
-        if sent.startswith(GET):
-            assert answer_on(connection).status == 200
         RequestTimeout.model_validate(answer_on(connection).problem)
         assert ends(connection)
+
+
+def test_half_a_head_after_an_answer_is_not_waited_for(strict: Server) -> None:
+    with connected(strict) as connection:
+        connection.sendall(GET + b"GET /h")
+        assert answer_on(connection).status == 200
+        connection.sendall(b"ea")
+        assert is_reset(connection)
 
 
 @pytest.mark.parametrize("path", long_but(["/optimize"], ["/optimize", "/evaluate", "/robots"]))
@@ -109,6 +131,23 @@ def test_a_body_that_nobody_reads_is_not_waited_for(strict: Server) -> None:
         assert ends(connection)
 
 
+@pytest.mark.parametrize("is_answered", [False, True])
+def test_a_malformed_body_ends_the_connection(strict: Server, is_answered: bool) -> None:
+    path = "/nowhere" if is_answered else "/optimize"
+    head = f"POST {path} HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n".encode()
+    with connected(strict) as connection:
+        connection.sendall(head + b"1\r\n{\r\n")
+        if is_answered:
+            assert answer_on(connection).status == 404
+            connection.sendall(b"no chunk\r\n")
+            assert is_reset(connection)
+        else:
+            connection.sendall(b"no chunk\r\n")
+            MalformedHttp.model_validate(answer_on(connection).problem)
+            assert ends(connection)
+    assert not [entry for entry in strict.logged() if entry["level"] == "error"]
+
+
 def test_an_answer_that_is_not_read_is_thrown_away(strict: Server) -> None:
     with connected(strict, receive_buffer=4096) as connection:
         # more than the buffers of both sockets hold
@@ -121,6 +160,33 @@ def test_requests_far_ahead_of_their_answers_are_refused(strict: Server) -> None
         connection.sendall(GET * 1000)
         assert ends(connection)
     assert strict.get("/healthz").status_code == 200
+
+
+def test_uvicorn_has_what_a_connection_needs() -> None:
+    """The arguments of its protocol, the state of a request, and h11's error while it answers a malformed request."""
+    assert list(inspect.signature(H11Protocol).parameters) == ["config", "server_state", "app_state", "_loop"]
+    states: list[Any] = []
+    written: list[BaseException | None] = []
+
+    async def app(scope: Scope, receive: Receive, send: Send) -> None:
+        states.append(scope["state"])
+        await send({"type": "http.response.start", "status": 204})
+        await send({"type": "http.response.body"})
+
+    async def run() -> None:
+        transport = Mock(asyncio.Transport, is_closing=lambda: False, get_extra_info=lambda _: None)
+        transport.write = lambda _: written.append(sys.exception())
+        config = Config(app, lifespan="off", log_config=None)
+        protocol = H11Protocol(config=config, server_state=ServerState(), app_state={"connection": 1})
+        protocol.connection_made(transport)
+        protocol.data_received(GET)
+        await asyncio.gather(*protocol.tasks)
+        assert states == [{"connection": 1}] and set(written) == {None}
+        written.clear()
+        protocol.data_received(b"GET /" + b"x" * 100_000)
+        assert [each.error_status_hint for each in written if isinstance(each, h11.RemoteProtocolError)][:1] == [431]
+
+    asyncio.run(run())
 
 
 def test_one_client_has_its_share_of_connections(strict: Server) -> None:

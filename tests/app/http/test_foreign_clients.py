@@ -48,7 +48,7 @@ def test_offers_one_after_another_on_one_connection(server: Server) -> None:
     with connected(server) as connection:
         connection.sendall(3 * get + lines("GET /robots HTTP/1.1", "Host: localhost"))
         assert [answer_on(connection).status for _ in range(4)] == 4 * [200]
-    assert asked(server, lines("CONNECT localhost:80 HTTP/1.1", "Host: localhost")).status == 400
+    assert asked(server, lines("CONNECT localhost:80 HTTP/1.1", "Host: localhost")).status == 404
 
 
 @pytest.mark.parametrize("path", ["/healthz", "/robots", "/robots/ur5e", "/studio", "/problems/busy", "/nowhere"])
@@ -90,7 +90,9 @@ def test_a_method_that_a_path_has_not_is_told_so(server: Server, path: str) -> N
 def test_http_1_0_has_no_host(server: Server) -> None:
     post = lines("POST /optimize HTTP/1.0", f"Content-Length: {len(WRONG)}") + WRONG
     assert "`sart`" in json.dumps(asked(server, post).problem)
-    assert asked(server, lines("GET /robots HTTP/1.1", "Connection: close")).problem["type"] == "/problems/wrong-host"
+    assert (
+        asked(server, lines("GET /robots HTTP/1.1", "Connection: close")).problem["type"] == "/problems/malformed-http"
+    )
 
 
 @pytest.mark.parametrize("declared", ["", " ", ";charset=utf-8"])

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from joulepath.app.exceptions import TooManyBytes, TooManyBytesOfClient
-from joulepath.app.http.transfers import BytesInFlight
+from joulepath.app.http.bytes_in_flight import BytesInFlight, Held
 from joulepath.app.schemas.errors import Busy, TooManyRequests
 from tests.app.live import Server, serving, until
 from tests.app.raw import RawAnswer, answer_on, connected, post
@@ -93,13 +93,24 @@ def test_a_killed_service_leaves_no_files(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_what_is_released_can_be_held_again() -> None:
-    in_flight = BytesInFlight(most=100, most_of_client=60)
-    in_flight.add("a", 60)
-    with pytest.raises(TooManyBytesOfClient):
-        in_flight.add("a", 1)
-    with pytest.raises(TooManyBytes):
-        in_flight.add("b", 41)
-    in_flight.add("b", 40)
-    in_flight.release("a", 60)
-    in_flight.add("b", 20)
-    in_flight.add("a", 40)
+    in_flight = BytesInFlight(most=100, most_of_client=60, small=0)
+    with Held(in_flight, "a") as first:
+        first.hold(60)
+        with Held(in_flight, "a") as further, pytest.raises(TooManyBytesOfClient):
+            further.hold(1)
+        with Held(in_flight, "b") as other:
+            with pytest.raises(TooManyBytes):
+                other.hold(41)
+            other.hold(40)
+            other.hold(30)
+            assert in_flight.held == {"a": 60, "b": 40}, "it is the most that it holds at a time"
+    assert not in_flight.held, "names of clients do not pile up"
+    with Held(in_flight, "a") as again:
+        again.hold(60)
+
+
+def test_small_ones_do_not_count() -> None:
+    in_flight = BytesInFlight(most=1, most_of_client=1)
+    with Held(in_flight, "a") as held:
+        held.hold(in_flight.small)
+        assert not in_flight.held
