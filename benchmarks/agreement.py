@@ -6,14 +6,13 @@
 Every random request is answered by `/optimize` with a free duration, with the duration of that answer and with
 durations around it, by `/pareto`, by `/compare`, and by `/cycle` as an open cycle of one stop. All are the same
 problem, or a more constrained one. Reported are the relative differences of the energies from that of the free answer;
-of durations around it, what they need less. The requests of the worst differences are printed.
+of durations around it, what they need less.
 """
 
 from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -76,11 +75,6 @@ def request(seed: int, index: int, kind: str | None = None) -> tuple[str, Json]:
     goal: Json = {"q": q_goal.tolist()} if index % 2 == 0 else {"pose": as_pose(flange(robot, q_goal))}
     fields: Json = {"robot": name, "start": {"q": q_start.tolist()}, "goal": goal, "collisions": False}
     return kind, fields | _variation(rng, robot, kind)
-
-
-def requests(seed: int, count: int, kind: str | None = None) -> Iterator[tuple[str, Json]]:
-    """The first `count` requests of a seed."""
-    return (request(seed, index, kind) for index in range(count))
 
 
 def _ends(rng: np.random.Generator, robot: Robot) -> tuple[Array, Array]:
@@ -182,11 +176,6 @@ def summary(outcomes: list[Outcome]) -> Json:
         "count": len(outcomes),
         "answered": len(answered),
         "differences": {name: Spread.of([abs(each.differences[name]) for each in rows[name]]) for name in names},
-        "worst": {
-            name: {"index": worst.index, "kind": worst.kind, "by": worst.differences[name], "request": worst.request}
-            for name in names
-            if (worst := max(rows[name], key=lambda each: abs(each.differences[name]), default=None)) is not None
-        },
         "dearer": [each.index for each in answered if each.is_dearer],
         # the free answer is refused as well where no motion exists
         "refused_by_some": {each.index: each.refused for each in answered if each.refused},
@@ -212,13 +201,12 @@ def main() -> int:
     """Asks the endpoints, prints the differences, and checks the requirements."""
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, default=100, help="requests (%(default)s)")
-    arguments.add_argument("--first", type=int, default=0, help="index of the first request (%(default)s)")
     arguments.add_argument("--kind", choices=KINDS, help="only this kind (default: in turn)")
     arguments.add_argument("--deadline", type=float, default=60.0, help="of each request [s] (%(default)s)")
     given = arguments.parse_args()
     on_one_core()
     outcomes: list[Outcome] = []
-    for index in range(given.first, given.first + given.count):
+    for index in range(given.count):
         outcomes.append(examine(index, *request(given.seed, index, given.kind), given.deadline))
         shown = {name: f"{value:+.1e}" for name, value in outcomes[-1].differences.items()}
         print(index, outcomes[-1].kind, shown, outcomes[-1].refused or "", f"{outcomes[-1].cpu:.1f} s", flush=True)
@@ -226,9 +214,6 @@ def main() -> int:
     print(f"{results['answered']} of {results['count']} requests have a motion; {results['cpu']:.0f} s")
     for name, spread in results["differences"].items():
         print(f"{name:14s} {spread.times(100).formatted(' %', 3)}")
-    for name, worst in results["worst"].items():
-        print(f"worst, {name}: request {worst['index']} ({worst['kind']}), {worst['by']:+.2%}")
-        print(f"    {orjson.dumps(worst['request']).decode()}")
     write_json(given.json, results)
     failed = failed_requirements(results)
     for message in failed:

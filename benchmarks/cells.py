@@ -59,31 +59,8 @@ class CellTask:
         return f"seed {self.seed} index {self.index} ({self.cell})"
 
 
-@dataclass(frozen=True)
-class Draw:
-    """A random cell with collision-free configurations: q_start (nq,) and those of the goal pose T_goal (4, 4), the
-    nearest first [rad]. It is number `draw` of its task."""
-
-    draw: int
-    cell: Cell
-    arm: Arm
-    model: CollisionModel
-    q_start: Array
-    q_goals: list[Array]
-    T_goal: Array
-
-    def reached(self) -> Array | None:
-        """The nearest goal configuration (nq,) [rad] to which the path planner finds a path in AMPLE seconds; None if
-        there is none."""
-        checkers, one = ValidityCheckers(self.arm, self.model), Effort(paths=1)
-        for q_goal in self.q_goals:
-            if plan_paths(self.arm, self.q_start, q_goal, Deadline.after(AMPLE), one, checkers=checkers).paths:
-                return q_goal
-        return None
-
-
-def draws(seed: int, index: int) -> Iterator[Draw]:
-    """The draws of task `index` of a seed; the kinds of cells take turns."""
+def cell_task(seed: int, index: int) -> CellTask:
+    """Task `index` of a seed; the kinds of cells take turns."""
     cell = CELLS[index % len(CELLS)]
     table = Obstacle("table", Box(np.array([2.0, 2.0, 0.04])), _at(0, 0, -0.03))
     for draw in count():
@@ -95,20 +72,25 @@ def draws(seed: int, index: int) -> Iterator[Draw]:
         model = CollisionModel(arm)
         T_start, T_goal = starts(), goals()
         from_, to = (_clear(arm, model, T) for T in (T_start, T_goal))
-        if from_ and to:
-            q_start = from_[int(rng.integers(len(from_)))]
-            away = [float(np.abs(q - q_start).max()) for q in to]
-            yield Draw(draw, cell, arm, model, q_start, [to[k] for k in np.argsort(away, kind="stable")], T_goal)
-
-
-def cell_task(seed: int, index: int) -> CellTask:
-    """Task `index` of a seed; the kinds of cells take turns."""
-    for each in draws(seed, index):
-        q_goal = each.reached()
+        if not from_ or not to:
+            continue
+        q_start = from_[int(rng.integers(len(from_)))]
+        nearest_first = sorted(to, key=lambda q: float(np.abs(q - q_start).max()))
+        q_goal = _reached(arm, model, q_start, nearest_first)
         if q_goal is not None:
-            blocked = each.model.least_distance(np.linspace(each.q_start, q_goal, 200), 0.0) < 0
-            return CellTask(seed, index, each.cell, each.arm, each.q_start, q_goal, each.T_goal, each.draw + 1, blocked)
+            blocked = model.least_distance(np.linspace(q_start, q_goal, 200), 0.0) < 0
+            return CellTask(seed, index, cell, arm, q_start, q_goal, T_goal, draw + 1, blocked)
     raise AssertionError
+
+
+def _reached(arm: Arm, model: CollisionModel, q_start: Array, goals: list[Array]) -> Array | None:
+    """The first goal configuration (nq,) [rad] to which the path planner finds a path in AMPLE
+    seconds; None if there is none."""
+    checkers, one = ValidityCheckers(arm, model), Effort(paths=1)
+    for q_goal in goals:
+        if plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), one, checkers=checkers).paths:
+            return q_goal
+    return None
 
 
 def cell_tasks(seed: int, number: int) -> Iterator[CellTask]:

@@ -6,7 +6,6 @@
     python -m benchmarks.rounds --count 50 --turned
     python -m benchmarks.rounds --count 5 --stops 12
     python -m benchmarks.rounds --count 10 --time 1.5
-    python -m benchmarks.rounds --count 20 --stops 2 --near --time 1.5
     python -m benchmarks.rounds --count 20 --stops 5 --passes 4
     python -m benchmarks.rounds --count 5 --stops 12 --free
     python -m benchmarks.rounds --count 1 --stops 245 --deadline 600
@@ -16,8 +15,7 @@ next one, and comes back. Poses are drawn with the tool nearly down where the ar
 or as long as `--dwell` says: what it draws then, no choice of configurations saves. Collisions are ignored, so that
 every cycle has an answer. With `--anywhere`, the start is one more such pose, in any configuration: choosing move by
 move, the first move chooses it. With `--turned`, the parts are cycle: the tool may be turned by any angle about its
-axis at every stop. With `--near`, the arm carries 4 kg to each stop from joint positions at most 1.5 rad from those
-before, drawn anywhere: its fastest moves are hard to find. With `--time`, each cycle gets so many times the duration of
+axis at every stop. With `--time`, each cycle gets so many times the duration of
 least energy; the excess is what its answer needs beyond the least of its feasible baselines and of the cycle in its own
 time with a wait, and ends the benchmark if there is any. With `--passes`, it passes through the first stops without a
 rest, and carries the part nowhere; then a cycle that needs more than the one that stops there ends the benchmark. With
@@ -50,8 +48,6 @@ from joulepath.optimizer.problem.stops import Stop
 
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 PART, NOTHING = Payload(mass=2.0, com=np.array([0.0, 0.0, 0.05])), Payload()
-# joint positions near each other [rad], and what the arm carries there
-WHOLE_RANGE, NEAR, HEAVY = 2.9, 1.5, Payload(mass=4.0, com=np.array([0.0, 0.0, 0.1]))
 # ring around the base, heights [m], and greatest tilt of the tool [rad]
 NEAREST, FARTHEST, HEIGHTS, TILT = 0.35, 0.7, (0.05, 0.4), 0.2
 
@@ -98,18 +94,6 @@ def rounds(
             order=FreeOrder() if free else None,
             deadline=deadline,
         )
-
-
-def near_cycles(seed: int, count: int, stops: int, deadline: float) -> Iterator[Cycle]:
-    """Cycles over joint positions that are near each other, with a heavy part."""
-    arm = Arm(robot=load_robot("ur5e"), collisions=False, payload=HEAVY)
-    for k in range(count):
-        rng = np.random.default_rng([seed, k])
-        q = [rng.uniform(-WHOLE_RANGE, WHOLE_RANGE, 6)]
-        while len(q) <= stops:
-            q.append(np.clip(q[-1] + rng.uniform(-NEAR, NEAR, 6), -WHOLE_RANGE, WHOLE_RANGE))
-        targets = [Stop(name=str(j), target=each) for j, each in enumerate(q[1:])]
-        yield Cycle(arm=arm, start=q[0], stops=targets, windings=False, deadline=deadline)
 
 
 def _target(pose: Pose, turned: bool) -> Pose | ConeOrientedPose:
@@ -170,7 +154,6 @@ def main() -> None:
     arguments.add_argument("--anywhere", action="store_true", help="the start is a pose, in any configuration")
     arguments.add_argument("--turned", action="store_true", help="the tool may be turned about its axis at the stops")
     arguments.add_argument("--time", type=float, help="give each cycle so many times its own duration")
-    arguments.add_argument("--near", action="store_true", help="joint positions near each other, with 4 kg")
     arguments.add_argument("--dwell", type=float, default=DWELL, help="dwell at each stop [s] (%(default)s)")
     given = arguments.parse_args()
     on_one_core()
@@ -180,7 +163,7 @@ def main() -> None:
     optimal = legs = certified = 0
     how = (given.passes, given.free, given.dwell, given.anywhere, given.turned)
     size = (given.seed, given.count, given.stops, given.deadline)
-    for asked in near_cycles(*size) if given.near else rounds(*size, *how):
+    for asked in rounds(*size, *how):
         own = None if given.time is None else plan_cycle(asked)
         if own is not None:
             asked = in_time(asked, own, given.time)

@@ -3,10 +3,11 @@
     python -m benchmarks.deadlines --count 200 --seed 0
     python -m benchmarks.deadlines --only "slow TCP" fronts --count 40
 
-Each kind of request is hard in its own way: a TCP or joints so slow that a motion takes minutes, 64 obstacles, motions
-of ten minutes with 20,000 samples, 32 targets, free orientations, energy storage, fronts, comparisons, what-ifs, a log
-of ten minutes. Each is run as a worker runs it, from the validated request to the encoded document, in this process,
-with a deadline of 20 ms to 2 s. The overrun is the time after the deadline at which the document or problem is there.
+Each kind of request is hard in its own way: a TCP so slow that a motion takes minutes, 64
+obstacles, motions of ten minutes with 20,000 samples, 32 targets, the mechanical objective, and fronts.
+Each is run as a worker runs it, from the validated request to the encoded
+document, in this process, with a deadline of 20 ms to 2 s. The overrun is the time after the
+deadline at which the document or problem is there.
 """
 
 from __future__ import annotations
@@ -21,21 +22,15 @@ from typing import Any
 import numpy as np
 
 from benchmarks.command import on_one_core, parser, write_json
-from benchmarks.service import ROOT
 from benchmarks.statistics import Spread
 from benchmarks.tasks import as_pose, collision_free, flange
 from joulepath.app.engine.result import json_document
 from joulepath.app.engine.task import Task
 from joulepath.app.http.problem_details import problem_content
-from joulepath.app.schemas.compare import CompareRequest
 from joulepath.app.schemas.pareto import ParetoRequest
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.app.schemas.whatif import WhatifRequest
-from joulepath.app.tasks.compare import CompareTask
-from joulepath.app.tasks.evaluate import EvaluateTask
 from joulepath.app.tasks.optimize import OptimizeTask
 from joulepath.app.tasks.pareto import ParetoTask
-from joulepath.app.tasks.whatif import WhatifTask
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from joulepath.optimizer.optimize import warm_up
@@ -87,20 +82,6 @@ def slow_tcp(rng: np.random.Generator) -> Fields:
     return between(rng) | {"limits": {name: speed}, "sample_period": 0.02}
 
 
-def slow_joints(rng: np.random.Generator) -> Fields:
-    """Minutes long: the joints creep."""
-    name = str(rng.choice(["velocity", "acceleration", "jerk"]))
-    return between(rng) | {
-        "limits": {name: float(np.exp(rng.uniform(np.log(0.01), np.log(0.3))))},
-        "sample_period": 0.02,
-    }
-
-
-def weak_motors(rng: np.random.Generator) -> Fields:
-    """Torque limits near what the arm needs to hold itself."""
-    return between(rng) | {"limits": {"torque": [float(rng.uniform(40, 80))] * 3 + [float(rng.uniform(5, 15))] * 3}}
-
-
 def obstacles(rng: np.random.Generator) -> Fields:
     """64 obstacles of every shape, and a tool of many capsules."""
     shapes = []
@@ -133,107 +114,27 @@ def many_targets(rng: np.random.Generator) -> Fields:
     return {"start": pose(rng), "goal": {"any_of": [pose(rng) for _ in range(32)]}}
 
 
-def free_goal(rng: np.random.Generator) -> Fields:
-    """Poses whose orientation is free, one or several."""
-
-    def one() -> Fields:
-        position = pose(rng)["pose"]["position"]
-        return {"pose": {"position": position, "orientation": "free"}}
-
-    return {"start": joint(rng), "goal": one() if rng.integers(2) else {"any_of": [one() for _ in range(6)]}}
-
-
-def storage(rng: np.random.Generator) -> Fields:
-    """Energy storage too small for the surplus, with a payload."""
-    bus = {"mode": "storage", "capacity": float(rng.uniform(0.5, 20)), "power": 50.0, "efficiency": 0.9}
-    return between(rng) | {"bus": bus, "payload": {"mass": 4.0, "com": [0.0, 0.0, 0.05]}}
-
-
 def mechanical(rng: np.random.Generator) -> Fields:
     """The mechanical objective, whose bound rules out little."""
     duration = {"max": float(rng.uniform(3, 600))}
     return between(rng, True) | {"objective": "mechanical", "duration": duration, "sample_period": COARSE}
 
 
-def glass(rng: np.random.Generator) -> Fields:
-    """A tool cone around an axis that both ends keep upright, and a dwell."""
-    robot = load_robot(ROBOT)
-    q = collision_free(rng, robot)
-    axis = flange(robot, q)[:3, :3].T @ [0.0, 0.0, 1.0]
-    cone = {"axis": axis.tolist(), "direction": [0.0, 0.0, 1.0], "half_angle": 0.3}
-    moved = (q + rng.uniform(-2, 2, 6) * [1, 0, 0, 0, 0, 0]).clip(robot.limits.q_min, robot.limits.q_max)
-    return {"start": {"q": q.tolist()}, "goal": {"q": moved.tolist()}, "tool_cone": cone, "dwell": {"time": 8.0}}
-
-
-def methods(rng: np.random.Generator) -> Fields:
-    """The other methods."""
-    name = str(rng.choice(["time_scaling", "lagrange", "uniform_scaling", "polynomial_ga"]))
-    return between(rng, True) | {"method": name} | slow_or_not(rng)
-
-
-def slow_or_not(rng: np.random.Generator) -> Fields:
-    """Limits that make a motion long, one time in three."""
-    return {} if rng.integers(3) else {"limits": {"tcp_speed": 0.005}, "sample_period": 0.02}
-
-
 OPTIMIZE: dict[str, Callable[[np.random.Generator], Fields]] = {
     "slow TCP": slow_tcp,
-    "slow joints": slow_joints,
-    "weak motors": weak_motors,
     "obstacles": obstacles,
     "ten minutes": ten_minutes,
     "many targets": many_targets,
-    "free goal": free_goal,
-    "storage": storage,
     "mechanical": mechanical,
-    "glass": glass,
-    "methods": methods,
 }
-
-
-def optimized(rng: np.random.Generator) -> Fields:
-    """A body of one of the kinds above, at random."""
-    return OPTIMIZE[str(rng.choice(list(OPTIMIZE)))](rng)
 
 
 def front(rng: np.random.Generator, index: int) -> Task:
     """A front over the durations of a hard request."""
-    body = optimized(rng)
+    body = OPTIMIZE[str(rng.choice(list(OPTIMIZE)))](rng)
     if not isinstance(body.get("duration"), dict):
         body.pop("duration", None)
     return ParetoTask(ParetoRequest.model_validate(body | {"points": 12}), "benchmark", "json")
-
-
-def comparison(rng: np.random.Generator, index: int) -> Task:
-    """All methods on a hard request, with complete answers."""
-    body = optimized(rng)
-    body.pop("method", None)
-    return CompareTask(CompareRequest.model_validate(body | {"answers": True}), "benchmark")
-
-
-def changes(rng: np.random.Generator, index: int) -> Task:
-    """Eight changed arms of a hard request."""
-    rows = [{"name": f"links {k}", "arm": {"link_mass_scale": 0.5 + 0.05 * k}} for k in range(8)]
-    return WhatifTask(WhatifRequest.model_validate({"optimize": optimized(rng), "changes": rows}), "benchmark")
-
-
-def log(rng: np.random.Generator, index: int) -> Task:
-    """A log of ten minutes at 100 Hz, with samples, among obstacles."""
-    t = np.arange(60_000) * 0.01
-    q = collision_free(rng, load_robot(ROBOT)) + 0.2 * np.sin(t[:, None] * rng.uniform(0.2, 2.0, 6))
-    body = {"trajectory": {"t": t.tolist(), "q": q.tolist()}, "sample_period": 0.05, "scene": obstacles(rng)["scene"]}
-    file = ROOT / "build" / "bench" / "log.json"
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_bytes(json_document(body))
-    return EvaluateTask(str(file), "json", {}, "json", "benchmark", max(DEADLINES))
-
-
-def given(rng: np.random.Generator, index: int) -> Task:
-    """A motion of a thousand configurations and sixteen changed arms."""
-    waypoints = collision_free(rng, load_robot(ROBOT)) + rng.uniform(-0.3, 0.3, (1000, 6))
-    evaluate = {"configurations": waypoints.tolist(), "time_per_segment": 0.6}
-    rows = [{"name": f"links {k}", "arm": {"link_mass_scale": 0.5 + 0.05 * k}} for k in range(16)]
-    return WhatifTask(WhatifRequest.model_validate({"evaluate": evaluate, "changes": rows}), "benchmark")
 
 
 def _optimize(kind: str) -> Callable[[np.random.Generator, int], Task]:
@@ -243,10 +144,6 @@ def _optimize(kind: str) -> Callable[[np.random.Generator, int], Task]:
 KINDS: dict[str, Callable[[np.random.Generator, int], Task]] = {
     **{kind: _optimize(kind) for kind in OPTIMIZE},
     "fronts": front,
-    "comparisons": comparison,
-    "changes": changes,
-    "changes of a given motion": given,
-    "logs": log,
 }
 
 
@@ -254,9 +151,6 @@ def run(kind: str, seed: int, index: int) -> Outcome:
     """Request `index` of a seed and kind, run to its document or problem."""
     rng = np.random.default_rng([seed, index, *kind.encode()])
     task, deadline = KINDS[kind](rng, index), DEADLINES[index % len(DEADLINES)]
-    if isinstance(task, EvaluateTask):
-        # it has no deadline of its own, but the service's longest: parsing alone takes longer than the short ones here
-        deadline = max(DEADLINES)
     began = time.perf_counter()
     try:
         document = task.run(deadline).document

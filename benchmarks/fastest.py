@@ -59,9 +59,9 @@ class Outcome:
         return self.shortest / min(self.started, self.optimized, self.shortest)
 
 
-def problems(robot: Robot, seed: int, count: int, torque: float = 1.0) -> Iterator[Problem]:
-    """The moves of a seed, with this share of the robot's torque limits."""
-    limits = replace(robot.limits, tau_max=torque * robot.limits.tau_max)
+def problems(robot: Robot, seed: int, count: int) -> Iterator[Problem]:
+    """The moves of a seed."""
+    limits = robot.limits
     for index in range(count):
         rng = np.random.default_rng([seed, index])
         most = NEAR if index % 4 < 2 else np.pi
@@ -139,12 +139,11 @@ def main() -> None:
     arguments.add_argument("--count", type=int, default=60, help="moves (%(default)s)")
     arguments.add_argument("--starts", type=int, default=8, help="random starts of each (%(default)s)")
     arguments.add_argument("--robot", default="ur5e", help="(%(default)s)")
-    arguments.add_argument("--torque", type=float, default=1.0, help="share of the torque limits (%(default)s)")
     asked = arguments.parse_args()
     on_one_core()
     outcomes = list[Outcome]()
     with one_thread():
-        for index, problem in enumerate(problems(load_robot(asked.robot), asked.seed, asked.count, asked.torque)):
+        for index, problem in enumerate(problems(load_robot(asked.robot), asked.seed, asked.count)):
             began = time.process_time()
             error = refused(problem)
             seconds = time.process_time() - began

@@ -1,9 +1,8 @@
 """Identification on real logs and on simulated arms, against its gates. The exit code is 1 if one is missed.
 
     JOULEPATH_TEST_DATA=FOLDER python -m benchmarks.identification
-    python -m benchmarks.identification --only structure synthetic time --runs 200
+    python -m benchmarks.identification --only synthetic standins --runs 200
 
-- `structure`: numbers of base parameters, without and with rotors.
 - `ur3e`: power from motion alone. Each motion is left out with its reverse and predicted; then five random moves at a
   time predict the rest of the log.
 - `tx40`: friction against published values from the same log, and each half of the log predicted from the other.
@@ -12,13 +11,11 @@
   beside the model's. 200 runs take some minutes.
 - `standins`: simulated logs in the place of real ones that are not public: another motion of the same day and other
   days of a UR10e, a payload from two logs of different days, halves of a log of a Panda.
-- `time`: of a fit to 30 s of log on one core.
 """
 
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,17 +27,13 @@ from benchmarks.identification_logs import MISSING, WRIST, folder, tx40, tx40_re
 from benchmarks.identification_standins import TORQUE_SENSOR, behind_the_gears, day_of, log_of
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Robot
-from joulepath.models.uncertainty.ranges import P95
-from joulepath.optimizer.identify.arm.base_parameters import base_parameters
-from joulepath.optimizer.identify.estimates.estimate import Name
-from joulepath.optimizer.identify.fits.base_fit import BaseFit, base_arm, fit_base
+from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
+from joulepath.optimizer.identify.fits.block import moving
 from joulepath.optimizer.identify.fits.fitting import fit_rows
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.identify.quality.interval import energy_sd, spread_of
-from joulepath.optimizer.identify.quality.validation import power_errors, torque_errors
+from joulepath.optimizer.identify.quality.validation import torque_errors
 from joulepath.optimizer.identify.results import TorqueErrors
-from joulepath.optimizer.identify.rows.clusters import clusters_of
 from joulepath.optimizer.identify.rows.fit_rows import Rows, rows_of
 from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import Truth, off_the_model, recorded, truth_of
@@ -53,7 +46,9 @@ MOVES_OF_A_DRAW = 5
 OFTEN = 0.2
 # W, standard deviation of the power that each simulated move draws beside the model's: 1 % of a move's energy
 MOVE_EFFECT = 0.6
-TX40_OPTIONS = IdentificationOptions(terms=("coulomb", "viscous", "offset"), couplings=(WRIST,), held_out=0.0)
+TX40_OPTIONS = IdentificationOptions(
+    terms=("coulomb", "viscous", "offset"), couplings=(WRIST,), method="base_parameters", held_out=0.0
+)
 
 
 @dataclass(frozen=True)
@@ -71,41 +66,22 @@ class Gate:
         return self.least <= self.value <= self.most
 
 
-def structure(_: Path | None, __: int) -> list[Gate]:
-    """Numbers of base parameters."""
-    found = list[Gate]()
-    for name, counts in (("ur10e", (36, 40)), ("ur5e", (36, 40)), ("panda", (43, 48))):
-        for rotors, count in zip((False, True), counts, strict=True):
-            value = base_parameters(load_robot(name).model, rotors).count
-            found.append(Gate(f"{name}: base parameters{' with rotors' * rotors}", value, count, count))
-    return found
-
-
 def ur3e_power(place: Path | None, _: int) -> list[Gate]:
     """Power of the UR3e from its motion."""
     assert place is not None
     robot, log = ur3e(place)
-    rows = rows_of(robot, [replace(log, effort=None, effort_meaning=None)])
-    options = IdentificationOptions(held_out=0.0)
-    predicted, inside, half = np.full(len(rows.power), np.nan), list[bool](), list[float]()
-    for group in rows.groups:
-        out = rows.group == group
-        blind = fit_rows(robot, rows.take(~out), options)
-        predicted[out] = blind.arm.power(rows.take(out))[0]
-        spread = replace(spread_of(blind, rows.take(~out)), session=0.0)
-        for move in np.unique(rows.move[out & ~rows.rest]):
-            part = rows.take((rows.move == move) & ~rows.rest)
-            energy, sd = energy_sd(blind, spread, part)
-            inside.append(abs(float(part.weight @ part.power) - energy) <= P95 * sd)
-            half.append(100 * P95 * sd / energy)
-    errors = power_errors([(rows, predicted)])
+    log = replace(log, effort=None, effort_meaning=None)
+    found = identify(robot, [log], IdentificationOptions(held_out=1.0)).validation
+    assert found is not None and found.fitted.power is not None
+    assert found.coverage is not None and found.half_width is not None
+    errors, draws = found.fitted.power, _draws(robot, rows_of(robot, [log]), IdentificationOptions(held_out=0.0))
     return [
         Gate("ur3e, left out with its reverse: RMSE [W]", errors.rmse, 0.0, 2.0),
         Gate("ur3e, same: mean error of energy [%]", errors.energy_mean, 0.0, 1.3),
         Gate("ur3e, same: greatest error of energy [%]", errors.energy_max, 0.0, 4.0),
-        Gate("ur3e, same: share between P5 and P95", float(np.mean(inside)), 0.85, 1.0),
-        Gate("ur3e, same: half of P5 to P95 [%]", float(np.mean(half)), 0.0, 2.5),
-        Gate("ur3e, five moves: P90 of the error of the rest's energy [%]", _draws(robot, rows, options), 0.0, 1.5),
+        Gate("ur3e, same: share between P5 and P95", found.coverage, 0.85, 1.0),
+        Gate("ur3e, same: half of P5 to P95 [%]", found.half_width, 0.0, 2.5),
+        Gate("ur3e, five moves: P90 of the error of the rest's energy [%]", draws, 0.0, 1.5),
     ]
 
 
@@ -126,28 +102,20 @@ def tx40_torque(place: Path | None, _: int) -> list[Gate]:
     assert place is not None
     robot, log = tx40(place)
     rows = rows_of(robot, [log], regressor=True)
-    near = agreeing(base_of(robot, rows), tx40_reference(place))
+    near = agreeing(fit_rows(robot, rows, TX40_OPTIONS).estimate, tx40_reference(place))
     found = [Gate("tx40: published friction figures met, of 13", near, 12, 13)]
     first = np.arange(len(rows.q)) < len(rows.q) // 2
     for name, half in (("first", first), ("second", ~first)):
-        fitted = base_of(robot, rows.take(half))
-        other = base_arm(robot, rows.take(~half), rows.effort[~half], clusters_of(rows.take(~half)), TX40_OPTIONS)
-        error = other.values - fitted.torque(other)
+        arm, rest = fit_rows(robot, rows.take(half), TX40_OPTIONS).arm, rows.take(~half)
+        error = rest.effort - arm.torque(rest)
         for joint, most in enumerate((10.0, 8.0, 13.0, 12.0, 22.0, 20.0)):
-            of = other.block.joint == joint
-            relative = 100 * float(np.linalg.norm(error[of]) / np.linalg.norm(other.values[of]))
+            of = moving(rest, rest.effort, joint, TX40_OPTIONS.velocity_threshold, TX40_OPTIONS.couplings)
+            relative = 100 * float(np.linalg.norm(error[of, joint]) / np.linalg.norm(rest.effort[of, joint]))
             found.append(Gate(f"tx40, {name} half predicts the other: J{joint + 1} [%]", relative, 0.0, most))
     return found
 
 
-def base_of(robot: Robot, rows: Rows) -> BaseFit:
-    """The base fit of rows with torques."""
-    clusters = clusters_of(rows)
-    arm = base_arm(robot, rows, rows.effort, clusters, TX40_OPTIONS)
-    return fit_base(robot, arm, clusters, TX40_OPTIONS)
-
-
-def agreeing(fitted: BaseFit, reference: dict[str, tuple[float, float]]) -> int:
+def agreeing(fitted: Estimate, reference: dict[str, tuple[float, float]]) -> int:
     """How many published friction figures with a standard deviation below 5 % are met within 3 of them, or 3 %.
 
     The published terms of joints 5 and 6 have the coupling's viscous friction in them.
@@ -202,24 +170,6 @@ def _true(truth: Truth, figure: str, joint: int | None) -> float:
     if joint is None:
         return {"idle_power": truth.idle_power, "link_mass_scale": 1.0}[figure]
     return float(getattr(truth, figure)[joint])
-
-
-def times(_: Path | None, __: int) -> list[Gate]:
-    """Seconds of one core for a fit to 30 s of log, with its validation; the least of three."""
-    robot = load_robot("ur10e")
-    log = recorded(robot, truth_of(robot), moves=10).log()
-    found = list[Gate]()
-    for what, options, most in (
-        ("without", IdentificationOptions(), 1.0),
-        ("with", IdentificationOptions(refit=True), 3.0),
-    ):
-        spent = list[float]()
-        for _repeat in range(3):
-            start = time.process_time()
-            identify(robot, [log], options)
-            spent.append(time.process_time() - start)
-        found.append(Gate(f"fit of {log.duration:.0f} s of log {what} inertials [s]", min(spent), 0.0, most))
-    return found
 
 
 def standins(_: Path | None, __: int) -> list[Gate]:
@@ -293,12 +243,10 @@ def _halves() -> list[Gate]:
 
 
 PARTS: dict[str, Callable[[Path | None, int], list[Gate]]] = {
-    "structure": structure,
     "ur3e": ur3e_power,
     "tx40": tx40_torque,
     "synthetic": synthetic,
     "standins": standins,
-    "time": times,
 }
 OF_LOGS = ("ur3e", "tx40")
 

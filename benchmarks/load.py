@@ -1,7 +1,4 @@
-"""The service under steady load: each client sends its next request as soon as the last one is answered.
-
-Then a burst: more simultaneous requests than one client may have. The service must refuse the excess with 429.
-"""
+"""The service under steady load: each client sends its next request as soon as the last one is answered."""
 
 from __future__ import annotations
 
@@ -9,7 +6,6 @@ import os
 import threading
 import time
 from collections import Counter
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -21,7 +17,6 @@ from benchmarks.statistics import Spread
 from benchmarks.tasks import request_task
 
 PERIOD = 1.0  # between two measurements of memory [s]
-BURST = 40  # simultaneous requests
 VALID = b'"certificate"'
 
 
@@ -95,32 +90,14 @@ def steady(service: Service, seed: int, clients: int, seconds: float) -> dict[st
     }
 
 
-def burst(service: Service, seed: int) -> dict[str, Any]:
-    """Results of BURST simultaneous requests."""
-    bodies = [request_task(seed, index).body for index in range(BURST)]
-
-    def one(body: dict[str, Any]) -> tuple[int, bool]:
-        answer = service.client().optimize(body)
-        return answer.status, "retry-after" in answer.headers
-
-    with ThreadPoolExecutor(BURST) as threads:
-        answers = list(threads.map(one, bodies))
-    return {
-        "sent": BURST,
-        "statuses": {str(s): n for s, n in Counter(status for status, _ in answers).items()},
-        "refusals_have_retry_after": all(named for status, named in answers if status == 429),
-    }
-
-
 def main() -> None:
-    """Runs the load, then the burst."""
+    """Runs the load."""
     arguments = parser(__doc__, seed=7)
     arguments.add_argument("--clients", type=int, default=8, help="clients (%(default)s)")
     arguments.add_argument("--seconds", type=float, default=60.0, help="duration [s] (%(default)s)")
     given = arguments.parse_args()
     with running() as service:
         results = steady(service, given.seed, given.clients, given.seconds)
-        results["burst"] = burst(service, given.seed)
     wall = results["wall"]
     print(
         f"{results['clients']} clients for {results['seconds']:.0f} s: {results['answers']} answers, "
@@ -132,7 +109,6 @@ def main() -> None:
         f"memory of {results['processes']} processes, MiB: second quarter {results['memory_first']:.0f}, "
         f"last {results['memory_last']:.0f}; same processes throughout: {results['same_workers']}"
     )
-    print(f"burst: {results['burst']}")
     write_json(given.json, results)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.command import on_one_core, parser, write_json
-from benchmarks.reference import FILES, fingerprint, load, problem_of
+from benchmarks.reference import FILE, fingerprint, load, problem_of
 from benchmarks.statistics import Spread
 from benchmarks.tasks import move
 from joulepath.models.registry import load_robot
@@ -23,14 +23,13 @@ def main() -> None:
     """Solves every task that has a reference, and compares the energies."""
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, help="tasks (all that have a reference)")
-    arguments.add_argument("--objective", choices=tuple(FILES), default="electrical", help="(%(default)s)")
-    arguments.add_argument("--reference", type=Path, help="the stored references (those of the objective)")
+    arguments.add_argument("--reference", type=Path, default=FILE, help="the stored references (%(default)s)")
     arguments.add_argument("--deadline", type=float, default=AMPLE, help="of each search [s] (%(default)s)")
     given = arguments.parse_args()
     on_one_core()
     robot = load_robot("ur5e")
     compile_kernel(robot)
-    reference = load(given.reference or FILES[given.objective])
+    reference = load(given.reference)
     if reference["fingerprint"] != fingerprint(robot):
         raise SystemExit("The robot's parameters have changed: renew the references by python -m benchmarks.reference")
     rows: list[dict[str, Any]] = []
@@ -39,9 +38,7 @@ def main() -> None:
             continue
         task = move(reference["seed"], row["index"])
         try:
-            energy = optimize(replace(problem_of(task, given.objective), deadline=given.deadline)).energy.of(
-                given.objective
-            )
+            energy = optimize(replace(problem_of(task), deadline=given.deadline)).energy.electrical.total
         except JoulepathError as error:
             print(f"index {task.index}: {error!r}")
             energy = float("inf")
@@ -57,15 +54,12 @@ def main() -> None:
         "fine_control_points": reference["fine_control_points"],
         "excess": Spread.of([row["excess"] for row in rows]),
         "fine_excess": Spread.of([row["fine_excess"] for row in rows]),
-        "within_half_percent": sum(row["excess"] <= 0.005 for row in rows) / len(rows),
         "within_one_percent": sum(row["excess"] <= 0.01 for row in rows) / len(rows),
-        "within_three_percent": sum(row["excess"] <= 0.03 for row in rows) / len(rows),
         "worst": worst[:5],
     }
     print(f"energy above the best of {results['starts']} starts: {results['excess'].times(100).formatted(' %', 2)}")
     print(f"above the references refined on a finer grid: {results['fine_excess'].times(100).formatted(' %', 2)}")
-    shares = ("half", "one", "three")
-    print(", ".join(f"within {share} percent: {results[f'within_{share}_percent']:.0%}" for share in shares))
+    print(f"within one percent: {results['within_one_percent']:.0%}")
     print(f"worst: {[(row['index'], round(row['excess'], 4)) for row in worst[:5]]}")
     write_json(given.json, results)
 

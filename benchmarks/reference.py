@@ -8,12 +8,6 @@ Each task is solved by joulepath's SQP from STARTS initial guesses (the straight
 POINTS control points, and by IPOPT from IPOPT_STARTS initial guesses on the same spline. The SQP then refines IPOPT's
 motions, so that they satisfy the limits between the nodes, too. Finally it refines the best motion on twice as many
 spans. Limits are those of the robot, and the duration is free. `make bench` compares answers with the stored energies.
-
-    python -m benchmarks.reference --objective mechanical --count 12 --starts 16
-
-writes benchmarks/mechanical_reference_energies.json. Mechanical work is solved at a fixed duration, between STRETCH
-times the shortest one, on MECHANICAL_POINTS control points, from one width of the smoothed corners to the next, by the
-SQP alone.
 """
 
 from __future__ import annotations
@@ -36,23 +30,16 @@ from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.energy.kernel_cache import compile_kernel
-from joulepath.optimizer.energy.plant import SHARPER_WIDTHS, WIDTH
 from joulepath.optimizer.methods.duration_intervals import duration_intervals
 from joulepath.optimizer.methods.free_spline import FreeSpline
 from joulepath.optimizer.methods.sqp_method import Guess
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.solution import Objective
 from joulepath.optimizer.trajectories import bspline
-from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 from joulepath.optimizer.trajectories.spline import Spline
 
-FILES: dict[Objective, Path] = {
-    "electrical": Path(__file__).with_name("reference_energies.json"),
-    "mechanical": Path(__file__).with_name("mechanical_reference_energies.json"),
-}
-FILE = FILES["electrical"]
+FILE = Path(__file__).with_name("reference_energies.json")
 SEED, TASKS = 1, 100
 STARTS, POINTS = 64, 25
 IPOPT_STARTS = 4
@@ -60,8 +47,6 @@ FINE_POINTS = 45  # spans of half the length
 MODES = 3  # half waves of a perturbation
 PERTURBATIONS = (0.1, 1.5)  # least and largest standard deviation of the waves' amplitudes [rad]
 PATIENCE = 60.0  # longest time for one start [s]
-MECHANICAL_POINTS = 40
-STRETCH = (1.2, 3.0)
 
 
 def perturbation(rng: np.random.Generator, space: bspline.Basis, nq: int) -> Array:
@@ -77,55 +62,39 @@ def _opti() -> CasadiOptiGrid:
     return CasadiOptiGrid(load_robot("ur5e"), POINTS, 2 * POINTS + 11)
 
 
-def problem_of(task: Move, objective: Objective = "electrical") -> Problem:
-    """The problem of a task. Its duration is free for electrical energy, and fixed by a draw for mechanical work."""
+def problem_of(task: Move) -> Problem:
+    """The problem of a task."""
     arm = Arm(robot=load_robot("ur5e"), collisions=False)
-    if objective == "electrical":
-        return Problem(arm=arm, start=task.q_start, goal=task.q_goal)
-    stretch = float(np.random.default_rng([task.seed, task.index, 2]).uniform(*STRETCH))
-    duration = stretch * float(shortest_duration(task.q_goal - task.q_start, arm.active_limits))
-    return Problem(
-        arm=arm,
-        start=task.q_start,
-        goal=task.q_goal,
-        objective=objective,
-        duration_min=duration,
-        duration_max=duration,
-    )
+    return Problem(arm=arm, start=task.q_start, goal=task.q_goal)
 
 
 class Search:
     """The best motion found for one task, and its exact energy [J] in the objective."""
 
-    def __init__(self, task: Move, objective: Objective = "electrical") -> None:
+    def __init__(self, task: Move) -> None:
         self.move = task
-        self.prepared = PreparedProblem.of(problem_of(task, objective))
-        self.widths = (WIDTH,) if objective == "electrical" else (WIDTH, *SHARPER_WIDTHS)
+        self.prepared = PreparedProblem.of(problem_of(task))
         self.best: Spline | None = None
         self.energy = np.inf
 
     def improve(self, guess: Guess) -> float:
         """The energy [J] reached from an initial guess, inf without a motion. The best motion is stored."""
-        energy = np.inf
-        for width in self.widths:
-            interval = duration_intervals(self.prepared, self.move.q_goal, width=width)[0]
-            deadline = Deadline.after(PATIENCE)
-            solver = FreeSpline(self.prepared, self.move.q_start, self.move.q_goal, deadline, interval)
-            spline = solver.improve(guess).spline
-            if spline is None:
-                break
-            energy = self.prepared.objective_of(self.prepared.energy(spline))
-            if energy < self.energy:
-                self.best, self.energy = spline, energy
-            guess = Guess(guess.space, spline.control_points, spline.duration)
+        interval = duration_intervals(self.prepared, self.move.q_goal)[0]
+        deadline = Deadline.after(PATIENCE)
+        solver = FreeSpline(self.prepared, self.move.q_start, self.move.q_goal, deadline, interval)
+        spline = solver.improve(guess).spline
+        if spline is None:
+            return float("inf")
+        energy = self.prepared.objective_of(self.prepared.energy(spline))
+        if energy < self.energy:
+            self.best, self.energy = spline, energy
         return float(energy)
 
 
-def search(seed: int, starts: int, ipopt_starts: int, objective: Objective, index: int) -> dict[str, Any]:
+def search(seed: int, starts: int, ipopt_starts: int, index: int) -> dict[str, Any]:
     """The results for one task; energies in J."""
     task = move(seed, index)
-    electrical = objective == "electrical"
-    found, space = Search(task, objective), bspline.uniform(POINTS if electrical else MECHANICAL_POINTS)
+    found, space = Search(task), bspline.uniform(POINTS)
     nq = len(task.q_start)
     straight = task.q_start + np.outer(space.quintic, task.q_goal - task.q_start)
     rng = np.random.default_rng([seed, index, 1])
@@ -143,7 +112,7 @@ def search(seed: int, starts: int, ipopt_starts: int, objective: Objective, inde
     energies = [from_line, *(found.improve(guess(perturbed())) for _ in range(starts - 1))]
     by_ipopt = [_ipopt(found, perturbed() - straight if k else None) for k in range(ipopt_starts)]
     least = found.energy
-    if found.best is not None and electrical:
+    if found.best is not None:
         fine = bspline.uniform(FINE_POINTS)
         unit = found.best.knots / found.best.duration
         points = bspline.refit(found.best.control_points, unit, fine.knots)
@@ -197,16 +166,13 @@ def main() -> None:
     """Solves the tasks and stores the results."""
     arguments = parser(__doc__, seed=SEED)
     arguments.add_argument("--count", type=int, default=TASKS, help="tasks (%(default)s)")
-    arguments.add_argument("--objective", choices=tuple(FILES), default="electrical", help="(%(default)s)")
     arguments.add_argument("--starts", type=int, default=STARTS, help="initial guesses of the SQP (%(default)s)")
     arguments.add_argument("--ipopt-starts", type=int, default=IPOPT_STARTS, help="and of IPOPT (%(default)s)")
     arguments.add_argument("--processes", type=int, default=2, help="processes (%(default)s)")
-    arguments.add_argument("--output", type=Path, help="file to write (that of the objective)")
+    arguments.add_argument("--output", type=Path, default=FILE, help="file to write (%(default)s)")
     given = arguments.parse_args()
     on_one_core()
-    electrical = given.objective == "electrical"
-    output: Path = given.output or FILES[given.objective]
-    ipopt_starts = given.ipopt_starts if electrical else 0  # its cost is the electrical energy
+    output: Path = given.output
     robot = load_robot("ur5e")
     compile_kernel(robot)
     settings = {
@@ -214,15 +180,15 @@ def main() -> None:
         "fingerprint": fingerprint(robot),
         "seed": given.seed,
         "starts": given.starts,
-        "ipopt_starts": ipopt_starts,
-        "control_points": POINTS if electrical else MECHANICAL_POINTS,
-        "fine_control_points": FINE_POINTS if electrical else MECHANICAL_POINTS,
+        "ipopt_starts": given.ipopt_starts,
+        "control_points": POINTS,
+        "fine_control_points": FINE_POINTS,
     }
     before = load(output) if output.exists() else {}
     continued = {name: before.get(name) for name in settings} == settings
     rows: list[dict[str, Any]] = before["tasks"] if continued else []
     done = {row["index"] for row in rows}
-    one: Callable[[int], dict[str, Any]] = partial(search, given.seed, given.starts, ipopt_starts, given.objective)
+    one: Callable[[int], dict[str, Any]] = partial(search, given.seed, given.starts, given.ipopt_starts)
     with multiprocessing.get_context("spawn").Pool(given.processes) as pool:
         for row in pool.imap_unordered(one, (index for index in range(given.count) if index not in done)):
             rows = sorted([*rows, row], key=lambda each: int(each["index"]))

@@ -1,4 +1,4 @@
-"""benchmarks/RESULTS.md from the results of the sections: requirements, distributions, growth, other planners."""
+"""benchmarks/RESULTS.md from the results of the sections: requirements, distributions, other planners."""
 
 from __future__ import annotations
 
@@ -22,7 +22,6 @@ def write(path: Path, machine: Results, results: dict[str, Results | None], took
         _notes(results),
         _arms(results.get("arms")),
         _load(results.get("load")),
-        _growth(results.get("scaling")),
         _foreign(results.get("foreign")),
     ]
     if planners.rows:
@@ -81,18 +80,10 @@ def _spreads(results: dict[str, Results | None]) -> Iterator[list[str]]:
                 yield _spread(
                     f"random feasible requests, {kind}{what}", "gap, 1 - lower bound / energy [%]", gap, PERCENT
                 )
-    if starts := results.get("starts"):
-        cold = starts["cold"]
-        yield _spread("requests while the kernel compiles", "time [ms]", cold["wall_meanwhile"], MS, 0)
-        yield _spread("requests after the kernel is compiled", "time [ms]", cold["wall_afterwards"], MS, 0)
     if quality := results.get("quality"):
         for name, points in (("excess", "control_points"), ("fine_excess", "fine_control_points")):
             task = f"best of {quality['starts']} starts, {quality[points]} control points"
             yield _spread(task, "energy above it [%]", quality[name], PERCENT, 2)
-    if simulation := results.get("simulation"):
-        for run, title in (("feed_forward", "known torques and PD"), ("pd", "PD alone"), ("changed", "changed arms")):
-            for quantity, spread in simulation[run].items():
-                yield _spread(f"answers replayed in MuJoCo, {title}", quantity, spread, 1, 4)
     if load := results.get("load"):
         yield _spread(f"{load['clients']} clients", "time [ms]", load["wall"], MS, 0)
 
@@ -110,16 +101,6 @@ def _notes(results: dict[str, Results | None]) -> str:
         lines.append(f"Among obstacles, the straight line in joint space collides in {scenes['blocked']} tasks.")
         lines.append(f"Among obstacles, {planned} answers start from a planned collision-free path.")
         lines += [f"Not solved: {each}." for each in scenes["unsolved"]]
-    if starts := results.get("starts"):
-        warm, cold = starts["warm"], starts["cold"]
-        lines.append(f"Warm cache: ready {warm['start_to_ready']:.1f} s after the start of the process.")
-        lines.append(f"Warm cache: a request sent at once is answered {warm['start_to_answer']:.1f} s after the start.")
-        compiled = cold["compiled_after"]
-        if compiled is not None:
-            lines.append(
-                f"Empty cache: the kernel is compiled {compiled:.1f} s after the start. "
-                f"{cold['answered_meanwhile']} requests are answered until then."
-            )
     for section in ("http", "success", "tight"):
         found = results.get(section) or {"refused": [], "errors": []}
         lines += [f"Answered with a problem: {each}." for each in found["refused"]]
@@ -154,64 +135,18 @@ def _arms(found: Results | None) -> str:
 def _load(found: Results | None) -> str:
     if found is None:
         return ""
-    burst = ", ".join(f"{count} with status {status}" for status, count in sorted(found["burst"]["statuses"].items()))
     return (
         "## Load\n\n"
         f"Each of {found['clients']} clients sends its next request as soon as the last one is answered. "
         f"{found['most_in_flight']} requests are in flight at all times on {found['cores']} workers. The service gives "
         f"{found['per_second']:.0f} answers per second, {found['answers']} in all. The resident memory of its "
         f"processes adds up to {found['memory_first']:.0f} MiB in the second quarter of the time, and to "
-        f"{found['memory_last']:.0f} MiB in the last. Then {found['burst']['sent']} requests arrive at once: {burst}."
+        f"{found['memory_last']:.0f} MiB in the last."
     )
-
-
-def _growth(found: Results | None) -> str:
-    if found is None:
-        return ""
-    exponents = (
-        [name, f"{found[key]['exponent']:.1f}", f"{found[key]['exponent_per_iteration']:.1f}" if per_iteration else ""]
-        for name, key, per_iteration in (
-            ("control points", "control_points", True),
-            ("degrees of freedom", "joints", True),
-            ("candidates", "candidates", False),
-        )
-    )
-    times = ["time: median [ms]", "95th percentile [ms]"]
-    parts = [
-        "## Growth",
-        f"Exponents of power laws, fitted to medians by least squares in logarithms; {found['count']} tasks per size.",
-        table(["size", "exponent of the time", "exponent of the time per iteration"], exponents),
-        "**Control points**: one NLP with evenly spaced knots.",
-        table(
-            ["control points", "nodes", *times, "iterations: median", "solved [%]"],
-            (
-                [str(row["size"]), str(row["nodes"]), *_times(row), *_solved(row)]
-                for row in found["control_points"]["rows"]
-            ),
-        ),
-        "**Degrees of freedom**: one candidate of an arm whose chain is shortened or extended.",
-        table(
-            ["joints", *times, "iterations: median", "solved [%]"],
-            ([str(row["size"]), *_times(row), *_solved(row)] for row in found["joints"]["rows"]),
-        ),
-        "**Candidates**: one whole answer.",
-        table(
-            ["allowed", "candidates: median", *times, "NLPs solved: median"],
-            (
-                [row["name"], f"{row['size']:.0f}", *_times(row, 0), f"{row['iterations']['p50']:.0f}"]
-                for row in found["candidates"]["rows"]
-            ),
-        ),
-    ]
-    return "\n\n".join(parts)
 
 
 def _times(row: Results, digits: int = 1) -> list[str]:
     return [f"{row['wall'][name] * MS:.{digits}f}" for name in ("p50", "p95")]
-
-
-def _solved(row: Results) -> list[str]:
-    return [f"{row['iterations']['p50']:.0f}", f"{PERCENT * row['solved'] / row['wall']['count']:.0f}"]
 
 
 def _foreign(found: Results | None) -> str:

@@ -9,16 +9,6 @@ from typing import Any
 Results = dict[str, Any]
 
 MS, PERCENT = 1e3, 1e2
-# what the documentation promises of answers that MuJoCo plays with torques known in advance and a PD loop
-PROMISES = {
-    "torque [1e-9 of the limit]": 1.0,
-    "joints [mrad]": 0.3,
-    "TCP [mm]": 0.25,
-    "electrical [%]": 0.05,
-    "mechanical [%]": 0.1,
-    "contacts": 0.0,
-    "accelerations, MuJoCo and Pinocchio [1e-9]": 1.0,
-}
 
 
 @dataclass(frozen=True)
@@ -88,18 +78,6 @@ def _scenes(found: Results) -> Iterator[Requirement]:
     yield Requirement("among obstacles", "answers in collision", "count", len(found["collisions"]), 0)
 
 
-def _starts(found: Results) -> Iterator[Requirement]:
-    warm, cold = found["warm"], found["cold"]
-    task = "start with a warm cache"
-    yield Requirement(
-        task, "time of the first request after readiness [s]", "value", warm["first_after_ready"], 1, digits=2
-    )
-    task = "start with an empty cache"
-    yield Requirement(task, "time from start to first answer [s]", "value", cold["start_to_answer"], 20, digits=1)
-    lost = 0 if cold["all_answered"] else 1
-    yield Requirement(task, "runs with an unanswered request", "count", lost, 0)
-
-
 def _success(found: Results) -> Iterator[Requirement]:
     task = "random feasible requests"
     valid = PERCENT * found["valid_fraction"]
@@ -141,36 +119,22 @@ def _quality(found: Results) -> Iterator[Requirement]:
 
 
 def _load(found: Results) -> Iterator[Requirement]:
-    task, wall, burst = f"{found['clients']} clients for {found['seconds']:.0f} s", found["wall"], found["burst"]
+    task, wall = f"{found['clients']} clients for {found['seconds']:.0f} s", found["wall"]
     errors = sum(count for status, count in found["statuses"].items() if status != "200") + len(found["lost"])
     yield Requirement(task, "errors", "count", errors, 0)
     yield Requirement(task, "99th percentile / median of the time", "value", wall["p99"] / wall["p50"], 4, digits=1)
     growth = found["memory_last"] / found["memory_first"]
     yield Requirement(task, "memory, last / second quarter of the time", "median", growth, 1.05, digits=3)
     yield Requirement(task, "workers replaced", "runs", 0 if found["same_workers"] else 1, 0)
-    other = sum(count for status, count in burst["statuses"].items() if status not in ("200", "429"))
-    task = f"burst of {burst['sent']} requests"
-    yield Requirement(task, "answers other than 200 and 429", "count", other, 0)
-    yield Requirement(task, "answers 429", "count", burst["statuses"].get("429", 0), 1, at_least=True)
-    unnamed = 0 if burst["refusals_have_retry_after"] else 1
-    yield Requirement(task, "runs with an answer 429 without `Retry-After`", "count", unnamed, 0)
-
-
-def _simulation(found: Results) -> Iterator[Requirement]:
-    for quantity, bound in PROMISES.items():
-        most = found["feed_forward"][quantity]["maximum"]
-        yield Requirement("answers replayed in MuJoCo", quantity, "maximum", most, bound, digits=4)
 
 
 SECTIONS: dict[str, Callable[[Results], Iterator[Requirement]]] = {
     "solver": _solver,
     "http": _http,
     "scenes": _scenes,
-    "starts": _starts,
     "success": _success,
     "tight": _tight,
     "arms": _arms,
     "quality": _quality,
-    "simulation": _simulation,
     "load": _load,
 }

@@ -1,4 +1,4 @@
-"""Statistics of repeated measurements: quartiles, percentiles, and the exponent of a power-law fit."""
+"""Statistics of repeated measurements: quartiles and percentiles."""
 
 from __future__ import annotations
 
@@ -41,8 +41,3 @@ class Spread:
             f"median {numbers['p50']}{unit}, 95th percentile {numbers['p95']}{unit} "
             f"(quartiles {numbers['p25']} and {numbers['p75']}, maximum {numbers['maximum']}, n = {self.count})"
         )
-
-
-def exponent(x: Sequence[float], y: Sequence[float]) -> float:
-    """The exponent k of the power law y = c xᵏ fitted by least squares in logarithms."""
-    return float(np.polyfit(np.log(x), np.log(y), 1)[0])

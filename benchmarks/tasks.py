@@ -61,14 +61,11 @@ def moves(seed: int, count: int, robot: Robot | None = None) -> Iterator[Move]:
     return (move(seed, index, robot) for index in range(count))
 
 
-def request_task(
-    seed: int, index: int, kind: Kind | None = None, varied: bool = False, robot: str = "ur5e"
-) -> RequestTask:
+def request_task(seed: int, index: int, kind: Kind | None = None, robot: str = "ur5e") -> RequestTask:
     """Task `index` of a seed: a request with default settings between reachable targets.
 
     A target is the pose, or the joint positions, of a configuration that is uniform over the joint ranges and without
-    self-collision. The kinds alternate if `kind` is None. `varied` adds other fields at random: payload, mounting,
-    tighter limits, another objective, a duration, no full-turn alternatives. Such a request can be infeasible.
+    self-collision. The kinds alternate if `kind` is None.
     """
     arm = load_robot(robot)
     rng = np.random.default_rng([seed, index])
@@ -77,8 +74,6 @@ def request_task(
     T_start, T_goal = flange(arm, q_start), flange(arm, q_goal)
     start = {"q": q_start.tolist()} if kind == "joint to pose" else {"pose": as_pose(T_start)}
     body: dict[str, Any] = {"robot": robot, "start": start, "goal": {"pose": as_pose(T_goal)}}
-    if varied:
-        body |= _variation(rng, arm)
     return RequestTask(seed, index, kind, body, q_start, q_goal, T_start, T_goal)
 
 
@@ -91,11 +86,9 @@ def collision_free(rng: np.random.Generator, robot: Robot) -> Array:
             return np.asarray(q)
 
 
-def request_tasks(
-    seed: int, count: int, kind: Kind | None = None, varied: bool = False, robot: str = "ur5e"
-) -> Iterator[RequestTask]:
+def request_tasks(seed: int, count: int, kind: Kind | None = None, robot: str = "ur5e") -> Iterator[RequestTask]:
     """The first `count` requests of a seed, all of one kind if `kind` is given."""
-    return (request_task(seed, index, kind, varied, robot) for index in range(count))
+    return (request_task(seed, index, kind, robot) for index in range(count))
 
 
 def flange(robot: Robot, q: Array) -> Array:
@@ -110,26 +103,3 @@ def as_pose(T: Array) -> dict[str, list[float]]:
     """A pose as requests state it: position [m] and quaternion x, y, z, w."""
     quaternion = pin.Quaternion(np.ascontiguousarray(T[:3, :3])).normalized()
     return {"position": T[:3, 3].tolist(), "quaternion": quaternion.coeffs().tolist()}
-
-
-def _variation(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
-    """Random fields of a request other than its targets."""
-    fields: dict[str, Any] = {}
-    if rng.random() < 0.5:
-        mass = float(rng.uniform(0.0, robot.rated_payload))
-        fields["payload"] = {"mass": mass, "com": rng.uniform([-0.05, -0.05, 0.0], [0.05, 0.05, 0.15]).tolist()}
-    if rng.random() < 0.5:
-        fields["gravity"] = MOUNTS[str(rng.choice(list(MOUNTS)))]
-    if rng.random() < 0.5:
-        fields["limits"] = {
-            "velocity": (robot.limits.v_max * rng.uniform(0.3, 1.0)).tolist(),
-            "acceleration": (robot.limits.a_max * rng.uniform(0.3, 1.0)).tolist(),
-            "jerk": (robot.limits.j_max * rng.uniform(0.3, 1.0)).tolist(),
-        }
-    if rng.random() < 0.3:
-        fields |= {"objective": "mechanical", "duration": {"max": float(rng.uniform(3.0, 6.0))}}
-    elif rng.random() < 0.3:
-        fields["duration"] = float(rng.uniform(1.5, 6.0))
-    if rng.random() < 0.3:
-        fields["windings"] = False
-    return fields

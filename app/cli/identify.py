@@ -33,6 +33,26 @@ FIT = click.option(
     show_default=True,
     help="What is found. May be repeated. Power is added where the logs have it; payload is that of the last log.",
 )
+METHOD = click.option(
+    "--method",
+    type=click.Choice([
+        "automatic",
+        "motor_current",
+        "electrical_power",
+        "base_parameters",
+        "essential_parameters",
+        "periodic",
+        "base_wrench",
+        "threshold_velocity",
+        "temperature",
+    ]),
+    default="automatic",
+    show_default=True,
+    help="How it is found; docs/identification.md says what each method needs.",
+)  # fmt: skip
+PERIOD = click.option(
+    "--period", type=click.FloatRange(0.1, 1e4), help="Period of the motion [s], for --method periodic."
+)
 TERMS = click.option(
     "--term",
     "terms",
@@ -49,13 +69,16 @@ TERMS = click.option(
 Examples:
   joulepath identify monday.csv --robot ur10e
   joulepath identify cold.csv warm.csv --validate friday.csv --refit --output figures.json
-  joulepath identify empty.csv loaded.csv --fit payload"""
+  joulepath identify empty.csv loaded.csv --fit payload
+  joulepath identify excitation.csv --method periodic --period 10 --validate friday.csv"""
 )
 @click.argument("logs", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @OUTPUT
 @click.option("--robot", default="ur5e", show_default=True, help="Name of the robot.")
 @OTHERS
 @FIT
+@METHOD
+@PERIOD
 @TERMS
 @click.option("--refit", is_flag=True, help="Find the links' inertials, too.")
 @click.option("--estimator", type=click.Choice(["wls", "irls", "ols"]), default="wls", help="irls: against outliers.")
@@ -69,6 +92,8 @@ def identify(
     robot: str,
     others: tuple[Path, ...],
     fit: tuple[str, ...],
+    method: str,
+    period: float | None,
     terms: tuple[str, ...],
     refit: bool,
     estimator: str,
@@ -88,12 +113,10 @@ def identify(
     request_id = new_id()
     carried = None if payload is None else {"mass": payload, "com": list(com)}
     settings: dict[str, Any] = {"robot": robot, "payload": carried, "units": units, "effort": effort}
-    files = [*logs, *others]
-    read = tuple(
-        (_settings_of(LogSettings, settings | {"name": file.stem[:80]}, request_id), _packed(file)) for file in files
-    )
+    read = tuple(_read(LogSettings, settings, file, request_id) for file in (*logs, *others))
     body: dict[str, Any] = {"logs": [_FILE_ID] * len(logs), "estimator": estimator, "fit": list(fit)}
-    body |= {"friction": {"terms": list(terms)}, "inertials": "refit" if refit else "keep"}
+    body |= {"method": method, "period": period, "inertials": "refit" if refit else "keep"}
+    body |= {"friction": {"terms": list(terms)}}
     body |= {"validate": [_FILE_ID] * len(others)} if others else {}
     asked = validated(IdentifyRequest, _json(body), request_id)
     with terminal.progress(f"Identifying from {len(logs)} logs"):
@@ -108,10 +131,10 @@ def _answered(asked: Any, read: Any, request_id: str) -> bytes:
     return answered(IdentifyTask(asked, read, request_id), asked.deadline, request_id)
 
 
-def _settings_of(model: Any, fields: dict[str, Any], request_id: str) -> dict[str, Any]:
-    """Checked settings of a log, as they are stored."""
-    found: dict[str, Any] = validated(model, _json(fields), request_id).model_dump(mode="json")
-    return found
+def _read(model: Any, fields: dict[str, Any], file: Path, request_id: str) -> tuple[dict[str, Any], bytes]:
+    """Checked settings of a log, as they are stored, and its packed file."""
+    named = _json(fields | {"name": file.stem[:80]})
+    return validated(model, named, request_id).model_dump(mode="json"), _packed(file)
 
 
 def _json(content: dict[str, Any]) -> bytes:

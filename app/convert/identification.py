@@ -27,6 +27,8 @@ def to_options(request: IdentifyRequest) -> IdentificationOptions:
     return IdentificationOptions(
         fit=tuple(request.fit),
         refit=request.inertials == "refit",
+        method=request.method,
+        period=request.period,
         held_out=held_out.get("moves", fraction),
         terms=tuple(request.friction.terms),
         knee=request.friction.knee,
@@ -47,6 +49,8 @@ def identification_fields(found: Identification, validation: Validation) -> dict
         "validation": _without_curves(asdict(validation)),
         "residuals": asdict(found.residuals),
         "temperatures": asdict(found.temperatures),
+        "noise": None if found.noise is None else asdict(found.noise),
+        "thresholds": found.thresholds,
         "advice": None if found.advice is None else asdict(found.advice),
         "payload": None if found.payload is None else _payload_fields(found.payload),
     }

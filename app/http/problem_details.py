@@ -72,6 +72,7 @@ TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     identification_errors.NotExcited: problems.NotExcited,
     identification_errors.NothingHeldOut: problems.NothingHeldOut,
     identification_errors.NoPowerChannel: problems.NoPowerChannel,
+    identification_errors.MethodNotApplicable: problems.MethodNotApplicable,
     identification_errors.PayloadUnknown: problems.PayloadUnknown,
     optimizer_errors.UnknownRobot: problems.UnknownRobot,
     optimizer_errors.UnreachablePose: problems.UnreachablePose,

@@ -15,6 +15,17 @@ from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
 MOST_LOGS = 32
 Target = Literal["friction", "rotor", "torque_constant", "power", "payload"]
 Term = Literal["coulomb", "viscous", "load", "offset", "curved"]
+Method = Literal[
+    "automatic",
+    "motor_current",
+    "electrical_power",
+    "base_parameters",
+    "essential_parameters",
+    "periodic",
+    "base_wrench",
+    "threshold_velocity",
+    "temperature",
+]
 State = Literal["queued", "running", "done", "failed", "cancelled"]
 LogIds = Annotated[list[str], Field(min_length=1, max_length=MOST_LOGS)]
 DEADLINE = 60.0
@@ -67,6 +78,17 @@ class IdentifyRequest(Request):
         ["friction", "rotor"],
         default=["friction", "rotor"],
     )
+    method: Method = described(
+        "How it is found. `automatic`: friction and rotors with the robot's own links where the logs "
+        "have currents or torques, and power where they have it. The others are methods of the "
+        "literature, each for its own kind of log: one that does not fit is `method-not-applicable`.",
+        None,
+        "automatic",
+        default="automatic",
+    )
+    period: float | None = described(
+        "Period of the motion; only for the method `periodic`.", "s", 10.0, default=None, ge=0.1, le=1e4
+    )
     inertials: Literal["keep", "refit"] = described(
         "`keep`: the robot's own. `refit`: they are found, too, as those of real bodies near the robot's own.",
         None,
@@ -94,7 +116,9 @@ class IdentifyRequest(Request):
 class IdentifiedParameter(Response):
     """A figure of a joint or of the whole arm."""
 
-    figure: str = described("Its name, as in `GET /robots/{name}`.", None, "coulomb")
+    figure: str = described(
+        "Its name, as in `GET /robots/{name}`, or the expression of a base parameter.", None, "coulomb"
+    )
     joint: int | None = described("Number of the joint, from 0; null: of the whole arm.", "1", 1)
     value: float = described("The value that is used.", "SI", 7.1)
     sd: float = described("Its standard deviation.", "SI", 0.2)
@@ -170,6 +194,16 @@ class Residuals(Response):
     power_lag_one: float | None = described("The same of the power; null without power.", "1", 0.1)
     white: bool = described("Whether all of them are below 0.3.", None, False)
     sessions: list[float] = described("Size of each log's friction relative to the fit's.", "1", [0.98, 1.02])
+
+
+class MeasuredNoise(Response):
+    """Noise of torques, from the repetitions of a periodic motion."""
+
+    periods: int = described("Number of whole periods in the log.", "1", 8)
+    deviation: list[float] = described(
+        "Standard deviation of each joint's torque.", "N·m", [0.6, 0.7, 0.4, 0.1, 0.1, 0.1]
+    )
+    excess: float = described("Mean square of the residuals over that of the noise: 1 if the model is right.", "1", 1.1)
 
 
 class Temperatures(Response):
@@ -306,5 +340,11 @@ class IdentificationResult(Response):
     validation: Validation = part("Errors on moves that the fit has not seen.")
     residuals: Residuals = part("What the fit leaves over of the moves.")
     temperatures: Temperatures = part("Friction over temperature.")
+    noise: MeasuredNoise | None = part("Noise of a periodic motion; null with other methods.")
+    thresholds: list[float] | None = described(
+        "Speeds below which no sample of a joint was used; null but for the method `threshold_velocity`.",
+        "rad/s",
+        [0.05, 0.04, 0.03, 0.02, 0.02, 0.02],
+    )
     advice: Advice | None = part("What would help most; null if nothing is known of it.")
     payload: FoundPayload | None = part("What the last log carried; null if it was not asked for.")

@@ -26,6 +26,12 @@ class LogColumns(Request):
     torque: _Columns | None = described("Motor torques at the joints.", None, ["nm_1", "nm_2"], default=None)
     effort: _Columns | None = described("Efforts of unknown meaning.", None, ["eff_1", "eff_2"], default=None)
     temperature: _Columns | None = described("Temperatures of the joints [°C].", None, ["t_1", "t_2"], default=None)
+    wrench: _Columns | None = described(
+        "Force [N] and torque [N·m] on a sensor beneath the base, about and along the axes of the base frame.",
+        None,
+        ["f_x", "f_y", "f_z", "t_x", "t_y", "t_z"],
+        default=None,
+    )
     power: _Column | None = described("Power drawn from the bus of the arm [W].", None, "watts", default=None)
 
 

@@ -37,7 +37,7 @@ class LogSettings(LogFile):
 class LogChannel(Response):
     """A channel of a log."""
 
-    name: str = described("`q1`, `v1`, `a1`, `effort1`, `temperature1`, … or `power`.", None, "effort2")
+    name: str = described("`q1`, `v1`, `a1`, `effort1`, `temperature1`, `wrench1`, … or `power`.", None, "effort2")
     column: str | None = described("Its column in the file; null if it was made from another.", None, "i2")
     unit: str = described("Its unit.", None, "A")
     min: float = described("Least value, in this unit.", "SI", -3.2)

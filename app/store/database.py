@@ -13,6 +13,7 @@ from alembic import command
 from alembic.config import Config
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
+from alembic.util import CommandError
 from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url, text
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import ConnectionPoolEntry
@@ -35,6 +36,17 @@ _SERVER_TIMEOUT = 5.0
 _PAGES = ("freelist_count", "page_size")
 _MIGRATION_LOCK = 0x6A6F756C65
 """Key of the advisory lock in PostgreSQL: any number that no other program uses in this database."""
+
+
+class OtherVersion(CommandError):
+    """Another version of the service made the database; `revision` is that of its tables."""
+
+    def __init__(self, revision: str, url: URL) -> None:
+        super().__init__(
+            f"Another version of the service made the tables of {url.render_as_string()} (revision {revision}), and "
+            "this one cannot migrate them: start that version, or move the database away (or set another "
+            "JOULEPATH_DATABASE_URL), and a new one is made."
+        )
 
 
 def create_database_engine(url: str) -> Engine:
@@ -121,7 +133,7 @@ def _keep_log(connection: sqlite3.Connection) -> None:
 def migrate(engine: Engine) -> None:
     """Migrates the tables to this version. Several processes may call it at the same time: one works, the others wait.
 
-    Raises CommandError if a later version of the service created the database.
+    Raises OtherVersion if the database has tables of which this version has no migration.
     """
     file = sqlite_file(engine.url)
     if file is not None:
@@ -131,8 +143,11 @@ def migrate(engine: Engine) -> None:
     with engine.connect() as connection:
         # without a lock, so that a database that cannot be written can be read
         present = MigrationContext.configure(connection).get_current_revision()
-    if present == ScriptDirectory.from_config(config).get_current_head():
+    scripts = ScriptDirectory.from_config(config)
+    if present == scripts.get_current_head():
         return
+    if present is not None and present not in {script.revision for script in scripts.walk_revisions()}:
+        raise OtherVersion(present, engine.url)
     with _migrating(engine) as connection:
         config.attributes["connection"] = connection
         command.upgrade(config, "head")

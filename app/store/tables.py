@@ -139,9 +139,9 @@ class Answer(Table):
     owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
     study_id: Mapped[str | None] = mapped_column(ForeignKey("studies.id", ondelete="CASCADE"))
     job_id: Mapped[str | None] = mapped_column(String(ID_LENGTH))
-    """Whoever deletes a job deletes its answers: SQLite adds no foreign key to a table that exists."""
+    """Whoever deletes a job deletes its answers."""
     robot: Mapped[str | None] = mapped_column(String(ROBOT_LENGTH))
-    """This and the next three are what lists show; null if it has none, or is of an earlier version."""
+    """This and the next three are what lists show; null if it has none."""
     energy: Mapped[float | None]
     duration: Mapped[float | None]
     status: Mapped[str | None] = mapped_column(String(16))

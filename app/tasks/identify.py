@@ -33,8 +33,8 @@ class IdentifyTask:
     def run(self, deadline: float) -> TaskResult:
         """What was found, within about `deadline` seconds; the curves of its residuals are stored beside it.
 
-        Raises UnknownRobot, EffortNotUsable, NotExcited, NothingHeldOut, NoPowerChannel, PayloadUnknown, InvalidRequest
-        or DeadlineExceeded.
+        Raises UnknownRobot, EffortNotUsable, MethodNotApplicable, NotExcited, NothingHeldOut,
+        NoPowerChannel, PayloadUnknown, InvalidRequest or DeadlineExceeded.
         """
         with until(Deadline.after(deadline)):
             return self._identified()

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import checkpoint
 
 BODY = 10
 """Parameters of a body."""
@@ -31,6 +32,24 @@ def rigid_regressor(model: pin.Model, q: Array, v: Array, a: Array) -> Array:
     found = np.empty((len(q), model.nq, BODY * model.nq))
     for row in range(len(q)):
         found[row] = pin.computeJointTorqueRegressor(model, data, q[row], v[row], a[row])
+    return found
+
+
+def base_wrench_regressor(model: pin.Model, q: Array, v: Array, a: Array) -> Array:
+    """The matrices (n, 6, 10 nq) whose products with the bodies' parameters are the wrench of the
+    links on the base: force [N] and torque [N·m] about its origin, in its axes. Rotors are
+    neglected."""
+    data = model.createData()
+    found = np.empty((len(q), 6, BODY * model.nq))
+    for row in range(len(q)):
+        checkpoint()
+        pin.rnea(model, data, q[row], v[row], a[row])
+        pin.forwardKinematics(model, data, q[row])
+        for joint in range(1, model.njoints):
+            body = pin.jointBodyRegressor(model, data, joint)
+            at = slice(BODY * (joint - 1), BODY * joint)
+            # minus: what the base exerts on the links acts back on it
+            found[row, :, at] = -data.oMi[joint].toDualActionMatrix() @ body
     return found
 
 

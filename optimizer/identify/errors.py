@@ -48,6 +48,14 @@ class NoPowerChannel(JoulepathError):
         )
 
 
+class MethodNotApplicable(JoulepathError):
+    """The logs do not have what the `method` needs."""
+
+    def __init__(self, method: str, needs: str) -> None:
+        super().__init__(f"The method {method} does not fit these logs: {needs}")
+        self.method = method
+
+
 class PayloadUnknown(JoulepathError):
     """Torque constants were asked for, and it is not known what the arm carried; `joints` carry too little to tell."""
 

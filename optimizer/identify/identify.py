@@ -17,8 +17,10 @@ from joulepath.optimizer.identify.document import document_of
 from joulepath.optimizer.identify.errors import NoPowerChannel, NotExcited, PayloadUnknown
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
 from joulepath.optimizer.identify.estimates.grouped import lag_one
+from joulepath.optimizer.identify.fits.base_fit import BaseTerms
 from joulepath.optimizer.identify.fits.block import own_value, terms_of
-from joulepath.optimizer.identify.fits.fitting import LINK_MASS_SCALE, Fitted, fit_rows, motor_torque
+from joulepath.optimizer.identify.fits.by_method import fit_by_method, prepared
+from joulepath.optimizer.identify.fits.fitting import LINK_MASS_SCALE, Fitted, motor_torque
 from joulepath.optimizer.identify.fits.payload_fit import Carried, joints_without_gravity, loaded, payload_of
 from joulepath.optimizer.identify.fits.temperature import temperatures_of
 from joulepath.optimizer.identify.fits.torque_fit import MOST_RELATIVE_SD, UNSURE, ZERO
@@ -35,6 +37,7 @@ from joulepath.optimizer.identify.results import (
     Advice,
     Curves,
     IdentifiedFigures,
+    MeasuredNoise,
     Parameter,
     Physical,
     Residuals,
@@ -73,10 +76,21 @@ class Identification:
     curves: Curves
     logs: tuple[str, ...]
 
+    @property
+    def noise(self) -> MeasuredNoise | None:
+        """The noise of a periodic motion; None with other methods."""
+        return self.fitted.noise
+
+    @property
+    def thresholds(self) -> Array | None:
+        """Speeds (nq,) [rad/s] below which no sample of a joint was used, where the method finds
+        them; else None."""
+        return self.fitted.thresholds
+
     @one_thread()
     def validate(self, logs: Sequence[Log]) -> Validation:
         """Errors of the figures on other logs, none of whose moves may be in the fit. Raises InvalidProblem."""
-        rows = rows_of(self.robot, logs, self.options.refit)
+        rows = rows_of(self.robot, logs, self.options.needs_regressor)
         return validate(self.robot, [Fold(self.fitted, self.spread, rows)], self.options.velocity_threshold)
 
     def figures(self) -> IdentifiedFigures:
@@ -93,7 +107,7 @@ class Identification:
             values["inverter_linear"] = electrics.inverter
         if LINK_MASS_SCALE in fitted:
             values |= inertials_of(self.robot, (arm.links - 1) * body_parameters(self.robot.model))
-        if arm.bodies is not None:
+        if arm.bodies is not None and not self.options.reduced:
             values |= inertials_of(self.robot, arm.bodies)
         # those that the logs tell only together with others count, too: their errors go with the others'
         turn = {name: row for name, row in self._parameters_of_figures() if name[0] in values or name[0] in LINK_NAMES}
@@ -157,12 +171,14 @@ def identify(robot: Robot, logs: Sequence[Log], options: IdentificationOptions |
     Raises:
         InvalidProblem: the logs or options do not fit the robot or each other.
         EffortNotUsable: the efforts of a log exclude gravity.
+        MethodNotApplicable: a log does not have what the method needs.
         NoPowerChannel: power is asked for, and no log has it.
         NotExcited: the logs tell nothing of what is asked for.
         PayloadUnknown: torque constants are asked for, and nobody said what the arm carried.
         NothingHeldOut: the logs have fewer than two different motions.
     """
-    options, last = options or IdentificationOptions(), len(logs) - 1
+    logs, options = prepared(logs, options or IdentificationOptions())
+    last = len(logs) - 1
     rows = _rows(robot, logs, options)
     _check(robot, rows, logs, options)
     validation, blind = None, np.zeros(len(rows.q), dtype=bool)
@@ -173,13 +189,11 @@ def identify(robot: Robot, logs: Sequence[Log], options: IdentificationOptions |
         validation = validate(robot, folds, options.velocity_threshold)
     carried = _carried(robot, rows, options, last)
     rows = rows if carried is None else loaded(rows, carried)
-    fitted = fit_rows(robot, rows, options)
-    parameters = _parameters(robot, fitted.estimate)
+    fitted = fit_by_method(robot, rows, options)
+    parameters = _parameters(robot, fitted.estimate, options)
     if carried is not None:
         parameters += carried.parameters(logs[-1].payload)
-    sought = [each for each in parameters if set(options.fit) != {"payload"} or each.figure.startswith("payload")]
-    if not any(each.identified for each in sought):
-        raise _not_excited([each.figure for each in sought], logs, options)
+    _check_identified(parameters, logs, options)
     return Identification(
         robot=robot,
         options=options,
@@ -187,7 +201,7 @@ def identify(robot: Robot, logs: Sequence[Log], options: IdentificationOptions |
         spread=spread_of(fitted, rows),
         parameters=parameters,
         structure=structure_of(robot, rows, options),
-        physical=physical_of(robot, fitted.arm),
+        physical=None if options.reduced else physical_of(robot, fitted.arm),
         residuals=_residuals(fitted, rows, options),
         temperatures=temperatures_of(
             rows, motor_torque(fitted.arm, rows), fitted.arm, fitted.clusters, options.velocity_threshold
@@ -200,10 +214,17 @@ def identify(robot: Robot, logs: Sequence[Log], options: IdentificationOptions |
     )
 
 
+def _check_identified(parameters: Sequence[Parameter], logs: Sequence[Log], options: IdentificationOptions) -> None:
+    """Raise NotExcited if the logs tell nothing of what is sought."""
+    sought = [each for each in parameters if set(options.fit) != {"payload"} or each.figure.startswith("payload")]
+    if not any(each.identified for each in sought):
+        raise _not_excited([each.figure for each in sought], logs, options)
+
+
 def _rows(robot: Robot, logs: Sequence[Log], options: IdentificationOptions) -> Rows:
     """The rows of the logs. Where a payload is sought, the last log's counts as nothing, whatever it says."""
     if "payload" not in options.fit:
-        return rows_of(robot, logs, options.refit)
+        return rows_of(robot, logs, options.needs_regressor, options.method == "base_wrench")
     if len(logs) < 2:
         raise InvalidProblem("logs", "A payload needs two logs: one without it, and last the one with it.")
     return rows_of(robot, [*logs[:-1], replace(logs[-1], payload=Payload())], regressor=True)
@@ -221,7 +242,7 @@ def _fold(robot: Robot, rows: Rows, out: Mask, options: IdentificationOptions, l
     seen = rows.take(~out)
     carried = _carried(robot, seen, options, last)
     seen = seen if carried is None else loaded(seen, carried)
-    blind = fit_rows(robot, seen, options)
+    blind = fit_by_method(robot, seen, options)
     spread = replace(spread_of(blind, seen), session=0.0)
     del seen  # rows are large
     held = rows.take(out)
@@ -236,14 +257,14 @@ def _check(robot: Robot, rows: Rows, logs: Sequence[Log], options: Identificatio
             "external",
             {},
         )
-    if "torque_constant" in options.fit and (not rows.current or options.refit or options.couplings):
+    if "torque_constant" in options.fit and (not rows.current or options.needs_regressor or options.couplings):
         raise InvalidProblem(
             "fit",
             "torque_constant needs motor currents, and links that are known: leave it out, or keep the inertials.",
         )
     if "torque_constant" in options.fit and ("payload" in options.fit or not all(log.payload_known for log in logs)):
         raise PayloadUnknown(joints_without_gravity(robot, rows, logs))
-    if "payload" in options.fit and (options.refit or options.couplings):
+    if "payload" in options.fit and (options.needs_regressor or options.couplings):
         raise InvalidProblem("fit", "A payload needs links that are known, and no couplings: leave it out.")
     power = bool(np.isfinite(rows.power).any())
     if "power" in options.fit and not power:
@@ -251,7 +272,7 @@ def _check(robot: Robot, rows: Rows, logs: Sequence[Log], options: Identificatio
     if options.held_out and rows.rest.all():
         raise _not_excited(terms_of(options), logs, options)
     efforts = bool(np.isfinite(rows.effort).any())
-    if not power and not efforts:
+    if not power and not efforts and options.method != "base_wrench":
         raise _not_excited(options.fit, logs, options)
     if "payload" in options.fit and not efforts:
         raise _not_excited(["payload"], logs, options)
@@ -259,28 +280,30 @@ def _check(robot: Robot, rows: Rows, logs: Sequence[Log], options: Identificatio
 
 def _not_excited(parameters: Sequence[str], logs: Sequence[Log], options: IdentificationOptions) -> NotExcited:
     """With the excitation that would tell them: friction always, and what the torques of the links tell."""
-    links = options.refit or {"torque_constant", "payload"} & set(options.fit)
+    links = options.needs_regressor or {"torque_constant", "payload"} & set(options.fit)
     excite = [*(["inertials"] if links else []), *(["rotor"] if "rotor" in options.targets else []), "friction"]
     carried = logs[0].payload
     return NotExcited(parameters, logs[0].robot, excite, carried.mass, carried.com.tolist())
 
 
-def _parameters(robot: Robot, estimate: Estimate) -> tuple[Parameter, ...]:
+def _parameters(robot: Robot, estimate: Estimate, options: IdentificationOptions) -> tuple[Parameter, ...]:
+    base = BaseTerms.of(robot, [], options) if options.reduced else None
+    own = {} if base is None else dict(zip(base.names, base.own.tolist(), strict=True))
     deviations = np.sqrt(np.diag(estimate.covariance))
     return tuple(
-        _parameter(robot, name, value, sd, why)
+        _parameter(name, value, sd, own[name] if name in own else _previous(robot, name), why)
         for name, value, sd, why in zip(
             estimate.names, estimate.value.tolist(), deviations.tolist(), estimate.why, strict=True
         )
     )
 
 
-def _parameter(robot: Robot, name: Name, value: float, sd: float, why: str) -> Parameter:
+def _parameter(name: Name, value: float, sd: float, previous: float, why: str) -> Parameter:
     if not why and value == 0:
         why = ZERO
     elif not why and not sd <= MOST_RELATIVE_SD * abs(value):
         why = UNSURE.format(sd / abs(value))
-    return Parameter(*name, value, sd, _previous(robot, name), not why, why)
+    return Parameter(*name, value, sd, previous, not why, why)
 
 
 def _previous(robot: Robot, name: Name) -> float:

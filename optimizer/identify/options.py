@@ -14,6 +14,19 @@ from joulepath.optimizer.exceptions import InvalidProblem
 Target = Literal["friction", "rotor", "torque_constant", "power", "payload"]
 Term = Literal["coulomb", "viscous", "load", "offset", "curved"]
 Estimator = Literal["ols", "wls", "irls"]
+Method = Literal[
+    "automatic",
+    "motor_current",
+    "electrical_power",
+    "base_parameters",
+    "essential_parameters",
+    "periodic",
+    "base_wrench",
+    "threshold_velocity",
+    "temperature",
+]
+"""How the figures are found; docs/identification.md says what each method needs, and when to choose
+it."""
 DEFAULT_TERMS: tuple[Term, ...] = ("coulomb", "viscous", "load", "offset")
 
 
@@ -45,6 +58,8 @@ class IdentificationOptions:
     """`fit`: the figures to find; power is added by itself where the logs have it, friction and
     rotors where the payload of the last log is to be found. `refit`: the links' inertials, too.
 
+    `method` is how they are found, and `period` [s] that of the motion for the method `periodic`.
+
     `held_out` is the fraction of the moves that validate; 0: none, 1: each motion in its turn. `terms` are those of the
     friction law, `knee` [rad/s] that of its step (None: the robot's own). `velocity_threshold` [rad/s]: slower samples
     of a joint do not enter its rows. `prior_weight` is that of the robot's own inertials in a refit. Raises
@@ -53,6 +68,8 @@ class IdentificationOptions:
 
     fit: Sequence[Target] = ("friction", "rotor")
     refit: bool = False
+    method: Method = "automatic"
+    period: float | None = None
     held_out: float = 0.3
     terms: Sequence[Term] = DEFAULT_TERMS
     knee: float | None = None
@@ -69,6 +86,14 @@ class IdentificationOptions:
             object.__setattr__(self, name, given)
         if self.estimator not in get_args(Estimator):
             raise InvalidProblem("estimator", f"estimator must be one of {', '.join(get_args(Estimator))}.")
+        if self.method not in get_args(Method):
+            raise InvalidProblem("method", f"method must be one of {', '.join(get_args(Method))}.")
+        if self.period is not None and not 0.1 <= self.period <= 1e4:
+            raise InvalidProblem("period", "period must be from 0.1 to 10000 s.")
+        if self.refit and self.links_unknown:
+            raise InvalidProblem(
+                "inertials", f"The method {self.method} finds the links by itself: keep the inertials."
+            )
         for name, least, most in (
             ("held_out", 0.0, 1.0),
             ("velocity_threshold", 0.0, 10.0),
@@ -79,6 +104,21 @@ class IdentificationOptions:
         if self.knee is not None and not 1e-6 <= self.knee <= 1.0:
             raise InvalidProblem("knee", "knee must be from 1e-6 to 1 rad/s.")
         object.__setattr__(self, "couplings", tuple(self.couplings))
+
+    @property
+    def reduced(self) -> bool:
+        """Whether base parameters are found, which need no knowledge of the links."""
+        return self.method in ("base_parameters", "essential_parameters", "periodic")
+
+    @property
+    def links_unknown(self) -> bool:
+        """Whether the method finds parameters of the links."""
+        return self.reduced or self.method == "base_wrench"
+
+    @property
+    def needs_regressor(self) -> bool:
+        """Whether the fit needs the regressor of the links."""
+        return self.refit or self.links_unknown
 
     @property
     def targets(self) -> tuple[Target, ...]:

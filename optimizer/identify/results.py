@@ -138,6 +138,19 @@ class Temperatures:
     sd: Array
 
 
+@dataclass(frozen=True, eq=False)
+class MeasuredNoise:
+    """The noise of `periods` periods: standard deviation (nq,) [N·m] of a row's torque.
+
+    `excess` is the mean square of the residuals over that of the noise: 1 if the model is right,
+    more if it misses something.
+    """
+
+    periods: int
+    deviation: Array
+    excess: float
+
+
 @dataclass(frozen=True)
 class Advice:
     """What would help most: the figure that takes the largest `share` of the energy's variance away if it is known, and

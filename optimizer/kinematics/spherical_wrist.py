@@ -62,7 +62,6 @@ class SphericalWrist:
     up: Array
     origin: Array
     wrist: Array
-    forearm_axis: Array
     last_axis: Array
 
     @classmethod
@@ -94,7 +93,6 @@ class SphericalWrist:
             up=up,
             origin=p[0],
             wrist=axes.T_zero[:3, :3].T @ (wrist - axes.T_zero[:3, 3]),
-            forearm_axis=z[3],
             last_axis=axes.T_zero[:3, :3].T @ z[5],
         )
 

@@ -91,22 +91,6 @@ class SimulatedArm:
                 found[k] = self.data.qfrc_inverse
         return found
 
-    def accelerations(self, q: Array, v: Array, tau: Array) -> Array:
-        """Accelerations (k, nq) [rad/s²] under torques tau (k, nq) [N·m], friction and contacts left out."""
-        found = np.empty_like(q)
-        with self.without("constraint"):
-            for k, state in enumerate(zip(q, v, tau, strict=True)):
-                self.data.qpos[:], self.data.qvel[:], self.data.qfrc_applied[:] = state
-                self._simulator.mj_forward(self.model, self.data)
-                found[k] = self.data.qacc
-        return found
-
-    def tcp_position(self, q: Array) -> Array:
-        """Position (3,) [m] of the TCP in the base frame at q (nq,) [rad]."""
-        self.data.qpos[:] = q
-        self._simulator.mj_kinematics(self.model, self.data)
-        return np.array(self.data.site_xpos[0])
-
 
 def with_changes(arm: Arm, payload: float = 1.0, friction: float = 1.0) -> Arm:
     """The arm with mass and inertia of its payload, and with its friction, multiplied by factors."""

@@ -5,19 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
-from benchmarks.reference import FILES, fingerprint, load
+from benchmarks.reference import fingerprint, load
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.problem.problem import Objective
 
 
-@pytest.mark.parametrize("objective", FILES)
-def test_references_are_of_the_robots_figures(objective: Objective) -> None:
+def test_references_are_of_the_robots_figures() -> None:
     robot = load_robot("ur5e")
     # what is computed from figures, and kept with them, is none
     assert robot.limits.rates.shape == (3, 6)
-    assert load(FILES[objective])["fingerprint"] == fingerprint(robot)
+    assert load()["fingerprint"] == fingerprint(robot)
 
 
 def test_a_friction_that_grows_with_the_load_has_other_references() -> None:

@@ -1,22 +1,15 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
-from benchmarks.chains import chain
-from benchmarks.statistics import Spread, exponent
+from benchmarks.statistics import Spread
 from benchmarks.tasks import KINDS, flange, move, moves, request_task, request_tasks
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Robot
-from joulepath.optimizer.energy.kernel import Kernel
-from joulepath.optimizer.energy.kernel_expressions import build
-from joulepath.optimizer.energy.kernel_functions import Interpreted
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
-from joulepath.optimizer.prepared_problem import PreparedProblem
-from tests.optimizer.moves import problem_with
 
 POSE_ERROR = 1e-12  # rounding of a few products of rotations
 TORQUE_ERROR = 1e-9  # N·m
@@ -52,32 +45,7 @@ def test_requests_are_valid_and_reachable(robot: Robot, index: int) -> None:
         assert inverse_kinematics_for(robot).branches(T)
 
 
-@pytest.mark.parametrize("index", range(40))
-def test_varied_requests_are_valid(index: int) -> None:
-    OptimizeRequest.model_validate(request_task(0, index, varied=True).body)
-
-
-@pytest.mark.parametrize("joints", range(2, 8))
-def test_chains_move_as_pinocchio_says(robot: Robot, joints: int) -> None:
-    arm = chain(robot, joints)
-    assert arm.nq == joints and arm.limits.v_max.shape == arm.friction.coulomb.shape == (joints,)
-    kernel = Kernel(arm, Interpreted(build(arm)))
-    q, v, a = np.random.default_rng(joints).normal(size=(3, 5, joints))
-    task = PreparedProblem.of(problem_with(np.zeros(joints), np.zeros(joints), robot=arm))
-    tau = kernel.torque(q, v, a, task.objective_parameters)
-    data = task.model.createData()
-    for k in range(5):
-        assert np.abs(pin.rnea(task.model, data, q[k], v[k], a[k]) - tau[k]).max() < TORQUE_ERROR
-
-
-def test_a_chain_of_all_joints_is_the_robot(robot: Robot) -> None:
-    q = np.linspace(-1, 1, robot.nq)
-    assert np.array_equal(flange(chain(robot, robot.nq), q), flange(robot, q))
-
-
-def test_exponent_and_spread() -> None:
-    x = np.array([8.0, 13.0, 32.0])
-    assert exponent(x, 3 * x**2.5) == pytest.approx(2.5)
+def test_spread() -> None:
     spread = Spread.of([1.0, 2.0, 3.0, 4.0, 10.0])
     assert (spread.count, spread.minimum, spread.p50, spread.maximum) == (5, 1.0, 3.0, 10.0)
     assert spread.times(1e3).p50 == 3000.0 and spread.times(1e3).count == 5

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from joulepath.app.schemas.errors.figures import FiguresInUse, TooManyFigures, UnknownFigures
 from joulepath.app.schemas.errors.identifications import (
+    MethodNotApplicable,
     NoPowerChannel,
     NotExcited,
     NothingHeldOut,
@@ -122,6 +123,7 @@ PROBLEMS: tuple[type[ProblemDetails], ...] = (
     UnknownIdentification,
     NotExcited,
     NothingHeldOut,
+    MethodNotApplicable,
     NoPowerChannel,
     PayloadUnknown,
     EffortNotUsable,
@@ -174,6 +176,7 @@ __all__ = [
     "LogTooLarge",
     "MalformedHttp",
     "MethodNotAllowed",
+    "MethodNotApplicable",
     "NoCollisionFreeTrajectory",
     "NoMeshes",
     "NoPowerChannel",

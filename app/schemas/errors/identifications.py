@@ -42,6 +42,16 @@ class NoPowerChannel(ProblemDetails):
     status: Literal[422] = fixed("status", 422)
 
 
+class MethodNotApplicable(ProblemDetails):
+    """The logs do not have what the `method` needs: `detail` says what is missing. Log it, or choose another method;
+    `automatic` takes what the logs have."""
+
+    type: Literal["/problems/method-not-applicable"] = fixed("type", "/problems/method-not-applicable")
+    title: Literal["Method not applicable"] = fixed("title", "Method not applicable")
+    status: Literal[422] = fixed("status", 422)
+    method: str = described("The method that was asked for.", None, "periodic")
+
+
 class PayloadUnknown(ProblemDetails):
     """`torque_constant` is asked for, it is not known what the arm carried, and joints carry too little weight to tell
     their constants. Send the logs again with `payload`: `{"mass": 0}` if the arm carried nothing. A payload is found

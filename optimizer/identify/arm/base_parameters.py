@@ -45,6 +45,12 @@ class BaseParameters:
         """Each base parameter as a sum of standard parameters."""
         return tuple(self._expression(row, main) for row, main in zip(self.combination, self.independent, strict=True))
 
+    def lone(self, bodies: int) -> tuple[int, ...]:
+        """Numbers of the base parameters that are a single rotor's, behind so many parameters of
+        bodies."""
+        single = (np.abs(self.combination) > LEAST_COEFFICIENT).sum(axis=1) == 1
+        return tuple(k for k, main in enumerate(self.independent) if main >= bodies and single[k])
+
     def _expression(self, row: Array, main: int) -> str:
         others = [k for k in np.flatnonzero(np.abs(row) > LEAST_COEFFICIENT).tolist() if k != main]
         return "".join([self.names[main], *(f" {row[k]:+.6g}·{self.names[k]}" for k in others)])

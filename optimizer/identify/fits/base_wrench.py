@@ -1,64 +1,63 @@
-"""Base parameters from the force and torque beneath the arm (Christoforou et al.): without friction, without currents.
+"""Links from the force and torque beneath the arm (Christoforou et al.): without friction, without
+currents.
 
-A sensor under the base measures what all moving links exert on the ground. That wrench is linear in the same parameters
-of the bodies as the torques, and friction and motors within the arm do not act on it. Rotors are neglected.
+A sensor under the base measures what all moving links exert on the ground. That wrench is linear in
+the same parameters of the bodies as the torques, and friction and motors within the arm do not act
+on it. Rotors are neglected. What the sensor shows at rest, and the weight of the base, are in the
+mean of the wrench, which is taken out.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-import pinocchio as pin
 
-from joulepath.models.robot import Array
-from joulepath.optimizer.deadline import checkpoint
-from joulepath.optimizer.energy.link_regressor import BODY
-from joulepath.optimizer.identify.arm.base_parameters import independent_columns
-from joulepath.optimizer.identify.estimates.grouped import Grouped, jackknife, left_out, solve
+from joulepath.models.robot import Array, Robot
+from joulepath.models.uncertainty.parameters import LINKS
+from joulepath.optimizer.energy.link_regressor import BODY, body_parameters
+from joulepath.optimizer.identify.arm.pseudo_inertia import nearness
+from joulepath.optimizer.identify.estimates.estimate import Estimate
+from joulepath.optimizer.identify.estimates.grouped import Grouped, left_out
+from joulepath.optimizer.identify.fits.consistent import solve_consistent
+from joulepath.optimizer.identify.fits.whole_fit import LINK
+from joulepath.optimizer.identify.options import IdentificationOptions
+from joulepath.optimizer.identify.rows.clusters import Clusters, shared_variance
+from joulepath.optimizer.identify.rows.fit_rows import Rows
 
-STATES = 60
-
-
-@dataclass(frozen=True, eq=False)
-class WrenchFit:
-    """Base parameters (b,) of the wrench, their covariance, and how they are combined from those of the bodies."""
-
-    value: Array
-    covariance: Array
-    combination: Array
+AXES = 6
+WEIGHINGS = 2
 
 
-def base_wrench_regressor(model: pin.Model, q: Array, v: Array, a: Array) -> Array:
-    """The matrices (n, 6, 10 nq) whose products with the bodies' parameters are the wrench that the moving links exert
-    on the base: force [N] and torque [N·m] about its origin, in its axes."""
-    data = model.createData()
-    found = np.empty((len(q), 6, BODY * model.nq))
-    for row in range(len(q)):
-        checkpoint()
-        pin.rnea(model, data, q[row], v[row], a[row])
-        pin.forwardKinematics(model, data, q[row])
-        for joint in range(1, model.njoints):
-            body = pin.jointBodyRegressor(model, data, joint)
-            at = slice(BODY * (joint - 1), BODY * joint)
-            # minus: what the base exerts on the links acts back on it
-            found[row, :, at] = -data.oMi[joint].toDualActionMatrix() @ body
-    return found
+def fit_wrench(robot: Robot, rows: Rows, clusters: Clusters, options: IdentificationOptions) -> Estimate:
+    """The links' 10 nq parameters, those of real bodies, from rows with a wrench and its regressor.
 
-
-def fit_base_wrench(model: pin.Model, q: Array, v: Array, a: Array, wrench: Array, move: Array) -> WrenchFit:
-    """Base parameters from wrenches (n, 6) at q, v, a (n, nq); the spread is that over the moves (n,) of the rows."""
-    random = np.random.default_rng(0)
-    states = (random.uniform(-reach, reach, (STATES, model.nq)) for reach in (np.pi, 2.0, 5.0))
-    kept, combination = independent_columns(base_wrench_regressor(model, *states).reshape(6 * STATES, -1))
-    columns = base_wrench_regressor(model, q, v, a)[:, :, list(kept)]
-    numbers = np.unique(move, return_inverse=True)[1]
-    # forces and torques have different units: each of the six by the size of its noise, about that of its values
-    scale = np.maximum(wrench.std(axis=0), 1e-9)
-    flat = (columns / scale[:, None]).reshape(-1, len(kept))
-    grouped = Grouped.of(
-        flat, (wrench / scale).ravel(), np.ones(len(flat)), np.repeat(numbers, 6), int(numbers.max()) + 1
+    The robot's own parameters are the prior, as in a refit from torques (`fit_whole`).
+    """
+    assert rows.wrench_regressor is not None
+    own = body_parameters(robot.model)
+    regressor = rows.wrench_regressor - rows.wrench_regressor.mean(axis=0)
+    columns = regressor.reshape(-1, len(own))
+    values = (rows.wrench - rows.wrench.mean(axis=0)).ravel()
+    cluster = np.repeat(clusters.of_row, AXES)
+    precision = options.prior_weight * nearness(own)
+    value = own
+    for _ in range(WEIGHINGS):
+        weight = _weights(values - columns @ value, clusters)
+        grouped = Grouped.of(columns, values, weight, cluster, clusters.count)
+        gram, moment = grouped.gram.sum(axis=0) + precision, grouped.moment.sum(axis=0) + precision @ own
+        value = solve_consistent(gram, moment, len(own) // BODY, np.full(len(own), -np.inf))
+    spread = np.linalg.solve(gram, precision)
+    return Estimate(
+        names=tuple((LINK + part, joint) for joint in range(robot.nq) for part in LINKS),
+        value=value,
+        replicates=left_out(grouped, value, np.ones(len(own), dtype=bool), precision),
+        why=("",) * len(own),
+        drift=spread @ np.linalg.inv(gram),
     )
-    value = solve(grouped.gram.sum(axis=0), grouped.moment.sum(axis=0), np.full(len(kept), -np.inf))
-    spread = left_out(grouped, value, np.ones(len(kept), dtype=bool))
-    return WrenchFit(value, jackknife(spread), combination)
+
+
+def _weights(residuals: Array, clusters: Clusters) -> Array:
+    """Of each row and axis (6 n,): the inverse of the axis's variance, as large as if all rows were
+    independent."""
+    rest = residuals.reshape(-1, AXES)
+    alike = np.ones(len(rest))
+    return np.tile([1 / shared_variance(each, alike, clusters) for each in rest.T], len(rest))

@@ -25,7 +25,7 @@ class Block:
     """Columns (n, p) of the terms `names`, the torques (n,) that they add up to, joint and cluster (n,) of each row.
 
     `own` are the robot's own values of the terms, `lower` (p,) their least ones. `spread` [N·m] is the standard
-    deviation of each joint's rigid torque. `speed` [rad/s] is the curved term's.
+    deviation of each joint's rigid torque. `speed` [rad/s] is the curved term's where it was sought.
     """
 
     names: tuple[Name, ...]
@@ -36,7 +36,7 @@ class Block:
     lower: Array
     own: Mapping[Name, float]
     spread: Mapping[int | None, float]
-    speed: float
+    speed: float | None
 
 
 def terms_of(options: IdentificationOptions) -> list[str]:
@@ -53,14 +53,18 @@ def block_of(
     clusters: Clusters,
     options: IdentificationOptions,
     joints: Sequence[int],
-    speed: float = 1.0,
+    speed: float | None = None,
 ) -> Block:
-    """The block of some joints, from motor torques (n, nq) [N·m], NaN where there are none."""
+    """The block of some joints, from motor torques (n, nq) [N·m], NaN where there are none.
+
+    `speed` [rad/s] is that of the curved term; None: the robot's own, joint by joint.
+    """
     terms, knee = terms_of(options), robot.friction.knee if options.knee is None else options.knee
     couplings = [(k, each) for k, each in enumerate(options.couplings) if set(each.joints) <= set(joints)]
     coupled = [term for term in terms if term in ("coulomb", "viscous", "rotor_inertia")]
     names = [(term, joint) for joint in joints for term in terms]
     names += [(COUPLED + term, k) for k, _ in couplings for term in coupled]
+    own_speed = robot.friction.speed if speed is None else np.full(robot.nq, speed)
     parts = list[tuple[Array, Array, int, Numbers]]()
     known, spread = _known(robot, rows, options), dict[int | None, float]()
     for at, joint in enumerate(joints):
@@ -69,7 +73,9 @@ def block_of(
         spread[joint] = float(rigid[:, joint].std()) if use.any() else 0.0
         columns = np.zeros((int(use.sum()), len(names)))
         for k, term in enumerate(terms):
-            columns[:, at * len(terms) + k] = column(term, v[:, joint], a[:, joint], rigid[:, joint], knee, speed)
+            columns[:, at * len(terms) + k] = column(
+                term, v[:, joint], a[:, joint], rigid[:, joint], knee, float(own_speed[joint])
+            )
         for c, (_, coupling) in enumerate(couplings):
             ratios = coupling.ratios
             for k, term in enumerate(coupled):

@@ -12,10 +12,14 @@ from joulepath.optimizer.energy.link_regressor import body_parameters
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm, own_arm, with_torques
 from joulepath.optimizer.identify.arm.power_model import Electrics, packed_size
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, joined
+from joulepath.optimizer.identify.fits.base_fit import BaseTerms, fit_base
+from joulepath.optimizer.identify.fits.base_wrench import fit_wrench
+from joulepath.optimizer.identify.fits.periodic import fit_periodic
 from joulepath.optimizer.identify.fits.power_fit import Prior, fit_power, prior_of
 from joulepath.optimizer.identify.fits.torque_fit import fit_torques
-from joulepath.optimizer.identify.fits.whole_fit import fit_whole
+from joulepath.optimizer.identify.fits.whole_fit import LINK, fit_whole
 from joulepath.optimizer.identify.options import IdentificationOptions
+from joulepath.optimizer.identify.results import MeasuredNoise
 from joulepath.optimizer.identify.rows.clusters import Clusters, clusters_of
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
@@ -30,13 +34,16 @@ HARDLY = "The logs hardly tell it from the robot's own."
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """The arm with the fitted figures, the estimate behind it, and the arms (G,) `without` each cluster.
+    """The arm with the fitted figures, the estimate behind it, and the arms (G,) `without` each
+    cluster.
 
-    The jackknife of the `varied` arms (G,) is the error of the fit by the errors of the rows. What the fit takes from
-    the robot's own figures has errors: the `tilted` arms have one of them each, in the torques and in what the
-    electrics make of it. `drift` is the covariance of the packed electrics by their own ranges, and `lost` (G, p, p)
-    what leaving each cluster out adds to all of their covariance.
-    `mean_power` [W] is that of the rows, NaN without power.
+    The jackknife of the `varied` arms (G,) is the error of the fit by the errors of the rows. What
+    the fit takes from the robot's own figures has errors: the `tilted` arms have one of them each,
+    in the torques and in what the electrics make of it. `drift` is the covariance of the packed
+    electrics by their own ranges, and `lost` (G, p, p) what leaving each cluster out adds to all of
+    their covariance. `mean_power` [W] is that of the rows, NaN without power. `noise` is that of a
+    periodic motion, `thresholds` (nq,) [rad/s] are speeds below which no sample of a joint was
+    used; None where the method finds none.
     """
 
     arm: FittedArm
@@ -48,10 +55,12 @@ class Fitted:
     drift: Array
     lost: Array
     mean_power: float
+    noise: MeasuredNoise | None = None
+    thresholds: Array | None = None
 
 
 def fit_rows(robot: Robot, rows: Rows, options: IdentificationOptions) -> Fitted:
-    """Fits what the rows have: torques, power or both."""
+    """Fits what the rows have: torques, power or both; or the wrench beneath the base."""
     clusters, arm = clusters_of(rows), own_arm(robot, options.knee)
     torque, with_power = motor_torque(arm, rows), bool(np.isfinite(rows.power).any())
     fitted = Fitted(
@@ -65,6 +74,8 @@ def fit_rows(robot: Robot, rows: Rows, options: IdentificationOptions) -> Fitted
         lost=np.zeros((clusters.count, *(packed_size(robot.nq),) * 2)),
         mean_power=float(np.mean(rows.power[np.isfinite(rows.power) & ~rows.rest])) if with_power else np.nan,
     )
+    if options.method == "base_wrench":
+        return _with_wrench(robot, rows, fitted, options)
     errors = np.zeros((0, 0))
     if np.isfinite(torque).any():
         fitted, errors = _with_torque(robot, rows, torque, fitted, options)
@@ -75,13 +86,20 @@ def _with_torque(
     robot: Robot, rows: Rows, torque: Array, fitted: Fitted, options: IdentificationOptions
 ) -> tuple[Fitted, Array]:
     """With the torques fitted, and the errors (k, p) of the tilted arms' parameters."""
-    own, links = fitted.arm, body_parameters(robot.model)
-    found = (fit_whole if options.refit else fit_torques)(robot, rows, torque, fitted.clusters, options)
-    terms = len(found.names) - (len(links) if options.refit else 0)
+    own = fitted.arm
+    noise = None
+    if options.method == "periodic":
+        found, noise = fit_periodic(robot, rows, torque, fitted.clusters, options)
+    else:
+        fit = fit_whole if options.refit else fit_base if options.reduced else fit_torques
+        found = fit(robot, rows, torque, fitted.clusters, options)
+    of_links = np.array([joint is None or name.startswith(LINK) for name, joint in found.names])
+    terms = tuple(name for name, of_link in zip(found.names, of_links.tolist(), strict=True) if not of_link)
+    turn, before = _link_changes(robot, options)
 
     def arm(values: Array) -> FittedArm:
-        made = with_torques(own, found.names[:terms], values[:terms], tuple(options.couplings))
-        return replace(made, bodies=values[terms:] - links) if options.refit else made
+        made = with_torques(own, terms, values[~of_links], tuple(options.couplings))
+        return replace(made, bodies=turn @ (values[of_links] - before)) if of_links.any() else made
 
     errors = _errors(found.drift)
     without = tuple(arm(values) for values in found.replicates)
@@ -92,8 +110,37 @@ def _with_torque(
         without=without,
         varied=without,
         tilted=tuple(arm(found.value + error) for error in errors),
+        noise=noise,
     )
     return made, errors
+
+
+def _link_changes(robot: Robot, options: IdentificationOptions) -> tuple[Array, Array]:
+    """The matrix (10 nq, k) that turns changes of the links' unknowns into those of bodies, and the
+    robot's own values (k,) of these unknowns."""
+    links = body_parameters(robot.model)
+    if not options.reduced:
+        return np.eye(len(links)), links
+    terms = BaseTerms.of(robot, [], options)
+    return terms.bodies(len(links)), terms.own[: len(terms.expressed)]
+
+
+def _with_wrench(robot: Robot, rows: Rows, fitted: Fitted, options: IdentificationOptions) -> Fitted:
+    """With the links fitted to the wrench beneath the base; all else is the robot's own."""
+    found, own = fit_wrench(robot, rows, fitted.clusters, options), body_parameters(robot.model)
+
+    def arm(values: Array) -> FittedArm:
+        return replace(fitted.arm, bodies=values - own)
+
+    without = tuple(arm(values) for values in found.replicates)
+    return replace(
+        fitted,
+        arm=arm(found.value),
+        estimate=found,
+        without=without,
+        varied=without,
+        tilted=tuple(arm(found.value + error) for error in _errors(found.drift)),
+    )
 
 
 def _errors(covariance: Array) -> Array:

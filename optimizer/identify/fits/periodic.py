@@ -7,52 +7,97 @@ of Gaussian noise, and the covariance of the figures follows without any residua
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.identify.errors import MethodNotApplicable
+from joulepath.optimizer.identify.estimates.estimate import Estimate
+from joulepath.optimizer.identify.estimates.grouped import solve
+from joulepath.optimizer.identify.fits.base_fit import base_arm, terms_of_arm
+from joulepath.optimizer.identify.logs.log import Log, LogMove
+from joulepath.optimizer.identify.options import IdentificationOptions
+from joulepath.optimizer.identify.results import MeasuredNoise
+from joulepath.optimizer.identify.rows.clusters import Clusters
+from joulepath.optimizer.identify.rows.fit_rows import Rows
 
-LEAST_PERIODS = 2
-
-
-@dataclass(frozen=True, eq=False)
-class Period:
-    """The mean period of a signal (m, k), and the variance (k,) of the noise of a single sample."""
-
-    mean: Array
-    variance: Array
-    periods: int
-
-
-@dataclass(frozen=True, eq=False)
-class Likelihood:
-    """The most likely figures (p,) and their covariance (p, p). `excess` is the mean square of the residuals over that
-    of the measured noise: 1 if the model is right, more if it misses something."""
-
-    value: Array
-    covariance: Array
-    excess: float
+_AVERAGED = ("q", "v", "a", "rigid", "links", "effort", "power", "temperature", "regressor")
 
 
-def mean_period(signal: Array, samples: int) -> Period:
-    """The mean period of a signal (n, k) that repeats every `samples` rows. Raises InvalidProblem below two periods."""
-    periods = len(signal) // samples
-    if periods < LEAST_PERIODS:
-        raise InvalidProblem("logs", f"The log has {periods} whole periods: at least {LEAST_PERIODS} are needed.")
-    parts = signal[: periods * samples].reshape(periods, samples, -1)
-    return Period(parts.mean(axis=0), parts.var(axis=0, ddof=1).mean(axis=0), periods)
+@dataclass(frozen=True)
+class PeriodicSettings:
+    """What counts as a periodic log."""
+
+    least_periods: int = 2
+    """Periods of a log: the spread of fewer is not defined."""
+    most_apart: float = 0.02
+    """Largest distance of a joint from its mean position of all periods [rad]; far above the
+    repeatability of arms."""
 
 
-def most_likely(regressor: Array, measured: Period) -> Likelihood:
-    """The most likely figures for torques (m, nq) that are `regressor` (m, nq, p) times them, and noise."""
-    deviation = np.sqrt(np.maximum(measured.variance, 1e-300) / measured.periods)
-    columns = (regressor / deviation[:, None]).reshape(-1, regressor.shape[2])
-    values = (measured.mean / deviation).ravel()
-    value, *_ = np.linalg.lstsq(columns, values, rcond=None)
-    covariance = np.linalg.inv(columns.T @ columns)
+def periods_of(log: Log, period: float, settings: PeriodicSettings | None = None) -> Log:
+    """The log cut into whole periods [s] from its first motion on, each of which counts as a move.
+
+    Periods begin at the nearest sample. Raises MethodNotApplicable if there are too few, or if the
+    motion differs.
+    """
+    settings = settings or PeriodicSettings()
+    moving = [move for move in log.moves if not move.at_rest]
+    start, end = (moving[0].start, moving[-1].end) if moving else (0, 0)
+    length, rate = int(period * log.rate), log.rate
+    count = round((end - start) / (period * rate))
+    starts = [start + round(k * period * rate) for k in range(count)]
+    starts = [each for each in starts if each + length <= len(log.time)]
+    if len(starts) < settings.least_periods:
+        raise MethodNotApplicable(
+            "periodic",
+            f"the log has {len(starts)} whole periods of {period:g} s, and at least "
+            f"{settings.least_periods} are needed.",
+        )
+    q = np.array([log.q[each : each + length] for each in starts])
+    apart = float(np.abs(q - q.mean(axis=0)).max())
+    if apart > settings.most_apart:
+        raise MethodNotApplicable(
+            "periodic",
+            f"its periods of {period:g} s are up to {apart:.2g} rad apart. Give the `period` of the "
+            "motion, and log the same motion again and again.",
+        )
+    return replace(log, moves=tuple(LogMove(each, each + length, False) for each in starts))
+
+
+def fit_periodic(
+    robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions
+) -> tuple[Estimate, MeasuredNoise]:
+    """The most likely base parameters and friction from motor torques (n, nq) [N·m] of whole
+    periods."""
+    assert options.period is not None
+    count = round((rows.time[-1] - rows.time[0]) / options.period)
+    periods = torque.reshape(count, -1, robot.nq)
+    noise = np.sqrt(periods.var(axis=0, ddof=1).mean(axis=0))
+    mean = mean_period(rows, count)
+    arm = base_arm(robot, mean, periods.mean(axis=0), Clusters(np.zeros(len(mean.q), dtype=np.int64), 1), options)
+    terms = terms_of_arm(robot, arm, options)
+    deviation = np.maximum(noise[arm.block.joint], 1e-9) / np.sqrt(count)
+    columns, values = terms.columns(arm) / deviation[:, None], arm.values / deviation
+    gram = columns.T @ columns
+    value = solve(gram, columns.T @ values, terms.lower)
+    free = value > terms.lower
+    covariance = np.zeros_like(gram)
+    covariance[np.ix_(free, free)] = np.linalg.pinv(gram[np.ix_(free, free)], hermitian=True)
     residuals = values - columns @ value
-    return Likelihood(
-        np.asarray(value), np.asarray(covariance), float(residuals @ residuals / (len(values) - len(value)))
+    excess = float(residuals @ residuals / (len(values) - int(free.sum())))
+    without = np.tile(value, (clusters.count, 1))
+    estimate = Estimate(terms.names, value, without, ("",) * len(value), covariance)
+    return estimate, MeasuredNoise(periods=count, deviation=noise, excess=excess)
+
+
+def mean_period(rows: Rows, count: int) -> Rows:
+    """The mean (n / count rows) of so many periods, which follow one another in the rows."""
+    length = len(rows.q) // count
+    first = rows.take(np.arange(len(rows.q)) < length)
+    means = {name: getattr(rows, name) for name in _AVERAGED}
+    return replace(
+        first,
+        **{name: each.reshape(count, length, *each.shape[1:]).mean(axis=0) for name, each in means.items()},
     )

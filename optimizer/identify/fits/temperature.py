@@ -7,6 +7,8 @@ whatever else drifts.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from joulepath.models.robot import Array
@@ -16,9 +18,21 @@ from joulepath.optimizer.identify.results import Temperatures
 from joulepath.optimizer.identify.rows.clusters import Clusters
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
-LEAST_SPAN = 8.0
-"""Span [K] of a joint's temperature over the logs from which its friction is taken to depend on it."""
 STEPS, CONVERGED = 20, 1e-9
+
+
+@dataclass(frozen=True)
+class TemperatureSettings:
+    """When friction is taken to depend on the temperature."""
+
+    least_span: float = 8.0
+    """Span of a joint's temperature over the logs from which on it does [K]."""
+    passes: int = 4
+    """Fits at the reference temperature: the rate of a joint that cools and slows at once is found
+    in four."""
+
+
+SETTINGS = TemperatureSettings()
 
 
 def temperatures_of(rows: Rows, torque: Array, arm: FittedArm, clusters: Clusters, threshold: float) -> Temperatures:
@@ -32,11 +46,21 @@ def temperatures_of(rows: Rows, torque: Array, arm: FittedArm, clusters: Cluster
         if not use.any():
             continue
         reference[joint], span[joint] = float(temperature[use].mean()), float(np.ptp(temperature[use]))
-        if span[joint] >= LEAST_SPAN:
+        if span[joint] >= SETTINGS.least_span:
             part = Clusters(clusters.of_row[use], clusters.count)
             above = temperature[use] - reference[joint]
             k[joint], sd[joint] = _rate(friction[use, joint], rest[use, joint], above, part)
     return Temperatures(reference, span, k, sd)
+
+
+def at_reference(rows: Rows, arm: FittedArm, found: Temperatures) -> Rows:
+    """The rows with the efforts that they would have with all joints at their reference temperatures.
+
+    Joints whose rate is not known stay as they are.
+    """
+    above = np.where(np.isfinite(found.k) & np.isfinite(rows.temperature), rows.temperature - found.reference, 0.0)
+    change = (arm.friction_torque(rows) - arm.offset) * (np.exp(-np.nan_to_num(found.k) * above) - 1)
+    return replace(rows, effort=rows.effort - (change / arm.torque_constant if rows.current else change))
 
 
 def _rate(friction: Array, rest: Array, above: Array, clusters: Clusters) -> tuple[float, float]:

@@ -7,35 +7,67 @@ The threshold is the greatest speed below which a class is off by more than it c
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.identify.arm.fitted_arm import FittedArm
 from joulepath.optimizer.identify.arm.friction_columns import columns
+from joulepath.optimizer.identify.rows.fit_rows import Rows
 
-CLASSES = 30
-# samples that a class has at least, standard deviations by which it is off, and share of the friction
-LEAST, SDS, SHARE = 10, 4.0, 0.05
-TERMS = ("coulomb", "viscous", "offset")
-# rad/s; the step of Coulomb friction is far below every class
-KNEE = 1e-4
-FAST = 0.25
+_TERMS = ("coulomb", "viscous", "offset")
 
 
-def velocity_threshold(v: Array, friction: Array) -> float:
+@dataclass(frozen=True)
+class ThresholdSettings:
+    """How a threshold is sought."""
+
+    classes: int = 30
+    """Classes of speed, evenly spaced in its logarithm."""
+    least_samples: int = 10
+    """Samples of a class whose mean counts."""
+    deviations: float = 4.0
+    """Standard deviations of its mean by which a class is off."""
+    share: float = 0.05
+    """Share of the Coulomb friction by which a class is off at least: less does not bias the
+    figures."""
+    knee: float = 1e-4
+    """Speed over which Coulomb friction reverses [rad/s]; far below every class."""
+    fast: float = 0.25
+    """Share of the greatest speed above which the law is taken to hold."""
+
+
+def velocity_threshold(v: Array, friction: Array, settings: ThresholdSettings | None = None) -> float:
     """The threshold [rad/s] of a joint with friction torques (n,) [N·m] at speeds v (n,); 0 if there is none."""
+    settings = settings or ThresholdSettings()
     speed, greatest = np.abs(v), float(np.abs(v).max())
-    fast = speed > FAST * greatest
-    matrix = columns(TERMS, v, v, v, KNEE)
+    fast = speed > settings.fast * greatest
+    matrix = columns(_TERMS, v, v, v, settings.knee)
     figures, *_ = np.linalg.lstsq(matrix[fast], friction[fast], rcond=None)
     # a drag that is too small or too great in both directions
     error = np.sign(v) * (friction - matrix @ figures)
-    edges = np.geomspace(greatest / 1000, FAST * greatest, CLASSES + 1)
+    edges = np.geomspace(greatest / 1000, settings.fast * greatest, settings.classes + 1)
     number = np.digitize(speed, edges)
     found = 0.0
-    for k in range(1, CLASSES + 1):
+    for k in range(1, settings.classes + 1):
         part = error[number == k]
-        if len(part) >= LEAST:
-            by_chance = SDS * float(part.std(ddof=1)) / np.sqrt(len(part))
-            if abs(float(part.mean())) > max(by_chance, SHARE * float(figures[0])):
+        if len(part) >= settings.least_samples:
+            by_chance = settings.deviations * float(part.std(ddof=1)) / np.sqrt(len(part))
+            if abs(float(part.mean())) > max(by_chance, settings.share * float(figures[0])):
                 found = float(edges[k])
     return found
+
+
+def thresholds_of(arm: FittedArm, rows: Rows, torque: Array) -> Array:
+    """The threshold (nq,) [rad/s] of each joint, from motor torques (n, nq) [N·m]; 0 where there is
+    none."""
+    friction = torque - arm.link_torque(rows)
+    use = np.isfinite(friction) & (rows.v != 0) & ~rows.rest[:, None]
+    joints = [(rows.v[use[:, j], j], friction[use[:, j], j]) for j in range(rows.v.shape[1])]
+    return np.array([velocity_threshold(v, part) if v.size else 0.0 for v, part in joints])
+
+
+def faster(rows: Rows, thresholds: Array) -> Rows:
+    """The rows without the efforts of joints that are slower than their thresholds (nq,) [rad/s]."""
+    return replace(rows, effort=np.where(np.abs(rows.v) > thresholds, rows.effort, np.nan))

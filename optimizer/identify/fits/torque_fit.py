@@ -7,7 +7,7 @@ the rest is fitted again.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -46,7 +46,7 @@ def fit_torques(
     robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions
 ) -> Estimate:
     """Friction and rotor inertia from motor torques (n, nq) [N·m], NaN where there are none."""
-    found = list[Estimate]()
+    found, speeds = list[Estimate](), dict[int, float]()
     for joints in _joint_sets(robot.nq, options.couplings):
         block = block_of(robot, rows, torque, clusters, options, joints)
         if "curved" in options.terms:
@@ -56,8 +56,21 @@ def fit_torques(
                 key=lambda each: _misfit(each, clusters, options),
             )
         found.append(_fit(robot, block, clusters, options))
+        if block.speed is not None:
+            kept = {name for name, why in zip(found[-1].names, found[-1].why, strict=True) if why}
+            speeds |= {joint: block.speed for joint in joints if ("curved", joint) not in kept}
     estimate = joined(found)
-    return _unscaled(robot, estimate) if "torque_constant" in options.fit else estimate
+    if "torque_constant" in options.fit:
+        estimate = _unscaled(robot, estimate)
+    return joined([estimate, _exactly(speeds, clusters.count)])
+
+
+def _exactly(speeds: Mapping[int, float], clusters: int) -> Estimate:
+    """The speeds [rad/s] of the curved terms, by joint; their errors are in those of the terms."""
+    names: tuple[Name, ...] = tuple(("speed", joint) for joint in speeds)
+    value = np.array([*speeds.values()])
+    drift = np.zeros((len(value), len(value)))
+    return Estimate(names, value, np.tile(value, (clusters, 1)), ("",) * len(value), drift)
 
 
 def _unscaled(robot: Robot, found: Estimate) -> Estimate:

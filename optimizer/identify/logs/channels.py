@@ -30,6 +30,10 @@ def _channels(log: Log, columns: Columns, effort: Group | None) -> Iterator[Chan
         for j, size in enumerate(noise(values, log.rate)):
             column = None if indices is None else columns.names[indices[j]]
             yield Channel(f"{name}{j + 1}", column, units[name], *_range(values[:, j]), float(size))
+    if log.wrench is not None:
+        for j, size in enumerate(noise(log.wrench, log.rate)):
+            column = columns.names[columns.groups["wrench"][j]]
+            yield Channel(f"wrench{j + 1}", column, "N" if j < 3 else "N·m", *_range(log.wrench[:, j]), float(size))
     if log.power is not None:
         column = " · ".join(columns.names[k] for k in columns.groups["power"])
         (size,) = noise(log.power[:, None], log.rate)

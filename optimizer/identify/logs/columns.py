@@ -9,10 +9,12 @@ from typing import ClassVar, Literal
 
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 
-Group = Literal["q", "v", "a", "current", "torque", "effort", "temperature", "commanded", "power", "payload"]
+Group = Literal["q", "v", "a", "current", "torque", "effort", "temperature", "commanded", "power", "payload", "wrench"]
 """What columns hold: joint positions, speeds, accelerations, currents, torques, efforts of unknown meaning,
 temperatures, commanded speeds; power of the arm, or voltage and current that multiply to it; mass and centre of the
-payload."""
+payload; force and torque on a sensor beneath the base."""
+WRENCH = 6
+"""Columns of a wrench: three of the force, then three of the torque."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,7 @@ class Form:
     joints: Mapping[Group, str]
     power: tuple[str, ...] = ()
     payload: tuple[str, ...] = ()
+    wrench: tuple[str, ...] = ()
 
 
 AT = r"[._\[ ]?([0-9]{1,3})\]?"
@@ -56,6 +59,7 @@ FORMS = (
             "torque": "tau([0-9]{1,3})",
         },
         ("p",),
+        wrench=("fx", "fy", "fz", "mx", "my", "mz"),
     ),
     Form(
         "ros",
@@ -110,6 +114,7 @@ class Columns:
         "effort",
         "temperature",
         "power",
+        "wrench",
     )
     """What a map of columns may name."""
 
@@ -202,6 +207,8 @@ def _single(form: Form, names: Sequence[str]) -> Iterator[tuple[Group, tuple[int
     """The columns of a form that belong to no joint."""
     if form.power and all(name in names for name in form.power):
         yield "power", tuple(names.index(name) for name in form.power)
+    if form.wrench and all(name in names for name in form.wrench):
+        yield "wrench", tuple(names.index(name) for name in form.wrench)
     present = tuple(names.index(name) for name in form.payload if name in names)
     if form.payload and form.payload[0] in names:
         # the centre only if all of it is there
@@ -209,7 +216,8 @@ def _single(form: Form, names: Sequence[str]) -> Iterator[tuple[Group, tuple[int
 
 
 def mapped(names: Sequence[str], columns: Mapping[str, str | Sequence[str]], nq: int) -> Columns:
-    """The columns that a caller's map names: `time`, `nanoseconds` and `power` by one name, others by one per joint.
+    """The columns that a caller's map names: `time`, `nanoseconds` and `power` by one name,
+    `wrench` by six, others by one per joint.
 
     Raises InvalidProblem for a wrong map, InvalidTable where the header does not have a column.
     """
@@ -223,10 +231,14 @@ def mapped(names: Sequence[str], columns: Mapping[str, str | Sequence[str]], nq:
         wanted = [given] if isinstance(given, str) else [*given]
         if group in ("time", "nanoseconds", "power") and len(wanted) != 1:
             raise InvalidProblem(f"columns.{group}", f"columns.{group} must be the name of one column.")
+        if group == "wrench" and len(wanted) != WRENCH:
+            raise InvalidProblem(
+                "columns.wrench", "columns.wrench must name six columns: of the force, then the torque."
+            )
         found[group] = tuple(_index(names, each) for each in wanted)
     time = (*found.pop("time"), *found.pop("nanoseconds", ()))
     groups: dict[Group, tuple[int, ...]] = found  # type: ignore[assignment]
-    _check_counts({group: indices for group, indices in groups.items() if group != "power"}, names, nq)
+    _check_counts({group: indices for group, indices in groups.items() if group not in ("power", "wrench")}, names, nq)
     return Columns("mapped", names, time, groups)
 
 

@@ -29,15 +29,17 @@ class LogMove:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Log:
-    """One log of the arm `robot`, in SI units. Compared by identity. All arrays are read-only and share their rows, in
-    single or double precision.
+    """One log of the arm `robot`, in SI units. Compared by identity. All arrays are read-only and
+    share their rows, in single or double precision.
 
-    `time` (n,) [s] is the uniform grid, from 0 in steps of 1 / `rate` [Hz]. `q` [rad], `v` [rad/s] and `a` [rad/s²] are
-    (n, joints). `effort` (n, joints) is what `effort_meaning` says: both are None where no effort was logged. `power`
-    (n,) [W] is drawn from the arm's bus, `temperature` (n, joints) [°C] that of the joints; None where not logged.
-    `payload` is what the arm carried, and `payload_known` whether anybody said so. `gravity` (3,) [m/s²] is in the base
-    frame.
-    `moves` cover all rows in their order, apart from pauses between blocks of a log that never rests.
+    `time` (n,) [s] is the uniform grid, from 0 in steps of 1 / `rate` [Hz]. `q` [rad], `v` [rad/s]
+    and `a` [rad/s²] are (n, joints). `effort` (n, joints) is what `effort_meaning` says: both are
+    None where no effort was logged. `power` (n,) [W] is drawn from the arm's bus, `temperature` (n,
+    joints) [°C] that of the joints; None where not logged. `wrench` (n, 6) is the force [N] and the
+    torque [N·m], about the origin of the base frame and in its axes, that the arm exerts on a
+    sensor beneath its base; None where not logged. `payload` is what the arm carried, and
+    `payload_known` whether anybody said so. `gravity` (3,) [m/s²] is in the base frame. `moves`
+    cover all rows in their order, apart from pauses between blocks of a log that never rests.
 
     Raises InvalidProblem if an array has another shape than the grid asks for.
     """
@@ -51,6 +53,7 @@ class Log:
     effort_meaning: EffortMeaning | None = None
     power: Array | None = None
     temperature: Array | None = None
+    wrench: Array | None = None
     payload: Payload = field(default_factory=Payload)
     payload_known: bool = True
     gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
@@ -61,7 +64,7 @@ class Log:
 
     def __post_init__(self) -> None:
         rows, joints = len(self.time), np.shape(self.q)[-1]
-        shapes: dict[str, tuple[int, ...]] = {"time": (rows,), "power": (rows,), "gravity": (3,)}
+        shapes: dict[str, tuple[int, ...]] = {"time": (rows,), "power": (rows,), "wrench": (rows, 6), "gravity": (3,)}
         shapes |= dict.fromkeys(("q", "v", "a", "effort", "temperature"), (rows, joints))
         for name, shape in shapes.items():
             values = getattr(self, name)

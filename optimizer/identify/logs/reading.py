@@ -140,7 +140,7 @@ def _read(source: Path | bytes, robot: Robot, options: LogOptions) -> LogReading
     grid = channels.grid
     q = channels.take("q")
     assert q is not None
-    logged = {group: channels.take(group) for group in ("v", "a", "commanded", "temperature")}
+    logged = {group: channels.take(group) for group in ("v", "a", "commanded", "temperature", "wrench")}
     v, a = speeds_of(q, logged["v"], logged["a"], columns, grid.rate, remarks)
     motion = Motion(robot, payload, gravity, q, v, a, grid.rate)
     named = None if options.effort is None else next((group for group in _EFFORTS if group in channels.values), None)
@@ -159,6 +159,7 @@ def _read(source: Path | bytes, robot: Robot, options: LogOptions) -> LogReading
         effort_meaning=None if found is None else found.meaning,
         power=power,
         temperature=logged["temperature"],
+        wrench=logged["wrench"],
         payload=payload,
         payload_known=payload_known,
         gravity=gravity,

@@ -14,7 +14,12 @@ import numpy.typing as npt
 
 from joulepath.models.robot import Array, Mask, Robot
 from joulepath.optimizer.deadline import checkpoint
-from joulepath.optimizer.energy.link_regressor import rigid_regressor, rigid_torques
+from joulepath.optimizer.energy.link_regressor import (
+    base_wrench_regressor,
+    body_parameters,
+    rigid_regressor,
+    rigid_torques,
+)
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.logs.log import Log, LogMove
 from joulepath.optimizer.identify.rows.same_motion import groups_of_motions
@@ -46,6 +51,8 @@ class Rows:
     through all logs, and rows at rest belong to the move before. `group` (n,): moves along the same motion share one.
     `weight` (n,) [s] is the time that a row stands for, `regressor`
     (n, nq, 10 nq) is that of the links, None where their inertials are taken as known.
+    `wrench` (n, 6) [N, N·m] acts beneath the base, NaN where not logged. `wrench_regressor`
+    (n, 6, 10 nq) is that of the links; with it, the wrench is without what the arm carries.
     """
 
     time: Array
@@ -57,6 +64,7 @@ class Rows:
     effort: Array
     power: Array
     temperature: Array
+    wrench: Array
     log: Numbers
     move: Numbers
     group: Numbers
@@ -64,6 +72,7 @@ class Rows:
     weight: Array
     current: bool
     regressor: Array | None = None
+    wrench_regressor: Array | None = None
 
     def take(self, rows: Mask) -> Rows:
         """Only these rows (n,)."""
@@ -76,8 +85,8 @@ class Rows:
         return np.unique(self.group[~self.rest])
 
 
-def rows_of(robot: Robot, logs: Sequence[Log], regressor: bool = False) -> Rows:
-    """The rows of logs of one robot, with the regressor of its links or without.
+def rows_of(robot: Robot, logs: Sequence[Log], regressor: bool = False, wrench: bool = False) -> Rows:
+    """The rows of logs of one robot, with the regressors of its links or without.
 
     Raises InvalidProblem if a log is of another robot, has other joints, or a power that is none of the arm's bus."""
     if not logs:
@@ -98,11 +107,22 @@ def rows_of(robot: Robot, logs: Sequence[Log], regressor: bool = False) -> Rows:
             model = robot.model.copy()
             model.gravity.linear = log.gravity
             piece["regressor"] = rigid_regressor(model, piece["q"], piece["v"], piece["a"])
+        if wrench:
+            piece |= _wrench(robot, log, piece)
         pieces.append(piece)
     # taken out one by one, and not copied if there is nothing to join: regressors are large
     joined = {name: _joined([piece.pop(name) for piece in pieces]) for name in [*pieces[0]]}
     joined["group"] = groups_of_motions(joined["q"], joined["v"], joined["move"], joined["rest"])
     return Rows(**joined, current=meanings == ["current"])
+
+
+def _wrench(robot: Robot, log: Log, rows: dict[str, Array]) -> dict[str, Array]:
+    """The regressor of the wrench beneath the base, and the wrench without what the arm carries."""
+    load = log.payload
+    loaded = robot.loaded_model(load.mass, load.com, load.inertia, log.gravity)
+    regressor = base_wrench_regressor(loaded, rows["q"], rows["v"], rows["a"])
+    carried = body_parameters(loaded) - body_parameters(robot.model)
+    return {"wrench_regressor": regressor, "wrench": rows["wrench"] - regressor @ carried}
 
 
 def _check_power(robot: Robot, log: Log) -> None:
@@ -162,6 +182,7 @@ def _rows_of_log(robot: Robot, log: Log, number: int, moves: int, every: int) ->
         "effort": mean(log.effort, joints),
         "power": mean(log.power, ()),
         "temperature": mean(log.temperature, joints),
+        "wrench": mean(log.wrench, (6,)),
         "log": np.full(len(starts), number),
         "move": of_move + moves,
         "rest": rest,

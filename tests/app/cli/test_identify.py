@@ -12,7 +12,7 @@ import pytest
 
 from joulepath.app.cli.identify import identify, summary_of
 from joulepath.app.schemas import errors as problems
-from joulepath.app.schemas.identifications import IdentificationResult, Target, Term
+from joulepath.app.schemas.identifications import IdentificationResult, Method, Target, Term
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.problem.arm import Payload
 from tests.app.cli.console import Here
@@ -75,7 +75,20 @@ def test_power_is_refused_of_logs_without(here: Here, tmp_path: Path) -> None:
     problems.NoPowerChannel.model_validate(content)
 
 
-@pytest.mark.parametrize(("option", "literal"), [("fit", Target), ("terms", Term)])
+def test_a_method_is_asked_for_by_its_name(here: Here, logs: list[str], tmp_path: Path) -> None:
+    output = tmp_path / "figures.json"
+    command = ("identify", logs[0], "--payload", "0", "--term", "coulomb", "--term", "viscous")
+    assert here.run(*command, "--method", "base_parameters", "-o", str(output))[0] == 0
+    result = IdentificationResult.model_validate_json(output.read_bytes())
+    assert any("·" in each.figure for each in result.parameters)
+    assert result.physical is None and result.structure.excited == result.structure.base
+    assert "inertials" not in result.document
+    code, content = here.problem(*command, "--method", "periodic", "--period", "5", "--validate", logs[1])
+    assert code == 1
+    assert problems.MethodNotApplicable.model_validate(content).method == "periodic"
+
+
+@pytest.mark.parametrize(("option", "literal"), [("fit", Target), ("method", Method), ("terms", Term)])
 def test_the_choices_are_those_of_the_service(option: str, literal: object) -> None:
     choices = next(each for each in identify.params if each.name == option).type
     assert isinstance(choices, click.Choice)

@@ -44,6 +44,7 @@ ERRORS: list[JoulepathError] = [
     identification_errors.NotExcited(["coulomb", "viscous"], "ur5e", ["friction"], 2.0, [0.0, 0.0, 0.05]),
     identification_errors.NothingHeldOut(1),
     identification_errors.NoPowerChannel(),
+    identification_errors.MethodNotApplicable("base_wrench", "it needs a force."),
     identification_errors.PayloadUnknown([0, 5]),
     exceptions.StartInCollision([COLLIDING]),
     exceptions.GoalInCollision([COLLIDING, replace(COLLIDING, depth=0.01)]),

@@ -10,7 +10,6 @@ import pytest
 import yaml
 from starlette.testclient import TestClient
 
-from benchmarks.read_back.urscript_machine import Controller
 from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.export import FORMATS, ExportFormat
 from joulepath.models.registry import load_robot
@@ -18,6 +17,7 @@ from joulepath.models.urdf import urdf_of
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_problems import refused
 from tests.app.test_openapi_examples import DOCUMENT
+from tests.optimizer.export.read_back.urscript_machine import Controller
 
 Json = dict[str, Any]
 LOAD = {"mass": 2.0, "com": [0.0, 0.0, 0.05]}

@@ -20,6 +20,7 @@ from joulepath.app.schemas.identifications import (
     ResidualMove,
 )
 from joulepath.models.registry import load_robot
+from joulepath.optimizer.energy.link_regressor import base_wrench_regressor, body_parameters
 from joulepath.optimizer.problem.arm import Payload
 from tests.app.requests import HOME
 from tests.app.routes.test_problems import refused
@@ -200,6 +201,45 @@ def test_what_logs_do_not_tell_is_a_problem(
     problem.model_validate(found.problem)
     if "advice" in found.problem:
         assert ExcitationRequest.model_validate(found.problem["advice"]).robot == ROBOT.name
+
+
+@pytest.mark.parametrize("method", ["motor_current", "electrical_power", "essential_parameters", "threshold_velocity"])
+def test_methods_are_asked_for_by_name(client: TestClient, log: str, method: str) -> None:
+    whole = ended(client, logs=[log], method=method)
+    assert whole.result is not None, whole.problem
+    figures = {each.figure for each in whole.result.parameters}
+    assert (whole.result.thresholds is not None) == (method == "threshold_velocity")
+    assert ("torque_constant" in figures) == (method == "motor_current")
+    assert ("link_mass_scale" in figures) == (method == "electrical_power")
+    assert any("·" in each for each in figures) == (method == "essential_parameters")
+    assert whole.figures is not None
+
+
+@pytest.mark.parametrize("method", ["periodic", "base_wrench", "temperature"])
+def test_a_method_that_the_log_does_not_fit_is_a_problem(client: TestClient, log: str, method: str) -> None:
+    found = ended(client, logs=[log], method=method, period=5.0)
+    assert found.problem is not None
+    assert problems.MethodNotApplicable.model_validate(found.problem).method == method
+
+
+def test_links_from_a_log_with_the_wrench_beneath_the_base(client: TestClient) -> None:
+    recording = recorded(ROBOT, TRUTH, moves=8)
+    state = (recording.exact_q, recording.exact_v, recording.a)
+    wrench = base_wrench_regressor(ROBOT.model, *state) @ body_parameters(ROBOT.model)
+    lines = csv_of(recording, without="iP").decode().splitlines()
+    cells = [",".join(f"{each:.6g}" for each in row) for row in wrench]
+    body = "\n".join(f"{a},{b}" for a, b in zip(lines, ["fx,fy,fz,mx,my,mz", *cells], strict=True))
+    answer = client.post("/logs", content=body, params=NOTHING, headers=CSV)
+    assert answer.status_code == 201, answer.text
+    assert "wrench6" in {each["name"] for each in answer.json()["channels"]}
+    result = done(client, logs=[answer.json()["id"]], method="base_wrench")
+    assert result.physical is not None and result.physical.consistent
+    mass = result.document["inertials"]["mass"]["value"]
+    own = [each.mass for each in list(ROBOT.model.inertias)[1:]]
+    assert mass == pytest.approx(own, rel=0.2)
+    links = [each for each in result.parameters if each.sd > 0]
+    assert len(links) == 60
+    assert all(abs(each.value - each.previous) <= FAR * each.sd for each in links)
 
 
 def test_a_payload_is_the_difference_of_two_logs(client: TestClient, log: str) -> None:

@@ -6,14 +6,11 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from alembic import command
-from alembic.config import Config
-from sqlalchemy import event, text
+from sqlalchemy import event
 
 from joulepath.app.access.client import OPERATOR
 from joulepath.app.engine.result import StoredAnswer
 from joulepath.app.store import studies
-from joulepath.app.store.database import create_database_engine, migrate
 from joulepath.app.store.store import Store
 from joulepath.app.store.studies import Step
 from joulepath.app.store.tables import Iteration, Study, new_id
@@ -90,27 +87,3 @@ def test_to_add_one_reads_as_much_in_a_study_of_any_length(tmp_path: Path, count
             event.remove(Iteration, "load", note)
 
     with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
-
-
-def test_studies_of_earlier_releases_are_filled_in(tmp_path: Path) -> None:
-    url = f"sqlite:///{tmp_path}/joulepath.db"
-
-    async def test(store: Store) -> None:
-        await begun(store)
-        await begun(store, "mechanical")
-
-    with_store(url, test)
-    engine = create_database_engine(url)
-    read = text("SELECT study_id, number, best, met_by FROM iterations ORDER BY study_id, number")
-    with engine.connect() as connection:
-        before = connection.execute(read).all()
-    config = Config()
-    config.set_main_option("script_location", "app/store/migrations")
-    with engine.execution_options(writes=True).begin() as connection:
-        config.attributes["connection"] = connection
-        command.downgrade(config, "v0004")
-    migrate(engine)
-    with engine.connect() as connection:
-        assert connection.execute(read).all() == before
-    engine.dispose()
-    assert {row.best for row in before} == {1, 2, 4}

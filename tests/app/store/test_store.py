@@ -29,7 +29,7 @@ from joulepath.app.schemas import answers as schemas
 from joulepath.app.schemas import errors as problems
 from joulepath.app.settings import Settings
 from joulepath.app.store import answers, database
-from joulepath.app.store.database import create_database_engine, migrate
+from joulepath.app.store.database import OtherVersion, create_database_engine, migrate
 from joulepath.app.store.store import Store
 from joulepath.app.store.store_answers import store_answers
 from joulepath.app.store.tables import Answer, Table, new_id, now
@@ -99,6 +99,17 @@ def test_the_comparison_above_can_fail(tmp_path: Path) -> None:
     with engine.begin() as connection:
         connection.execute(text("DROP INDEX ix_answers_study_id"))
     assert len(tables(url)) == 1
+
+
+def test_a_database_of_another_version_is_refused_with_what_to_do(url: str) -> None:
+    engine = create_database_engine(url)
+    migrate(engine)
+    with engine.execution_options(writes=True).begin() as connection:
+        connection.execute(text("UPDATE alembic_version SET version_num = 'v0013'"))
+    with pytest.raises(OtherVersion, match=r"v0013.*move the database away") as caught:
+        migrate(engine)
+    assert "secret" not in str(caught.value)
+    engine.dispose()
 
 
 def test_several_processes_may_migrate_at_once(url: str) -> None:

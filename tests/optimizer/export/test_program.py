@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.read_back.random_motions import arm_of, one_move, random_spline
 from joulepath.optimizer.energy.plant import Plant
 from joulepath.optimizer.evaluate.sample_check import check_samples
 from joulepath.optimizer.exceptions import InvalidProblem, NotCertified
@@ -25,6 +24,7 @@ from joulepath.optimizer.solution import Trajectory
 from joulepath.optimizer.trajectories.spline import Spline, retimed
 from joulepath.optimizer.trajectories.through_samples import spline_through
 from tests.optimizer.export.programs import cycle_with_payload
+from tests.optimizer.export.read_back.random_motions import arm_of, one_move, random_spline
 from tests.optimizer.moves import AMPLE, GOAL, START
 
 

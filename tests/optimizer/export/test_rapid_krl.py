@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.read_back.point_programs import cut, deviation, read_krl, read_rapid, stated, through
-from benchmarks.read_back.random_motions import OWN, arm_of, one_move, random_spline
 from joulepath.optimizer.exceptions import FormatUnsuitable
 from joulepath.optimizer.export.krl import KrlOptions, to_krl
 from joulepath.optimizer.export.program import Move, Program, Rest
 from joulepath.optimizer.export.rapid import RapidOptions, to_rapid
 from tests.optimizer.export.programs import LOAD, cycle_with_payload
+from tests.optimizer.export.read_back.point_programs import cut, deviation, read_krl, read_rapid, stated, through
+from tests.optimizer.export.read_back.random_motions import OWN, arm_of, one_move, random_spline
 
 # 1e-6 degrees, and the rounding of times at the speed of these motions
 ROUNDING = 1e-5

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 import yaml
 
-from benchmarks.read_back.joint_trajectories import deviations, followed
-from benchmarks.read_back.random_motions import arm_of, one_move
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import FormatUnsuitable
 from joulepath.optimizer.export import quintic_points as points_module
@@ -19,6 +17,8 @@ from joulepath.optimizer.export.quintic_points import POSITION_TOLERANCE, VELOCI
 from joulepath.optimizer.export.ros_messages import MoveitOptions, Ros2Options, to_moveit, to_ros2
 from joulepath.optimizer.trajectories.spline import Spline
 from tests.optimizer.export.programs import cycle_with_payload
+from tests.optimizer.export.read_back.joint_trajectories import deviations, followed
+from tests.optimizer.export.read_back.random_motions import arm_of, one_move
 
 # fields of the messages, as their definitions have them
 GOAL = {

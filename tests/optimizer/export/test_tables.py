@@ -8,7 +8,6 @@ from io import BytesIO
 import numpy as np
 import pytest
 
-from benchmarks.read_back.random_motions import one_move
 from joulepath.app.convert.motion_csv import MotionCsv
 from joulepath.optimizer.exceptions import FormatUnsuitable
 from joulepath.optimizer.export.csv_table import to_csv
@@ -17,6 +16,7 @@ from joulepath.optimizer.export.npz_arrays import to_npz
 from joulepath.optimizer.export.rows import TableOptions
 from joulepath.optimizer.trajectories.spline import Spline
 from tests.optimizer.export.programs import LOAD, cycle_with_payload
+from tests.optimizer.export.read_back.random_motions import one_move
 
 # twelve significant digits of numbers below 1e4
 ROUNDING = 1e-8

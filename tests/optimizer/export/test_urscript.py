@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_lsq_spline
 
-from benchmarks.read_back.random_motions import arm_of, one_move, random_spline
-from benchmarks.read_back.urscript_machine import Controller, Halt, translated
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import FormatUnsuitable
 from joulepath.optimizer.export.program import Move, Program
 from joulepath.optimizer.export.urscript import SET_POINT_ERROR, UrscriptOptions, to_urscript
 from joulepath.optimizer.trajectories.spline import retimed
 from tests.optimizer.export.programs import LOAD, cycle_with_payload
+from tests.optimizer.export.read_back.random_motions import arm_of, one_move, random_spline
+from tests.optimizer.export.read_back.urscript_machine import Controller, Halt, translated
 
 EVIL = 'pick"\n  set_standard_digital_out(7, True)\r# \u2028 end'
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -10,15 +11,22 @@ import pytest
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
-from joulepath.optimizer.energy.link_regressor import body_parameters, rigid_regressor, rigid_torques
-from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.energy.link_regressor import (
+    base_wrench_regressor,
+    body_parameters,
+    rigid_regressor,
+    rigid_torques,
+)
 from joulepath.optimizer.identify.arm.base_parameters import base_parameters
-from joulepath.optimizer.identify.fits.base_wrench import base_wrench_regressor, fit_base_wrench
-from joulepath.optimizer.identify.fits.periodic import mean_period, most_likely
+from joulepath.optimizer.identify.errors import MethodNotApplicable
+from joulepath.optimizer.identify.fits.fitting import motor_torque
 from joulepath.optimizer.identify.fits.threshold import velocity_threshold
-from joulepath.optimizer.identify.identify import identify
-from joulepath.optimizer.identify.options import IdentificationOptions
-from tests.identification_logs import recorded, truth_of
+from joulepath.optimizer.identify.identify import Identification, identify
+from joulepath.optimizer.identify.logs.log import Log, LogMove
+from joulepath.optimizer.identify.options import IdentificationOptions, Method, Term
+from joulepath.optimizer.identify.rows.fit_rows import rows_of
+from joulepath.optimizer.problem.arm import Payload
+from tests.identification_logs import Truth, recorded, truth_of
 
 ROBOT = load_robot("ur5e")
 # of the standard deviations: what one of a thousand figures exceeds
@@ -41,32 +49,104 @@ def fourier(nq: int, periods: int, seed: int = 0) -> tuple[Array, Array, Array]:
     return q, v, a
 
 
+def log_of(truth: Truth, q: Array, v: Array, a: Array, noise: Array, **channels: Any) -> Log:
+    """A log of torques, whose noise has the standard deviations (nq,) [N·m]."""
+    rigid = rigid_torques(ROBOT.model, q, v, a)
+    friction = truth.coulomb * v / np.hypot(v, ROBOT.friction.knee) + truth.viscous * v
+    torque = rigid + truth.rotor_inertia * a + friction
+    torque += np.random.default_rng(1).normal(0.0, 1.0, torque.shape) * noise
+    return Log(
+        robot="ur5e", time=np.arange(len(q)) / RATE, q=q, v=v, a=a, effort=torque, effort_meaning="torque",
+        rate=RATE, moves=(LogMove(0, len(q), False),), **channels,
+    )  # fmt: skip
+
+
+def away(found: Identification, truth: Truth) -> Array:
+    """Errors of the figures over their standard deviations; base parameters are those of the robot
+    itself."""
+    errors = []
+    for each in found.parameters:
+        true = each.previous if each.joint is None else float(getattr(truth, each.figure)[each.joint])
+        errors.append((each.value - true) / each.sd)
+    return np.array(errors)
+
+
+PLAIN: tuple[Term, ...] = ("coulomb", "viscous")
+SIZES = np.array([2.0, 2.0, 1.0, 0.2, 0.2, 0.1])
+
+
 def test_maximum_likelihood_from_a_periodic_excitation() -> None:
     """Swevers: joints with noise of different size are weighted by it, and the covariance holds."""
-    model = ROBOT.model
-    base = base_parameters(model, rotors=False)
-    q, v, a = fourier(ROBOT.nq, 8)
-    regressor = rigid_regressor(model, q, v, a)[:, :, base.independent]
-    truth = base.combination @ body_parameters(model)
-    sizes = np.array([2.0, 2.0, 1.0, 0.2, 0.2, 0.1])
-    noise = np.random.default_rng(1).normal(0.0, 1.0, (len(q), ROBOT.nq)) * sizes
-    samples = round(PERIOD * RATE)
-    measured = mean_period(rigid_torques(model, q, v, a) + noise, samples)
-    assert np.sqrt(measured.variance) == pytest.approx(sizes, rel=0.05)
-    found = most_likely(regressor[:samples], measured)
-    error = found.value - truth
-    assert (np.abs(error) < FAR * np.sqrt(np.diag(found.covariance))).all()
-    # of 36 figures, the square of the error by its covariance is 36, give or take 8.5
-    assert 15 < error @ np.linalg.solve(found.covariance, error) < 60
-    assert found.excess == pytest.approx(1.0, abs=0.1)
+    truth, (q, v, a) = truth_of(ROBOT), fourier(ROBOT.nq, 8)
+    # of rotors that one cannot tell from links, the true inertia is the robot's own
+    truth = replace(truth, rotor_inertia=ROBOT.drives.rotor_inertia)
+    options = IdentificationOptions(method="periodic", period=PERIOD, terms=PLAIN, held_out=0.0)
+    log = log_of(truth, q, v, a, SIZES)
+    found = identify(ROBOT, [log], options)
+    assert found.noise is not None and found.noise.periods == 8
+    assert found.noise.deviation == pytest.approx(SIZES, rel=0.06)
+    assert found.noise.excess == pytest.approx(1.0, abs=0.1)
+    # 40 base parameters, of which four are rotors, and 12 figures of friction
+    assert len(found.parameters) == 52 and np.abs(away(found, truth)).max() < FAR
+    assert np.mean(away(found, truth) ** 2) == pytest.approx(1.0, abs=0.6)
     # a model that misses something is told by it
-    wrong = replace(measured, mean=measured.mean + 0.5 * np.sign(v[:samples]))
-    assert most_likely(regressor[:samples], wrong).excess > 2
+    missed = replace(log, effort=np.array(log.effort) + np.where(np.abs(v) < 0.3, np.sign(v), 0.0))
+    wrong = identify(ROBOT, [missed], options)
+    assert wrong.noise is not None and wrong.noise.excess > 2
+    # another motion, by figures that have no body behind them
+    others = log_of(truth, *fourier(ROBOT.nq, 1, seed=5), SIZES)
+    errors = found.validate([others]).fitted.torque
+    assert errors is not None and errors.rmse == pytest.approx(SIZES, rel=0.15)
+    assert found.physical is None and "mass" not in found.figures().values
 
 
-def test_a_log_without_two_periods_is_refused() -> None:
-    with pytest.raises(InvalidProblem, match="2"):
-        mean_period(np.zeros((750, 6)), 500)
+@pytest.mark.parametrize(
+    ("periods", "period", "said"), [(1, PERIOD, "1 whole periods"), (4, 0.9 * PERIOD, "rad apart")]
+)
+def test_a_log_without_periods_is_refused(periods: int, period: float, said: str) -> None:
+    log = log_of(truth_of(ROBOT), *fourier(ROBOT.nq, periods), SIZES)
+    with pytest.raises(MethodNotApplicable, match=said):
+        identify(ROBOT, [log], IdentificationOptions(method="periodic", period=period, held_out=0.0))
+
+
+def test_base_parameters_without_knowledge_of_the_links() -> None:
+    """Gautier: of a robot with other links, base parameters and friction are found, and torques
+    predicted."""
+    truth = replace(truth_of(ROBOT), rotor_inertia=ROBOT.drives.rotor_inertia)
+    log = log_of(truth, *fourier(ROBOT.nq, 4), 0.1 * SIZES)
+    model = ROBOT.model.copy()
+    for body in list(model.inertias)[1:]:
+        body.mass *= 1.3
+    wrong = replace(ROBOT, model=model)
+    found = identify(wrong, [log], IdentificationOptions(method="base_parameters", terms=PLAIN, held_out=0.0))
+    base = base_parameters(ROBOT.model)
+    own = np.append(body_parameters(ROBOT.model), ROBOT.drives.rotor_inertia)
+    true = dict(zip(base.expressions, (base.combination @ own).tolist(), strict=True))
+    values = {each.figure: each for each in found.parameters if each.joint is None}
+    errors = [(each.value - true[name]) / each.sd for name, each in values.items()]
+    assert len(errors) >= 36 and np.abs(errors).max() < 2 * FAR and np.median(np.abs(errors)) < 1.5
+    assert found.structure.excited == found.structure.base == 40
+    others = log_of(truth, *fourier(ROBOT.nq, 1, seed=5), 0.1 * SIZES)
+    validation = found.validate([others])
+    assert validation.fitted.torque is not None and validation.own.torque is not None
+    assert validation.fitted.torque.rmse == pytest.approx(0.1 * SIZES, rel=0.3)
+    assert (validation.fitted.torque.rmse[1:] < 0.5 * validation.own.torque.rmse[1:]).all()
+
+
+def test_essential_parameters_are_told_and_the_rest_is_the_robots_own() -> None:
+    """Verdonck, Radkhah: what a log does not tell is left out, and what is left is told the better."""
+    truth = replace(truth_of(ROBOT), rotor_inertia=ROBOT.drives.rotor_inertia)
+    log = log_of(truth, *fourier(ROBOT.nq, 2), 2 * SIZES)
+    every, essential = (
+        identify(ROBOT, [log], IdentificationOptions(method=method, terms=PLAIN, held_out=0.0))
+        for method in ("base_parameters", "essential_parameters")
+    )
+    left = [each for each in essential.parameters if each.why]
+    assert left and all(each.value == each.previous for each in left)
+    assert all(each.sd <= 0.3 * abs(each.value) for each in essential.parameters if not each.why)
+    before = {(each.figure, each.joint): each.sd for each in every.parameters}
+    ratios = [each.sd / before[each.figure, each.joint] for each in essential.parameters if not each.why]
+    assert np.median(ratios) < 1
 
 
 def test_the_wrench_beneath_the_arm_is_that_of_its_links() -> None:
@@ -83,18 +163,45 @@ def test_the_wrench_beneath_the_arm_is_that_of_its_links() -> None:
         assert np.abs(row - expected).max() < ROUNDING * np.abs(expected).max() * 100
 
 
-def test_base_parameters_from_the_wrench_beneath_the_arm() -> None:
-    """Christoforou: no friction is in it, however great that is."""
+def test_links_from_the_wrench_beneath_the_arm() -> None:
+    """Christoforou: links that are heavier than the robot's own are found, however great friction
+    is."""
     model, (q, v, a) = ROBOT.model, fourier(ROBOT.nq, 4)
-    random = np.random.default_rng(2)
-    exact = base_wrench_regressor(model, q, v, a) @ body_parameters(model)
-    wrench = exact + random.normal(0.0, 1.0, exact.shape) * np.array([1.0, 1.0, 1.0, 0.3, 0.3, 0.3])
-    found = fit_base_wrench(model, q, v, a, wrench, np.arange(len(q)) // 100)
-    truth = found.combination @ body_parameters(model)
-    z = (found.value - truth) / np.sqrt(np.diag(found.covariance))
-    assert np.abs(z).max() < FAR
-    # the wrench tells more combinations than the torques do
-    assert len(truth) > base_parameters(model, rotors=False).count
+    real = model.copy()
+    for body in list(real.inertias)[1:]:
+        body.mass *= 1.3
+    exact = base_wrench_regressor(real, q, v, a) @ body_parameters(real)
+    # the sensor has an offset, and carries the base
+    noise = np.random.default_rng(2).normal(0.0, 0.1, exact.shape)
+    log = log_of(
+        truth_of(ROBOT), q, v, a, 50 * SIZES, wrench=exact + noise + np.array([3.0, -2.0, -40.0, 1.0, 0.0, 2.0])
+    )
+    found = identify(ROBOT, [log], IdentificationOptions(method="base_wrench", held_out=0.0))
+    assert found.physical is not None and found.physical.consistent
+    test = [each[::7] for each in fourier(ROBOT.nq, 1, seed=5)]
+    body = found.figures().values
+    assert body["mass"].sum() == pytest.approx(1.3 * sum(each.mass for each in list(model.inertias)[1:]), rel=0.15)
+    change = np.array([each.value - each.previous for each in found.parameters])
+    true, own = (rigid_torques(each, *test) for each in (real, model))
+    fitted = own + rigid_regressor(model, *test) @ change
+    # joint 1 turns about gravity: its torque is of inertias alone, which the prior holds
+    off, before = (np.linalg.norm(each - true, axis=0)[1:4] for each in (fitted, own))
+    assert (off < 0.1 * before).all()
+    assert "coulomb" not in body
+
+
+def test_links_from_the_wrench_do_not_depend_on_the_payload() -> None:
+    model, (q, v, a) = ROBOT.model, fourier(ROBOT.nq, 2)
+    payload = Payload(3.0, np.array([0.0, 0.02, 0.1]))
+    loaded = ROBOT.loaded_model(payload.mass, payload.com, payload.inertia, np.array([0.0, 0.0, -9.81]))
+    found = []
+    for carried, load in ((model, Payload()), (loaded, payload)):
+        wrench = base_wrench_regressor(carried, q, v, a) @ body_parameters(carried)
+        log = log_of(truth_of(ROBOT), q, v, a, SIZES, wrench=wrench, payload=load)
+        found.append(
+            identify(ROBOT, [log], IdentificationOptions(method="base_wrench", held_out=0.0)).figures().values["mass"]
+        )
+    assert found[0] == pytest.approx(found[1], rel=1e-3)
 
 
 def test_four_times_the_moves_halve_the_deviations() -> None:
@@ -111,6 +218,85 @@ def test_four_times_the_moves_halve_the_deviations() -> None:
     both = deviations[0].keys() & deviations[1].keys()
     ratio = np.median([deviations[0][name] / deviations[1][name] for name in both])
     assert len(both) >= 12 and 1.5 < ratio < 3.5
+
+
+def test_motor_currents_need_known_links_and_give_torque_constants() -> None:
+    """Paes: as asking for the torque constants, of logs of currents alone."""
+    truth = truth_of(ROBOT)
+    recording = recorded(ROBOT, truth, moves=8)
+    found = identify(ROBOT, [recording.log()], IdentificationOptions(method="motor_current", held_out=0.0))
+    assert "torque_constant" in {each.figure for each in found.parameters}
+    with pytest.raises(MethodNotApplicable, match="currents"):
+        identify(ROBOT, [recording.log("torque")], IdentificationOptions(method="motor_current"))
+
+
+def test_electrical_power_does_without_torques() -> None:
+    """Liu: the efforts of a log do not count, however wrong they are."""
+    log = recorded(ROBOT, truth_of(ROBOT), moves=8).log("torque")
+    wrong = replace(log, effort=3 * np.array(log.effort))
+    options = IdentificationOptions(method="electrical_power", held_out=0.0)
+    one, two = (identify(ROBOT, [each], options).parameters for each in (log, wrong))
+    assert "link_mass_scale" in {each.figure for each in one} and one == two
+    with pytest.raises(MethodNotApplicable, match="power"):
+        identify(ROBOT, [replace(log, power=None)], options)
+
+
+def test_friction_at_the_reference_temperature() -> None:
+    """Hao: a log that begins cold has the friction of its mean temperature, and less is left over."""
+    truth = replace(truth_of(ROBOT), load=np.zeros(ROBOT.nq), offset=np.zeros(ROBOT.nq))
+    log = replace(recorded(ROBOT, truth, moves=24).log("torque"), power=None)
+    warm = np.linspace(20.0, 50.0, len(log.time))[:, None] * np.ones(ROBOT.nq)
+    friction = truth.coulomb * log.v / np.hypot(log.v, truth.knee) + truth.viscous * log.v
+    log = replace(log, effort=log.effort + friction * (np.exp(-0.01 * (warm - 35.0)) - 1), temperature=warm)
+    terms: tuple[Term, ...] = ("coulomb", "viscous", "offset")
+    plain, found = (
+        identify(ROBOT, [log], IdentificationOptions(method=method, terms=terms, held_out=0.0))
+        for method in ("automatic", "temperature")
+    )
+    assert found.temperatures.k[:3] == pytest.approx([0.01] * 3, abs=0.002)
+    for each, before in zip(found.parameters, plain.parameters, strict=True):
+        if each.figure == "coulomb" and each.joint is not None and each.joint < 3:
+            true = truth.coulomb[each.joint] * np.exp(-0.01 * (found.temperatures.reference[each.joint] - 35.0))
+            assert each.value == pytest.approx(true, rel=0.03)
+            assert each.sd < before.sd
+    cold = replace(log, temperature=np.full(log.q.shape, 30.0))
+    with pytest.raises(MethodNotApplicable, match="0 K"):
+        identify(ROBOT, [cold], IdentificationOptions(method="temperature"))
+
+
+@pytest.mark.parametrize(("method", "rise"), [("automatic", 0.1), ("base_parameters", None)])
+def test_a_curved_rise_is_predicted_at_the_speed_at_which_it_was_fitted(method: Method, rise: float | None) -> None:
+    truth, (q, v, a) = truth_of(ROBOT), fourier(ROBOT.nq, 4)
+    log = log_of(truth, q, v, a, 0.1 * SIZES)
+    # with known links the speed is sought, else it is the robot's own
+    speed = ROBOT.friction.speed if rise is None else rise
+    log = replace(log, effort=np.array(log.effort) + 4.0 * np.arcsinh(v / speed))
+    found = identify(ROBOT, [log], IdentificationOptions(method=method, terms=(*PLAIN, "curved"), held_out=0.0))
+    rows = rows_of(ROBOT, [log], regressor=True)
+    error = motor_torque(found.fitted.arm, rows) - found.fitted.arm.torque(rows)
+    moving = np.abs(rows.v) > 0.02
+    rms = np.sqrt((moving * error**2).sum(axis=0) / moving.sum(axis=0))
+    assert (rms < 3 * 0.1 * SIZES + 0.05).all()
+
+
+def test_figures_above_the_threshold_velocity() -> None:
+    """Vuong: friction that rises below a speed does not bias the figures of what is above it."""
+    truth, (q, v, a) = truth_of(ROBOT), fourier(ROBOT.nq, 8)
+    log = log_of(truth, q, v, a, 0.1 * SIZES)
+    slow = 0.8 * truth.coulomb * np.sign(v) * np.maximum(1 - np.abs(v) / 0.3, 0.0)
+    log = replace(log, effort=np.array(log.effort) + slow)
+    plain, found = (
+        identify(ROBOT, [log], IdentificationOptions(method=method, terms=PLAIN, held_out=0.0))
+        for method in ("automatic", "threshold_velocity")
+    )
+    assert plain.thresholds is None and found.thresholds is not None
+    assert ((found.thresholds > 0.1) & (found.thresholds < 0.4)).all()
+    off = [
+        np.mean([abs(each.value / truth.coulomb[each.joint] - 1) for each in fitted.parameters
+                 if each.figure == "coulomb" and each.joint is not None])
+        for fitted in (plain, found)
+    ]  # fmt: skip
+    assert off[1] < 0.05 < off[0]
 
 
 def stribeck(v: Array, threshold: float, random: np.random.Generator) -> Array:
