@@ -28,6 +28,7 @@ COPY joulepath joulepath
 COPY models models
 COPY optimizer optimizer
 COPY app app
+COPY examples app/static/examples
 RUN mv /tmp/studio/joulepath/app/static/studio/vendor app/static/studio/
 ENV JOULEPATH_CACHE_DIR=/opt/joulepath/kernels MPLCONFIGDIR=/opt/matplotlib
 # Importing every module shows that nothing needed was left behind, and leaves the bytecode of what is used.

@@ -16,7 +16,7 @@ VENV := .venv
 PY := $(VENV)/bin/python
 INSTALL := $(PY) scripts/install.py
 STUDIO := app/static/studio
-NATIVE := optimizer/native/libjoulepath.so
+NATIVE := optimizer/native/libjoulepath.so.1
 SOURCES := app optimizer models tests benchmarks examples scripts
 
 # The optimiser's C library is compiled once, and its kernels once per robot. Where there is no C compiler, one comes as

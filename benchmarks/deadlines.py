@@ -24,12 +24,12 @@ import numpy as np
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
 from benchmarks.tasks import as_pose, collision_free, flange
+from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.engine.result import json_document
 from joulepath.app.engine.task import Task
 from joulepath.app.http.problem_details import problem_content
 from joulepath.app.schemas.pareto import ParetoRequest
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.app.tasks.optimize import OptimizeTask
 from joulepath.app.tasks.pareto import ParetoTask
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError

@@ -15,7 +15,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.energy.limited_torque import limited_torque
 from joulepath.optimizer.energy.losses import breakdown
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.solution import Energy
+from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.trajectories.limit_ratios import limit_ratios
 
 PERIOD = 1e-3  # largest period of the fine grid [s]

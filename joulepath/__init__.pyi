@@ -12,7 +12,6 @@ from .optimizer.evaluate.interval_energy import IntervalEnergy
 from .optimizer.evaluate.limit_report import LimitReport
 from .optimizer.evaluate.nearest_contact import LeastClearance
 from .optimizer.evaluate.recording import RecordedRows, Recording, Waypoints
-from .optimizer.evaluate.sampler import Samples
 from .optimizer.exceptions import (
     ContradictoryOrder,
     CycleTooShort,
@@ -47,7 +46,7 @@ from .optimizer.export.rapid import RapidOptions
 from .optimizer.export.ros_messages import MoveitOptions, Ros2Options
 from .optimizer.export.rows import TableOptions
 from .optimizer.export.urscript import UrscriptOptions
-from .optimizer.identify.errors import NoPowerChannel, NotExcited, NothingHeldOut, PayloadUnknown
+from .optimizer.identify.errors import MethodNotApplicable, NoPowerChannel, NotExcited, NothingHeldOut, PayloadUnknown
 from .optimizer.identify.identify import Identification, identify
 from .optimizer.identify.logs.log import Log, LogMove
 from .optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
@@ -93,25 +92,25 @@ from .optimizer.replay.outcome import Outcome
 from .optimizer.replay.planned import PlannedBaseline, PlannedMotion, PlannedTorques
 from .optimizer.replay.play import Contact
 from .optimizer.replay.replay import Replay, ReplayedChange, SavingRange, replay
-from .optimizer.solution import (
-    Baseline,
-    Branch,
-    CandidateReport,
-    CandidateStatus,
-    Certificate,
-    Clearance,
+from .optimizer.result.candidates import CandidateReport, CandidateStatus, UnreachableTarget
+from .optimizer.result.certificate import Certificate, Clearance
+from .optimizer.result.energy import (
     ElectricalEnergy,
     Energy,
     EnergyInterval,
     JointEnergy,
-    LimitsInForce,
     MechanicalEnergy,
     SavingInterval,
+    StorageUse,
+)
+from .optimizer.result.solution import (
+    Baseline,
+    Configuration,
+    LimitsInForce,
+    Samples,
     Solution,
     SolverReport,
-    StorageUse,
     Trajectory,
-    UnreachableTarget,
 )
 from .optimizer.trajectories.spline import Spline
 from .optimizer.what_if import WhatIf, what_if
@@ -123,7 +122,6 @@ __all__ = [
     "Attachment",
     "Baseline",
     "Box",
-    "Branch",
     "BranchFilter",
     "Bus",
     "CandidateReport",
@@ -137,6 +135,7 @@ __all__ = [
     "Compared",
     "Comparison",
     "ConeOrientedPose",
+    "Configuration",
     "Contact",
     "ContradictoryOrder",
     "Coupling",
@@ -191,6 +190,7 @@ __all__ = [
     "LogTooLarge",
     "MechanicalEnergy",
     "Mesh",
+    "MethodNotApplicable",
     "Move",
     "MoveitOptions",
     "NoCollisionFreeTrajectory",

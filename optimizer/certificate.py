@@ -29,7 +29,8 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import Single, single
 from joulepath.optimizer.problem.tool_cone import ToolCone
 from joulepath.optimizer.problem.tool_path import SPEED_TOLERANCE, ToolPath
-from joulepath.optimizer.solution import Certificate, Energy
+from joulepath.optimizer.result.certificate import Certificate, EndError
+from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.trajectories.limit_ratios import limit_ratios
 from joulepath.optimizer.trajectories.passing import deviations
 from joulepath.optimizer.trajectories.quadrature import grid, simpson_weights
@@ -228,8 +229,8 @@ class _Replay:
                 rotations[k] = self.data.oMi[self._last].rotation
         return rotations, twists
 
-    def end_error(self, target: Single, named: Array, reached: Array) -> tuple[float, float]:
-        """Error (position [m], rotation [rad]) of the TCP at `reached` (nq,) [rad] against the target.
+    def end_error(self, target: Single, named: Array, reached: Array) -> EndError:
+        """Error of the TCP at `reached` (nq,) [rad] against the target.
 
         Forward kinematics cannot tell joint positions apart that differ by full turns. The rotation is therefore at
         least the largest deviation of a joint from the joint positions named, and from those of a joint target. For a
@@ -239,7 +240,7 @@ class _Replay:
         T_reached = self.tcp_pose(reached)
         if isinstance(target, ConeOrientedPose):
             position = float(np.linalg.norm(T_reached[:3, 3] - target.position))
-            return position, _worst(excess_angle(target, T_reached[:3, :3]), joint_error)
+            return EndError(position, _worst(excess_angle(target, T_reached[:3, :3]), joint_error))
         if isinstance(target, Pose):
             T_target = target.T
         else:
@@ -247,7 +248,7 @@ class _Replay:
             joint_error = _worst(joint_error, float(np.abs(reached - target).max()))
         position = float(np.linalg.norm(T_reached[:3, 3] - T_target[:3, 3]))
         rotation = float(np.linalg.norm(pin.log3(T_target[:3, :3].T @ T_reached[:3, :3])))
-        return position, _worst(rotation, joint_error)
+        return EndError(position, _worst(rotation, joint_error))
 
     def tcp_pose(self, q: Array) -> Array:
         """T_base_tcp (4, 4) at q (nq,) [rad] by Pinocchio's forward kinematics."""

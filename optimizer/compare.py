@@ -13,7 +13,8 @@ from joulepath.optimizer.methods import METHODS
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.problem import MethodName, Problem
 from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, forward, nobody
-from joulepath.optimizer.solution import Objective, Solution
+from joulepath.optimizer.result.energy import Objective
+from joulepath.optimizer.result.solution import Solution
 
 
 @dataclass(frozen=True, eq=False)

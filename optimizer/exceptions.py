@@ -36,7 +36,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from joulepath.models.robot import Array
-    from joulepath.optimizer.solution import CandidateReport, Clearance, UnreachableTarget
+    from joulepath.optimizer.result.candidates import CandidateReport, UnreachableTarget
+    from joulepath.optimizer.result.certificate import Clearance
 
 # arm configurations that an error lists at most: an end of free orientation has hundreds
 MOST_BRANCHES = 64

@@ -12,8 +12,8 @@ from joulepath.optimizer.methods import METHODS
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.progress import Tell, forward, nobody
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.solution import Solution
 
 
 def optimize(problem: Problem, clock: Clock = time.perf_counter, tell: Tell = nobody) -> Solution:

@@ -13,7 +13,7 @@ from typing import Protocol
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 
 # problems that are handed out ahead of time: however many there are, memory does not grow with them
 AHEAD = 64

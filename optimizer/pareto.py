@@ -31,11 +31,11 @@ from joulepath.optimizer.exceptions import DeadlineExceeded, DurationTooShort, I
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, forward, nobody
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.fastest import fastest, fastest_of
 from joulepath.optimizer.search.reserve import report_time
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sampled_ends import between
-from joulepath.optimizer.solution import Solution
 from joulepath.optimizer.trajectories.spline import Spline
 
 LEAST_POINTS, MOST_POINTS = 2, 100

@@ -24,7 +24,7 @@ from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import Target
-from joulepath.optimizer.solution import Energy, Sensitivity
+from joulepath.optimizer.result.energy import Energy, Sensitivity
 from joulepath.optimizer.surroundings import Surroundings
 from joulepath.optimizer.trajectories.limit_ratios import too_much
 from joulepath.optimizer.trajectories.spline import Spline

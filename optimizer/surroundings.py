@@ -20,7 +20,7 @@ from joulepath.optimizer.kinematics.forward import joint_placements
 from joulepath.optimizer.kinematics.path_constraints import PathConstraints, path_constraint_list
 from joulepath.optimizer.nlp.clearance_constraint import ClearanceConstraint
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.solution import Clearance
+from joulepath.optimizer.result.certificate import Clearance
 from joulepath.optimizer.trajectories.spline import Spline
 
 # samples of a motion at which distances are computed

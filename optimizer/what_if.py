@@ -18,9 +18,11 @@ from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import Problem, narrowed
+from joulepath.optimizer.result.certificate import Certificate
+from joulepath.optimizer.result.energy import Energy
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.incumbent import SLACK
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.solution import Certificate, Energy, Solution
 from joulepath.optimizer.trajectories.spline import Spline
 
 # least deadline of a search [s]; shares of the time that the first search leaves to the known motion, and of what is

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 from joulepath.models.own_arm.description import Collision, Description, Drives, Electronics
-from tests.models.test_capsule_cover import meshes as arm_folder
+from tests.mesh_folders import meshes as arm_folder
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "own_robot.md").read_text()

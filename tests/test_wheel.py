@@ -97,15 +97,16 @@ def clean(variables: os._Environ[str] | dict[str, str]) -> dict[str, str]:
 
 
 def test_the_wheel_holds_all_that_runs(wheel: Path) -> None:
-    """Every tracked file of the three packages, the C library, the libraries of the page, and nothing else beside the
-    metadata."""
+    """Every tracked file of the three packages, the C library, the libraries of the page, the examples, and nothing
+    else beside the metadata."""
     tracked = subprocess.run(
-        ["git", "ls-files", "--cached", "--others", "--exclude-standard", "joulepath", *PACKAGES],
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard", "joulepath", *PACKAGES, "examples"],
         cwd=ROOT, capture_output=True, text=True, check=True,
     ).stdout.split()  # fmt: skip
     vendor = (ROOT / "app" / "static" / "studio" / "vendor").rglob("*")
     present = {name for name in tracked if (ROOT / name).is_file()}
     present |= {str(each.relative_to(ROOT)) for each in (LIBRARY, *vendor) if each.is_file()}
+    present = {f"app/static/{name}" if name.startswith("examples/") else name for name in present}
     present = {name if name.startswith("joulepath/") else f"joulepath/{name}" for name in present}
     assert LIBRARY.is_file()
     with zipfile.ZipFile(wheel) as archive:

@@ -26,8 +26,8 @@ def optimize(file: str, output: Path | None) -> None:
     FILE is the JSON of `POST /optimize`, or - for standard input. The answer is JSON, too. If standard error is a
     terminal, a summary follows: energy, duration, status, lower bound and gap.
     """
+    from joulepath.app.api.optimize.task import OptimizeTask
     from joulepath.app.schemas.request import OptimizeRequest
-    from joulepath.app.tasks.optimize import OptimizeTask
 
     search(OptimizeRequest, OptimizeTask, file, output, summary_of)
 

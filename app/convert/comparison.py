@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from joulepath.app.answers.bounded_energy import optimality_gap
 from joulepath.app.convert.fields import fields
-from joulepath.app.convert.solution import baseline_fields, optimality_gap
 from joulepath.app.schemas import request as asked
 from joulepath.app.schemas.compare import ROW_FIELDS, CompareRequest
 from joulepath.optimizer.compare import Comparison
@@ -50,7 +50,7 @@ def to_compare_response(
         "lower_bound": bound,
         "best": found.best,
         "methods": rows,
-        "baselines": baseline_fields(found.solutions[found.best]),
+        "baselines": found.solutions[found.best].baselines,
     }
 
 

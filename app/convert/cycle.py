@@ -11,14 +11,12 @@ from joulepath.app.convert.arm import to_arm, to_limits, to_payload
 from joulepath.app.convert.fields import fields
 from joulepath.app.convert.pose import to_base
 from joulepath.app.convert.request import to_branch, to_target, to_target_pose, to_tool_path
-from joulepath.app.convert.solution import energy_fields, optimality_gap
 from joulepath.app.convert.until import time_left, until
 from joulepath.app.convert.warnings import DIVIDED, MISSED, NO_DEFAULT_MOTION, certified_warnings
 from joulepath.app.schemas import cycle as asked
 from joulepath.app.schemas.arm import MoveLimits
 from joulepath.app.schemas.path import Line as LineRequest
 from joulepath.app.schemas.path import StopPath as StopPathRequest
-from joulepath.app.schemas.response import Clearance
 from joulepath.app.schemas.stop import StopRequest
 from joulepath.models.robot import Robot
 from joulepath.optimizer.cycle.cycle_solution import CycleMove, CycleSolution
@@ -30,9 +28,8 @@ from joulepath.optimizer.problem.line import Line
 from joulepath.optimizer.problem.stop_path import StopPath, at_stop
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.targets import Target
-from joulepath.optimizer.solution import Objective, Solution
-
-_PLACE = ("label", "q", "target")
+from joulepath.optimizer.result.energy import Objective
+from joulepath.optimizer.result.solution import Configuration, Solution
 
 
 def to_cycle(request: asked.CycleRequest, deadline: float) -> Cycle:
@@ -136,19 +133,9 @@ def to_cycle_response(
         "id": None,
         **fields(request, "robot", "method", "objective"),
         **fields(found, "order", "duration", "status", "price_of_time"),
-        "energy": {
-            **energy_fields(energy),
-            "lower_bound": found.lower_bound,
-            "optimality_gap": optimality_gap(found.lower_bound, energy.of(found.objective)),
-        },
+        "energy": asked.CycleEnergy.bounded(energy, found.lower_bound, found.objective),
         "legs": [leg for move in found.moves for leg in _legs(move, found.objective, store)],
-        "baselines": [
-            {
-                **fields(each, *asked.CycleBaseline.model_fields),
-                "saving_interval": each.saving_interval and vars(each.saving_interval),
-            }
-            for each in found.baselines
-        ],
+        "baselines": [fields(each, *asked.CycleBaseline.model_fields) for each in found.baselines],
         "certificate": {
             "worst_ratio": _worst_ratio(found),
             "joins": found.joins,
@@ -193,14 +180,14 @@ def _divided(found: CycleSolution) -> list[tuple[str, float]]:
 def _legs(move: CycleMove, objective: Objective, store: Callable[[Solution], str]) -> list[dict[str, Any]]:
     """The entries of a move, and of the dwell and the wait after it."""
     solution = move.solution
-    start = {**fields(solution.start, *_PLACE), "stop": move.planned.start}
-    goal = {**fields(solution.goal, *_PLACE), "stop": move.planned.goal}
+    start = _at(solution.start, move.planned.start)
+    goal = _at(solution.goal, move.planned.goal)
     legs: list[dict[str, Any]] = [
         {
             "kind": move.planned.kind,
             "start": start,
             "goal": goal,
-            "passes": [{**fields(each.at, *_PLACE), **fields(each, "stop", "t")} for each in move.passes],
+            "passes": [asked.Passed(**vars(each.at), stop=each.stop, t=each.t) for each in move.passes],
             "t0": move.t0,
             "duration": solution.duration,
             "electrical": solution.energy.electrical.total,
@@ -237,6 +224,10 @@ def _legs(move: CycleMove, objective: Objective, store: Callable[[Solution], str
     return legs
 
 
+def _at(place: Configuration, stop: str) -> asked.StopConfiguration:
+    return asked.StopConfiguration(**vars(place), stop=stop)
+
+
 def _worst_ratio(found: CycleSolution) -> dict[str, float]:
     worst: dict[str, float] = {}
     for move in found.moves:
@@ -245,12 +236,12 @@ def _worst_ratio(found: CycleSolution) -> dict[str, float]:
     return worst
 
 
-def _clearance(found: CycleSolution) -> dict[str, Any] | None:
+def _clearance(found: CycleSolution) -> asked.CycleClearance | None:
     """The smallest clearance, with the index of its move among the legs."""
     leg, nearest = 0, None
     for move in found.moves:
         clearance = move.solution.certificate.clearance
-        if clearance is not None and (nearest is None or clearance.min_clearance < nearest["min_clearance"]):
-            nearest = {**fields(clearance, *Clearance.model_fields), "leg": leg}
+        if clearance is not None and (nearest is None or clearance.min_clearance < nearest.min_clearance):
+            nearest = asked.CycleClearance(**vars(clearance), leg=leg)
         leg += 1 + (move.planned.dwell > 0) + (move.wait > 0)
     return nearest

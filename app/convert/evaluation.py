@@ -4,25 +4,24 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from functools import reduce
 from io import StringIO
 from typing import Any
 
 import numpy as np
 
+from joulepath.app.answers.declared import as_json
 from joulepath.app.convert.arm_fields import arm_fields
 from joulepath.app.convert.fields import fields
 from joulepath.app.convert.motion_csv import MotionCsv
 from joulepath.app.convert.recorded import reading_of
-from joulepath.app.convert.solution import energy_fields
 from joulepath.app.convert.warnings import sampled_warnings
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings, SampledClearance
 from joulepath.optimizer.csv_table import FIRST_ROW
 from joulepath.optimizer.evaluate.evaluate import Evaluation
 from joulepath.optimizer.evaluate.interval_energy import IntervalEnergy
 from joulepath.optimizer.evaluate.recording import Recording, Waypoints
-from joulepath.optimizer.evaluate.sampler import Samples
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.logs.recorded import Measured
 
@@ -86,7 +85,7 @@ def _to_waypoints(settings: EvaluateSettings, q: Any, first_row: int) -> Waypoin
 def to_evaluate_response(request_id: str, found: Evaluated) -> dict[str, Any]:
     """The answer of `POST /evaluate`, for the motion of the arm asked about."""
     asked, result = found.asked, found.result
-    samples, nearest = result.samples, result.nearest
+    nearest = result.nearest
     return {
         "request": request_id,
         "id": None,
@@ -104,14 +103,14 @@ def to_evaluate_response(request_id: str, found: Evaluated) -> dict[str, Any]:
         "collides": None if nearest is None else nearest.distance < 0,
         "nearest": None if nearest is None else fields(nearest, *SampledClearance.model_fields),
         "warnings": [*found.remarks, *sampled_warnings(result)],
-        "samples": None if samples is None else fields(samples, *Samples.__dataclass_fields__),
+        "samples": result.samples,
     }
 
 
 def _interval_fields(interval: IntervalEnergy, known: Measured | None) -> dict[str, Any]:
     return {
         **fields(interval, "start", "end"),
-        "energy": energy_fields(interval.energy),
+        "energy": interval.energy,
         **fields(interval, "mean_mechanical_power", "kinetic_start", "kinetic_end", "balance_error"),
         "measured": None if known is None else vars(known),
     }
@@ -135,6 +134,8 @@ def to_csv_table(found: Evaluated) -> str:
 
 def _flat(name: str, value: Any) -> list[tuple[str, Any]]:
     """Names and values of a nested answer: `electrical.total`, `per_joint.friction.1`, …"""
+    if is_dataclass(value):
+        value = as_json(value)
     if isinstance(value, dict):
         # almost all fields are in `energy`: it would only make the names longer
         parts = [(key if not name or name == "energy" else f"{name}.{key}", part) for key, part in value.items()]

@@ -11,7 +11,6 @@ import numpy as np
 from joulepath.app.convert.arm import to_arm
 from joulepath.app.convert.arm_fields import arm_fields
 from joulepath.app.convert.fields import fields
-from joulepath.app.convert.solution import certificate_fields, energy_fields, trajectory_fields
 from joulepath.app.convert.until import time_left, until
 from joulepath.app.schemas.excitation import ExcitationRequest
 from joulepath.optimizer.deadline import Deadline
@@ -48,14 +47,14 @@ def to_excitation_response(request: ExcitationRequest, request_id: str, found: E
         "robot": request.robot,
         "arm": arm_fields(request),
         "coefficients": fields(found, "period", "centre", "a", "b"),
-        "trajectory": trajectory_fields(found.trajectory),
-        "energy": energy_fields(found.energy),
+        "trajectory": found.trajectory,
+        "energy": found.energy,
         **fields(found, "condition", "scaled_condition"),
         "predicted_sd": [
             {"parameter": name, "sd": sd} for name, sd in zip(found.names, found.predicted_sd.tolist(), strict=True)
         ],
         **fields(found, "starts", "feasible"),
-        "certificate": certificate_fields(found.certificate),
+        "certificate": found.certificate,
     }
 
 

@@ -7,12 +7,6 @@ from typing import Any
 import numpy as np
 
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.solution import UnreachableTarget
-
-
-def unreachable_fields(target: UnreachableTarget) -> dict[str, Any]:
-    """One entry of `unreachable`."""
-    return fields(target, "end", "target", "reason")
 
 
 def location(error: InvalidProblem, where: str) -> list[str | int]:

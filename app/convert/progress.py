@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from joulepath.app.answers.bounded_energy import optimality_gap
 from joulepath.app.convert.fields import fields
-from joulepath.app.convert.solution import optimality_gap
 from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Event
 
 

@@ -17,7 +17,8 @@ from joulepath.optimizer.replay.outcome import Outcome
 from joulepath.optimizer.replay.planned import PlannedMotion, PlannedTorques
 from joulepath.optimizer.replay.reference import course_of
 from joulepath.optimizer.replay.replay import Quantity, Replay
-from joulepath.optimizer.solution import BaselineName, Energy, Objective
+from joulepath.optimizer.result.energy import Energy, Objective
+from joulepath.optimizer.result.solution import BaselineName
 
 
 class _Electrical(Part):

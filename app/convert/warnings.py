@@ -10,7 +10,8 @@ from joulepath.optimizer.replay.outcome import Outcome
 from joulepath.optimizer.replay.planned import PlannedMotion
 from joulepath.optimizer.replay.replay import Replay
 from joulepath.optimizer.replay.shapes import unsimulated
-from joulepath.optimizer.solution import Clearance, Solution
+from joulepath.optimizer.result.certificate import Clearance
+from joulepath.optimizer.result.solution import Solution
 
 ADVICE = "Make sure that the arm and its cell are known as accurately, or ask for a margin."
 

@@ -10,18 +10,11 @@ from typing import Any
 
 import orjson
 
+from joulepath.app.answers.declared import as_json
+from joulepath.app.answers.envelope import AnswerFigures
+
 _HEAD = re.compile(rb'\{"request":"([^"]*)","id":(?:null|"([^"]*)")')
 """The first fields of an answer: the id of its request, and its own. No id has a quotation mark."""
-
-
-@dataclass(frozen=True)
-class AnswerFigures:
-    """What lists show of an answer: robot, energy [J], duration [s] and status; None if it has none."""
-
-    robot: str | None = None
-    energy: float | None = None
-    duration: float | None = None
-    status: str | None = None
 
 
 @dataclass(frozen=True)
@@ -34,7 +27,7 @@ class StoredAnswer:
 
     id: str
     body: bytes
-    figures: AnswerFigures = AnswerFigures()
+    figures: AnswerFigures = field(default_factory=AnswerFigures)
 
     @property
     def path(self) -> str:
@@ -57,20 +50,18 @@ class TaskResult:
     media_type: str
     stored: tuple[StoredAnswer, ...] = ()
     kept_as: str | None = None
-    figures: AnswerFigures = AnswerFigures()
+    figures: AnswerFigures = field(default_factory=AnswerFigures)
     is_optimal: bool = False
     age: int | None = None
     motions: Mapping[str, bytes] = field(default_factory=dict)
 
     @classmethod
-    def of_json(cls, content: Mapping[str, Any], stored: tuple[StoredAnswer, ...] = ()) -> TaskResult:
+    def of_json(cls, content: Any, stored: tuple[StoredAnswer, ...] = ()) -> TaskResult:
         """A JSON document: see `json_document`."""
         return cls(json_document(content), "application/json", stored)
 
     @classmethod
-    def of_kept_json(
-        cls, content: Mapping[str, Any], figures: AnswerFigures, stored: tuple[StoredAnswer, ...] = ()
-    ) -> TaskResult:
+    def of_kept_json(cls, content: Any, figures: AnswerFigures, stored: tuple[StoredAnswer, ...] = ()) -> TaskResult:
         """A JSON document that is to be kept. Its fields `request` and `id` come first, `answer` comes last."""
         is_optimal = figures.status == "optimal"
         return cls(json_document(content), "application/json", stored, None, figures, is_optimal).kept()
@@ -116,6 +107,6 @@ def _last_field(answer_id: str | None) -> bytes:
     return b',"answer":null}' if answer_id is None else b',"answer":"%s"}' % StoredAnswer(answer_id, b"").path.encode()
 
 
-def json_document(content: Mapping[str, Any]) -> bytes:
-    """`content` as JSON. NumPy arrays must be C-contiguous; a number that is not finite becomes null."""
-    return orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)
+def json_document(content: Any) -> bytes:
+    """An object of a declared class, or a dict, as JSON. A number that is not finite becomes null."""
+    return orjson.dumps(content, default=as_json, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_PASSTHROUGH_DATACLASS)

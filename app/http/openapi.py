@@ -11,6 +11,7 @@ from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
 from joulepath.app.access.rules import needed_role
+from joulepath.app.http.answer_examples import add_examples
 from joulepath.app.http.authentication import SCHEME
 from joulepath.app.http.sites import PROBES
 from joulepath.app.schemas.errors import (
@@ -26,7 +27,8 @@ from joulepath.app.schemas.errors import (
     WrongHost,
 )
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
-from joulepath.app.schemas.examples import BODY_EXAMPLES
+from joulepath.app.schemas.examples.bodies import BODY_EXAMPLES
+from joulepath.app.schemas.examples.files import shown
 from joulepath.app.schemas.jobs import NewJob
 from joulepath.app.schemas.logs import LogSettings
 from joulepath.app.settings import Settings
@@ -112,6 +114,10 @@ def _document(app: FastAPI, settings: Settings, with_keys: bool) -> dict[str, An
         for media_type, examples in by_media_type.items():
             operation = document["paths"][path].get("post") or document["paths"][path]["put"]
             operation["requestBody"]["content"][media_type]["examples"] = examples
+    for path, example in shown().items():
+        responses = document["paths"][path]["post"]["responses"]
+        answer = next(responses[status] for status in ("200", "201") if status in responses)
+        add_examples(schemas, answer["content"]["application/json"]["schema"], example.get("answer"))
     _add_access(document, with_keys)
     for deadline in _deadlines(document):
         deadline["maximum"] = settings.max_deadline

@@ -8,8 +8,9 @@ from typing import Any
 from fastapi.exceptions import RequestValidationError
 from pydantic import ValidationError
 
-from joulepath.app.convert.candidates import candidate_counts, candidate_fields, most_telling
-from joulepath.app.convert.fields import fields, location, unreachable_fields
+from joulepath.app.answers.declared import as_json
+from joulepath.app.convert.candidates import candidate_counts, most_telling
+from joulepath.app.convert.fields import fields, location
 from joulepath.app.exceptions import (
     AnswerInUse,
     BodyTooLarge,
@@ -167,9 +168,9 @@ def _own_field(error: Exception, name: str) -> Any:
         return candidate_counts(error.candidates)  # type: ignore[attr-defined]
     value = getattr(error, name)
     if name == "unreachable":
-        return [unreachable_fields(target) for target in value]
+        return [as_json(target) for target in value]
     if name == "branches":
         return [fields(branch, *problems.CollidingBranch.model_fields) for branch in value]
     if name == "attempts":
         return [fields(attempt, "label", "followed", "reason") for attempt in value]
-    return [candidate_fields(candidate) for candidate in most_telling(value)] if name == "candidates" else value
+    return [as_json(candidate) for candidate in most_telling(value)] if name == "candidates" else value

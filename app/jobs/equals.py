@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from joulepath import __version__
+from joulepath.app.answers.envelope import AnswerFigures
 from joulepath.app.convert.packed import packed, unpacked
-from joulepath.app.engine.result import AnswerFigures, TaskResult
+from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions import StoreUnavailable
 from joulepath.app.jobs.heap import Held
 from joulepath.app.jobs.work import request_id_of

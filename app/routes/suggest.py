@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import orjson
 from fastapi import APIRouter, Query, Request, Response
 
+from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions import Busy, EmptyStudy, TaskFailed, WorkerDied
 from joulepath.app.http.disconnect import unless_disconnected
@@ -25,7 +26,6 @@ from joulepath.app.store import answers, studies
 from joulepath.app.store.store import Store
 from joulepath.app.studies.suggestions import Proposal, base_of, proposals
 from joulepath.app.tasks.arm_engine import ArmEngine, known_here
-from joulepath.app.tasks.optimize import OptimizeTask
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 
 router = APIRouter(prefix="/studies", tags=["studies"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 from itertools import islice
@@ -11,6 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
+from joulepath.app.answers.declared import with_unit
 from joulepath.app.schemas.examples.values import ANSWER_ID, REQUEST_ID
 from joulepath.app.schemas.lengths import ROBOT_LENGTH
 from joulepath.optimizer.problem.names import is_plain
@@ -50,9 +50,7 @@ def _form(name: str) -> str:
 def described(description: str, unit: str | None, example: Any, **constraints: Any) -> Any:
     """A field with its description, its unit (None: has no unit, "1": a plain number) and a realistic example."""
     extra: dict[str, Any] = {} if unit is None else {"x-unit": unit}
-    # after the noun: at the end of the first clause
-    text = description if unit in (None, "1") else re.sub(r"(?=[.;:](\s|$))", f" [{unit}]", description, count=1)
-    return Field(description=text, examples=[example], json_schema_extra=extra, **constraints)
+    return Field(description=with_unit(description, unit), examples=[example], json_schema_extra=extra, **constraints)
 
 
 def part(description: str) -> Any:

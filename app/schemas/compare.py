@@ -7,11 +7,14 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
+from joulepath.app.answers.declared import Shown
+from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.schemas.common import Answer, Response, described, part
 from joulepath.app.schemas.request import MotionRequest
-from joulepath.app.schemas.response import GAP, LOWER_BOUND, OBJECTIVE, Baseline, OptimizeResponse
+from joulepath.app.schemas.wording import GAP, LOWER_BOUND, OBJECTIVE
 from joulepath.optimizer.problem.problem import MethodName
-from joulepath.optimizer.solution import Objective
+from joulepath.optimizer.result.energy import Objective
+from joulepath.optimizer.result.solution import Baseline
 
 ALL: list[MethodName] = list(get_args(MethodName))
 _PROBLEM = {"type": "/problems/duration-too-short", "title": "Duration too short", "status": 422}
@@ -59,7 +62,9 @@ class MethodResult(Response):
         None,
         _PROBLEM,
     )
-    answer: OptimizeResponse | None = part("The complete answer of `POST /optimize` if `answers` is true; else null.")
+    answer: Annotated[OptimizeAnswer, Shown] | None = part(
+        "The complete answer of `POST /optimize` if `answers` is true; else null."
+    )
 
 
 ROW_FIELDS = tuple(MethodResult.model_fields)
@@ -74,4 +79,4 @@ class CompareResponse(Answer):
     methods: Annotated[list[MethodResult], Field(min_length=1)] = part(
         "One row per method, in the order of the request."
     )
-    baselines: Annotated[list[Baseline], Field(min_length=1)] = part("Baselines of the best method.")
+    baselines: Annotated[list[Annotated[Baseline, Shown]], Field(min_length=1)] = part("Baselines of the best method.")

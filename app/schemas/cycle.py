@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, Tag, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
+from joulepath.app.answers.bounded_energy import EnergyAndBound
+from joulepath.app.answers.declared import Shown
 from joulepath.app.schemas.arm import ArmRequest
 from joulepath.app.schemas.common import Answer, Response, described, part
-from joulepath.app.schemas.energy import MotionEnergy, SavingInterval
 from joulepath.app.schemas.examples.values import ANSWER_PATH
 from joulepath.app.schemas.request import (
     SECONDS_OR_RANGE,
@@ -20,14 +22,17 @@ from joulepath.app.schemas.request import (
     WhichCandidates,
     which_candidates,
 )
-from joulepath.app.schemas.response import GAP, WARNINGS, Clearance, Configuration, WorstRatio
 from joulepath.app.schemas.stop import PlainName, StopRequest
+from joulepath.app.schemas.wording import WARNINGS
 from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.optimizer.cycle.cycle_solution import CycleBaselineName
+from joulepath.optimizer.declared import Joules, Seconds
 from joulepath.optimizer.problem.cycle import LONGEST_ROUND, MOST_STOPS
 from joulepath.optimizer.problem.free_order import MOST_FREE_STOPS
 from joulepath.optimizer.problem.problem import MethodName
-from joulepath.optimizer.solution import Objective
+from joulepath.optimizer.result.certificate import Clearance, WorstRatio
+from joulepath.optimizer.result.energy import Objective, SavingInterval
+from joulepath.optimizer.result.solution import Configuration
 
 # of a cycle with more stops, the default deadline is longer, and samples are no closer: answers stay as large as before
 _MANY_STOPS, _LONG_DEADLINE, _LEAST_PERIOD = 100, 120.0, 1e-3
@@ -188,33 +193,30 @@ class CycleRequest(ArmRequest):
         return self
 
 
-class CycleEnergy(MotionEnergy):
+@dataclass(frozen=True, kw_only=True)
+class CycleEnergy(EnergyAndBound):
     """Energy of the cycle: the moves, and dwells and waiting in `electrical.dwell`."""
 
-    lower_bound: float = described(
-        "Lower bound of the objective: no cycle that rests at these stops, or goes through those with `via`, of any "
-        "configurations, shapes and durations, needs less.",
-        "J",
-        536.1,
-    )
-    optimality_gap: float = described(GAP, "1", 0.11)
+    lower_bound: Joules
+    """Lower bound of the objective: no cycle that rests at these stops, or goes through those with
+    `via`, of any configurations, shapes and durations, needs less."""
 
 
+@dataclass(frozen=True, kw_only=True)
 class StopConfiguration(Configuration):
     """The arm configuration at a place of the cycle."""
 
-    stop: str = described(
-        "Name of the stop; with `/approach` or `/retreat` at the outer end of its line, with `/entry` at the start of "
-        "its path; `start` for the start.",
-        None,
-        "pick",
-    )
+    stop: str
+    """Name of the stop; with `/approach` or `/retreat` at the outer end of its line, with `/entry` at
+    the start of its path; `start` for the start."""
 
 
+@dataclass(frozen=True, kw_only=True)
 class Passed(StopConfiguration):
     """A stop that a move passes through, and in which arm configuration."""
 
-    t: float = described("When it passes, from the start of the move.", "s", 0.61)
+    t: Seconds
+    """When it passes, from the start of the move."""
 
 
 class CycleLeg(Response):
@@ -226,9 +228,9 @@ class CycleLeg(Response):
         None,
         "move",
     )
-    start: StopConfiguration = part("Where it begins.")
-    goal: StopConfiguration = part("Where it ends; of a dwell and a wait, where it began.")
-    passes: list[Passed] = part("Stops that the move passes through, in their order.")
+    start: Annotated[StopConfiguration, Shown] = part("Where it begins.")
+    goal: Annotated[StopConfiguration, Shown] = part("Where it ends; of a dwell and a wait, where it began.")
+    passes: list[Annotated[Passed, Shown]] = part("Stops that the move passes through, in their order.")
     t0: float = described("When it begins, from the start of the cycle.", "s", 1.42)
     duration: float = described("How long it takes.", "s", 0.91)
     electrical: float = described("Electrical energy drawn from the supply.", "J", 71.3)
@@ -271,21 +273,23 @@ class CycleBaseline(Response):
         "Whether every move is within the limits; collisions are checked at sample points.", None, True
     )
     saving: float = described("1 - energy of the answer / energy of this cycle, of the objective.", "1", 0.15)
-    saving_interval: SavingInterval | None = part(
+    saving_interval: Annotated[SavingInterval, Shown] | None = part(
         "How well the saving is known. Null for the objective `mechanical`, and in answers of an earlier version."
     )
 
 
+@dataclass(frozen=True, kw_only=True)
 class CycleClearance(Clearance):
     """Smallest clearance over all moves."""
 
-    leg: int = described("Index in `legs`, from 0, of the move that comes so close.", None, 2)
+    leg: int
+    """Index in `legs`, from 0, of the move that comes so close."""
 
 
 class CycleCertificate(Response):
     """The certificates of all moves, and how the moves fit together."""
 
-    worst_ratio: WorstRatio = part("Largest value / limit over all moves, for each limit.")
+    worst_ratio: Annotated[WorstRatio, Shown] = part("Largest value / limit over all moves, for each limit.")
     joins: float = described("Largest jump of a joint from the end of a move to the start of the next.", "rad", 0.0)
     pass_error: float = described(
         "Largest deviation of a joint from the configuration of a stop that a move passes through.", "rad", 0.0
@@ -294,7 +298,7 @@ class CycleCertificate(Response):
     balance_error: float = described(
         "Relative difference of the sum of the electrical parts of the cycle and the total.", "1", 1e-6
     )
-    clearance: CycleClearance | None = part("Smallest clearance; null if `collisions` is false.")
+    clearance: Annotated[CycleClearance, Shown] | None = part("Smallest clearance; null if `collisions` is false.")
 
 
 class CycleSearch(Response):
@@ -327,7 +331,7 @@ class CycleResponse(Answer):
         "W",
         31.5,
     )
-    energy: CycleEnergy = part("Energy and power of the cycle.")
+    energy: Annotated[CycleEnergy, Shown] = part("Energy and power of the cycle.")
     legs: Annotated[list[CycleLeg], Field(min_length=1)] = part("Moves and dwells in their order.")
     baselines: list[CycleBaseline] = part("The same cycle in other ways; without what was not found in time.")
     certificate: CycleCertificate = part("Independent check of all moves.")

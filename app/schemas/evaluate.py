@@ -7,19 +7,21 @@ from typing import Annotated, Literal, Self
 from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
+from joulepath.app.answers.declared import Shown
 from joulepath.app.schemas.arm import ArmRequest, one_or_each
 from joulepath.app.schemas.common import JointPositions, MotionAnswer, Request, Response, described, part
-from joulepath.app.schemas.energy import MotionEnergy
 from joulepath.app.schemas.examples.values import LOG_ID
 from joulepath.app.schemas.examples.values import PAPER_HOME as _HOME
 from joulepath.app.schemas.examples.values import PAPER_POSE as _THERE
 from joulepath.app.schemas.lengths import ID_LENGTH
 from joulepath.app.schemas.log_file import LogFile
 from joulepath.app.schemas.request import Seconds
-from joulepath.app.schemas.response import BODIES, WARNINGS, SampledMotion
+from joulepath.app.schemas.wording import BODIES, WARNINGS
 from joulepath.optimizer.evaluate.limit_report import LimitName
 from joulepath.optimizer.evaluate.sampler import MOST_SAMPLES
 from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.result.energy import Energy
+from joulepath.optimizer.result.solution import Samples
 
 MAX_ROWS = 100_000
 """Largest number of rows of a motion sent as JSON; a CSV file may have more."""
@@ -169,7 +171,7 @@ class IntervalEnergy(Response):
 
     start: float = described("Time at which it starts, from the start of the motion.", "s", 0.0)
     end: float = described("Time at which it ends, from the start of the motion.", "s", 1.5)
-    energy: MotionEnergy = part("Energy and power.")
+    energy: Annotated[Energy, Shown] = part("Energy and power.")
     mean_mechanical_power: float = described("Mean of Σ_j |tau_j v_j|: mechanical energy / duration.", "W", 14.3)
     kinetic_start: float = described("Kinetic energy just after `start`, rotors included.", "J", 6.9)
     kinetic_end: float = described("Kinetic energy just before `end`, rotors included.", "J", 6.2)
@@ -242,4 +244,4 @@ class EvaluateResponse(MotionAnswer):
     )
     nearest: SampledClearance | None = part("Smallest clearance at sample points; null if `collisions` is false.")
     warnings: list[str] = described(WARNINGS + " Of a log, also what `POST /logs` says of it.", None, [])
-    samples: SampledMotion | None = part("Samples of the motion; null without `sample_period`.")
+    samples: Annotated[Samples, Shown] | None = part("Samples of the motion; null without `sample_period`.")

@@ -6,12 +6,14 @@ from typing import Annotated
 
 from pydantic import Field
 
+from joulepath.app.answers.declared import Shown
 from joulepath.app.schemas.arm import ArmRequest
 from joulepath.app.schemas.common import MotionAnswer, Response, described, part
-from joulepath.app.schemas.energy import MotionEnergy
 from joulepath.app.schemas.examples.values import HOME
-from joulepath.app.schemas.response import Certificate, Trajectory
 from joulepath.optimizer.excitation.excitation_problem import Criterion, Part
+from joulepath.optimizer.result.certificate import Certificate
+from joulepath.optimizer.result.energy import Energy
+from joulepath.optimizer.result.solution import Trajectory
 
 _ALL: list[Part] = ["inertials", "rotor", "friction"]
 _Angles = Annotated[list[Annotated[float, Field(ge=-1e3, le=1e3)]], Field(min_length=1, max_length=16)]
@@ -97,11 +99,11 @@ class ExcitationResponse(MotionAnswer):
     """A motion that tells the parameters of an arm apart, from rest to rest."""
 
     coefficients: Series = part("The motion as a series.")
-    trajectory: Trajectory = part("The same motion as a spline, with samples.")
-    energy: MotionEnergy = part("Energy of one period.")
+    trajectory: Annotated[Trajectory, Shown] = part("The same motion as a spline, with samples.")
+    energy: Annotated[Energy, Shown] = part("Energy of one period.")
     condition: float = described("Condition of the columns, over the noise.", "1", 270.0)
     scaled_condition: float = described("Condition of the columns, scaled to one length.", "1", 12.0)
     predicted_sd: list[PredictedDeviation] = part("Predicted standard deviations.")
     starts: int = described("Starts that were completed.", "1", 3)
     feasible: int = described("Starts that gave a motion within all limits.", "1", 3)
-    certificate: Certificate = part("Independent check of the motion.")
+    certificate: Annotated[Certificate, Shown] = part("Independent check of the motion.")

@@ -155,7 +155,7 @@ class Prediction(Response):
     power: PowerErrors | None = part("Of power; null without power.")
 
 
-class Validation(Response):
+class HeldOutErrors(Response):
     """How figures predict moves that their fit has not seen."""
 
     moves: int = described("Number of these moves.", "1", 6)
@@ -337,7 +337,7 @@ class IdentificationResult(Response):
     parameters: list[IdentifiedParameter] = part("Every figure that was sought.")
     structure: Structure = part("Base parameters of the links and rotors.")
     physical: Physical | None = part("Whether refitted links are real bodies; null if they are kept.")
-    validation: Validation = part("Errors on moves that the fit has not seen.")
+    validation: HeldOutErrors = part("Errors on moves that the fit has not seen.")
     residuals: Residuals = part("What the fit leaves over of the moves.")
     temperatures: Temperatures = part("Friction over temperature.")
     noise: MeasuredNoise | None = part("Noise of a periodic motion; null with other methods.")

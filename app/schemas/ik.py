@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from joulepath.app.schemas.common import Answer, BasePose, Response, described, part
 from joulepath.app.schemas.examples.values import BOX, HOME, LABEL
-from joulepath.app.schemas.response import BODIES
 from joulepath.app.schemas.scene import CarriedBody, CellRequest
+from joulepath.app.schemas.wording import BODIES
 from joulepath.optimizer.problem.problem import LONGEST_DURATION
 
 

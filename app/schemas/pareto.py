@@ -9,10 +9,10 @@ from pydantic import Field
 from joulepath.app.schemas.common import Answer, Response, described, part
 from joulepath.app.schemas.examples.values import ANSWER_PATH, LABEL
 from joulepath.app.schemas.request import DurationRange, OptimizeRequest
-from joulepath.app.schemas.response import OBJECTIVE
+from joulepath.app.schemas.wording import OBJECTIVE
 from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.optimizer.problem.problem import MethodName
-from joulepath.optimizer.solution import Objective
+from joulepath.optimizer.result.energy import Objective
 
 
 class ParetoRequest(OptimizeRequest):

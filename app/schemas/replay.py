@@ -8,12 +8,12 @@ from pydantic import Field
 
 from joulepath.app.schemas.common import Answer, Request, Response, described, part
 from joulepath.app.schemas.given_answer import AnswerRequest
-from joulepath.app.schemas.response import BODIES
+from joulepath.app.schemas.wording import BODIES
 from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.optimizer.replay.controller import ControlName
 from joulepath.optimizer.replay.outcome import TOUCH
 from joulepath.optimizer.replay.replay import Quantity
-from joulepath.optimizer.solution import BaselineName
+from joulepath.optimizer.result.solution import BaselineName
 
 Fraction = Annotated[float, Field(gt=0, le=0.9)]
 

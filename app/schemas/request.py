@@ -15,7 +15,7 @@ from joulepath.app.schemas.path import Path
 from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.optimizer.evaluate.sampler import MOST_SAMPLES
 from joulepath.optimizer.problem.problem import LONGEST_DURATION, BoundEffort, MethodName
-from joulepath.optimizer.solution import Objective
+from joulepath.optimizer.result.energy import Objective
 
 Seconds = Annotated[float, Field(ge=1e-3, le=LONGEST_DURATION)]
 

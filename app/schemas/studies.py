@@ -24,7 +24,7 @@ from joulepath.app.schemas.examples.values import ANSWER_ID, CREATED, EVALUATE, 
 from joulepath.app.schemas.lengths import KEY_LENGTH, NAME_LENGTH
 from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.optimizer.solution import Objective
+from joulepath.optimizer.result.energy import Objective
 
 Name = Annotated[str, Field(min_length=1, max_length=NAME_LENGTH, pattern=NO_CONTROLS), PLAIN]
 IdempotencyKey = Annotated[str, Field(min_length=1, max_length=KEY_LENGTH, pattern=r"^[!-~]+$")]

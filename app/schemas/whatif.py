@@ -7,17 +7,18 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from joulepath.app.answers.declared import Shown
 from joulepath.app.schemas.arm import ArmRequest
 from joulepath.app.schemas.common import Answer, Request, Response, described, part
-from joulepath.app.schemas.energy import ElectricalEnergy
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.examples.values import ANSWER_PATH, EVALUATE, OPTIMIZE
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.app.schemas.response import OBJECTIVE, Certificate
 from joulepath.app.schemas.studies import Name
+from joulepath.app.schemas.wording import OBJECTIVE
 from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.optimizer.problem.names import first_repeated
-from joulepath.optimizer.solution import Objective
+from joulepath.optimizer.result.certificate import Certificate
+from joulepath.optimizer.result.energy import ElectricalEnergy, Objective
 
 MOST_CHANGES = 16
 
@@ -100,7 +101,7 @@ class WhatifBase(Response):
         "Whether the motion is within every limit and collision-free; an optimised motion always is.", None, True
     )
     duration: float = described("Duration of the motion.", "s", 0.78)
-    electrical: ElectricalEnergy = part("Energy drawn from the supply, and its parts.")
+    electrical: Annotated[ElectricalEnergy, Shown] = part("Energy drawn from the supply, and its parts.")
     mechanical: float = described("Mechanical work.", "J", 21.3)
     mean_power: float = described("Mean power drawn from the supply.", "W", 58.5)
     peak_power: float = described("Largest power drawn from the supply.", "W", 119.0)
@@ -168,7 +169,7 @@ class SameMotion(ChangedMotion):
         None,
         True,
     )
-    certificate: Certificate | None = part(
+    certificate: Annotated[Certificate, Shown] | None = part(
         "Certificate of an optimised motion on the changed arm; if `holds` is false, it shows why. Null for a given "
         "motion, whose limits are in `answer`."
     )

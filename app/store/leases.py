@@ -15,7 +15,8 @@ from typing import Any, Literal
 from sqlalchemy import select, tuple_, update
 from sqlalchemy.orm import Session, defer
 
-from joulepath.app.engine.result import AnswerFigures, StoredAnswer
+from joulepath.app.answers.envelope import AnswerFigures
+from joulepath.app.engine.result import StoredAnswer
 from joulepath.app.exceptions import TooManyFigures
 from joulepath.app.store import answers, cache, figures, jobs, known_motions
 from joulepath.app.store.cache import Answered, Asked, Meaning

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 
 
 def certified(solution: Solution) -> Solution:

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import orjson
 
+from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.convert.arm_fields import arm_fields
 from joulepath.app.convert.comparison import to_compare_response, to_optimize_request
 from joulepath.app.convert.request import to_problem
-from joulepath.app.convert.solution import to_optimize_response
 from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult, json_document
 from joulepath.app.http.problem_details import problem_content
@@ -17,7 +17,7 @@ from joulepath.app.schemas.compare import CompareRequest
 from joulepath.app.tasks.certified import certified
 from joulepath.optimizer.compare import compare
 from joulepath.optimizer.problem.problem import MethodName
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 
 
 @dataclass(frozen=True)
@@ -47,5 +47,5 @@ class CompareTask:
         if not self.request.answers:
             return None
         asked = to_optimize_request(self.request, method)
-        content = to_optimize_response(asked, self.request_id, solution, arm_fields(asked))
+        content = OptimizeAnswer.of(asked, self.request_id, solution, arm_fields(asked))
         return orjson.Fragment(json_document(content))

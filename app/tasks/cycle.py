@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
+from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.convert.cycle import to_cycle, to_cycle_response
 from joulepath.app.convert.cycle_arms import arms_of_moves
 from joulepath.app.convert.cycle_csv import to_cycle_csv
 from joulepath.app.convert.known_motions import to_kept, to_known_motions
-from joulepath.app.convert.solution import to_optimize_response
 from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.cycle import CycleRequest
@@ -20,7 +20,7 @@ from joulepath.app.tasks.certified import certified
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.cycle.known_motions import knowing
 from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class CycleTask:
         arms = iter(arms_of_moves(self.request, found))
 
         def store(solution: Solution) -> str:
-            answer = to_optimize_response(self.request, self.request_id, certified(solution), next(arms))
+            answer = OptimizeAnswer.of(self.request, self.request_id, certified(solution), next(arms))
             return collector.add(answer)
 
         content = to_cycle_response(self.request, self.request_id, found, store)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from joulepath.app.answers.declared import as_json
 from joulepath.app.convert.fields import fields
-from joulepath.app.convert.solution import energy_fields
 from joulepath.optimizer.energy.losses import ENERGY_FLOOR
-from joulepath.optimizer.solution import ElectricalEnergy, Energy
+from joulepath.optimizer.result.energy import ElectricalEnergy, Energy
 
 
 def quantities(energy: Energy, duration: float) -> dict[str, Any]:
@@ -22,7 +22,7 @@ def quantities(energy: Energy, duration: float) -> dict[str, Any]:
 
 def of_base(energy: Energy, duration: float) -> dict[str, Any]:
     """The quantities of the base, with the interval of its energy."""
-    return quantities(energy, duration) | {"electrical": energy_fields(energy)["electrical"]}
+    return quantities(energy, duration) | {"electrical": as_json(energy.electrical)}
 
 
 def differences(base: dict[str, Any], energy: Energy, duration: float) -> dict[str, Any]:

@@ -6,12 +6,13 @@ import uuid
 from dataclasses import dataclass
 from typing import Any
 
+from joulepath.app.answers.envelope import AnswerFigures
 from joulepath.app.convert.arm import robot_named
 from joulepath.app.convert.fields import location
 from joulepath.app.convert.identification import identification_fields, residual_fields, to_options
 from joulepath.app.convert.logs import stored_log
 from joulepath.app.convert.until import until
-from joulepath.app.engine.result import AnswerFigures, StoredAnswer, TaskResult, json_document
+from joulepath.app.engine.result import StoredAnswer, TaskResult, json_document
 from joulepath.app.exceptions import InvalidRequest
 from joulepath.app.schemas.identifications import IdentifyRequest
 from joulepath.optimizer.deadline import Deadline

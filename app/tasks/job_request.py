@@ -9,6 +9,7 @@ from typing import Any
 
 import orjson
 
+from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.convert.evaluation import to_evaluate_response
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.result import TaskResult
@@ -26,7 +27,6 @@ from joulepath.app.tasks.cycle import CycleTask
 from joulepath.app.tasks.evaluate import evaluated
 from joulepath.app.tasks.figures import replacing
 from joulepath.app.tasks.identify import IdentifyTask, Stored
-from joulepath.app.tasks.optimize import OptimizeTask
 from joulepath.app.tasks.pareto import ParetoTask
 from joulepath.app.tasks.whatif import WhatifTask
 from joulepath.optimizer.deadline import Deadline

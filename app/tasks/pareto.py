@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from io import StringIO
 from typing import Any, Literal
 
+from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.convert.arm_fields import arm_fields
 from joulepath.app.convert.fields import fields
 from joulepath.app.convert.request import to_problem
-from joulepath.app.convert.solution import to_optimize_response
 from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.pareto import ParetoRequest
 from joulepath.app.tasks.answer_collector import AnswerCollector
 from joulepath.optimizer.pareto import Front, pareto
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class ParetoTask:
             **fields(point, "lower_bound", "status"),
             "certified": point.certificate.valid,
             "worst_ratio": max(point.certificate.worst_ratio.values()),
-            "answer": collector.add(to_optimize_response(self.request, self.request_id, point, arm)),
+            "answer": collector.add(OptimizeAnswer.of(self.request, self.request_id, point, arm)),
         }
 
 

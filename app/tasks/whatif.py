@@ -7,12 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
+from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.convert.arm import to_arm
 from joulepath.app.convert.arm_fields import arm_fields
 from joulepath.app.convert.evaluation import Evaluated, to_evaluate_response, to_motion
 from joulepath.app.convert.recorded import as_logged
 from joulepath.app.convert.request import to_problem
-from joulepath.app.convert.solution import certificate_fields, to_optimize_response
 from joulepath.app.convert.until import time_left, until
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.http.problem_details import problem_content
@@ -28,7 +28,7 @@ from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, Inv
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.what_if import WhatIf, what_if
 
 R = TypeVar("R", OptimizeRequest, EvaluateRequest)
@@ -93,7 +93,7 @@ class _Optimized(_Work):
         problems = [self._problem(asked, k) for k in range(len(self.request.changes))]
         base = certified(_located(lambda: optimize(first), "optimize"))
         content = {
-            "answer": self.collector.add(to_optimize_response(asked, self.request_id, base, arm_fields(asked))),
+            "answer": self.collector.add(OptimizeAnswer.of(asked, self.request_id, base, arm_fields(asked))),
             "status": base.status,
             "holds": True,
             **of_base(base.energy, base.duration),
@@ -123,7 +123,7 @@ class _Optimized(_Work):
             return self.row(change, error)
         same = {
             "holds": found.certificate.valid,
-            "certificate": certificate_fields(found.certificate),
+            "certificate": found.certificate,
             "answer": None,
             **differences(content, found.same_motion, base.duration),
         }
@@ -139,7 +139,7 @@ class _Optimized(_Work):
         change_of_energy = best.energy.of(asked.objective) - found.same_motion.of(asked.objective)
         changed = _changed(asked, change)
         outcome = {
-            "answer": self.collector.add(to_optimize_response(changed, self.request_id, best, arm_fields(changed))),
+            "answer": self.collector.add(OptimizeAnswer.of(changed, self.request_id, best, arm_fields(changed))),
             "status": best.status,
             **differences(content, best.energy, best.duration),
         }

@@ -12,7 +12,7 @@ from joulepath.optimizer.collision.clearance_proof import proven_clearance
 from joulepath.optimizer.collision.model import CollisionModel, collision_model
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.scene import Scene
-from joulepath.optimizer.solution import Clearance
+from joulepath.optimizer.result.certificate import Clearance
 from joulepath.optimizer.trajectories.spline import Spline
 
 # distance [m] below which a motion is reported to pass close: what the tracking error of a controller, the calibration

@@ -16,7 +16,7 @@ from joulepath.models.shape_sizes import SIZES
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.scene import Attachment, Scene, Sphere, capsule_between
-from joulepath.optimizer.solution import Clearance
+from joulepath.optimizer.result.certificate import Clearance
 
 
 @dataclass(frozen=True)

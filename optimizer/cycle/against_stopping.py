@@ -16,7 +16,7 @@ from joulepath.optimizer.cycle.moves import Wait
 from joulepath.optimizer.cycle.passing_leg import PassingLeg
 from joulepath.optimizer.energy.interval import Known
 from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.trajectories.joined import joined
 
 # share of the deadline that the cycle with rests may take

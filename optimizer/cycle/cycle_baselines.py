@@ -18,8 +18,9 @@ from joulepath.optimizer.energy.interval import Known, saving_interval
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.free_order import is_given_order_allowed
+from joulepath.optimizer.result.energy import Sensitivity
+from joulepath.optimizer.result.solution import Baseline, Solution
 from joulepath.optimizer.search.baselines import baselines, nearest, saving
-from joulepath.optimizer.solution import Baseline, Sensitivity, Solution
 
 
 def move_by_move(search: CycleSearch) -> list[int] | None:

@@ -1,5 +1,4 @@
-"""The search for the cycle of least energy in its own time: the moves of its least chain are optimised to the end and
-certified, as `optimize` does it."""
+"""The search for the cycle of least energy in its own time, which certifies its moves as `optimize` does."""
 
 from __future__ import annotations
 
@@ -28,9 +27,10 @@ from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stops import PlannedMove
 from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, nobody
+from joulepath.optimizer.result.candidates import CandidateStatus
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.attempts import settled, solve
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.solution import CandidateStatus, Solution
 from joulepath.optimizer.trajectories.spline import Spline
 
 # shares of the deadline that the search leaves to the motions of its answer, and these to certify a simpler cycle that

@@ -13,8 +13,7 @@ import numpy as np
 
 from joulepath.optimizer.energy.interval import Known, with_interval
 from joulepath.optimizer.problem.stops import PlannedMove
-from joulepath.optimizer.solution import (
-    Branch,
+from joulepath.optimizer.result.energy import (
     ElectricalEnergy,
     Energy,
     JointEnergy,
@@ -22,9 +21,9 @@ from joulepath.optimizer.solution import (
     Objective,
     SavingInterval,
     Sensitivity,
-    Solution,
     StorageUse,
 )
+from joulepath.optimizer.result.solution import Configuration, Solution
 
 
 @dataclass(frozen=True)
@@ -32,7 +31,7 @@ class Pass:
     """Where a move passes through a `stop`, in which configuration, and when: `t` [s] after the move began."""
 
     stop: str
-    at: Branch
+    at: Configuration
     t: float
 
 

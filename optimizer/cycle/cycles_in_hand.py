@@ -19,8 +19,8 @@ from joulepath.optimizer.cycle.timed_cycle import Pair, Timed, TimedSearch
 from joulepath.optimizer.deadline import DeadlinePassed, watch
 from joulepath.optimizer.energy.interval import Known
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.incumbent import SLACK
-from joulepath.optimizer.solution import Solution
 from joulepath.optimizer.trajectories.spline import Spline, lasting, retimed
 
 # share of a duration by which moves are slowed to see what a second more saves

@@ -10,7 +10,7 @@ from joulepath.optimizer.cycle.cycle_solution import CycleMove
 from joulepath.optimizer.cycle.layers import Layer
 from joulepath.optimizer.cycle.passing_leg import passes_of
 from joulepath.optimizer.cycle.rests import dwell_energies, rest_sensitivity
-from joulepath.optimizer.solution import Branch, Solution
+from joulepath.optimizer.result.solution import Configuration, Solution
 
 # length [s] and energy [J] of a wait
 Wait = tuple[float, float]
@@ -52,7 +52,7 @@ def moves_of(
     return moves
 
 
-def _reached(layer: Layer, node: int) -> Branch:
+def _reached(layer: Layer, node: int) -> Configuration:
     """A configuration of a stop, with the one of its targets that it reaches."""
     end = layer.ends[layer.end[node]]
-    return Branch(end.label, layer.q[node], end.target)
+    return Configuration(end.label, layer.q[node], end.target)

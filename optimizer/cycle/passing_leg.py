@@ -22,8 +22,8 @@ from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.result.solution import Configuration
 from joulepath.optimizer.search.lower_bound import travel_bounds
-from joulepath.optimizer.solution import Branch
 from joulepath.optimizer.trajectories.passing import pass_times
 from joulepath.optimizer.trajectories.spline import Spline
 
@@ -165,4 +165,4 @@ def passes_of(leg: Leg, s: int, g: int, motion: Spline) -> list[Pass]:
 
 def _pass(layer: Layer, node: int, t: float) -> Pass:
     end = layer.ends[layer.end[node]]
-    return Pass(layer.name.removeprefix("stops/"), Branch(end.label, layer.q[node], end.target), t)
+    return Pass(layer.name.removeprefix("stops/"), Configuration(end.label, layer.q[node], end.target), t)

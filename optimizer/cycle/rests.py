@@ -12,7 +12,7 @@ from joulepath.optimizer.energy.plant import Plant
 from joulepath.optimizer.energy.sensitivity import waiting_sensitivity
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.stops import PlannedMove
-from joulepath.optimizer.solution import Sensitivity
+from joulepath.optimizer.result.energy import Sensitivity
 
 
 def holding_powers(move: PlannedMove, goal: Layer) -> Array:

@@ -32,8 +32,8 @@ from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stops import PlannedMove
+from joulepath.optimizer.result.energy import StorageUse
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.solution import StorageUse
 from joulepath.optimizer.trajectories.spline import Spline
 
 # shares of the deadline for the first search, and of what is left for the second one and for the moves

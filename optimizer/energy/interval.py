@@ -15,7 +15,7 @@ from joulepath.models.robot import Array
 from joulepath.models.uncertainty.parameters import BASE_POWER
 from joulepath.models.uncertainty.spread import Spread, spread_of
 from joulepath.optimizer.problem.arm import INVERTER_PARTS, Arm
-from joulepath.optimizer.solution import Energy, EnergyInterval, SavingInterval, Sensitivity
+from joulepath.optimizer.result.energy import Energy, EnergyInterval, SavingInterval, Sensitivity
 
 MOVE = "move"
 

@@ -19,7 +19,7 @@ import numpy as np
 from joulepath.models.robot import Array, Drives, FrictionLaw
 from joulepath.optimizer.energy.bus_flow import exchange
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.solution import ElectricalEnergy, Energy, JointEnergy, MechanicalEnergy, StorageUse
+from joulepath.optimizer.result.energy import ElectricalEnergy, Energy, JointEnergy, MechanicalEnergy, StorageUse
 
 ENERGY_FLOOR = 1e-6  # J; errors of energies below it are relative to it
 

@@ -20,7 +20,8 @@ from joulepath.optimizer.energy.losses import breakdown, flow_with, friction_tor
 from joulepath.optimizer.energy.sensitivity import energy_sensitivity
 from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.solution import Energy, Sensitivity, Trajectory
+from joulepath.optimizer.result.energy import Energy, Sensitivity
+from joulepath.optimizer.result.solution import Trajectory
 from joulepath.optimizer.trajectories.spline import Spline, fine_samples, sample
 
 Found = TypeVar("Found")
@@ -210,9 +211,8 @@ class Plant:
         flow = power_flow(tau, v, a, self.arm.drives, self.friction)
         charge = self._charge(spline, t)
         power = drawn_at(self.arm.bus, self.arm.regeneration, self.arm.base_power, flow.joints, charge)
-        return Trajectory(
-            t, q, v, a, tau, flow.tau_motor, power, spline, charge if self.arm.bus.mode == "storage" else None
-        )
+        shown = charge if self.arm.bus.mode == "storage" else None
+        return Trajectory(t, q, v, a, tau, flow.tau_motor, power, shown, spline=spline)
 
     def _charge(self, spline: Spline, t: Array) -> Array:
         """Charge (k,) [J] of the energy storage at times t (k,) [s]; zero without storage.

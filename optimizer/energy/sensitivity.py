@@ -28,7 +28,7 @@ from joulepath.optimizer.energy.link_regressor import BODY, rigid_regressor
 from joulepath.optimizer.energy.losses import friction_torque
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.dwell import Dwell
-from joulepath.optimizer.solution import Sensitivity
+from joulepath.optimizer.result.energy import Sensitivity
 
 # of a surplus that is stored, the storage takes all but rounding
 _STORED = 1e-9

@@ -26,11 +26,13 @@ from joulepath.optimizer.evaluate.limit_report import LimitMonitor, LimitReport
 from joulepath.optimizer.evaluate.nearest_contact import ClearanceMonitor, LeastClearance
 from joulepath.optimizer.evaluate.piecewise_motion import Indices, Motion, PiecewiseMotion, piecewise_motion
 from joulepath.optimizer.evaluate.recording import BLOCK
-from joulepath.optimizer.evaluate.sampler import Sampler, Samples
+from joulepath.optimizer.evaluate.sampler import Sampler
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.solution import Clearance, Energy, Sensitivity, Solution
+from joulepath.optimizer.result.certificate import Clearance
+from joulepath.optimizer.result.energy import Energy, Sensitivity
+from joulepath.optimizer.result.solution import Samples, Solution
 from joulepath.optimizer.trajectories.quadrature import lobatto_panels
 from joulepath.optimizer.trajectories.spline import Spline
 

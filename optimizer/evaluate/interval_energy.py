@@ -8,7 +8,7 @@ from functools import reduce
 from typing import TypeVar
 
 from joulepath.optimizer.energy.losses import relative_error
-from joulepath.optimizer.solution import Energy, StorageUse
+from joulepath.optimizer.result.energy import Energy, StorageUse
 
 Sum = TypeVar("Sum")
 

@@ -14,7 +14,7 @@ from joulepath.optimizer.collision.stand_ins import StandIns
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.evaluate.piecewise_motion import PiecewiseMotion
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.solution import Clearance
+from joulepath.optimizer.result.certificate import Clearance
 
 # greatest time between samples [s], unless a block would have more than MOST_INTERVALS of them
 PERIOD, MOST_INTERVALS = 0.01, 16384

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 
@@ -13,29 +13,12 @@ from joulepath.optimizer.energy.losses import power_flow
 from joulepath.optimizer.energy.plant import Plant
 from joulepath.optimizer.evaluate.piecewise_motion import PiecewiseMotion
 from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.result.solution import Samples
 
 MOST_SAMPLES = 20_000
 """Most samples that are returned: some 13 MB of JSON for six joints."""
 # a remainder of a period below this fraction of it is rounding, not a sample
 PERIOD_ROUNDING = 1e-6
-
-
-@dataclass(frozen=True)
-class Samples:
-    """A motion at multiples of a period and at its end: t (k,) [s]; q, v, a, tau, tau_motor (k, nq); power (k,) [W].
-
-    `tau` [N·m] is rigid body and rotor, `tau_motor` adds friction. `charge` (k,) [J] is that of the energy storage,
-    None without one.
-    """
-
-    t: Array
-    q: Array
-    v: Array
-    a: Array
-    tau: Array
-    tau_motor: Array
-    power: Array
-    charge: Array | None = None
 
 
 class Sampler:

@@ -28,7 +28,9 @@ from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import HalfSpace, Obstacle, Scene
-from joulepath.optimizer.solution import Certificate, Energy, Trajectory
+from joulepath.optimizer.result.certificate import Certificate
+from joulepath.optimizer.result.energy import Energy
+from joulepath.optimizer.result.solution import Trajectory
 from joulepath.optimizer.trajectories.spline import Spline, retimed
 
 MOUNTING_PLANE = "mounting plane"

@@ -11,7 +11,7 @@ from joulepath.optimizer.exceptions import InvalidProblem, NotCertified, Outside
 from joulepath.optimizer.export.program import Program
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.problem.problem import LONGEST_DURATION, Problem
-from joulepath.optimizer.solution import Certificate
+from joulepath.optimizer.result.certificate import Certificate
 
 
 @one_thread()

@@ -26,7 +26,7 @@ from joulepath.optimizer.export.ros_messages import MoveitOptions, Ros2Options, 
 from joulepath.optimizer.export.rows import TableOptions
 from joulepath.optimizer.export.urscript import UrscriptOptions, to_urscript
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 
 FormatName = Literal["urscript", "ros2", "moveit", "franka", "rapid", "krl", "csv", "json", "npz"]
 ExportOptions = UrscriptOptions | Ros2Options | MoveitOptions | FrankaOptions | RapidOptions | KrlOptions | TableOptions

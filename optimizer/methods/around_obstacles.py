@@ -20,7 +20,7 @@ from joulepath.optimizer.methods.planned_paths import (
 )
 from joulepath.optimizer.methods.sqp_method import NO_BETTER, with_effort
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.solution import Clearance
+from joulepath.optimizer.result.certificate import Clearance
 from joulepath.optimizer.trajectories.spline import Spline
 
 # the motion of a method along a smooth path, given as a motion of 1 s

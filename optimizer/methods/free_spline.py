@@ -20,7 +20,7 @@ from joulepath.optimizer.methods.planned_paths import FROM_PLANNED_PATH
 from joulepath.optimizer.methods.sqp_method import Guess, SqpMethod, above, with_effort
 from joulepath.optimizer.nlp.sqp import PROGRESS
 from joulepath.optimizer.problem.problem import LEAST_DURATION
-from joulepath.optimizer.solution import BaselineName
+from joulepath.optimizer.result.solution import BaselineName
 from joulepath.optimizer.trajectories import bspline, seven_segment
 from joulepath.optimizer.trajectories.bspline import Basis
 from joulepath.optimizer.trajectories.ramp_knots import RampKnots

@@ -14,7 +14,7 @@ from joulepath.optimizer.methods.limit_repair import sampled_overshoot
 from joulepath.optimizer.methods.method import SolveResult, SolveStatus
 from joulepath.optimizer.methods.planned_paths import no_polynomial_around
 from joulepath.optimizer.methods.sqp_method import Guess, SqpMethod, with_effort
-from joulepath.optimizer.solution import BaselineName
+from joulepath.optimizer.result.solution import BaselineName
 from joulepath.optimizer.trajectories.polynomial import polynomials
 from joulepath.optimizer.trajectories.ruckig_motion import time_optimal
 from joulepath.optimizer.trajectories.spline import Spline

@@ -18,7 +18,7 @@ from joulepath.optimizer.kinematics.path_constraints import PathConstraints
 from joulepath.optimizer.nlp.clearance_constraint import CLEARANCE, RESERVE, SCALE
 from joulepath.optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.solution import Clearance
+from joulepath.optimizer.result.certificate import Clearance
 from joulepath.optimizer.trajectories.bspline import in_all_spans
 from joulepath.optimizer.trajectories.quadrature import grid
 from joulepath.optimizer.trajectories.spline import Spline, peak_rates, retimed, sample, time_scale

@@ -14,7 +14,8 @@ from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.methods.duration_intervals import DurationInterval, duration_intervals
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.solution import BaselineName, Clearance
+from joulepath.optimizer.result.certificate import Clearance
+from joulepath.optimizer.result.solution import BaselineName
 from joulepath.optimizer.trajectories.spline import Spline, sampled
 
 DEADLINE_PASSED = "the deadline passed"

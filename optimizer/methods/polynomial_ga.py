@@ -27,7 +27,7 @@ from joulepath.optimizer.methods.planned_paths import (
     to_goal,
     without_path,
 )
-from joulepath.optimizer.solution import BaselineName
+from joulepath.optimizer.result.solution import BaselineName
 from joulepath.optimizer.trajectories import quintic
 from joulepath.optimizer.trajectories.polynomial import PolynomialBasis, polynomials
 from joulepath.optimizer.trajectories.spline import least_time_scale, retimed, spline_of, time_scales

@@ -31,7 +31,7 @@ from joulepath.optimizer.nlp.coordinates import Coordinates
 from joulepath.optimizer.nlp.nonlinear_program import NonlinearProgram
 from joulepath.optimizer.nlp.sqp import PROGRESS, Result, SqpStatus, solve
 from joulepath.optimizer.problem.problem import LONGEST_DURATION
-from joulepath.optimizer.solution import Clearance
+from joulepath.optimizer.result.certificate import Clearance
 from joulepath.optimizer.trajectories.bspline import Basis
 from joulepath.optimizer.trajectories.spline import Spline, sample, spline_of, time_scale
 

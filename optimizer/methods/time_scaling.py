@@ -18,7 +18,8 @@ from joulepath.optimizer.methods.sqp_method import Guess
 from joulepath.optimizer.methods.time_optimal_scaling import time_optimal_on_line
 from joulepath.optimizer.nlp.coordinates import Coordinates
 from joulepath.optimizer.nlp.sqp import PROGRESS
-from joulepath.optimizer.solution import BaselineName, Clearance
+from joulepath.optimizer.result.certificate import Clearance
+from joulepath.optimizer.result.solution import BaselineName
 from joulepath.optimizer.trajectories import bspline, seven_segment
 from joulepath.optimizer.trajectories.bspline import Basis
 from joulepath.optimizer.trajectories.spline import Spline

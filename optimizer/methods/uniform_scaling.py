@@ -22,7 +22,7 @@ from joulepath.optimizer.methods.limit_repair import torque_peaks
 from joulepath.optimizer.methods.method import CONVERGED, DEADLINE_PASSED, Method, SolveResult, SolveStatus
 from joulepath.optimizer.methods.path_retiming import PathRetiming
 from joulepath.optimizer.methods.sqp_method import with_effort
-from joulepath.optimizer.solution import BaselineName
+from joulepath.optimizer.result.solution import BaselineName
 from joulepath.optimizer.trajectories.quadrature import grid
 from joulepath.optimizer.trajectories.ruckig_motion import time_optimal_spline
 from joulepath.optimizer.trajectories.spline import Spline, lasting, least_time_scale, sample

@@ -17,7 +17,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 FOLDER = Path(__file__).resolve().parent
-LIBRARY = FOLDER / "libjoulepath.so"
+# A name that ends in .so alone would be taken for a module of Python.
+LIBRARY = FOLDER / "libjoulepath.so.1"
 # without contraction, all processors round alike
 FLAGS = ["-O3", "-fPIC", "-shared", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off"]
 # what every processor of a kind understands, as gcc and clang spell it, and as zig does: a default may demand more

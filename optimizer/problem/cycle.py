@@ -19,7 +19,7 @@ from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 from joulepath.optimizer.problem.stop_path import StopPath, at_stop
 from joulepath.optimizer.problem.stops import APPROACH, ENTRY, RETREAT, PlannedMove, Stop, moves_over, passing
 from joulepath.optimizer.problem.targets import AnyOf, Target, validated
-from joulepath.optimizer.solution import Objective
+from joulepath.optimizer.result.energy import Objective
 
 MOST_STOPS = 256
 # stops that one motion passes through: the effort of its nonlinear program grows with their square and more

@@ -16,7 +16,7 @@ from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.targets import AnyOf, Target, members, validated
 from joulepath.optimizer.problem.tool_path import ToolPath
-from joulepath.optimizer.solution import Objective
+from joulepath.optimizer.result.energy import Objective
 
 MethodName = Literal["bspline", "time_scaling", "lagrange", "uniform_scaling", "polynomial_ga"]
 # effort for the lower bound of the answer

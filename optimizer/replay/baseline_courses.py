@@ -17,7 +17,7 @@ from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.replay.planned import PlannedBaseline
 from joulepath.optimizer.replay.reference import Course, course_of, reference
-from joulepath.optimizer.solution import BaselineName
+from joulepath.optimizer.result.solution import BaselineName
 from joulepath.optimizer.trajectories.ruckig_motion import time_optimal_spline
 from joulepath.optimizer.trajectories.spline import lasting
 from joulepath.optimizer.trajectories.time_scalings import blend_time, default_times, quintic_spline, trapezoid_law

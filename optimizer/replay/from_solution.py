@@ -10,7 +10,8 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.replay.baseline_courses import ReportedBaseline, planned_baselines
 from joulepath.optimizer.replay.planned import PlannedMotion, PlannedTorques
 from joulepath.optimizer.replay.reference import course_of
-from joulepath.optimizer.solution import Objective, Solution
+from joulepath.optimizer.result.energy import Objective
+from joulepath.optimizer.result.solution import Solution
 
 
 def planned_motion(solution: Solution, arm: Arm, objective: Objective) -> PlannedMotion:

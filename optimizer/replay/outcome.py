@@ -14,7 +14,7 @@ from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.replay.play import Contact, Played
 from joulepath.optimizer.replay.reference import Reference
-from joulepath.optimizer.solution import Energy
+from joulepath.optimizer.result.energy import Energy
 
 # depth [m] of a contact that no good tracking explains: motions may be planned closer than any controller follows them
 TOUCH = 2.5e-4

@@ -23,8 +23,8 @@ from joulepath.optimizer.replay.planned import PlannedMotion
 from joulepath.optimizer.replay.play import play
 from joulepath.optimizer.replay.reference import Reference, reference
 from joulepath.optimizer.replay.simulated_arm import SimulatedArm, with_changes
+from joulepath.optimizer.result.solution import BaselineName, Solution
 from joulepath.optimizer.search.baselines import saving
-from joulepath.optimizer.solution import BaselineName, Solution
 
 Quantity = Literal["payload", "friction"]
 

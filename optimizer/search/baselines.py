@@ -25,7 +25,8 @@ from joulepath.optimizer.energy.limited_torque import limited_torque
 from joulepath.optimizer.energy.losses import breakdown, friction_torque
 from joulepath.optimizer.energy.sensitivity import energy_sensitivity, waiting_sensitivity
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.solution import Baseline, BaselineName, Energy
+from joulepath.optimizer.result.energy import Energy
+from joulepath.optimizer.result.solution import Baseline, BaselineName
 from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE, limit_ratios, too_much
 from joulepath.optimizer.trajectories.ruckig_motion import time_optimal
 from joulepath.optimizer.trajectories.time_scalings import SampledMotion, controller_default, quintic, trapezoid

@@ -8,8 +8,8 @@ from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.methods import method_of
 from joulepath.optimizer.methods.method import SolveResult, SolveStatus
 from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason
-from joulepath.optimizer.solution import CandidateStatus
 
 
 def explore(

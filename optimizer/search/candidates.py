@@ -18,12 +18,12 @@ from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.methods.method import SolveResult
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.targets import AnyOf, Side
+from joulepath.optimizer.result.candidates import CandidateReport, CandidateStatus
 from joulepath.optimizer.search.end_feasibility import check_configurations, raise_if_none_is_left
 from joulepath.optimizer.search.ends import SIDES, EndConfiguration
 from joulepath.optimizer.search.lower_bound import lower_bounds
 from joulepath.optimizer.search.mechanical_bound import mechanical_bounds
 from joulepath.optimizer.search.passing import bound_through
-from joulepath.optimizer.solution import CandidateReport, CandidateStatus
 from joulepath.optimizer.trajectories.spline import Spline
 
 FULL_TURN = 2 * np.pi
@@ -122,19 +122,19 @@ class Candidate:
     def report(self) -> CandidateReport:
         """The candidate as the answer reports it."""
         return CandidateReport(
-            self.start.label,
-            self.goal.label,
-            self.q_start,
-            self.q_goal,
-            self.status,
-            self.message,
-            self.lower_bound,
-            self.energy,
-            None if self.energy is None else self.duration,
-            self.start.target,
-            self.goal.target,
-            self.attempt is not None or self.status is CandidateStatus.FAILED,
-            None if self.energy is None else self.refined,
+            start=self.start.label,
+            start_target=self.start.target,
+            goal=self.goal.label,
+            goal_target=self.goal.target,
+            q_start=self.q_start,
+            q_goal=self.q_goal,
+            status=self.status,
+            reason=self.message,
+            lower_bound=self.lower_bound,
+            energy=self.energy,
+            duration=None if self.energy is None else self.duration,
+            refined=None if self.energy is None else self.refined,
+            tried=self.attempt is not None or self.status is CandidateStatus.FAILED,
         )
 
 

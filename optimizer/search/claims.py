@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from joulepath.optimizer.solution import Objective
+from joulepath.optimizer.result.energy import Objective
 
 
 @dataclass(frozen=True)

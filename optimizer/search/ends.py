@@ -20,7 +20,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.targets import AnyOf, Side, Single, Target
-from joulepath.optimizer.solution import UnreachableTarget
+from joulepath.optimizer.result.candidates import UnreachableTarget
 
 SIDES: tuple[Side, ...] = ("start", "goal")
 # orientations sampled of a pose that leaves it free, and of each of several such poses at least

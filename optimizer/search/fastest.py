@@ -13,6 +13,8 @@ from joulepath.optimizer.exceptions import DurationTooShort
 from joulepath.optimizer.methods.duration_intervals import DurationInterval
 from joulepath.optimizer.methods.fastest_motion import FastestMotion, FastestSettings
 from joulepath.optimizer.methods.method import Method, SolveResult, SolveStatus
+from joulepath.optimizer.result.candidates import CandidateStatus
+from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.search.attempts import solve_from, solver_of
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.incumbent import Incumbent
@@ -20,7 +22,6 @@ from joulepath.optimizer.search.missed_branches import all_known
 from joulepath.optimizer.search.outer_turns import families_of
 from joulepath.optimizer.search.quicker_ends import with_quicker_ends
 from joulepath.optimizer.search.sampled_ends import fastest_samples
-from joulepath.optimizer.solution import CandidateStatus, Energy
 from joulepath.optimizer.trajectories.spline import Spline, lasting, sampled
 
 # motions that obstacles stop are not too slow if so many times the shortest duration is allowed

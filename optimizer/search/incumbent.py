@@ -14,9 +14,11 @@ from joulepath.optimizer.methods.method import Method, SolveResult
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LEAST_DURATION, Problem, narrowed
 from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, nobody
+from joulepath.optimizer.result.candidates import CandidateStatus
+from joulepath.optimizer.result.certificate import Certificate
+from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.reserve import reserve
-from joulepath.optimizer.solution import CandidateStatus, Certificate, Energy
 from joulepath.optimizer.trajectories.spline import Spline, lasting
 
 # a baseline counts as better only beyond this share, the error of the quadratures that are compared

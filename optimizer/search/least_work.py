@@ -24,13 +24,13 @@ from joulepath.optimizer.methods.free_spline import TIGHT, FreeSpline
 from joulepath.optimizer.methods.method import SolveResult, SolveStatus
 from joulepath.optimizer.methods.sharp_motion import sharp_motion
 from joulepath.optimizer.methods.sqp_method import above
+from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.attempts import in_time, solver_of
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.outer_turns import FAMILIES, MEMBERS, NEAR, families_of, leave
 from joulepath.optimizer.search.rough_work import COARSE, Rough, RoughWork, best_of_each
 from joulepath.optimizer.search.sharpening import DENSE, LAST_PROGRESS, LEAST_FREEDOM, MIDDLE, PROGRESS, follow_in_time
-from joulepath.optimizer.solution import CandidateStatus
 
 # time [s] that the search needs to be sure of a motion
 LEAST_TIME = 3.0

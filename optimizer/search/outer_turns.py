@@ -14,9 +14,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.incumbent import Incumbent
-from joulepath.optimizer.solution import CandidateStatus
 
 # families are solved further if the energy of one of their members is at most this ratio of the best energy, so many
 # of them, and so many members of each

@@ -12,9 +12,9 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
+from joulepath.optimizer.result.solution import Baseline
 from joulepath.optimizer.search.baselines import baselines, saving
 from joulepath.optimizer.search.lower_bound import travel_bounds
-from joulepath.optimizer.solution import Baseline
 from joulepath.optimizer.trajectories.passing import pass_times
 from joulepath.optimizer.trajectories.spline import Spline
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from joulepath.optimizer.result.solution import Baseline
 from joulepath.optimizer.search.baselines import compared
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.incumbent import Incumbent
-from joulepath.optimizer.solution import Baseline
 from joulepath.optimizer.trajectories.spline import Spline
 from joulepath.optimizer.trajectories.time_scalings import SampledMotion, even_speed
 

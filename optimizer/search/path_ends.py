@@ -15,12 +15,12 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import Target
+from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason, bound, pairs
 from joulepath.optimizer.search.ends import EndConfiguration, ends, ends_of, label_of
 from joulepath.optimizer.search.free_ends_bound import backwards, bound_between
 from joulepath.optimizer.search.free_goal_bound import family_bound_of
 from joulepath.optimizer.search.missed_branches import bound_of_others
-from joulepath.optimizer.solution import CandidateStatus
 
 # rad: where a path leads, and joint positions that are given for its end
 SAME = 1e-6

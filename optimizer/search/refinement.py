@@ -10,6 +10,7 @@ import numpy as np
 from joulepath.optimizer.deadline import DeadlinePassed, watch
 from joulepath.optimizer.methods.free_spline import EXACT_BELOW, TIGHT
 from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.result.solution import Baseline, BaselineName
 from joulepath.optimizer.search.attempts import improve, solve_from
 from joulepath.optimizer.search.baselines import baselines, guesses, nearest
 from joulepath.optimizer.search.candidates import Candidate
@@ -19,7 +20,6 @@ from joulepath.optimizer.search.path_baselines import path_baselines
 from joulepath.optimizer.search.regrading import grade
 from joulepath.optimizer.search.sharpening import sharpen
 from joulepath.optimizer.search.sliding import slides
-from joulepath.optimizer.solution import Baseline, BaselineName
 from joulepath.optimizer.trajectories.ruckig_motion import time_optimal_spline
 from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 from joulepath.optimizer.trajectories.spline import Spline, least_time_scale, retimed, sampled

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.trajectories.quadrature import GRID_PERIOD
 
 # share of the deadline kept for the end of a short motion, at most [s]; and the share that is kept at most

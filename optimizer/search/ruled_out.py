@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Reason
 from joulepath.optimizer.search.free_goal_bound import family_bound_of
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.missed_branches import all_known, bound_of_others
 from joulepath.optimizer.search.path_ends import bound_beside
 from joulepath.optimizer.search.raised_bounds import raise_bounds
-from joulepath.optimizer.solution import CandidateStatus
 
 
 def ruled_out(incumbent: Incumbent, objective: float) -> tuple[float, bool]:

@@ -16,6 +16,9 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.progress import Improved, Tell, nobody
+from joulepath.optimizer.result.candidates import CandidateStatus, UnreachableTarget
+from joulepath.optimizer.result.energy import Energy
+from joulepath.optimizer.result.solution import Baseline, Configuration, LimitsInForce, Solution, SolverReport
 from joulepath.optimizer.search import free_goal, self_motions
 from joulepath.optimizer.search.attempts import solve, solve_from
 from joulepath.optimizer.search.baselines import with_saving_intervals
@@ -39,16 +42,6 @@ from joulepath.optimizer.search.sampled_ends import activate_deferred, between
 from joulepath.optimizer.search.second_attempt import reject
 from joulepath.optimizer.search.seeds import activate_seeds
 from joulepath.optimizer.search.sliding import slides
-from joulepath.optimizer.solution import (
-    Baseline,
-    Branch,
-    CandidateStatus,
-    Energy,
-    LimitsInForce,
-    Solution,
-    SolverReport,
-    UnreachableTarget,
-)
 from joulepath.optimizer.trajectories.spline import Spline, lasting, sampled
 
 # time after the deadline [s] at which a certificate is given up: better a little late than no answer
@@ -301,13 +294,13 @@ class Run:
         arm = self.problem.arm
         return Solution(
             status="optimal" if done and is_proven and incumbent.method.converges else "feasible",
-            start=Branch(best.start.label, best.q_start, best.start.target),
-            goal=Branch(best.goal.label, best.q_goal, best.goal.target),
+            start=Configuration(best.start.label, best.q_start, best.start.target),
+            goal=Configuration(best.goal.label, best.q_goal, best.goal.target),
             trajectory=trajectory,
             energy=with_interval(energy, sensitivity, spline.duration, arm),
             sensitivity=sensitivity,
             lower_bound=least,
-            limits=LimitsInForce(arm.active_limits, arm.tcp_speed, arm.elbow_speed),
+            limits=LimitsInForce.of(arm.active_limits, arm.tcp_speed, arm.elbow_speed),
             complete=all_known(self.problem),
             baselines=with_saving_intervals(
                 table, self.problem, Known(energy.electrical.total, sensitivity, spline.duration)

@@ -7,11 +7,11 @@ from dataclasses import replace
 from joulepath.optimizer.deadline import DeadlinePassed, watch
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.attempts import solve
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.refinement import refine
-from joulepath.optimizer.solution import CandidateStatus
 
 # limits become tighter by what the motion exceeded them by, and by this share
 BEYOND = 2e-3

@@ -18,9 +18,9 @@ from joulepath.optimizer.energy.dwell import brake_power, waits
 from joulepath.optimizer.methods.sqp_method import above
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
+from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.ends import EndConfiguration
-from joulepath.optimizer.solution import CandidateStatus
 from joulepath.optimizer.trajectories import quintic
 from joulepath.optimizer.trajectories.quadrature import quadrature
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import Annotated
 
 import numpy as np
 from scipy.interpolate import BSpline
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.declared import Axes, Count, Unit
 from joulepath.optimizer.trajectories import bspline
 from joulepath.optimizer.trajectories.quadrature import quadrature
 
@@ -23,11 +25,14 @@ FIT_SAMPLES = 201
 
 @dataclass(frozen=True)
 class Spline:
-    """A clamped B-spline q(t): degree, knots (m,) [s], control points (n, nq) [rad]."""
+    """Clamped B-spline of the joint positions over time."""
 
-    degree: int
-    knots: Array
-    control_points: Array
+    degree: Count
+    """Degree."""
+    knots: Annotated[Array, Axes(("knot",)), Unit("s")]
+    """Knots."""
+    control_points: Annotated[Array, Axes(("point", "joint")), Unit("rad")]
+    """Control points, [point][joint]."""
 
     @property
     def duration(self) -> float:

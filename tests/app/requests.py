@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from joulepath.app.schemas.examples.optimize import OPTIMIZE_EXAMPLES
+from joulepath.app.schemas.examples.files import body_examples
 
 HOME = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
 NEAR = [0.3, -1.4, 1.4, -1.5, -1.57, 0.2]
@@ -12,7 +12,7 @@ AMPLE = 100.0
 """A deadline [s] that a busy machine does not reach: each of these requests takes a few seconds at most."""
 PATIENT = {"deadline": AMPLE}
 EXAMPLES: dict[str, dict[str, Any]] = {
-    name: PATIENT | (example["value"] or {}) for name, example in OPTIMIZE_EXAMPLES.items()
+    name: PATIENT | (example["value"]) for name, example in body_examples("/optimize")["application/json"].items()
 }
 
 

@@ -9,14 +9,15 @@ import pytest
 from pydantic import BaseModel
 from starlette.testclient import TestClient
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.schemas.compare import CompareResponse
 from joulepath.app.schemas.cycle import CycleResponse
 from joulepath.app.schemas.pareto import ParetoResponse
-from joulepath.app.schemas.response import OptimizeResponse
 from tests.app.recorded import FOLDER, TASKS, record
 
 SCHEMAS: dict[str, type[BaseModel]] = {
-    "optimize": OptimizeResponse,
+    "optimize": model_of(OptimizeAnswer),
     "compare": CompareResponse,
     "pareto": ParetoResponse,
     "cycle": CycleResponse,
@@ -37,7 +38,7 @@ def test_recordings_keep_to_the_schemas(kind: str) -> None:
     recording = orjson.loads((FOLDER / f"{kind}.json").read_bytes())
     SCHEMAS[kind].model_validate_json(orjson.dumps(recording["document"]))
     for each in recording["stored"]:
-        OptimizeResponse.model_validate_json(orjson.dumps(each))
+        model_of(OptimizeAnswer).model_validate_json(orjson.dumps(each))
 
 
 @pytest.mark.long

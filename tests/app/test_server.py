@@ -16,9 +16,10 @@ from typing import Any, TypeVar
 import httpx2
 import pytest
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.schemas.errors import BodyTooLarge, Busy, MalformedHttp, ShuttingDown
 from joulepath.app.schemas.replay import ReplayResponse
-from joulepath.app.schemas.response import OptimizeResponse
 from tests.app.live import CLIENT, EXIT, ROOT, WARM_UP, Server, alive, processor_time, serving, until
 from tests.app.requests import EXAMPLES, long_search, move
 
@@ -89,7 +90,7 @@ def test_an_answer_is_played_in_mujoco(server: Server) -> None:
 def test_answers(server: Server) -> None:
     answer = server.post("/optimize", EXAMPLES["joint_to_pose"])
     assert answer.status_code == 200
-    OptimizeResponse.model_validate_json(answer.content)
+    model_of(OptimizeAnswer).model_validate_json(answer.content)
 
 
 def test_the_page_for_newcomers_shows_what_its_script_prints(server: Server) -> None:

@@ -19,8 +19,8 @@ from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from joulepath.optimizer.methods import sqp_method
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.pareto import pareto
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.second_attempt import WITHIN_TIGHTER
-from joulepath.optimizer.solution import Solution
 from tests.selection import long_but
 
 Json = dict[str, Any]

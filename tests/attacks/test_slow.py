@@ -18,7 +18,7 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, fixed, limits, problem
 from tests.selection import long_but

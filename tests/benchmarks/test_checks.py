@@ -12,9 +12,10 @@ import pytest
 from benchmarks.checks import allowed, beats, errors_found, refusal_errors
 from benchmarks.motion import SplineMotion, replay
 from benchmarks.tasks import RequestTask, request_task
+from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.convert.arm_fields import arm_fields
 from joulepath.app.convert.request import to_problem
-from joulepath.app.convert.solution import to_optimize_response
+from joulepath.app.engine.result import json_document
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.optimize import optimize
@@ -33,8 +34,8 @@ def task() -> RequestTask:
 @pytest.fixture(scope="module")
 def answered(task: RequestTask) -> Json:
     request = OptimizeRequest.model_validate(task.body)
-    content = to_optimize_response(request, "id", optimize(to_problem(request, 10.0)), arm_fields(request))
-    answer: Json = orjson.loads(orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY))
+    content = OptimizeAnswer.of(request, "id", optimize(to_problem(request, 10.0)), arm_fields(request))
+    answer: Json = orjson.loads(json_document(content))
     return answer
 
 

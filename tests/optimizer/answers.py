@@ -13,8 +13,8 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.baselines import saving
-from joulepath.optimizer.solution import Solution
 from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 from tests.optimizer.moves import (
     CEILING,

@@ -16,7 +16,8 @@ from joulepath.optimizer.energy.losses import breakdown
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.solution import Certificate, Clearance, Energy
+from joulepath.optimizer.result.certificate import Certificate, Clearance
+from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.trajectories.spline import Spline
 from tests.optimizer.moves import problem_with
 

@@ -19,8 +19,8 @@ from joulepath.optimizer.exceptions import (
 )
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.search.reserve import RESERVE
-from joulepath.optimizer.solution import Certificate
 from tests.optimizer.answers import CONDITIONS, CONVERGED, ROUNDING, assert_true, shortest, solved
 from tests.optimizer.clocks import LAST_READINGS, CountingClock
 from tests.optimizer.moves import (

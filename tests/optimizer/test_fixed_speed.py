@@ -16,9 +16,10 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stop_path import StopPath
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.tool_path import SPEED_TOLERANCE, ToolPath
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 from tests.optimizer.moves import AMPLE
-from tests.optimizer.test_tool_path import ARM, HOME, along, moved, poses_of
+from tests.optimizer.test_tool_path import ARM, HOME, poses_of
+from tests.optimizer.tool_paths import along, moved
 from tests.selection import long_but
 
 # relative: speeds by differences of positions 1/4000 of the motion apart

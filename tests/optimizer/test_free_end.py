@@ -24,7 +24,7 @@ from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.tool_path import ToolPath
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 from tests.optimizer.moves import ROBOT, tcp_pose
 from tests.optimizer.test_turning_path import ARM, Z, down, over_the_base
 from tests.optimizer.tool_paths import HOME, along, moved

@@ -19,12 +19,12 @@ from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.candidates import bound, pairs
 from joulepath.optimizer.search.ends import ends_of
 from joulepath.optimizer.search.free_ends_bound import bound_between
 from joulepath.optimizer.search.path_ends import bound_beside, path_candidates
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.solution import Solution
 from tests.optimizer.moves import AMPLE, tcp_pose
 from tests.optimizer.test_free_end import WRONG, free
 from tests.optimizer.test_turning_path import ARM, Z, down, over_the_base

@@ -20,8 +20,8 @@ from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.solution import Solution
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
 from tests.optimizer.moves import PAYLOAD, START, changed, fixed, limits, problem, tcp_pose
 from tests.selection import long_but

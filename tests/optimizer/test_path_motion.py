@@ -12,7 +12,7 @@ import pytest
 from joulepath.models.robot import Array
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.tool_cone import ToolCone
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.trajectories.spline import sample
 from tests.optimizer.moves import problem_with
 from tests.selection import long_but

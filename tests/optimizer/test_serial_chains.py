@@ -25,7 +25,7 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import MethodName, Problem
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.problem.tool_cone import ToolCone
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.what_if import what_if
 from tests.optimizer import moves
 from tests.optimizer.chains import move, serial_chain

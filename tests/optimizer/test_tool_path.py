@@ -24,7 +24,7 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.problem.tool_path import ToolPath
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 from tests.optimizer.moves import AMPLE, ROBOT, limits, tcp_pose
 from tests.optimizer.tool_paths import ARM, HOME, along, moved, poses_of
 from tests.selection import long_but

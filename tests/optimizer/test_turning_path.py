@@ -23,7 +23,7 @@ from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.tool_path import ToolPath
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 from tests.optimizer.moves import AMPLE, ROBOT
 from tests.optimizer.tool_paths import HOME, along, moved
 from tests.selection import long_but

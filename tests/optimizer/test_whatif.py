@@ -13,7 +13,7 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.what_if import what_if
 from tests.optimizer.cells import at
 from tests.optimizer.clocks import CountingClock

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
+from joulepath.app.answers.declared import Shown
 from joulepath.app.schemas.common import Response, described, part
 from joulepath.app.schemas.errors.problem_details import ProblemDetails, fixed
 from joulepath.app.schemas.examples.values import HOME, LABEL
-from joulepath.app.schemas.response import BODIES, Candidate, CandidateCounts, UnreachableTarget
+from joulepath.app.schemas.wording import BODIES
+from joulepath.optimizer.result.candidates import CandidateCounts, CandidateReport, UnreachableTarget
 
 
 class UnknownRobot(ProblemDetails):
@@ -76,7 +78,7 @@ class UnreachableTargets(_TargetError):
     type: Literal["/problems/unreachable-targets"] = fixed("type", "/problems/unreachable-targets")
     title: Literal["No reachable target"] = fixed("title", "No reachable target")
     status: Literal[422] = fixed("status", 422)
-    unreachable: list[UnreachableTarget] = part("All targets of the `any_of`, each with the cause.")
+    unreachable: list[Annotated[UnreachableTarget, Shown]] = part("All targets of the `any_of`, each with the cause.")
 
 
 class OutsideLimits(ProblemDetails):
@@ -269,10 +271,10 @@ class TorqueInfeasible(ProblemDetails):
 
 
 class _SearchError(ProblemDetails):
-    candidates: list[Candidate] = part(
+    candidates: list[Annotated[CandidateReport, Shown]] = part(
         "Candidates with their status and their reason: those that failed first, at most 64."
     )
-    candidate_counts: CandidateCounts = part("Number of all candidates by status.")
+    candidate_counts: Annotated[CandidateCounts, Shown] = part("Number of all candidates by status.")
 
 
 class NoTrajectory(_SearchError):

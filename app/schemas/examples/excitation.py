@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fastapi.openapi.models import Example
+from joulepath.app.schemas.examples.files import Example
 
 EXCITATION_EXAMPLES: dict[str, Example] = {
     "friction_and_rotors": {

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fastapi.openapi.models import Example
-
+from joulepath.app.schemas.examples.files import Example
 from joulepath.app.schemas.examples.values import HOME, NEAR, STANDING_STILL
 
 _DURATION = 1.5

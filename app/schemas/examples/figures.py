@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fastapi.openapi.models import Example
+from joulepath.app.schemas.examples.files import Example
 
 # that of the example: it follows from the content
 FIGURES_ID = "26d7fc46-dfa6-58dc-957c-af3337058506"

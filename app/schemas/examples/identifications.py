@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from fastapi.openapi.models import Example
-
+from joulepath.app.schemas.examples.files import Example
 from joulepath.app.schemas.examples.values import LOG_ID, OTHER_LOG_ID
 
 IDENTIFY_EXAMPLES: dict[str, Example] = {

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from fastapi.openapi.models import Example
-
+from joulepath.app.schemas.examples.files import Example
 from joulepath.app.schemas.examples.values import ANSWER_PATH, EVALUATE, HOME, NEAR
 
 PAYLOAD = {"mass": 2.0, "com": [0.0, 0.0, 0.05]}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import cos, pi
 
-from fastapi.openapi.models import Example
+from joulepath.app.schemas.examples.files import Example
 
 _PERIOD, _ROWS = 0.05, 61
 _REACH = [0.4, 0.5, -0.6, 0.3, 0.2, 0.5]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fastapi.openapi.models import Example
+from joulepath.app.schemas.examples.files import Example
 
 URDF = """<robot name="example">
   <link name="base"/>

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from fastapi.openapi.models import Example
-
+from joulepath.app.schemas.examples.files import Example
 from joulepath.app.schemas.examples.values import HOME, OPTIMIZE
 
 PARETO_EXAMPLES: dict[str, Example] = {

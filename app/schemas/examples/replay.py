@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from fastapi.openapi.models import Example
-
 from joulepath.app.schemas.examples.export import ANSWER
+from joulepath.app.schemas.examples.files import Example
 
 _ENERGY: dict[str, Any] = {"electrical": {"total": 70.40564079868456}, "mechanical": {"total": 11.614725877535061}}
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from fastapi.openapi.models import Example
-
-from joulepath.app.schemas.examples.optimize import OPTIMIZE_EXAMPLES
+from joulepath.app.schemas.examples.files import Example, body_examples
 from joulepath.app.schemas.examples.values import ANSWER_ID, HOME
 
+_OPTIMIZE = body_examples("/optimize")["application/json"]
 STUDY_EXAMPLES: dict[str, Example] = {
     "electrical": {
         "summary": "At most 60 J of electrical energy",
@@ -25,7 +24,7 @@ ITERATION_EXAMPLES: dict[str, Example] = {
     }
 }
 ITERATION_EXAMPLES |= {
-    name: {"summary": OPTIMIZE_EXAMPLES[name]["summary"], "value": {"optimize": OPTIMIZE_EXAMPLES[name]["value"]}}
+    name: {"summary": _OPTIMIZE[name]["summary"], "value": {"optimize": _OPTIMIZE[name]["value"]}}
     for name in ("time_scaling", "joint_to_pose")
 }
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from fastapi.openapi.models import Example
-
+from joulepath.app.schemas.examples.files import Example
 from joulepath.app.schemas.examples.values import HOME
 
 _LOW = [0.5, -2.57, 2.57, -1.07, -1.07, 0.5]

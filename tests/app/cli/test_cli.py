@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.schemas.cycle import CycleResponse
 from joulepath.app.schemas.evaluate import EvaluateResponse
-from joulepath.app.schemas.examples.evaluate import EVALUATE_EXAMPLES
-from joulepath.app.schemas.response import OptimizeResponse
+from joulepath.app.schemas.examples.files import body_examples
 from joulepath.app.settings import Settings
 from tests.app.cli.console import CSV, CSV_OPTIONS, Here, request, run
 from tests.app.requests import HOME, NEAR, PATIENT
@@ -22,7 +23,7 @@ def test_optimize_answers_as_the_service_does(tmp_path: Path) -> None:
     file.write_text(request())
     finished = run("optimize", str(file), cwd=tmp_path)
     assert (finished.returncode, finished.stderr) == (0, b"")
-    answer = OptimizeResponse.model_validate_json(finished.stdout)
+    answer = model_of(OptimizeAnswer).model_validate_json(finished.stdout)
     assert answer.status == "optimal"
     assert answer.trajectory.q[-1] == pytest.approx(NEAR)
 
@@ -42,7 +43,7 @@ def test_optimize_reads_standard_input_and_writes_a_file(tmp_path: Path) -> None
     output = tmp_path / "answer.json"
     finished = run("optimize", "-", "--output", str(output), stdin=request())
     assert (finished.returncode, finished.stdout, finished.stderr) == (0, b"", b"")
-    OptimizeResponse.model_validate_json(output.read_bytes())
+    model_of(OptimizeAnswer).model_validate_json(output.read_bytes())
 
 
 @pytest.mark.parametrize(
@@ -91,7 +92,7 @@ def test_an_output_that_cannot_be_written_is_wrong_usage(here: Here, tmp_path: P
 
 @pytest.mark.long
 def test_evaluate_answers_as_the_service_does() -> None:
-    example = next(iter(EVALUATE_EXAMPLES.values()))["value"]
+    example = next(iter(body_examples("/evaluate")["application/json"].values()))["value"]
     finished = run("evaluate", "-", stdin=json.dumps(example))
     assert (finished.returncode, finished.stderr) == (0, b"")
     EvaluateResponse.model_validate_json(finished.stdout)

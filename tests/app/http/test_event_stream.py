@@ -11,6 +11,8 @@ import httpx2
 import orjson
 import pytest
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.schemas.compare import CompareResponse
 from joulepath.app.schemas.cycle import CycleResponse
 from joulepath.app.schemas.errors import (
@@ -22,7 +24,6 @@ from joulepath.app.schemas.errors import (
     WorkerLost,
 )
 from joulepath.app.schemas.pareto import ParetoResponse
-from joulepath.app.schemas.response import OptimizeResponse
 from tests.app.live import CLIENT, GRACE, Server, serving, until
 from tests.app.requests import HOME, NEAR, long_search, move
 
@@ -63,7 +64,7 @@ def test_the_answer_is_that_of_a_request_without_progress(one: Server) -> None:
     assert names(events) == ["candidates", "candidate", "incumbent", "answer"]
     assert set(events[1][1]) == {"index", "status", "bound", "energy"}
     name, answer = events[-1]
-    OptimizeResponse.model_validate_json(orjson.dumps(answer))
+    model_of(OptimizeAnswer).model_validate_json(orjson.dumps(answer))
     incumbent = [content for name, content in events if name == "incumbent"][-1]
     assert incumbent == {
         "energy": answer["energy"]["electrical"]["total"],

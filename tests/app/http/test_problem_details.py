@@ -19,9 +19,12 @@ from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.excitation.errors import ExcitationInfeasible
 from joulepath.optimizer.identify import errors as identification_errors
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
-from joulepath.optimizer.solution import CandidateReport, Clearance, UnreachableTarget
+from joulepath.optimizer.result.candidates import CandidateReport, CandidateStatus, UnreachableTarget
+from joulepath.optimizer.result.certificate import Clearance
 
-CANDIDATE = CandidateReport("left/up/flip", "left/up/flip", np.zeros(6), np.ones(6), "failed", "no step left", 12.5)
+CANDIDATE = CandidateReport(
+    "left/up/flip", 0, "left/up/flip", 0, np.zeros(6), np.ones(6), CandidateStatus.FAILED, "no step left", 12.5
+)
 COLLIDING = exceptions.CollidingBranch("left/up/flip", 0, np.zeros(6), ("table", "forearm"), 0.02)
 HIT = Clearance(-0.02, -0.02, ("table", "forearm"), 0.5)
 ERRORS: list[JoulepathError] = [

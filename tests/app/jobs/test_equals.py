@@ -11,8 +11,9 @@ import pytest
 
 from joulepath import __version__
 from joulepath.app.access.client import OPERATOR
+from joulepath.app.answers.envelope import AnswerFigures
 from joulepath.app.convert.packed import packed, unpacked
-from joulepath.app.engine.result import AnswerFigures, TaskResult
+from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions import TaskFailed
 from joulepath.app.store import jobs
 from joulepath.app.store.cache import Meaning

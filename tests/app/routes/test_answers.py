@@ -9,16 +9,18 @@ import orjson
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.answers.envelope import AnswerFigures
+from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.convert.candidates import MOST_IN_A_PROBLEM, most_telling
-from joulepath.app.engine.result import AnswerFigures, TaskResult
+from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.answers import AnswerList
 from joulepath.app.schemas.cycle import CycleResponse
-from joulepath.app.schemas.response import OptimizeResponse
 from joulepath.app.settings import Settings
 from joulepath.app.store.store import Store
 from joulepath.app.store.store_answers import keep_answer
-from joulepath.optimizer.solution import CandidateReport, CandidateStatus
+from joulepath.optimizer.result.candidates import CandidateReport, CandidateStatus
 from tests.app.requests import EXAMPLES, HOME, NEAR, PATIENT, move
 from tests.app.store.test_store import with_store
 
@@ -38,7 +40,7 @@ def test_candidates_as_asked(
     client: TestClient, everything: dict[str, Any], which: str | None, kept: tuple[str, ...]
 ) -> None:
     answer = client.post("/optimize", json=TWO_POSES | ({} if which is None else {"candidates": which}))
-    OptimizeResponse.model_validate_json(answer.content)
+    model_of(OptimizeAnswer).model_validate_json(answer.content)
     content = answer.json()
     assert content["candidates"] == [each for each in everything["candidates"] if each["status"] in kept]
     counted = Counter(each["status"] for each in everything["candidates"])
@@ -145,7 +147,7 @@ def test_a_study_keeps_all_candidates_for_its_suggestions(client: TestClient) ->
 
 def test_a_problem_lists_the_most_telling_candidates() -> None:
     statuses = [CandidateStatus.PRUNED] * 100 + [CandidateStatus.INFEASIBLE] * 30 + [CandidateStatus.FAILED] * 20
-    reports = [CandidateReport("a", "b", [0.0], [0.0], status, "", 1.0) for status in statuses]  # type: ignore[arg-type]
+    reports = [CandidateReport("a", 0, "b", 0, [0.0], [0.0], status, "", 1.0) for status in statuses]  # type: ignore[arg-type]
     listed = Counter(each.status for each in most_telling(reports))
     assert listed == {CandidateStatus.FAILED: 20, CandidateStatus.INFEASIBLE: 30, CandidateStatus.PRUNED: 14}
     assert listed.total() == MOST_IN_A_PROBLEM

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.convert.warnings import NO_DEFAULT_MOTION
 from joulepath.app.routes.parameters import deadline_of
 from joulepath.app.schemas.cycle import CycleRequest, CycleResponse
-from joulepath.app.schemas.response import OptimizeResponse
 from tests.app.requests import HOME, PATIENT
 
 # relative: sums of the same numbers in another order
@@ -96,7 +97,7 @@ def test_every_move_refers_to_its_answer(answer: dict[str, Any], client: TestCli
             continue
         kept = client.get(leg["answer"]).json()
         assert kept["kind"] == "optimize"
-        own = OptimizeResponse.model_validate(kept["answer"]).model_dump(exclude_unset=True)
+        own = model_of(OptimizeAnswer).model_validate(kept["answer"]).model_dump(exclude_unset=True)
         assert own["energy"]["electrical"]["total"] == leg["electrical"] and own["duration"] == leg["duration"]
         assert own["branch"]["goal"]["q"] == leg["goal"]["q"]
         clearances.append(own["certificate"]["clearance"]["min_clearance"])

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath.app.schemas.response import OptimizeResponse
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.optimize.task import OptimizeAnswer
 from tests.app.requests import HOME, PATIENT
 from tests.app.routes.test_cycle import PART, ROUNDING, answered, down
 
@@ -50,7 +51,7 @@ def test_a_pass_is_part_of_one_leg(answer: dict[str, Any]) -> None:
 
 def test_its_answer_is_a_motion_through_the_stop(answer: dict[str, Any], client: TestClient) -> None:
     leg = answer["legs"][2]
-    kept = OptimizeResponse.model_validate(client.get(leg["answer"]).json()["answer"])
+    kept = model_of(OptimizeAnswer).model_validate(client.get(leg["answer"]).json()["answer"])
     assert kept.energy.electrical.total == leg["electrical"] and kept.energy.lower_bound == leg["lower_bound"]
     samples = kept.trajectory
     k = int(np.argmin(np.abs(np.array(samples.t) - leg["passes"][0]["t"])))

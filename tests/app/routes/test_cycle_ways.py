@@ -7,8 +7,9 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.schemas.cycle import CycleResponse
-from joulepath.app.schemas.response import OptimizeResponse
 from tests.app.routes.test_cycle import a_cycle, down
 
 LINES = {
@@ -38,7 +39,7 @@ def test_lines_are_legs_of_their_own(client: TestClient) -> None:
     ]
     worst = content["certificate"]["worst_ratio"]
     assert 0 < worst["path_position"] <= 1 and 0.9 < worst["tcp_speed"] <= 1 + 1e-6
-    line = OptimizeResponse.model_validate(client.get(content["legs"][3]["answer"]).json()["answer"])
+    line = model_of(OptimizeAnswer).model_validate(client.get(content["legs"][3]["answer"]).json()["answer"])
     assert line.certificate.worst_ratio.path_rotation is not None
 
 

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath.app.schemas.response import OptimizeResponse
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.optimize.task import OptimizeAnswer
 from tests.app.requests import EXAMPLES, move
 
 BALANCE = 1e-4  # relative; quadrature of the corners of power
@@ -20,7 +21,7 @@ DOWN = EXAMPLES["storage_on_the_bus"]
 def answered(client: TestClient, body: dict[str, Any]) -> dict[str, Any]:
     answer = client.post("/optimize", json=body)
     assert answer.status_code == 200, answer.text
-    OptimizeResponse.model_validate_json(answer.content)
+    model_of(OptimizeAnswer).model_validate_json(answer.content)
     content: dict[str, Any] = answer.json()
     electrical = content["energy"]["electrical"]
     assert sum(electrical[part] for part in PARTS) == pytest.approx(electrical["total"], rel=BALANCE)

@@ -15,10 +15,11 @@ from starlette.testclient import TestClient
 from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.errors import ProblemDetails
 from joulepath.app.schemas.evaluate import EvaluateResponse
-from joulepath.app.schemas.examples.evaluate import CSV_EXAMPLES, EVALUATE_EXAMPLES
+from joulepath.app.schemas.examples.files import body_examples
 from tests.app.requests import HOME, NEAR, move
 
-REQUESTS: dict[str, Any] = {name: example["value"] for name, example in EVALUATE_EXAMPLES.items()}
+JSON_EXAMPLES = body_examples("/evaluate")["application/json"]
+REQUESTS: dict[str, Any] = {name: example["value"] for name, example in JSON_EXAMPLES.items()}
 HEADER = "t,q1,q2,q3,q4,q5,q6"
 # the same numbers by another way through text and radians
 SAME = 1e-9
@@ -78,7 +79,7 @@ def test_evaluates_what_optimize_answered(client: TestClient) -> None:
 
 
 def test_csv_and_json_agree(client: TestClient) -> None:
-    value = CSV_EXAMPLES["configurations"]["value"]
+    value = body_examples("/evaluate")["text/csv"]["configurations"]["value"]
     q = np.radians([[float(cell) for cell in line.split(",")] for line in value.splitlines()[1:]])
     by_csv = upload(
         client, value, units="deg", interpolation="linear", time_per_segment=1.5, payload='{"mass":1,"com":[0,0,0]}'

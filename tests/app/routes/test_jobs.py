@@ -10,9 +10,10 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.jobs import Job, JobList
-from joulepath.app.schemas.response import OptimizeResponse
 from tests.app.job_clients import ended, evaluation, optimization, parsed, sent, shown
 from tests.app.recorded import recorded_service
 from tests.app.requests import HOME, NEAR, move
@@ -55,7 +56,7 @@ def test_every_kind_is_answered_as_by_its_endpoint(client: TestClient, mixed: An
             assert kept["answer"]["request"] == f"{job['id']}.{each['index']}"
     alone = client.post("/optimize", json=optimization()["optimize"]).json()
     answer = client.get(job["requests"][0]["answer"]).json()["answer"]
-    OptimizeResponse.model_validate(answer)
+    model_of(OptimizeAnswer).model_validate(answer)
     assert answer["trajectory"] == alone["trajectory"]
     assert job["requests"][0]["energy"] == alone["energy"]["electrical"]["total"]
     assert (job["requests"][0]["duration"], job["requests"][0]["status"]) == (alone["duration"], alone["status"])
@@ -232,7 +233,7 @@ def test_a_client_may_wait_for_the_answer_of_its_job(client: TestClient) -> None
     waiting = {"Prefer": 'foo; bar="x", Respond-Async, wait=100'}
     answer = client.post("/optimize", json=move(), headers=waiting)
     assert (answer.status_code, answer.headers["preference-applied"]) == (200, "wait=100")
-    OptimizeResponse.model_validate_json(answer.content)
+    model_of(OptimizeAnswer).model_validate_json(answer.content)
     job = shown(client, answer.headers["location"])
     assert client.get(job["requests"][0]["answer"]).json()["answer"] == answer.json()
     answer = client.post("/optimize", json=TOO_SHORT["optimize"], headers=waiting)

@@ -10,7 +10,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.routes.large_bodies import LARGE
-from joulepath.app.schemas.examples import BODY_EXAMPLES
+from joulepath.app.schemas.examples.bodies import BODY_EXAMPLES
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.tasks.read_body import HeldBody, ReadBodyTask, held
 from tests.app.requests import AMPLE, HOME, move

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath.app.schemas.response import OptimizeResponse
-from joulepath.optimizer.solution import Certificate
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.optimize.task import OptimizeAnswer
+from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
 from tests.app.requests import EXAMPLES, move
 from tests.selection import long_but
@@ -30,7 +31,7 @@ def asked_and_answered(request: pytest.FixtureRequest, client: TestClient) -> tu
     assert answer.status_code == 200, answer.text
     assert answer.headers["content-type"] == "application/json"
     # strict, nothing missing, nothing more: the schema is the answer's
-    OptimizeResponse.model_validate_json(answer.content)
+    model_of(OptimizeAnswer).model_validate_json(answer.content)
     content: dict[str, Any] = answer.json()
     assert content["request"] == request.param and content["answer"] == f"/answers/{content['id']}"
     return asked, content

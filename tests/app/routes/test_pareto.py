@@ -10,9 +10,10 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.schemas.examples.pareto import PARETO_EXAMPLES
 from joulepath.app.schemas.pareto import ParetoResponse
-from joulepath.app.schemas.response import OptimizeResponse
 from tests.app.requests import move
 
 # enough for every point on a busy machine
@@ -51,7 +52,7 @@ def test_every_point_refers_to_its_answer(
     for point in front["points"]:
         kept = client.get(point["answer"]).json()
         assert kept["kind"] == "optimize"
-        answer = OptimizeResponse.model_validate(kept["answer"]).model_dump(exclude_unset=True)
+        answer = model_of(OptimizeAnswer).model_validate(kept["answer"]).model_dump(exclude_unset=True)
         energy = answer["energy"]
         assert (point["duration"], point["status"]) == (answer["duration"], answer["status"])
         assert point["electrical"] == energy["electrical"]["total"]

@@ -7,8 +7,9 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.schemas.errors import UnreachableTargets
-from joulepath.app.schemas.response import OptimizeResponse
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_validation import POSE, refused
 from tests.selection import long_but
@@ -20,7 +21,7 @@ def test_says_which_target_it_took(client: TestClient) -> None:
     goal = {"any_of": [FAR, {"pose": POSE}, {"q": NEAR}]}
     answer = client.post("/optimize", json=move(goal=goal, candidates="all"))
     assert answer.status_code == 200, answer.text
-    OptimizeResponse.model_validate_json(answer.content)
+    model_of(OptimizeAnswer).model_validate_json(answer.content)
     content = answer.json()
     assert (content["branch"]["start"]["target"], content["branch"]["goal"]["target"]) == (0, 2)
     assert content["branch"]["goal"]["q"] == NEAR
@@ -62,7 +63,7 @@ ORIENTATIONS: list[Any] = [
 def test_chooses_the_orientation(client: TestClient, orientation: Any) -> None:
     answer = client.post("/optimize", json=move(goal=loose(orientation)))
     assert answer.status_code == 200, answer.text
-    OptimizeResponse.model_validate_json(answer.content)
+    model_of(OptimizeAnswer).model_validate_json(answer.content)
     content = answer.json()
     assert content["status"] == "feasible"
     assert content["certificate"]["goal_error"]["position"] < 1e-6

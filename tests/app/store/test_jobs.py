@@ -11,8 +11,9 @@ import pytest
 from sqlalchemy import func, select
 
 from joulepath.app.access.client import OPERATOR
+from joulepath.app.answers.envelope import AnswerFigures
 from joulepath.app.convert.packed import packed, unpacked
-from joulepath.app.engine.result import AnswerFigures, StoredAnswer
+from joulepath.app.engine.result import StoredAnswer
 from joulepath.app.exceptions import JobNotCancellable, KeyReused, TooManyWaiting, UnknownAnswer, UnknownJob
 from joulepath.app.store import answers, job_events, jobs, leases
 from joulepath.app.store.jobs import NewJob, NewRequest

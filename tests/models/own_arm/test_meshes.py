@@ -22,8 +22,8 @@ from joulepath.models.own_arm.mesh_files import corners, in_folder, in_zip
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, LinkCapsule
 from joulepath.models.uploads.limits import LIMITS
+from tests.mesh_folders import meshes as arm_folder
 from tests.models.own_arm.arms import RICH, RICH_ARM, robot
-from tests.models.test_capsule_cover import meshes as arm_folder
 from tests.selection import long_but
 
 NAMED = RICH.replace('"forearm.stl"', '"package://cell/meshes/forearm.stl" scale="0.001 0.001 0.001"')

@@ -20,8 +20,8 @@ from joulepath.models.trust import energy_trust
 from joulepath.models.urdf import urdf_of
 from joulepath.optimizer.collision.model import collision_model
 from joulepath.optimizer.kinematics.ur_closed_form import URClosedForm
+from tests.mesh_folders import meshes as arm_folder
 from tests.models.own_arm.arms import AMPLE, HELD, PLAIN, RICH, RICH_ARM, refused, robot, whole
-from tests.models.test_capsule_cover import meshes as arm_folder
 
 # lengths of about 1 m and torques of some 100 N·m, both by sums of a hundred products
 EXACT, TORQUE = 1e-14, 1e-11

@@ -14,7 +14,7 @@ from joulepath.models.robot import Array
 from joulepath.models.uploads.limits import UnreadableFile
 from joulepath.models.uploads.mesh import read_mesh
 from joulepath.models.uploads.mesh_text import MeshSize
-from tests.models.test_capsule_cover import meshes as arm_folder
+from tests.mesh_folders import meshes as arm_folder
 
 SQUARE = """#
 o a

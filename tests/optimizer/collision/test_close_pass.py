@@ -15,7 +15,7 @@ from joulepath.optimizer.evaluate.evaluate import evaluate
 from joulepath.optimizer.evaluate.recording import Waypoints
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
-from joulepath.optimizer.solution import Clearance
+from joulepath.optimizer.result.certificate import Clearance
 from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.cells import at
 from tests.optimizer.moves import ROBOT

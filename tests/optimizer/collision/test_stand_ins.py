@@ -16,7 +16,7 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import Attachment, Box, HalfSpace, Mesh, Obstacle, Scene, Sphere, capsule_between
-from joulepath.optimizer.solution import Clearance
+from joulepath.optimizer.result.certificate import Clearance
 from tests.optimizer.cells import at
 from tests.optimizer.moves import AMPLE, HOME, ROBOT
 

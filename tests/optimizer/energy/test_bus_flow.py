@@ -19,8 +19,8 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Inverter, Payload
 from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.lower_bound import lower_bounds
-from joulepath.optimizer.solution import Solution
 from joulepath.optimizer.trajectories.spline import sample
 from tests.optimizer.energy.kernel_states import left_out
 from tests.optimizer.moves import ROBOT, limits, problem

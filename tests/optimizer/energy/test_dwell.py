@@ -18,7 +18,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.dwell import Dwell
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 from tests.optimizer.moves import ROBOT, fixed, problem
 from tests.selection import long_but
 

@@ -27,8 +27,8 @@ from joulepath.optimizer.problem.arm import Inverter
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.result.energy import Sensitivity
 from joulepath.optimizer.search.baselines import guesses
-from joulepath.optimizer.solution import Sensitivity
 from joulepath.optimizer.trajectories.spline import Spline, fine_samples
 from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, problem, torques

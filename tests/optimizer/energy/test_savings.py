@@ -7,7 +7,7 @@ import pytest
 
 from joulepath.models.uncertainty.parameters import count
 from joulepath.optimizer.energy.interval import Known, saving_interval, saving_intervals
-from joulepath.optimizer.solution import Sensitivity
+from joulepath.optimizer.result.energy import Sensitivity
 from tests.optimizer.moves import problem
 
 

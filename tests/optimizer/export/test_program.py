@@ -20,7 +20,7 @@ from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.stops import Stop
-from joulepath.optimizer.solution import Trajectory
+from joulepath.optimizer.result.solution import Trajectory
 from joulepath.optimizer.trajectories.spline import Spline, retimed
 from joulepath.optimizer.trajectories.through_samples import spline_through
 from tests.optimizer.export.programs import cycle_with_payload

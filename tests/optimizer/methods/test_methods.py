@@ -21,9 +21,9 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.problem import MethodName
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.candidates import bound, pairs
 from joulepath.optimizer.search.ends import ends
-from joulepath.optimizer.solution import Solution
 from joulepath.optimizer.trajectories.ruckig_motion import time_optimal_spline
 from tests.optimizer.clocks import LAST_READINGS, CountingClock
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, fixed, limits, problem, random_moves, tcp_pose

@@ -17,8 +17,8 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.solution import Solution
 from joulepath.optimizer.trajectories.joined import joined
 from joulepath.optimizer.trajectories.spline import Spline
 from tests.optimizer.moves import AMPLE, GOAL, START, fixed, problem

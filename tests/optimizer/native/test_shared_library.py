@@ -74,7 +74,7 @@ def test_a_clone_that_was_not_set_up_cannot_be_imported(tmp_path: Path) -> None:
     for package in {library.partition(".")[0], load_robot.__module__.partition(".")[0]}:
         spec = find_spec(package)
         assert spec is not None and spec.submodule_search_locations
-        ignored = shutil.ignore_patterns("*.so", "__pycache__")
+        ignored = shutil.ignore_patterns(build.LIBRARY.name, "__pycache__")
         shutil.copytree(spec.submodule_search_locations[0], tmp_path / package, ignore=ignored)
 
     def run(*command: str) -> subprocess.CompletedProcess[str]:

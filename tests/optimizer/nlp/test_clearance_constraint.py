@@ -22,7 +22,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
 from joulepath.optimizer.problem.tool_cone import ToolCone
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.trajectories.spline import sample
 from tests.optimizer.moves import fixed, problem_with
 

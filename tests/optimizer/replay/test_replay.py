@@ -24,7 +24,7 @@ from joulepath.optimizer.replay.from_solution import planned_motion
 from joulepath.optimizer.replay.planned import PlannedMotion, PlannedTorques
 from joulepath.optimizer.replay.reference import MOST_STEPS, course_of
 from joulepath.optimizer.replay.replay import Replay, replay
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.trajectories.spline import Spline
 from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.clocks import CountingClock

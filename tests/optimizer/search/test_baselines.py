@@ -16,6 +16,7 @@ from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.result.solution import Baseline
 from joulepath.optimizer.search.baselines import (
     Broken,
     baselines,
@@ -25,7 +26,6 @@ from joulepath.optimizer.search.baselines import (
     nearest,
     saving,
 )
-from joulepath.optimizer.solution import Baseline
 from joulepath.optimizer.trajectories.ruckig_motion import time_optimal
 from joulepath.optimizer.trajectories.time_scalings import SampledMotion, controller_default, quintic, trapezoid
 from tests.optimizer.moves import problem_with

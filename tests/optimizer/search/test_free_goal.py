@@ -28,11 +28,11 @@ from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.free_goal import goal_constraints
 from joulepath.optimizer.search.reserve import RESERVE
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sampled_ends import BATCH
-from joulepath.optimizer.solution import Solution
 from joulepath.optimizer.trajectories import bspline
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
 from tests.optimizer.moves import GOAL, HOME, PAYLOAD, ROBOT, START, TILTED, fixed, paper_poses, problem, tcp_pose

@@ -18,9 +18,9 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
+from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.search.baselines import guesses, motion_energy
 from joulepath.optimizer.search.lower_bound import lower_bounds, priced_bounds
-from joulepath.optimizer.solution import Energy
 from joulepath.optimizer.trajectories import bspline
 from joulepath.optimizer.trajectories.bspline import DEGREE
 from joulepath.optimizer.trajectories.quadrature import quadrature

@@ -17,10 +17,11 @@ from joulepath.optimizer.methods.method import Method, SolveResult, SolveStatus
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import MethodName
+from joulepath.optimizer.result.certificate import Certificate
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search import refinement
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.solution import Certificate, Solution
 from joulepath.optimizer.trajectories.spline import Spline, lasting
 from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.clocks import CountingClock, still

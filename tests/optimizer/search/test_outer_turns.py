@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import FULL_TURN, Candidate, Reason
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.outer_turns import FAMILIES, MEMBERS, NEAR, explore_families, families_of
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.solution import CandidateStatus
 from tests.optimizer.moves import GOAL, fixed, problem, tcp_pose
 
 DURATION = 3.0

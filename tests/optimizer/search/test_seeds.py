@@ -18,9 +18,9 @@ from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.seeds import MOST_ESTIMATED, MOST_SEEDS, NEAR, activate_seeds, estimates
-from joulepath.optimizer.solution import CandidateStatus
 from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 
 # s: no search comes near it, however busy the machine

@@ -16,7 +16,7 @@ from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.targets import AnyOf
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 from tests.optimizer.moves import ROBOT, problem, tcp_pose
 from tests.selection import long_but
 

@@ -12,7 +12,7 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.solution import Solution
+from joulepath.optimizer.result.solution import Solution
 from tests.optimizer.moves import PAYLOAD, ROBOT, START, fixed, limits, problem, random_moves, tcp_pose
 from tests.selection import long_but
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.optimize.task import OptimizeAnswer, OptimizeTask
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import (
@@ -20,9 +22,7 @@ from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
 from joulepath.app.routes.reply import BY_EVENTS, ServiceReply
 from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.app.schemas.response import OptimizeResponse
 from joulepath.app.store.store_answers import keep_answer
-from joulepath.app.tasks.optimize import OptimizeTask
 from joulepath.optimizer.progress import Tell, nobody
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
@@ -31,7 +31,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 @router.post(
     "/optimize",
     summary="The motion of least energy",
-    response_model=OptimizeResponse,
+    response_model=model_of(OptimizeAnswer),
     responses={
         200: {"content": BY_EVENTS, "headers": CACHED_HEADERS},
         **ACCEPTED,

@@ -1,0 +1,176 @@
+"""Answers from what classes declare: their JSON for orjson, their pydantic models for OpenAPI.
+
+A declared class is a dataclass, a NamedTuple or a TypedDict. Its fields have types with the markers of
+`joulepath.optimizer.declared`, and their meaning as the text below them. Nothing else reads these markers.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+import sys
+import types
+from collections.abc import Callable, Iterator
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import cache
+from operator import attrgetter
+from typing import Annotated, Any, Literal, NotRequired, Union, get_args, get_origin, get_type_hints, is_typeddict
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, create_model
+from pydantic_core import CoreSchema
+
+from joulepath.optimizer.declared import Axes, Internal, Keys, NotEmpty, NullIfInfinite, Unit
+
+_STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+
+def as_json(value: Any) -> Any:
+    """What orjson cannot encode by itself: declared classes, and arrays that are not in C order."""
+    if isinstance(value, np.ndarray):
+        return np.ascontiguousarray(value)
+    kind: type = type(value)
+    return _reader(kind)(value)
+
+
+@cache
+def _reader(kind: type) -> Callable[[Any], dict[str, Any]]:
+    names = shown_fields(kind)
+    if len(names) == 1:
+        (name,) = names
+        return lambda value: {name: getattr(value, name)}
+    get = attrgetter(*names)
+    return lambda value: dict(zip(names, get(value), strict=True))
+
+
+@cache
+def shown_fields(kind: type) -> tuple[str, ...]:
+    """Names of the fields of a declared class that answers show, in their order."""
+    if not _is_declared(kind):
+        raise TypeError(f"{kind.__name__} declares no fields")
+    hints = _hints(kind)
+    return tuple(name for name in _names(kind) if Internal not in _markers(hints[name]))
+
+
+@cache
+def model_of(kind: type) -> type[BaseModel]:
+    """The pydantic model of a declared class: its schema, and the check of a JSON document in tests."""
+    hints, texts = _hints(kind), texts_of(kind)
+    own: dict[str, Any] = {}
+    for name in shown_fields(kind):
+        if name not in texts:
+            raise TypeError(f"{kind.__name__}.{name} has no text below it")
+        own[name] = (_type(hints[name]), _field(hints[name], texts[name]))
+    return create_model(kind.__name__, __config__=_STRICT, __doc__=kind.__doc__, **own)
+
+
+class Shown:
+    """Marks a declared class in a pydantic model: `Annotated[Energy, Shown]`."""
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """The schema of the class's model."""
+        return handler(model_of(source))
+
+
+def with_unit(text: str, unit: str | None) -> str:
+    """A description with its unit after the noun: at the end of the first clause. None: no unit, "1": a plain
+    number."""
+    return text if unit in (None, "1") else re.sub(r"(?=[.;:](\s|$))", f" [{unit}]", text, count=1)
+
+
+def texts_of(kind: type) -> dict[str, str]:
+    """The meaning of every field of a class: the text below it, in the class itself or in one that it extends."""
+    found: dict[str, str] = {}
+    for each in reversed(kind.__mro__):
+        found |= _texts(each.__module__).get(each.__qualname__, {})
+    return found
+
+
+@cache
+def _texts(module: str) -> dict[str, dict[str, str]]:
+    """The texts below the fields of every class of a module; none for one that has no source."""
+    try:
+        tree = ast.parse(inspect.getsource(sys.modules[module]))
+    except (OSError, TypeError):
+        return {}
+    return {node.name: dict(_below_fields(node)) for node in tree.body if isinstance(node, ast.ClassDef)}
+
+
+def _below_fields(node: ast.ClassDef) -> Iterator[tuple[str, str]]:
+    for field, text in zip(node.body, node.body[1:], strict=False):
+        match field, text:
+            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(words))):
+                yield name, " ".join(words.split())
+
+
+def _is_declared(kind: Any) -> bool:
+    return isinstance(kind, type) and (is_dataclass(kind) or hasattr(kind, "_fields") or is_typeddict(kind))
+
+
+def _names(kind: Any) -> tuple[str, ...]:
+    if is_dataclass(kind):
+        return tuple(field.name for field in fields(kind))
+    return tuple(kind._fields if hasattr(kind, "_fields") else kind.__annotations__)
+
+
+@cache
+def _hints(kind: type) -> dict[str, Any]:
+    return get_type_hints(kind, include_extras=True)
+
+
+def _markers(hint: Any) -> tuple[Any, ...]:
+    """The markers of a type, and of the alternatives of a union: `Joules | None` is in joules."""
+    origin = get_origin(hint)
+    if origin is Annotated:
+        return (*hint.__metadata__, *_markers(hint.__origin__))
+    if origin in (Union, types.UnionType, NotRequired):
+        return tuple(marker for option in get_args(hint) for marker in _markers(option))
+    return ()
+
+
+def _field(hint: Any, text: str) -> Any:
+    others: dict[str, Any] = {}
+    units = [marker.symbol for marker in _markers(hint) if isinstance(marker, Unit)]
+    unit = units[0] if units else None
+    if NotEmpty in _markers(hint):
+        others["min_length"] = 1
+    if get_origin(hint) is NotRequired:
+        # a factory: a default would be in the schema
+        others["default_factory"] = float
+    extra: dict[str, Any] = {} if unit is None else {"x-unit": unit}
+    return Field(description=with_unit(text, unit), json_schema_extra=extra, **others)
+
+
+def _type(hint: Any) -> Any:
+    """The type of a field in a pydantic model: what its JSON is."""
+    origin, args = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        return _annotated(args[0], args[1:])
+    if origin is NotRequired:
+        return _type(args[0])
+    if origin in (Union, types.UnionType):
+        return Union[tuple(_type(option) for option in args)]  # noqa: UP007 - their number is not known here
+    if origin is tuple:
+        # fixed in length here, a plain list in JSON
+        return list[_type(args[0])]  # type: ignore[misc]
+    if origin is list:
+        return list[_type(args[0])]  # type: ignore[misc]
+    if origin is dict:
+        return dict[args[0], _type(args[1])]  # type: ignore[misc,valid-type]
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return Literal[tuple(member.value for member in hint)]
+    return model_of(hint) if _is_declared(hint) else hint
+
+
+def _annotated(inner: Any, markers: tuple[Any, ...]) -> Any:
+    axes = [name for marker in markers if isinstance(marker, Axes) for name in marker.names]
+    keys = [marker.of for marker in markers if isinstance(marker, Keys)]
+    found: Any = model_of(keys[0]) if keys else float if axes else _type(inner)
+    if NullIfInfinite in markers:
+        found = found | None
+    for _ in axes:
+        found = list[found]
+    return found

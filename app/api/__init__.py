@@ -1,0 +1,1 @@
+"""One folder per endpoint: what it answers, the task of a worker, and the route."""

@@ -1,0 +1,1 @@
+"""`POST /optimize`: the motion of least energy."""

@@ -1,0 +1,46 @@
+"""Examples of requests and answers, from the files in the folder `examples` of the repository.
+
+`examples/openapi/<path>.json` has an answer, and lists the requests that the OpenAPI document shows, by the names of
+their files in `examples/<path>`, each with its summary and description.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+Example = dict[str, Any]
+"""Summary, description and value, as in an OpenAPI document."""
+_MEDIA_TYPES = {".json": "application/json", ".csv": "text/csv"}
+
+
+@cache
+def folder() -> Path:
+    """The folder of the examples: the copy in the wheel, or that of the repository."""
+    app = Path(__file__).resolve().parents[2]
+    installed = app / "static" / "examples"
+    return installed if installed.is_dir() else app.parent / "examples"
+
+
+@cache
+def shown() -> dict[str, dict[str, Any]]:
+    """What `examples/openapi` has, by the path of the endpoint."""
+    listed = folder() / "openapi"
+    return {
+        f"/{file.relative_to(listed).with_suffix('').as_posix()}": json.loads(file.read_text(encoding="utf-8"))
+        for file in sorted(listed.rglob("*.json"))
+    }
+
+
+@cache
+def body_examples(path: str) -> dict[str, dict[str, Example]]:
+    """Examples of the body of a path: by media type, then by name."""
+    found: dict[str, dict[str, Example]] = {}
+    for name, words in shown()[path]["requests"].items():
+        file = folder() / path[1:] / name
+        text = file.read_text(encoding="utf-8")
+        value = json.loads(text) if file.suffix == ".json" else text
+        found.setdefault(_MEDIA_TYPES[file.suffix], {})[file.stem] = {**words, "value": value}
+    return found

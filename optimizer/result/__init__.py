@@ -1,0 +1,1 @@
+"""What a search answers, as frozen data; every field declares its unit and meaning."""

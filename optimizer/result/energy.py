@@ -1,0 +1,162 @@
+"""The energy of a motion, its parts, and how well it is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.declared import Joules, PerJoint, Ratio, Unit, Watts
+
+# what is minimised: energy drawn from the supply, or mechanical work
+Objective = Literal["electrical", "mechanical"]
+
+JointJoules = Annotated[PerJoint, Unit("J")]
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """How an electrical energy depends on the figures of the arm: its `gradient` (p,) in the order of
+    `joulepath.models.uncertainty.parameters`, and by how much the mean over their errors is above the energy itself
+    [J]."""
+
+    gradient: Array
+    shift: float
+
+    def __add__(self, other: Sensitivity) -> Sensitivity:
+        return Sensitivity(self.gradient + other.gradient, self.shift + other.shift)
+
+
+@dataclass(frozen=True)
+class EnergyInterval:
+    """How well the energy is known, from the errors that the figures of the arm may have."""
+
+    p5: Joules
+    """The energy is above this with 95 % probability."""
+    p95: Joules
+    """The energy is below this with 95 % probability."""
+    sd: Joules
+    """Standard deviation."""
+    shares: Annotated[dict[str, float], Unit("1")]
+    """Share of the variance by its source; they add up to 1. A figure of the arm: the greatest
+    share is the one to measure. `session`: friction differs from day to day. `move`: what the
+    model cannot express of a motion."""
+
+
+@dataclass(frozen=True)
+class SavingInterval:
+    """How well a saving is known. Both motions share the errors of the figures."""
+
+    p5: Ratio
+    """The saving is above this with 95 % probability."""
+    p95: Ratio
+    """The saving is below this with 95 % probability."""
+    sd: Ratio
+    """Standard deviation."""
+
+
+@dataclass(frozen=True)
+class ElectricalEnergy:
+    """Energy drawn from the supply. All other fields but `interval` are its parts and add up to `total`."""
+
+    total: Joules
+    """Energy drawn from the supply, including the wait until the end of the dwell. With energy
+    storage on the bus, plus the decrease of its charge (negative if the charge increased)."""
+    idle: Joules
+    """Power of the electronics times the duration."""
+    potential: Joules
+    """Gain of potential energy from start to goal; negative on the way down."""
+    kinetic: Joules
+    """Gain of kinetic energy; zero from standstill to standstill."""
+    friction: Joules
+    """Friction loss in the joints."""
+    copper: Joules
+    """Copper loss in the motor windings."""
+    inverter: Joules
+    """Loss in the inverters."""
+    braking: Joules
+    """Regenerated energy that no joint uses and no energy storage takes."""
+    recovered: Joules
+    """The part of `braking` that the supply takes back; zero or negative. The brake resistor
+    dissipates the sum of the two."""
+    storage_loss: Joules = 0.0
+    """Loss in the energy storage on the bus."""
+    dwell: Joules = 0.0
+    """Energy drawn while the arm waits at the goal until the end of the dwell."""
+    interval: EnergyInterval | None = None
+    """How well the total is known. Null for a part of a motion, and in answers stored by an earlier
+    version."""
+
+    @property
+    def parts_sum(self) -> float:
+        """Sum of the parts [J]: equal to `total` up to quadrature."""
+        return (
+            self.idle + self.potential + self.kinetic + self.friction
+            + self.copper + self.inverter + self.braking + self.recovered + self.storage_loss + self.dwell
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class MechanicalEnergy:
+    """Mechanical work of the joints, in absolute value and without friction."""
+
+    total: Joules
+    """∫ Σ_j |tau_j v_j| dt."""
+    per_joint: JointJoules
+    """∫ |tau_j v_j| dt of each joint j."""
+
+
+@dataclass(frozen=True)
+class JointEnergy:
+    """Energies per joint, in the order from base to flange."""
+
+    friction: JointJoules
+    """Friction loss, per joint."""
+    copper: JointJoules
+    """Copper loss in the motor windings, per joint."""
+    inverter: JointJoules
+    """Loss in the inverter, per joint."""
+    shaft: JointJoules
+    """Work of the motor at the joint, ∫ tau_motor · v dt, per joint; negative if the joint drives the
+    motor."""
+
+
+@dataclass(frozen=True)
+class StorageUse:
+    """The energy storage on the bus during the motion."""
+
+    initial: Joules
+    """Charge at the start."""
+    final: Joules
+    """Charge at the end."""
+    charged: Joules
+    """Energy taken from the bus."""
+    discharged: Joules
+    """Energy delivered to the bus."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Energy:
+    """Energy and power of a motion, or of a part of it."""
+
+    electrical: ElectricalEnergy
+    """Energy drawn from the supply, and its parts."""
+    mechanical: MechanicalEnergy
+    """Mechanical work."""
+    per_joint: JointEnergy
+    """Losses and shaft work per joint."""
+    storage: StorageUse | None = None
+    """The energy storage on the bus; null without one."""
+    peak_power: Watts
+    """Largest power drawn from the supply during the motion."""
+    mean_power: Watts
+    """Mean power drawn from the supply during the motion."""
+
+    def of(self, objective: Objective) -> float:
+        """The part of the energy that an objective minimises [J]."""
+        return self.electrical.total if objective == "electrical" else self.mechanical.total
+
+    def with_dwell(self, dwell: float) -> Energy:
+        """The same with energy [J] drawn while the arm waits afterwards."""
+        electrical = self.electrical
+        return replace(self, electrical=replace(electrical, total=electrical.total + dwell, dwell=dwell))
