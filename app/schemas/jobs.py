@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Tag
 
+from joulepath.app.api.compare.task import CompareRequest
 from joulepath.app.schemas.common import Request, Response, by_field, described, part
-from joulepath.app.schemas.compare import CompareRequest
 from joulepath.app.schemas.cycle import CycleRequest
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.examples.values import ANSWER_PATH, CREATED, EVALUATE, JOB_ID, OPTIMIZE

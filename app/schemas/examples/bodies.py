@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from joulepath.app.schemas.examples.compare import COMPARE_EXAMPLES
 from joulepath.app.schemas.examples.excitation import EXCITATION_EXAMPLES
 from joulepath.app.schemas.examples.export import EXPORT_EXAMPLES
 from joulepath.app.schemas.examples.figures import FIGURES_EXAMPLES
@@ -20,7 +19,6 @@ from joulepath.app.schemas.examples.whatif import WHATIF_EXAMPLES
 JSON, CSV = "application/json", "text/csv"
 BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     **{path: body_examples(path) for path in shown()},
-    "/compare": {JSON: COMPARE_EXAMPLES},
     "/pareto": {JSON: PARETO_EXAMPLES},
     "/whatif": {JSON: WHATIF_EXAMPLES},
     "/export/{format}": {JSON: EXPORT_EXAMPLES},

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.compare.task import CompareAnswer, CompareRequest, CompareTask
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from joulepath.app.routes.large_bodies import LargeBodyRoute
@@ -12,8 +14,6 @@ from joulepath.app.routes.parameters import deadline_of
 from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
 from joulepath.app.routes.reply import BY_EVENTS, ServiceReply
 from joulepath.app.schemas import errors as problems
-from joulepath.app.schemas.compare import CompareRequest, CompareResponse
-from joulepath.app.tasks.compare import CompareTask
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
@@ -21,7 +21,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 @router.post(
     "/compare",
     summary="The same motion by several methods",
-    response_model=CompareResponse,
+    response_model=model_of(CompareAnswer),
     responses={200: {"content": BY_EVENTS}, **ACCEPTED, **problem_responses(*MOTION_PROBLEMS, problems.KeyReused)},
 )
 async def compare(
