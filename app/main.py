@@ -15,6 +15,7 @@ from joulepath.app.access.key_ring import KeyRing
 from joulepath.app.access.start import key_ring
 from joulepath.app.api.compare import route as compare
 from joulepath.app.api.optimize import route as optimize
+from joulepath.app.api.pareto import route as pareto
 from joulepath.app.cluster.link import Cluster
 from joulepath.app.engine.pool import Engine
 from joulepath.app.engine.warm_up import warm
@@ -44,7 +45,6 @@ from joulepath.app.routes import (
     jobs,
     logs,
     metrics,
-    pareto,
     problems,
     replay,
     robots,

@@ -1,4 +1,4 @@
-"""What `POST /compare` takes and answers, and its work in a worker: the methods one after another."""
+"""What `POST /compare` takes and answers, and its work in a worker."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from joulepath.optimizer.compare import Compared, Comparison, compare
 from joulepath.optimizer.declared import Count, Joules, NotEmpty, Ratio, Seconds
 from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.result.energy import Objective
-from joulepath.optimizer.result.solution import Baseline
+from joulepath.optimizer.result.solution import Baseline, Solution
 
 ALL: list[MethodName] = list(get_args(MethodName))
 
@@ -36,8 +36,8 @@ def _different(methods: list[MethodName]) -> list[MethodName]:
 
 
 class CompareRequest(MotionRequest):
-    """A motion from standstill at `start` to standstill at `goal`, by several methods. `deadline` is for all methods
-    together."""
+    """A motion from standstill at `start` to standstill at `goal`, by several methods. `deadline` is
+    for all methods together."""
 
     methods: Annotated[list[MethodName], Field(min_length=1), AfterValidator(_different)] = described(
         "Methods to compare, each once; the rows of the answer keep this order.",
@@ -58,8 +58,8 @@ class CompareRequest(MotionRequest):
 
 @dataclass(frozen=True, kw_only=True)
 class MethodResult:
-    """Result of one method. If it found no motion, `problem` has the error, and all other fields except `method` are
-    null."""
+    """Result of one method. If it found no motion, `problem` has the error, and all other fields
+    except `method` are null."""
 
     method: MethodName
     """The method."""
@@ -112,14 +112,18 @@ class CompareAnswer(Answer):
 class CompareTask:
     """A validated request and its id.
 
-    One worker runs all methods. A comparison therefore takes one place in the queue, and its times are of one core.
+    One worker runs all methods, one after another. A comparison therefore takes one place in the
+    queue, and its times are of one core.
     """
 
     request: CompareRequest
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """The table, within about `deadline` seconds. If no method finds a motion, raises the error of the first."""
+        """The table, within about `deadline` seconds.
+
+        Raises the error of the first method if none finds a motion.
+        """
         problem = to_problem(self.request.by(self.request.methods[0]), deadline)
         found = compare(problem, self.request.methods, tell=listener())
         answer = CompareAnswer(
@@ -138,12 +142,13 @@ class CompareTask:
             if each.error is None:
                 yield self._row(found, each)
             else:
-                yield MethodResult(method=each.method, problem=problem_content(each.error, self.request_id))
+                problem = problem_content(each.error, self.request_id)
+                yield MethodResult(method=each.method, problem=problem)
 
     def _row(self, found: Comparison, each: Compared) -> MethodResult:
         """The row of a method that found a motion."""
         assert each.solution is not None
-        solution, asked = certified(each.solution), self.request.by(each.method)
+        solution = certified(each.solution)
         return MethodResult(
             method=each.method,
             status=solution.status,
@@ -157,7 +162,10 @@ class CompareTask:
             nlp_solves=solution.solver.nlp_solves,
             valid=solution.certificate.valid,
             worst_ratio=max(solution.certificate.worst_ratio.values()),
-            answer=OptimizeAnswer.of(asked, self.request_id, solution, arm_fields(asked))
-            if self.request.answers
-            else None,
+            answer=self._whole(each.method, solution) if self.request.answers else None,
         )
+
+    def _whole(self, method: MethodName, solution: Solution) -> OptimizeAnswer:
+        """The complete answer of a method."""
+        asked = self.request.by(method)
+        return OptimizeAnswer.of(asked, self.request_id, solution, arm_fields(asked))

@@ -14,6 +14,7 @@ import pytest
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.compare.task import CompareAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
+from joulepath.app.api.pareto.task import ParetoAnswer
 from joulepath.app.schemas.cycle import CycleResponse
 from joulepath.app.schemas.errors import (
     DurationTooShort,
@@ -23,7 +24,6 @@ from joulepath.app.schemas.errors import (
     Validation,
     WorkerLost,
 )
-from joulepath.app.schemas.pareto import ParetoResponse
 from tests.app.live import CLIENT, GRACE, Server, serving, until
 from tests.app.requests import HOME, NEAR, long_search, move
 
@@ -83,7 +83,7 @@ def test_the_answer_is_that_of_a_request_without_progress(one: Server) -> None:
 def test_other_paths_tell_too(one: Server) -> None:
     start, goal = {"q": HOME}, {"q": NEAR}
     front = told(one, "/pareto", move(**SHORT, points=2))
-    ParetoResponse.model_validate_json(orjson.dumps(front[-1][1]))
+    model_of(ParetoAnswer).model_validate_json(orjson.dumps(front[-1][1]))
     assert front[0] == ("candidates", {"total": 2})
     compared = told(one, "/compare", move(methods=["time_scaling", "uniform_scaling"]))
     model_of(CompareAnswer).model_validate_json(orjson.dumps(compared[-1][1]))

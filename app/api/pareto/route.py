@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.pareto.task import ParetoAnswer, ParetoRequest, ParetoTask
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
@@ -13,9 +15,7 @@ from joulepath.app.routes.parameters import WantedFormat, deadline_of
 from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
 from joulepath.app.routes.reply import BY_EVENTS, ServiceReply
 from joulepath.app.schemas import errors as problems
-from joulepath.app.schemas.pareto import ParetoRequest, ParetoResponse
 from joulepath.app.store.store_answers import store_answers
-from joulepath.app.tasks.pareto import ParetoTask
 from joulepath.optimizer.progress import Tell
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
@@ -24,7 +24,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 @router.post(
     "/pareto",
     summary="Energy over duration",
-    response_model=ParetoResponse,
+    response_model=model_of(ParetoAnswer),
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}}, **BY_EVENTS}},
         **ACCEPTED,
