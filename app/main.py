@@ -16,6 +16,7 @@ from joulepath.app.access.start import key_ring
 from joulepath.app.api.compare import route as compare
 from joulepath.app.api.optimize import route as optimize
 from joulepath.app.api.pareto import route as pareto
+from joulepath.app.api.whatif import route as whatif
 from joulepath.app.cluster.link import Cluster
 from joulepath.app.engine.pool import Engine
 from joulepath.app.engine.warm_up import warm
@@ -51,7 +52,6 @@ from joulepath.app.routes import (
     studies,
     studio,
     suggest,
-    whatif,
 )
 from joulepath.app.settings import Settings
 from joulepath.app.store.store import Store

@@ -13,12 +13,10 @@ from joulepath.app.schemas.examples.logs import LOG_EXAMPLES
 from joulepath.app.schemas.examples.own_arm import NEW_ROBOT_EXAMPLES, PUT_EXAMPLES
 from joulepath.app.schemas.examples.replay import REPLAY_EXAMPLES
 from joulepath.app.schemas.examples.studies import ITERATION_EXAMPLES, STUDY_EXAMPLES
-from joulepath.app.schemas.examples.whatif import WHATIF_EXAMPLES
 
 JSON, CSV = "application/json", "text/csv"
 BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     **{path: body_examples(path) for path in shown()},
-    "/whatif": {JSON: WHATIF_EXAMPLES},
     "/export/{format}": {JSON: EXPORT_EXAMPLES},
     "/replay": {JSON: REPLAY_EXAMPLES},
     "/ik": {JSON: IK_EXAMPLES},

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.whatif.answer import WhatifAnswer
+from joulepath.app.api.whatif.task import WhatifRequest, WhatifTask
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
@@ -13,9 +16,7 @@ from joulepath.app.routes.later import ACCEPTED, ServiceLater
 from joulepath.app.routes.parameters import deadline_of
 from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
 from joulepath.app.schemas import errors as problems
-from joulepath.app.schemas.whatif import WhatifRequest, WhatifResponse
 from joulepath.app.store.store_answers import store_answers
-from joulepath.app.tasks.whatif import WhatifTask
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
@@ -23,7 +24,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 @router.post(
     "/whatif",
     summary="The energy of a motion on a changed arm",
-    response_model=WhatifResponse,
+    response_model=model_of(WhatifAnswer),
     responses={
         **ACCEPTED,
         **problem_responses(
