@@ -18,8 +18,8 @@ class Dropped:
     energy: Joules | None
     """Energy of the motion found, of the objective; null if none was found."""
     reason: str
-    """Why it is not a point: no motion was found, a faster motion needs no more energy, or the motion
-    is the same optimum as the last point."""
+    """Why it is not a point: no motion was found, a faster motion needs no more energy, or the
+    motion is the same optimum as the last point."""
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,11 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     "/compare",
     summary="The same motion by several methods",
     response_model=model_of(CompareAnswer),
-    responses={200: {"content": BY_EVENTS}, **ACCEPTED, **problem_responses(*MOTION_PROBLEMS, problems.KeyReused)},
+    responses={
+        200: {"content": BY_EVENTS},
+        **ACCEPTED,
+        **problem_responses(*MOTION_PROBLEMS, problems.KeyReused),
+    },
 )
 async def compare(
     request: Request,
@@ -32,11 +36,13 @@ async def compare(
     later: ServiceLater,
     reply: ServiceReply,
 ) -> Response:
-    """Solves one request with several methods, one after another. The answer is a table of their energies, durations
-    and solve times; each motion is certified. A method that finds no motion has its problem in its row. If no method
-    finds a motion, the answer is the problem of the first method in the request. `Accept: text/event-stream` returns
-    events while the methods run, and then the answer."""
+    """Solves one request with several methods, one after another. The answer is a table of their
+    energies, durations and solve times; each motion is certified. A method that finds no motion has
+    its problem in its row. If no method finds a motion, the answer is the problem of the first
+    method in the request. `Accept: text/event-stream` returns events while the methods run, and
+    then the answer."""
     if later.wanted:
         return await later.respond("compare", body)
     task = CompareTask(body, request.state.id)
-    return await reply.of(lambda tell: engine.run(task, deadline_of(body, settings.max_deadline), tell))
+    deadline = deadline_of(body, settings.max_deadline)
+    return await reply.of(lambda tell: engine.run(task, deadline, tell))

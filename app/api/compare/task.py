@@ -35,18 +35,24 @@ def _different(methods: list[MethodName]) -> list[MethodName]:
     return methods
 
 
-class CompareRequest(MotionRequest):
-    """A motion from standstill at `start` to standstill at `goal`, by several methods. `deadline` is
-    for all methods together."""
+_Methods = Annotated[list[MethodName], Field(min_length=1), AfterValidator(_different)]
 
-    methods: Annotated[list[MethodName], Field(min_length=1), AfterValidator(_different)] = described(
+
+class CompareRequest(MotionRequest):
+    """A motion from standstill at `start` to standstill at `goal`, by several methods. `deadline`
+    is for all methods together."""
+
+    methods: _Methods = described(
         "Methods to compare, each once; the rows of the answer keep this order.",
         None,
         ["bspline", "lagrange"],
         default=ALL,
     )
     answers: bool = described(
-        "Whether each row contains the complete answer of `POST /optimize`.", None, False, default=False
+        "Whether each row contains the complete answer of `POST /optimize`.",
+        None,
+        False,
+        default=False,
     )
 
     def by(self, method: MethodName) -> OptimizeRequest:

@@ -8,7 +8,12 @@ from joulepath.app.answers.declared import model_of
 from joulepath.app.api.pareto.task import ParetoAnswer, ParetoRequest, ParetoTask
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from joulepath.app.routes.dependencies import (
+    ServiceArmEngine,
+    ServiceClient,
+    ServiceSettings,
+    ServiceStore,
+)
 from joulepath.app.routes.large_bodies import LargeBodyRoute
 from joulepath.app.routes.later import ACCEPTED, ServiceLater
 from joulepath.app.routes.parameters import WantedFormat, deadline_of
@@ -42,9 +47,10 @@ async def pareto(
     later: ServiceLater,
     reply: ServiceReply,
 ) -> Response:
-    """Finds the Pareto front of duration and energy over all arm configurations, from the fastest motion to the motion
-    of least energy. Each point refers to its complete answer. `Accept: text/csv` returns the points as CSV,
-    `Accept: text/event-stream` events while the search runs, and then the answer."""
+    """Finds the Pareto front of duration and energy over all arm configurations, from the fastest
+    motion to the motion of least energy. Each point refers to its complete answer.
+    `Accept: text/csv` returns the points as CSV, `Accept: text/event-stream` events while the
+    search runs, and then the answer."""
     if later.wanted:
         return await later.respond("pareto", body)
     task = ParetoTask(body, request.state.id, wanted)

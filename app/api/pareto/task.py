@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from dataclasses import dataclass
 from io import StringIO
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from joulepath.app.answers.declared import as_json, shown_fields
 from joulepath.app.answers.envelope import Answer
@@ -19,7 +19,7 @@ from joulepath.app.schemas.request import DurationRange, OptimizeRequest
 from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.app.tasks.answer_collector import AnswerCollector
 from joulepath.optimizer.declared import Joules, NotEmpty, Ratio, Seconds, Watts
-from joulepath.optimizer.pareto import pareto
+from joulepath.optimizer.pareto import LEAST_POINTS, MOST_POINTS, pareto
 from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.result.energy import Objective
 from joulepath.optimizer.result.front import Dropped, FrontSolver
@@ -29,17 +29,24 @@ from joulepath.optimizer.result.solution import Solution
 class ParetoRequest(OptimizeRequest):
     """A motion whose Pareto front of duration and energy is requested."""
 
-    points: int = described("Largest number of durations to solve.", "1", 12, default=12, ge=2, le=100)
+    points: int = described(
+        "Largest number of durations to solve.",
+        "1",
+        12,
+        default=12,
+        ge=LEAST_POINTS,
+        le=MOST_POINTS,
+    )
     duration: DurationRange | None = described(
-        "Bounds on the durations of the front. Null: from the shortest feasible duration to the duration of least "
-        "energy. The objective `mechanical` needs a `max` or a `cycle`.",
+        "Bounds on the durations of the front. Null: from the shortest feasible duration to the "
+        "duration of least energy. The objective `mechanical` needs a `max` or a `cycle`.",
         "s",
         {"max": 3.0},
         default=None,
     )
     deadline: float = described(
-        "Wall time for the whole front, including the wait for a worker. When it passes, the service returns the front "
-        "found so far.",
+        "Wall time for the whole front, including the wait for a worker. When it passes, the "
+        "service returns the front found so far.",
         "s",
         30.0,
         default=30.0,
@@ -135,7 +142,10 @@ class ParetoTask:
         asked, collector = self.request, AnswerCollector()
         front = pareto(to_problem(asked, deadline), asked.points, tell=listener())
         arm = arm_fields(asked)
-        points = [self._point(motion, collector, arm) for motion in front.points]
+        points = list[ParetoPoint]()
+        for motion in front.points:
+            path = collector.add(OptimizeAnswer.of(asked, self.request_id, motion, arm))
+            points.append(ParetoPoint.of(motion, asked.objective, path))
         if self.wanted == "csv":
             return TaskResult.of_csv(_table(points), collector.stored)
         answer = ParetoAnswer(
@@ -150,10 +160,6 @@ class ParetoTask:
             solver=front.solver,
         )
         return TaskResult.of_json(answer, collector.stored)
-
-    def _point(self, motion: Solution, collector: AnswerCollector, arm: dict[str, Any] | None) -> ParetoPoint:
-        whole = OptimizeAnswer.of(self.request, self.request_id, motion, arm)
-        return ParetoPoint.of(motion, self.request.objective, collector.add(whole))
 
 
 def _table(points: list[ParetoPoint]) -> str:

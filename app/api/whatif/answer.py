@@ -11,6 +11,8 @@ from joulepath.optimizer.energy.losses import ENERGY_FLOOR
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.energy import ElectricalEnergy, Energy, Objective
 
+Status = Literal["optimal", "feasible"]
+
 
 class Motion(Protocol):
     """A motion, optimised or given."""
@@ -120,7 +122,7 @@ class ChangedMotion:
 
     @classmethod
     def of(cls, base: Motion, energy: Energy, duration: float, **own: Any) -> Self:
-        """A motion of the changed arm. `own` are the fields of the class that are not in this one."""
+        """A motion of the changed arm. `own` are the fields that the class has beside these."""
         before = base.energy
         return cls(
             duration=DurationChange.of(base.duration, duration),
@@ -140,8 +142,8 @@ class Verdict:
     """Whether the motion is within every limit of the changed arm, collision-free, and reaches its
     targets."""
     certificate: Certificate | None
-    """Certificate of an optimised motion on the changed arm; if `holds` is false, it shows why. Null
-    for a given motion, whose limits are in `answer`."""
+    """Certificate of an optimised motion on the changed arm; if `holds` is false, it shows why.
+    Null for a given motion, whose limits are in `answer`."""
     answer: str | None
     """Path of the complete answer of `POST /evaluate` for a given motion; null for an optimised
     motion."""
@@ -158,7 +160,7 @@ class KeptMotion:
 
     answer: str
     """Path of the complete answer of `POST /optimize`."""
-    status: Literal["optimal", "feasible"]
+    status: Status
     """Status as in `POST /optimize`."""
 
 
@@ -179,9 +181,9 @@ class ChangeResult:
     """The best motion found for the changed arm; null for a given motion, or if there is none: see
     `problem`."""
     reoptimisation: Joules | None = None
-    """Energy of `reoptimised` minus energy of `same_motion`, of the objective; a negative value is a
-    saving. It is positive only if `same_motion` violates a limit, or if the deadline passed early.
-    Null if one of the two motions is missing."""
+    """Energy of `reoptimised` minus energy of `same_motion`, of the objective; a negative value is
+    a saving. It is positive only if `same_motion` violates a limit, or if the deadline passed
+    early. Null if one of the two motions is missing."""
     problem: dict[str, Any] | None = None
     """Error document that `POST /optimize` or `POST /evaluate` would return; null if there is a
     motion."""
@@ -193,10 +195,10 @@ class WhatifBase:
 
     answer: str
     """Path of the complete answer of `POST /optimize` or `POST /evaluate`."""
-    status: Literal["optimal", "feasible"] | None
+    status: Status | None
     """Status as in `POST /optimize`; null for a given motion."""
     holds: bool
-    """Whether the motion is within every limit and collision-free; an optimised motion always is."""
+    """Whether the motion is within every limit and collision-free; an optimised one always is."""
     duration: Seconds
     """Duration of the motion."""
     electrical: ElectricalEnergy
@@ -209,7 +211,7 @@ class WhatifBase:
     """Largest power drawn from the supply."""
 
     @classmethod
-    def of(cls, motion: Motion, answer: str, status: Literal["optimal", "feasible"] | None, holds: bool) -> Self:
+    def of(cls, motion: Motion, answer: str, status: Status | None, holds: bool) -> Self:
         """The base of a motion, whose complete answer is kept under the path `answer`."""
         energy = motion.energy
         return cls(
@@ -229,8 +231,8 @@ class WhatifAnswer(Answer):
     """A motion on the arm, and on changed arms."""
 
     objective: Objective | None
-    """Energy that was minimised: electrical energy drawn from the supply, or mechanical work. Null for
-    a given motion."""
+    """Energy that was minimised: electrical energy drawn from the supply, or mechanical work. Null
+    for a given motion."""
     base: WhatifBase
     """The motion on the unchanged arm."""
     changes: Annotated[list[ChangeResult], NotEmpty]

@@ -10,7 +10,12 @@ from joulepath.app.api.whatif.task import WhatifRequest, WhatifTask
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from joulepath.app.routes.dependencies import (
+    ServiceArmEngine,
+    ServiceClient,
+    ServiceSettings,
+    ServiceStore,
+)
 from joulepath.app.routes.large_bodies import LargeBodyRoute
 from joulepath.app.routes.later import ACCEPTED, ServiceLater
 from joulepath.app.routes.parameters import deadline_of
@@ -46,12 +51,14 @@ async def whatif(
     client: ServiceClient,
     later: ServiceLater,
 ) -> Response:
-    """Compares one motion on the arm as it is with the same task on changed arms: lighter links, another payload, other
-    drives or limits. Each change has two results, as differences from the base: the base's motion on the changed arm,
-    and the best motion of the changed arm. A given motion (`evaluate`) is evaluated only."""
+    """Compares one motion on the arm as it is with the same task on changed arms: lighter links,
+    another payload, other drives or limits. Each change has two results, as differences from the
+    base: the base's motion on the changed arm, and the best motion of the changed arm. A given
+    motion (`evaluate`) is evaluated only."""
     if later.wanted:
         return await later.respond("whatif", body)
     task = WhatifTask(body, request.state.id)
-    result = await unless_disconnected(request, engine.run(task, deadline_of(body, settings.max_deadline)))
+    deadline = deadline_of(body, settings.max_deadline)
+    result = await unless_disconnected(request, engine.run(task, deadline))
     kind = "evaluate" if body.optimize is None else "optimize"
     return result_response(await store_answers(store, settings, kind, result, client.owner))

@@ -11,7 +11,13 @@ from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from joulepath.app.api.optimize.task import OptimizeAnswer
-from joulepath.app.api.whatif.answer import ChangeResult, Reoptimised, SameMotion, WhatifAnswer, WhatifBase
+from joulepath.app.api.whatif.answer import (
+    ChangeResult,
+    Reoptimised,
+    SameMotion,
+    WhatifAnswer,
+    WhatifBase,
+)
 from joulepath.app.convert.arm import to_arm
 from joulepath.app.convert.arm_fields import arm_fields
 from joulepath.app.convert.evaluation import Evaluated, to_evaluate_response, to_motion
@@ -31,7 +37,12 @@ from joulepath.app.tasks.answer_collector import AnswerCollector
 from joulepath.app.tasks.certified import certified
 from joulepath.optimizer.deadline import Deadline, DeadlineShares
 from joulepath.optimizer.evaluate.evaluate import Evaluation, evaluate
-from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, InvalidTable, OutsideLimits
+from joulepath.optimizer.exceptions import (
+    DeadlineExceeded,
+    InvalidProblem,
+    InvalidTable,
+    OutsideLimits,
+)
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.names import first_repeated
@@ -51,7 +62,8 @@ def _changes_something(arm: ArmRequest) -> ArmRequest:
     if "robot" in arm.model_fields_set:
         raise PydanticCustomError("robot", "A change cannot replace the robot: leave `robot` out")
     if "figures" in arm.model_fields_set:
-        raise PydanticCustomError("figures", "A change cannot replace the robot's figures: leave `figures` out")
+        message = "A change cannot replace the robot's figures: leave `figures` out"
+        raise PydanticCustomError("figures", message)
     return arm
 
 
@@ -60,8 +72,8 @@ class Change(Request):
 
     name: Name = described("Name of the change.", None, "links of half the mass")
     arm: Annotated[ArmRequest, AfterValidator(_changes_something)] = described(
-        "Fields of the arm. Each replaces the whole field of the base. A field that is left out keeps the value of the "
-        "base.",
+        "Fields of the arm. Each replaces the whole field of the base. A field that is left out "
+        "keeps the value of the base.",
         None,
         {"link_mass_scale": 0.5},
     )
@@ -69,8 +81,16 @@ class Change(Request):
 
 def _different(changes: list[Change]) -> list[Change]:
     if first_repeated([change.name for change in changes]) is not None:
-        raise PydanticCustomError("repeated", "Give each change a different name; case and spaces make no difference")
+        message = "Give each change a different name; case and spaces make no difference"
+        raise PydanticCustomError("repeated", message)
     return changes
+
+
+_Changes = Annotated[
+    list[Change],
+    Field(min_length=1, max_length=MOST_CHANGES),
+    AfterValidator(_different),
+]
 
 
 class WhatifRequest(Request):
@@ -88,16 +108,14 @@ class WhatifRequest(Request):
         EVALUATE,
         default=None,
     )
-    changes: Annotated[list[Change], Field(min_length=1, max_length=MOST_CHANGES), AfterValidator(_different)] = (
-        described(
-            "Changes of the arm; each is made to the base alone.",
-            None,
-            [{"name": "links of half the mass", "arm": {"link_mass_scale": 0.5}}],
-        )
+    changes: _Changes = described(
+        "Changes of the arm; each is made to the base alone.",
+        None,
+        [{"name": "links of half the mass", "arm": {"link_mass_scale": 0.5}}],
     )
     deadline: float = described(
-        "Wall time for all runs together, including the wait for a worker. Each run gets an equal share of the time "
-        "that is left.",
+        "Wall time for all runs together, including the wait for a worker. Each run gets an equal "
+        "share of the time that is left.",
         "s",
         30.0,
         default=30.0,
@@ -108,7 +126,8 @@ class WhatifRequest(Request):
     @model_validator(mode="after")
     def _one_base(self) -> Self:
         if (self.optimize is None) == (self.evaluate is None):
-            raise PydanticCustomError("exactly_one", "Give exactly one of `optimize` and `evaluate`")
+            message = "Give exactly one of `optimize` and `evaluate`"
+            raise PydanticCustomError("exactly_one", message)
         return self
 
 
@@ -152,7 +171,12 @@ class _Work:
         )
         return TaskResult.of_json(answer, self.collector.stored)
 
-    def failed(self, change: Change, error: Exception, same: SameMotion | None = None) -> ChangeResult:
+    def failed(
+        self,
+        change: Change,
+        error: Exception,
+        same: SameMotion | None = None,
+    ) -> ChangeResult:
         """The entry of a change without a motion, or without a better one than the `same`."""
         problem = problem_content(error, self.request_id)
         return ChangeResult(name=change.name, same_motion=same, problem=problem)
@@ -165,7 +189,8 @@ class _Optimized(_Work):
         """The answer. Raises the error of the base, and InvalidProblem for an invalid change."""
         asked = self.request.optimize
         assert asked is not None
-        first = _located(lambda: to_problem(asked, min(asked.deadline, self.shares.next())), "optimize")
+        share = min(asked.deadline, self.shares.next())
+        first = _located(lambda: to_problem(asked, share), "optimize")
         # all of them before the first run, so that an invalid change is rejected at once
         problems = [self._problem(asked, k) for k in range(len(self.request.changes))]
         best = certified(_located(lambda: optimize(first), "optimize"))
@@ -177,11 +202,18 @@ class _Optimized(_Work):
         change = self.request.changes[k]
         try:
             left = min(asked.deadline, time_left(self.deadline))
-            return _located(lambda: to_problem(_changed(asked, change), left), f"changes.{k}.arm", change)
+            changed = _changed(asked, change)
+            return _located(lambda: to_problem(changed, left), f"changes.{k}.arm", change)
         except OutsideLimits as error:
             return error
 
-    def _row(self, asked: OptimizeRequest, k: int, base: Solution, problem: Problem | OutsideLimits) -> ChangeResult:
+    def _row(
+        self,
+        asked: OptimizeRequest,
+        k: int,
+        base: Solution,
+        problem: Problem | OutsideLimits,
+    ) -> ChangeResult:
         change, share = self.request.changes[k], self.shares.next()
         if isinstance(problem, OutsideLimits):
             return self.failed(change, problem)
@@ -193,23 +225,30 @@ class _Optimized(_Work):
             return self.failed(change, error)
         certificate = found.certificate
         same = SameMotion.of(
-            base, found.same_motion, base.duration, holds=certificate.valid, certificate=certificate, answer=None
+            base,
+            found.same_motion,
+            base.duration,
+            holds=certificate.valid,
+            certificate=certificate,
+            answer=None,
         )
         if found.reoptimised is None:
             assert found.error is not None
             return self.failed(change, _moved(found.error, f"changes.{k}.arm", change), same)
         best = certified(found.reoptimised)
         path = self._kept(_changed(asked, change), best)
+        better = Reoptimised.of(base, best.energy, best.duration, answer=path, status=best.status)
         return ChangeResult(
             name=change.name,
             same_motion=same,
-            reoptimised=Reoptimised.of(base, best.energy, best.duration, answer=path, status=best.status),
+            reoptimised=better,
             reoptimisation=best.energy.of(asked.objective) - found.same_motion.of(asked.objective),
         )
 
     def _kept(self, asked: OptimizeRequest, motion: Solution) -> str:
         """The path of the complete answer to a request."""
-        return self.collector.add(OptimizeAnswer.of(asked, self.request_id, motion, arm_fields(asked)))
+        whole = OptimizeAnswer.of(asked, self.request_id, motion, arm_fields(asked))
+        return self.collector.add(whole)
 
 
 class _Evaluated(_Work):
@@ -246,7 +285,12 @@ class _Evaluated(_Work):
             return self.failed(change, error)
         total, path = found.total, self._kept(_changed(asked, change), found)
         same = SameMotion.of(
-            base.total, total.energy, total.duration, holds=_holds(found), certificate=None, answer=path
+            base.total,
+            total.energy,
+            total.duration,
+            holds=_holds(found),
+            certificate=None,
+            answer=path,
         )
         return ChangeResult(name=change.name, same_motion=same)
 
@@ -256,7 +300,8 @@ class _Evaluated(_Work):
 
 
 def _located(work: Callable[[], T], where: str, change: Change | None = None) -> T:
-    """What `work` returns. Raises what it raises; an InvalidProblem with its field path changed by `_moved`."""
+    """What `work` returns. Raises what it raises; an InvalidProblem with its field path changed by
+    `_moved`."""
     try:
         return work()
     except InvalidProblem as error:
@@ -266,8 +311,8 @@ def _located(work: Callable[[], T], where: str, change: Change | None = None) ->
 def _moved(error: Exception, where: str, change: Change | None = None) -> Exception:
     """The error with its field path prefixed by `where`.
 
-    If the change does not set that field, the path is `where` alone. Errors about the motion, not about a field, are
-    returned unchanged.
+    If the change does not set that field, the path is `where` alone. Errors about the motion, not
+    about a field, are returned unchanged.
     """
     if not isinstance(error, InvalidProblem) or isinstance(error, OutsideLimits | InvalidTable):
         return error
@@ -277,7 +322,8 @@ def _moved(error: Exception, where: str, change: Change | None = None) -> Except
 
 def _changed(asked: R, change: Change) -> R:
     """The base's request with the fields that the change sets."""
-    return asked.model_copy(update={name: getattr(change.arm, name) for name in change.arm.model_fields_set})
+    arm = change.arm
+    return asked.model_copy(update={name: getattr(arm, name) for name in arm.model_fields_set})
 
 
 def _holds(result: Evaluation) -> bool:
