@@ -23,6 +23,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.configurations_beside import beside
 from joulepath.optimizer.cycle.cycle_baselines import compared_again
 from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleMove, CycleSolution
+from joulepath.optimizer.cycle.errors import NoSequence
 from joulepath.optimizer.cycle.known_motions import knowing, known_motions
 from joulepath.optimizer.cycle.move_problem import LEAST_TIME
 from joulepath.optimizer.cycle.successive_moves import successively_chosen
@@ -31,10 +32,9 @@ from joulepath.optimizer.exceptions import (
     DeadlineExceeded,
     InvalidProblem,
     JoulepathError,
-    NoReachableTarget,
-    NoSequence,
     NoTrajectory,
     UnreachablePose,
+    UnreachableTargets,
 )
 from joulepath.optimizer.kinematics.orientation_tolerance import nearest_orientation, sample_orientations
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -78,7 +78,7 @@ def with_free_orientations(asked: Cycle, search: Search, clock: Clock) -> CycleS
     with knowing(known_motions()):
         try:
             tried, best = _first(asked, free, search, end)
-        except NoReachableTarget as error:
+        except UnreachableTargets as error:
             raise _at_any_angle(error, [f"stops/{stop.entry}" for stop in free.values()]) from None
         compared, at_paths = best.baselines, _found_at(best, tried)
         if _is_compared_once(asked) and all(len(stop.places) == 1 for stop in asked.stops):
@@ -270,7 +270,7 @@ def _turned(pose: ConeOrientedPose, reference: Array, turn: Array) -> Pose:
     return pose.with_orientation(reference @ pin.exp3(turn))
 
 
-def _at_any_angle(error: NoReachableTarget, stops: Sequence[str]) -> JoulepathError:
+def _at_any_angle(error: UnreachableTargets, stops: Sequence[str]) -> JoulepathError:
     """The error for what is out of reach at every orientation, if it is one of the `stops`."""
     if error.target not in stops:
         return error

@@ -10,7 +10,7 @@ import numpy as np
 
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
 from joulepath.optimizer.energy.interval import Known, with_interval
-from joulepath.optimizer.exceptions import DeadlineExceeded, DurationTooShort, NoTrajectory
+from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from joulepath.optimizer.methods.method import SolveResult, SolveStatus
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.bus import Bus
@@ -26,6 +26,7 @@ from joulepath.optimizer.search.branch_and_bound import explore
 from joulepath.optimizer.search.candidates import Candidate, Reason, bound, pairs
 from joulepath.optimizer.search.claims import may_be_optimal
 from joulepath.optimizer.search.ends import ends
+from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.fastest import explore_or_find_fastest, find_fastest
 from joulepath.optimizer.search.freed_duration import start_from_free_duration
 from joulepath.optimizer.search.incumbent import Incumbent
