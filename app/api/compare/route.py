@@ -6,6 +6,7 @@ from fastapi import APIRouter, Request, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.compare.task import CompareAnswer, CompareRequest, CompareTask
+from joulepath.app.exceptions.stored import KeyReused
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from joulepath.app.routes.large_bodies import LargeBodyRoute
@@ -13,7 +14,6 @@ from joulepath.app.routes.later import ACCEPTED, ServiceLater
 from joulepath.app.routes.parameters import deadline_of
 from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
 from joulepath.app.routes.reply import BY_EVENTS, ServiceReply
-from joulepath.app.schemas import errors as problems
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
@@ -25,7 +25,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     responses={
         200: {"content": BY_EVENTS},
         **ACCEPTED,
-        **problem_responses(*MOTION_PROBLEMS, problems.KeyReused),
+        **problem_responses(*MOTION_PROBLEMS, KeyReused),
     },
 )
 async def compare(

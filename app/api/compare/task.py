@@ -16,7 +16,7 @@ from joulepath.app.convert.arm_fields import arm_fields
 from joulepath.app.convert.request import to_problem
 from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.http.problem_details import problem_content
+from joulepath.app.http.problems import problem_of
 from joulepath.app.schemas.common import described
 from joulepath.app.schemas.request import MotionRequest, OptimizeRequest
 from joulepath.app.tasks.certified import certified
@@ -148,7 +148,7 @@ class CompareTask:
             if each.error is None:
                 yield self._row(found, each)
             else:
-                problem = problem_content(each.error, self.request_id)
+                problem = problem_of(each.error, self.request_id)
                 yield MethodResult(method=each.method, problem=problem)
 
     def _row(self, found: Comparison, each: Compared) -> MethodResult:

@@ -7,6 +7,7 @@ from fastapi import APIRouter, Request, Response
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.pareto.task import ParetoAnswer, ParetoRequest, ParetoTask
 from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions.stored import KeyReused, StoreUnavailable
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import (
     ServiceArmEngine,
@@ -19,7 +20,6 @@ from joulepath.app.routes.later import ACCEPTED, ServiceLater
 from joulepath.app.routes.parameters import WantedFormat, deadline_of
 from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
 from joulepath.app.routes.reply import BY_EVENTS, ServiceReply
-from joulepath.app.schemas import errors as problems
 from joulepath.app.store.store_answers import store_answers
 from joulepath.optimizer.progress import Tell
 
@@ -33,7 +33,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}}, **BY_EVENTS}},
         **ACCEPTED,
-        **problem_responses(*MOTION_PROBLEMS, problems.StoreUnavailable, problems.KeyReused),
+        **problem_responses(*MOTION_PROBLEMS, StoreUnavailable, KeyReused),
     },
 )
 async def pareto(

@@ -25,7 +25,7 @@ from joulepath.app.convert.recorded import as_logged
 from joulepath.app.convert.request import to_problem
 from joulepath.app.convert.until import time_left, until
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.http.problem_details import problem_content
+from joulepath.app.http.problems import problem_of
 from joulepath.app.schemas.arm import ArmRequest
 from joulepath.app.schemas.common import Request, described
 from joulepath.app.schemas.evaluate import EvaluateRequest
@@ -40,7 +40,6 @@ from joulepath.optimizer.evaluate.evaluate import Evaluation, evaluate
 from joulepath.optimizer.exceptions import (
     DeadlineExceeded,
     InvalidProblem,
-    InvalidTable,
     OutsideLimits,
 )
 from joulepath.optimizer.optimize import optimize
@@ -178,7 +177,7 @@ class _Work:
         same: SameMotion | None = None,
     ) -> ChangeResult:
         """The entry of a change without a motion, or without a better one than the `same`."""
-        problem = problem_content(error, self.request_id)
+        problem = problem_of(error, self.request_id)
         return ChangeResult(name=change.name, same_motion=same, problem=problem)
 
 
@@ -311,10 +310,10 @@ def _located(work: Callable[[], T], where: str, change: Change | None = None) ->
 def _moved(error: Exception, where: str, change: Change | None = None) -> Exception:
     """The error with its field path prefixed by `where`.
 
-    If the change does not set that field, the path is `where` alone. Errors about the motion, not
-    about a field, are returned unchanged.
+    If the change does not set that field, the path is `where` alone. Other errors are returned
+    unchanged.
     """
-    if not isinstance(error, InvalidProblem) or isinstance(error, OutsideLimits | InvalidTable):
+    if not isinstance(error, InvalidProblem):
         return error
     is_set = change is None or error.field.partition(".")[0] in change.arm.model_fields_set
     return InvalidProblem(f"{where}.{error.field}" if is_set else where, str(error))
