@@ -13,7 +13,10 @@ from starlette.middleware.cors import CORSMiddleware
 from joulepath import __version__
 from joulepath.app.access.key_ring import KeyRing
 from joulepath.app.access.start import key_ring
+from joulepath.app.api.compare import route as compare
 from joulepath.app.api.optimize import route as optimize
+from joulepath.app.api.pareto import route as pareto
+from joulepath.app.api.whatif import route as whatif
 from joulepath.app.cluster.link import Cluster
 from joulepath.app.engine.pool import Engine
 from joulepath.app.engine.warm_up import warm
@@ -29,7 +32,6 @@ from joulepath.app.jobs.jobs import Jobs
 from joulepath.app.routes import (
     answers,
     cluster,
-    compare,
     cycle,
     docs,
     evaluate,
@@ -44,14 +46,12 @@ from joulepath.app.routes import (
     jobs,
     logs,
     metrics,
-    pareto,
     problems,
     replay,
     robots,
     studies,
     studio,
     suggest,
-    whatif,
 )
 from joulepath.app.settings import Settings
 from joulepath.app.store.store import Store
