@@ -13,6 +13,7 @@ from starlette.middleware.cors import CORSMiddleware
 from joulepath import __version__
 from joulepath.app.access.key_ring import KeyRing
 from joulepath.app.access.start import key_ring
+from joulepath.app.api.excitation import route as excitation
 from joulepath.app.api.optimize import route as optimize
 from joulepath.app.cluster.link import Cluster
 from joulepath.app.engine.pool import Engine
@@ -33,7 +34,6 @@ from joulepath.app.routes import (
     cycle,
     docs,
     evaluate,
-    excitation,
     export,
     figures,
     health,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from joulepath.app.schemas.examples.compare import COMPARE_EXAMPLES
-from joulepath.app.schemas.examples.excitation import EXCITATION_EXAMPLES
 from joulepath.app.schemas.examples.export import EXPORT_EXAMPLES
 from joulepath.app.schemas.examples.figures import FIGURES_EXAMPLES
 from joulepath.app.schemas.examples.files import Example, body_examples, shown
@@ -27,7 +26,6 @@ BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     "/replay": {JSON: REPLAY_EXAMPLES},
     "/ik": {JSON: IK_EXAMPLES},
     "/ik/path": {JSON: IK_PATH_EXAMPLES},
-    "/excitation": {JSON: EXCITATION_EXAMPLES},
     "/identifications": {JSON: IDENTIFY_EXAMPLES},
     "/logs": {CSV: LOG_EXAMPLES},
     "/robots": {JSON: NEW_ROBOT_EXAMPLES},

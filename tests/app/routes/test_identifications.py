@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.api.excitation.task import ExcitationRequest
 from joulepath.app.schemas import errors as problems
-from joulepath.app.schemas.excitation import ExcitationRequest
 from joulepath.app.schemas.identifications import (
     Identification,
     IdentificationList,
