@@ -13,6 +13,7 @@ from starlette.middleware.cors import CORSMiddleware
 from joulepath import __version__
 from joulepath.app.access.key_ring import KeyRing
 from joulepath.app.access.start import key_ring
+from joulepath.app.api.cycle import route as cycle
 from joulepath.app.api.excitation import route as excitation
 from joulepath.app.api.optimize import route as optimize
 from joulepath.app.cluster.link import Cluster
@@ -31,7 +32,6 @@ from joulepath.app.routes import (
     answers,
     cluster,
     compare,
-    cycle,
     docs,
     evaluate,
     export,

@@ -21,6 +21,8 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.answers.envelope import AnswerFigures
+from joulepath.app.api.cycle.request import CycleRequest
+from joulepath.app.api.cycle.task import CycleTask
 from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.engine import forkserver, pool
 from joulepath.app.engine.result import StoredAnswer, TaskResult
@@ -28,12 +30,10 @@ from joulepath.app.engine.task import Task, outcome
 from joulepath.app.engine.work import Ended, Take, Work
 from joulepath.app.main import create_app
 from joulepath.app.schemas.compare import CompareRequest
-from joulepath.app.schemas.cycle import CycleRequest
 from joulepath.app.schemas.pareto import ParetoRequest
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.settings import Settings
 from joulepath.app.tasks.compare import CompareTask
-from joulepath.app.tasks.cycle import CycleTask
 from joulepath.app.tasks.pareto import ParetoTask
 from joulepath.optimizer.deadline import Stopped
 from joulepath.optimizer.progress import Tell, nobody

@@ -10,9 +10,9 @@ from pydantic import BaseModel
 from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
+from joulepath.app.api.cycle.task import CycleAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.schemas.compare import CompareResponse
-from joulepath.app.schemas.cycle import CycleResponse
 from joulepath.app.schemas.pareto import ParetoResponse
 from tests.app.recorded import FOLDER, TASKS, record
 
@@ -20,7 +20,7 @@ SCHEMAS: dict[str, type[BaseModel]] = {
     "optimize": model_of(OptimizeAnswer),
     "compare": CompareResponse,
     "pareto": ParetoResponse,
-    "cycle": CycleResponse,
+    "cycle": model_of(CycleAnswer),
 }
 
 
