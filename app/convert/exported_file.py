@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.export import OPTIONS_OF, ExportFormat, ExportRequest
 from joulepath.optimizer.export.export import FORMATS, ExportOptions
 from joulepath.optimizer.export.ros_messages import Encoding

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Request, Response
 
+from joulepath.app.exceptions.stored import UnknownAnswer, UnknownFigures
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.http.weights import JSON, is_wanted
@@ -14,9 +15,10 @@ from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings,
 from joulepath.app.routes.kept_answers import with_kept_answers
 from joulepath.app.routes.large_bodies import LargeBodyRoute
 from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.export import FORMATS, ExportFormat, ExportRequest
 from joulepath.app.tasks.export import ExportResult, ExportTask
+from joulepath.optimizer.evaluate.errors import NotCertified
+from joulepath.optimizer.export.errors import FormatUnsuitable
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
@@ -52,10 +54,10 @@ _FILE: dict[int | str, dict[str, Any]] = {
         **_FILE,
         **problem_responses(
             *WORKER_PROBLEMS,
-            problems.UnknownFigures,
-            problems.UnknownAnswer,
-            problems.NotCertified,
-            problems.FormatUnsuitable,
+            UnknownFigures,
+            UnknownAnswer,
+            NotCertified,
+            FormatUnsuitable,
         ),
     },
 )

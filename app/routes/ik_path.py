@@ -11,9 +11,9 @@ from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from joulepath.app.routes.large_bodies import LargeBodyRoute
 from joulepath.app.routes.parameters import deadline_of
 from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.ik_path import IKPathRequest, IKPathResponse
 from joulepath.app.tasks.ik_path import IKPathTask
+from joulepath.optimizer.exceptions import OutsideLimits
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
@@ -22,7 +22,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     "/ik/path",
     summary="Configurations along a path of the TCP",
     response_model=IKPathResponse,
-    responses=problem_responses(*WORKER_PROBLEMS, problems.OutsideLimits),
+    responses=problem_responses(*WORKER_PROBLEMS, OutsideLimits),
 )
 async def follow(
     request: Request,

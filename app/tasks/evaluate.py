@@ -25,12 +25,12 @@ from joulepath.app.convert.query import query_values
 from joulepath.app.convert.recorded import as_logged, read_csv, reading_of, told_by
 from joulepath.app.convert.until import until
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.exceptions import InvalidRequest
-from joulepath.app.http.problem_details import invalid_request
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.http.problems import invalid_request
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.evaluate.evaluate import evaluate
-from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable, OutsideLimits
+from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.identify.logs.reading import LogReading
 from joulepath.optimizer.identify.logs.recorded import measured
 
@@ -74,8 +74,6 @@ class EvaluateTask:
                     motion = to_csv_motion(settings, table)
                 return Evaluated(settings, evaluate(arm, motion, settings.sample_period, end.left))
         except InvalidProblem as error:
-            if isinstance(error, InvalidTable | OutsideLimits):
-                raise  # about the motion
             raise InvalidRequest([{"loc": location(error, "query"), "msg": str(error)}]) from None
 
     def _evaluate_log(self, settings: EvaluateCsvSettings, end: Deadline, error: InvalidTable) -> Evaluated:

@@ -12,7 +12,7 @@ from joulepath.app.convert.replay import to_perturbation, to_planned_motion, to_
 from joulepath.app.convert.until import until
 from joulepath.app.convert.warnings import replay_warnings
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.http.problem_details import invalid_request
+from joulepath.app.http.problems import invalid_request
 from joulepath.app.schemas.replay import ReplayRequest
 from joulepath.app.tasks.kept_answers import WithKeptAnswers
 from joulepath.optimizer.deadline import Deadline
@@ -66,7 +66,7 @@ class ReplayTask(WithKeptAnswers):
         return TaskResult.of_json(content)
 
     def _planned(self) -> list[tuple[int | None, PlannedMotion]]:
-        """The motions of the answer, and of a round the index of each in `legs`."""
+        """The motions of the answer, and of a cycle the index of each in `legs`."""
         given = self.asked.answer
         answer = self.answers([given])[0] if isinstance(given, str) else given
         paths = paths_of_moves(answer)

@@ -8,6 +8,7 @@ from joulepath.app.answers.declared import model_of
 from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.cycle.task import CycleAnswer, CycleTask
 from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions.stored import KeyReused
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import (
     ServiceArmEngine,
@@ -21,7 +22,6 @@ from joulepath.app.routes.later import ACCEPTED, ServiceLater
 from joulepath.app.routes.parameters import WantedFormat, deadline_of
 from joulepath.app.routes.problem_lists import CYCLE_PROBLEMS
 from joulepath.app.routes.reply import BY_EVENTS, ServiceReply
-from joulepath.app.schemas import errors as problems
 from joulepath.app.store.store_answers import keep_answer, store_answers
 from joulepath.app.tasks.read_body import HeldBody
 from joulepath.app.tasks.request_key import cell_of
@@ -37,7 +37,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}}, **BY_EVENTS}},
         **ACCEPTED,
-        **problem_responses(*CYCLE_PROBLEMS, problems.KeyReused),
+        **problem_responses(*CYCLE_PROBLEMS, KeyReused),
     },
 )
 async def cycle(

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from joulepath.app.convert.exported_file import to_options
-from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.export import FORMATS as DESCRIBED
 from joulepath.app.schemas.export import OPTIONS_OF, ExportFormat, ExportRequest
 from joulepath.optimizer.export.export import FORMATS
