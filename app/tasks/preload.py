@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import signal
 from importlib import import_module
+from pkgutil import walk_packages
 
 from joulepath.app.engine.imports import importing
 
 TASKS = (
     "compare",
-    "cycle",
     "evaluate",
     "export",
     "ik",
     "ik_path",
     "job_body",
     "job_request",
-    "optimize",
     "own_robot",
     "pareto",
     "read_body",
@@ -27,6 +26,10 @@ TASKS = (
 with importing():
     for name in TASKS:
         import_module(f"joulepath.app.tasks.{name}")
+    api = import_module("joulepath.app.api")
+    for module in walk_packages(api.__path__, f"{api.__name__}."):
+        if module.name.endswith(".task"):
+            import_module(module.name)
     # imported where it is called, because the process that answers HTTP does not need it
     import_module("toppra")
     # whose fields messages about large bodies name
