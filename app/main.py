@@ -13,9 +13,14 @@ from starlette.middleware.cors import CORSMiddleware
 from joulepath import __version__
 from joulepath.app.access.key_ring import KeyRing
 from joulepath.app.access.start import key_ring
+from joulepath.app.api.answers import route as answers
 from joulepath.app.api.cycle import route as cycle
 from joulepath.app.api.excitation import route as excitation
+from joulepath.app.api.jobs import route as jobs
 from joulepath.app.api.optimize import route as optimize
+from joulepath.app.api.studies import route as studies
+from joulepath.app.api.studies.iterations import route as iterations
+from joulepath.app.api.studies.suggest import route as suggest
 from joulepath.app.cluster.link import Cluster
 from joulepath.app.engine.pool import Engine
 from joulepath.app.engine.warm_up import warm
@@ -29,7 +34,6 @@ from joulepath.app.jobs.dispatcher import Dispatcher
 from joulepath.app.jobs.executor import ClusterExecutor, Executor, LocalExecutor
 from joulepath.app.jobs.jobs import Jobs
 from joulepath.app.routes import (
-    answers,
     cluster,
     compare,
     docs,
@@ -40,17 +44,13 @@ from joulepath.app.routes import (
     identifications,
     ik,
     ik_path,
-    iterations,
-    jobs,
     logs,
     metrics,
     pareto,
     problems,
     replay,
     robots,
-    studies,
     studio,
-    suggest,
     whatif,
 )
 from joulepath.app.settings import Settings

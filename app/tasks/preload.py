@@ -19,7 +19,6 @@ TASKS = (
     "own_robot",
     "pareto",
     "read_body",
-    "study_step",
     "whatif",
 )
 

@@ -11,11 +11,11 @@ from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.answers.envelope import AnswerFigures
+from joulepath.app.api.answers.models import AnswerList
 from joulepath.app.api.cycle.task import CycleAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.base import InvalidRequest
-from joulepath.app.schemas.answers import AnswerList
 from joulepath.app.settings import Settings
 from joulepath.app.store.store import Store
 from joulepath.app.store.store_answers import keep_answer
