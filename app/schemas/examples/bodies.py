@@ -8,12 +8,11 @@ from joulepath.app.schemas.examples.figures import FIGURES_EXAMPLES
 from joulepath.app.schemas.examples.files import Example, body_examples, shown
 from joulepath.app.schemas.examples.identifications import IDENTIFY_EXAMPLES
 from joulepath.app.schemas.examples.ik import IK_EXAMPLES, IK_PATH_EXAMPLES
-from joulepath.app.schemas.examples.jobs import NEW_JOB_EXAMPLES
 from joulepath.app.schemas.examples.logs import LOG_EXAMPLES
 from joulepath.app.schemas.examples.own_arm import NEW_ROBOT_EXAMPLES, PUT_EXAMPLES
 from joulepath.app.schemas.examples.pareto import PARETO_EXAMPLES
 from joulepath.app.schemas.examples.replay import REPLAY_EXAMPLES
-from joulepath.app.schemas.examples.studies import ITERATION_EXAMPLES, STUDY_EXAMPLES
+from joulepath.app.schemas.examples.studies import ITERATION_EXAMPLES
 from joulepath.app.schemas.examples.whatif import WHATIF_EXAMPLES
 
 JSON, CSV = "application/json", "text/csv"
@@ -31,7 +30,5 @@ BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     "/robots": {JSON: NEW_ROBOT_EXAMPLES},
     "/robots/{name}": {JSON: PUT_EXAMPLES},
     "/figures": {JSON: FIGURES_EXAMPLES},
-    "/jobs": {JSON: NEW_JOB_EXAMPLES},
-    "/studies": {JSON: STUDY_EXAMPLES},
     "/studies/{id}/iterations": {JSON: ITERATION_EXAMPLES},
 }
