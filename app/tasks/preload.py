@@ -23,12 +23,12 @@ TASKS = (
 )
 
 with importing():
-    for name in TASKS:
-        import_module(f"joulepath.app.tasks.{name}")
-    api = import_module("joulepath.app.api")
-    for module in walk_packages(api.__path__, f"{api.__name__}."):
+    endpoints = import_module("joulepath.app.api")
+    for module in walk_packages(endpoints.__path__, "joulepath.app.api."):
         if module.name.endswith(".task"):
             import_module(module.name)
+    for name in TASKS:
+        import_module(f"joulepath.app.tasks.{name}")
     # imported where it is called, because the process that answers HTTP does not need it
     import_module("toppra")
     # whose fields messages about large bodies name
