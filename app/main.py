@@ -13,9 +13,16 @@ from starlette.middleware.cors import CORSMiddleware
 from joulepath import __version__
 from joulepath.app.access.key_ring import KeyRing
 from joulepath.app.access.start import key_ring
+from joulepath.app.api.answers import route as answers
 from joulepath.app.api.compare import route as compare
+from joulepath.app.api.cycle import route as cycle
+from joulepath.app.api.excitation import route as excitation
+from joulepath.app.api.jobs import route as jobs
 from joulepath.app.api.optimize import route as optimize
 from joulepath.app.api.pareto import route as pareto
+from joulepath.app.api.studies import route as studies
+from joulepath.app.api.studies.iterations import route as iterations
+from joulepath.app.api.studies.suggest import route as suggest
 from joulepath.app.api.whatif import route as whatif
 from joulepath.app.cluster.link import Cluster
 from joulepath.app.engine.pool import Engine
@@ -30,28 +37,21 @@ from joulepath.app.jobs.dispatcher import Dispatcher
 from joulepath.app.jobs.executor import ClusterExecutor, Executor, LocalExecutor
 from joulepath.app.jobs.jobs import Jobs
 from joulepath.app.routes import (
-    answers,
     cluster,
-    cycle,
     docs,
     evaluate,
-    excitation,
     export,
     figures,
     health,
     identifications,
     ik,
     ik_path,
-    iterations,
-    jobs,
     logs,
     metrics,
     problems,
     replay,
     robots,
-    studies,
     studio,
-    suggest,
 )
 from joulepath.app.settings import Settings
 from joulepath.app.store.store import Store

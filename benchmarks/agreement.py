@@ -23,11 +23,11 @@ from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
 from benchmarks.tasks import as_pose, flange
 from joulepath.app.api.compare.task import CompareRequest, CompareTask
+from joulepath.app.api.cycle.request import CycleRequest
+from joulepath.app.api.cycle.task import CycleTask
 from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.api.pareto.task import ParetoRequest, ParetoTask
-from joulepath.app.schemas.cycle import CycleRequest
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.app.tasks.cycle import CycleTask
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.exceptions import JoulepathError

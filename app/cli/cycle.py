@@ -24,8 +24,8 @@ def cycle(file: str, output: Path | None) -> None:
     FILE is the JSON of `POST /cycle`, or - for standard input. The answer is JSON, too. If standard error is a
     terminal, a summary follows: energy, duration, status, lower bound, gap and savings.
     """
-    from joulepath.app.schemas.cycle import CycleRequest
-    from joulepath.app.tasks.cycle import CycleTask
+    from joulepath.app.api.cycle.request import CycleRequest
+    from joulepath.app.api.cycle.task import CycleTask
 
     search(CycleRequest, CycleTask, file, output, summary_of)
 

@@ -10,8 +10,8 @@ from joulepath.app.cli import terminal
 from joulepath.app.cli.answer import answered, compile_kernel_of, content_of, new_id, parsed, validated, write
 
 if TYPE_CHECKING:
+    from joulepath.app.api.cycle.request import CycleRequest
     from joulepath.app.engine.task import Task
-    from joulepath.app.schemas.cycle import CycleRequest
     from joulepath.app.schemas.request import OptimizeRequest
 
 Summary = Callable[[dict[str, Any]], dict[str, str]]

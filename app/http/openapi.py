@@ -113,9 +113,11 @@ def _document(app: FastAPI, settings: Settings, with_keys: bool) -> dict[str, An
             operation = document["paths"][path].get("post") or document["paths"][path]["put"]
             operation["requestBody"]["content"][media_type]["examples"] = examples
     for path, example in shown().items():
+        if "answer" not in example:
+            continue
         responses = document["paths"][path]["post"]["responses"]
         answer = next(responses[status] for status in ("200", "201") if status in responses)
-        add_examples(schemas, answer["content"]["application/json"]["schema"], example.get("answer"))
+        add_examples(schemas, answer["content"]["application/json"]["schema"], example["answer"])
     _add_access(document, with_keys)
     for deadline in _deadlines(document):
         deadline["maximum"] = settings.max_deadline

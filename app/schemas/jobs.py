@@ -8,10 +8,10 @@ from typing import Annotated, Any, Literal
 from pydantic import Tag
 
 from joulepath.app.api.compare.task import CompareRequest
+from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.pareto.task import ParetoRequest
 from joulepath.app.api.whatif.task import WhatifRequest
 from joulepath.app.schemas.common import Request, Response, by_field, described, part
-from joulepath.app.schemas.cycle import CycleRequest
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.examples.values import ANSWER_PATH, CREATED, EVALUATE, JOB_ID, OPTIMIZE
 from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of

@@ -10,19 +10,19 @@ from typing import Any
 import orjson
 
 from joulepath.app.api.compare.task import CompareRequest, CompareTask
+from joulepath.app.api.cycle.request import CycleRequest
+from joulepath.app.api.cycle.task import CycleTask
 from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.api.pareto.task import ParetoRequest, ParetoTask
 from joulepath.app.api.whatif.task import WhatifRequest, WhatifTask
 from joulepath.app.convert.evaluation import to_evaluate_response
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.schemas.cycle import CycleRequest
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.identifications import IdentifyRequest
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.store.leases import FoundFigures
 from joulepath.app.tasks.answer_figures import figures_of
-from joulepath.app.tasks.cycle import CycleTask
 from joulepath.app.tasks.evaluate import evaluated
 from joulepath.app.tasks.figures import replacing
 from joulepath.app.tasks.identify import IdentifyTask, Stored

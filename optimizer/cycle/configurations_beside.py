@@ -79,7 +79,7 @@ def _visited(found: CycleSolution) -> dict[str, Array]:
     """The joint positions (nq,) [rad] at all places of a cycle, in their order, the start first."""
     at = {START: found.moves[0].solution.start.q}
     for move in found.moves:
-        at |= {each.stop: each.at.q for each in move.passes}
+        at |= {each.stop: each.q for each in move.passes}
         if move.planned.goal != START:
             at[move.planned.goal] = move.solution.goal.q
     return at

@@ -148,7 +148,14 @@ def compared(
     electrical = asked.objective == "electrical"
     interval = saving_interval(ours.electrical, theirs.electrical, asked.arm) if electrical else None
     own = saving(ours.of(asked.objective), theirs.of(asked.objective))
-    return CycleBaseline(name, duration, held, own, interval, theirs)
+    return CycleBaseline(
+        name=name,
+        duration=duration,
+        within_limits=held,
+        saving=own,
+        saving_interval=interval,
+        needed=theirs,
+    )
 
 
 def dwells_of(search: CycleSearch, nodes: list[int]) -> list[float]:

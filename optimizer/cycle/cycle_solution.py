@@ -5,14 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, reduce
-from itertools import pairwise
+from itertools import chain, pairwise
 from operator import add
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
+from joulepath.optimizer.declared import Internal, Joules, Ratio, Seconds
 from joulepath.optimizer.energy.interval import Known, with_interval
 from joulepath.optimizer.problem.stops import PlannedMove
+from joulepath.optimizer.result.cycle import (
+    CycleCertificate,
+    CycleClearance,
+    CycleSearchReport,
+    LegReport,
+    Pass,
+    StopConfiguration,
+)
 from joulepath.optimizer.result.energy import (
     ElectricalEnergy,
     Energy,
@@ -23,16 +32,7 @@ from joulepath.optimizer.result.energy import (
     Sensitivity,
     StorageUse,
 )
-from joulepath.optimizer.result.solution import Configuration, Solution
-
-
-@dataclass(frozen=True)
-class Pass:
-    """Where a move passes through a `stop`, in which configuration, and when: `t` [s] after the move began."""
-
-    stop: str
-    at: Configuration
-    t: float
+from joulepath.optimizer.result.solution import Solution
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,47 @@ class CycleMove:
         """Electrical energy [J] of the move, the dwell and the wait."""
         return self.solution.energy.electrical.total + self.dwell_energy + self.wait_energy
 
+    def legs(self, objective: Objective) -> list[LegReport]:
+        """The move, and the dwell and the wait after it if they last."""
+        solution, planned = self.solution, self.planned
+        goal = StopConfiguration.at(solution.goal, planned.goal)
+        move = LegReport(
+            kind=planned.kind,
+            start=StopConfiguration.at(solution.start, planned.start),
+            goal=goal,
+            passes=self.passes,
+            t0=self.t0,
+            duration=solution.duration,
+            electrical=solution.energy.electrical.total,
+            mechanical=solution.energy.mechanical.total,
+            lower_bound=solution.lower_bound,
+            payload_mass=planned.arm.payload.mass,
+            charge=self.charges[1] if self.charges else None,
+        )
+        dwell = replace(
+            move,
+            kind="dwell",
+            start=goal,
+            passes=[],
+            t0=self.t0 + solution.duration,
+            duration=planned.dwell,
+            electrical=self.dwell_energy,
+            mechanical=0.0,
+            lower_bound=self.dwell_energy if objective == "electrical" else 0.0,
+            payload_mass=planned.arm_after.payload.mass,
+            charge=self.charges[2] if self.charges else None,
+        )
+        wait = replace(
+            dwell,
+            kind="wait",
+            t0=dwell.t0 + dwell.duration,
+            duration=self.wait,
+            electrical=self.wait_energy,
+            lower_bound=self.wait_energy if objective == "electrical" else 0.0,
+            charge=self.charges[3] if self.charges else None,
+        )
+        return [move, *(rest for rest in (dwell, wait) if rest.duration > 0)]
+
 
 @dataclass(frozen=True)
 class Needed:
@@ -92,28 +133,40 @@ CycleBaselineName = Literal[
 ]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class CycleBaseline:
-    """Another way to go round: its duration [s], what it needs [J], our saving 1 - ours / theirs of the objective, and
-    how well that is known (None for mechanical work). `moves` are its own, where another bus may value them."""
+    """The same stops with the same payloads and dwells, in another way, and in the `time` that is asked
+    for."""
 
     name: CycleBaselineName
-    duration: float
+    """`stopping`: the best cycle that rests at the stops with `via`, too; the others then rest there as
+    well. `move_by_move`: at each stop the move that needs the least energy by itself, as successive
+    calls of `POST /optimize` choose it. `controller_default`: to the nearest configuration each time,
+    by the robot's own controller with its default speed and acceleration. Where `time` changes the
+    cycle: `same_factor`, every move slowed or sped up alike; `fastest_then_wait`, the fastest cycle,
+    in configurations of its own, and a wait. With a free order, where it is allowed: `given_order`,
+    the best cycle in the order of `stops`. With an energy storage on the bus: `without_storage`, the
+    best cycle on the same bus without it, beside `move_by_move` alone."""
+    duration: Seconds
+    """Duration of this cycle."""
+    electrical: Joules = field(init=False)
+    """Electrical energy of this cycle."""
+    mechanical: Joules = field(init=False)
+    """Mechanical work of its moves."""
     within_limits: bool
-    saving: float
+    """Whether every move is within the limits; collisions are checked at sample points."""
+    saving: Ratio
+    """1 - energy of the answer / energy of this cycle, of the objective."""
     saving_interval: SavingInterval | None
-    needed: Needed = field(repr=False)
-    moves: Sequence[CycleMove] = field(default=(), repr=False)
+    """How well the saving is known. Null for the objective `mechanical`."""
+    needed: Annotated[Needed, Internal] = field(repr=False)
+    """What this cycle needs."""
+    moves: Annotated[Sequence[CycleMove], Internal] = field(default=(), repr=False)
+    """Its own moves, where another bus may value them."""
 
-    @property
-    def electrical(self) -> float:
-        """Electrical energy [J]."""
-        return self.needed.electrical.energy
-
-    @property
-    def mechanical(self) -> float:
-        """Mechanical work [J]."""
-        return self.needed.mechanical
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "electrical", self.needed.electrical.energy)
+        object.__setattr__(self, "mechanical", self.needed.mechanical)
 
 
 @dataclass(frozen=True)
@@ -170,6 +223,44 @@ class CycleSolution:
         """Largest jump [rad] of a joint from the end of a move to the start of the next."""
         ends = [move.solution.trajectory.spline.control_points[[0, -1]] for move in self.moves]
         return max((float(np.abs(b[0] - a[1]).max()) for a, b in pairwise(ends)), default=0.0)
+
+    @property
+    def certificate(self) -> CycleCertificate:
+        """The worst of the certificates of all moves, and how the moves fit together."""
+        certificates = [move.solution.certificate for move in self.moves]
+        worst: dict[str, float] = {}
+        for name, ratio in chain.from_iterable(each.worst_ratio.items() for each in certificates):
+            worst[name] = max(ratio, worst.get(name, ratio))
+        electrical = self.energy.electrical
+        return CycleCertificate(
+            worst_ratio=worst,
+            joins=self.joins,
+            pass_error=max(each.pass_error for each in certificates),
+            energy_error=max(each.energy_error for each in certificates),
+            balance_error=abs(electrical.parts_sum - electrical.total) / abs(electrical.total or 1.0),
+            clearance=self._clearance,
+        )
+
+    @property
+    def _clearance(self) -> CycleClearance | None:
+        """The smallest clearance, with the index of its move among the legs."""
+        leg, nearest = 0, None
+        for move in self.moves:
+            clearance = move.solution.certificate.clearance
+            if clearance is not None and (nearest is None or clearance.min_clearance < nearest.min_clearance):
+                nearest = CycleClearance(**vars(clearance), leg=leg)
+            leg += len(move.legs(self.objective))
+        return nearest
+
+    @property
+    def search(self) -> CycleSearchReport:
+        """Effort of the search over all moves."""
+        return CycleSearchReport(
+            pairs=sum(move.pairs for move in self.moves),
+            distinct=sum(move.kinds for move in self.moves),
+            solved=sum(move.solved for move in self.moves),
+            wall_time=self.wall_time,
+        )
 
 
 def needed_by(moves: Sequence[CycleMove]) -> Needed:

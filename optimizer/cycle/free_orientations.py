@@ -228,7 +228,7 @@ def _axis_of(stop: Stop) -> Array:
 def _found_at(found: CycleSolution, tried: Mapping[str, Sequence[Turns]]) -> dict[str, Turns]:
     """The turns at each stop of a cycle."""
     goals = {move.planned.goal: move.solution.goal.target for move in found.moves}
-    passed = {each.stop: each.at.target for move in found.moves for each in move.passes}
+    passed = {each.stop: each.target for move in found.moves for each in move.passes}
     return {name: turns[(goals | passed)[name]] for name, turns in tried.items()}
 
 
@@ -291,5 +291,5 @@ def _of_one_target(move: CycleMove, places: set[str]) -> CycleMove:
     """The move, of which `places` have one target: its orientations are no targets that were asked for."""
     ends = {"start": move.planned.start, "goal": move.planned.goal}
     told = {name: replace(getattr(move.solution, name), target=0) for name, place in ends.items() if place in places}
-    passes = [replace(each, at=replace(each.at, target=0)) if each.stop in places else each for each in move.passes]
+    passes = [replace(each, target=0) if each.stop in places else each for each in move.passes]
     return replace(move, solution=replace(move.solution, **told), passes=passes)

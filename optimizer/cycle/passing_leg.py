@@ -15,14 +15,13 @@ from itertools import pairwise
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.cycle.cycle_solution import Pass
 from joulepath.optimizer.cycle.layers import Layer
 from joulepath.optimizer.cycle.legs import Leg, between, bounds_of, kinds_of
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LONGEST_DURATION
-from joulepath.optimizer.result.solution import Configuration
+from joulepath.optimizer.result.cycle import Pass
 from joulepath.optimizer.search.lower_bound import travel_bounds
 from joulepath.optimizer.trajectories.passing import pass_times
 from joulepath.optimizer.trajectories.spline import Spline
@@ -165,4 +164,5 @@ def passes_of(leg: Leg, s: int, g: int, motion: Spline) -> list[Pass]:
 
 def _pass(layer: Layer, node: int, t: float) -> Pass:
     end = layer.ends[layer.end[node]]
-    return Pass(layer.name.removeprefix("stops/"), Configuration(end.label, layer.q[node], end.target), t)
+    stop = layer.name.removeprefix("stops/")
+    return Pass(label=end.label, q=layer.q[node], target=end.target, stop=stop, t=t)

@@ -157,7 +157,7 @@ def _refined(asked: Cycle, best: Valued, end: Deadline, clock: Clock) -> Valued:
 
 def _problem(asked: Cycle, planned: PlannedMove, move: CycleMove, time: float) -> Problem:
     problem = problem_of(asked, planned, move.solution.start.q, move.solution.goal.q, time)
-    return replace(problem, passes=[each.at.q for each in move.passes])
+    return replace(problem, passes=[each.q for each in move.passes])
 
 
 def _moves(asked: Cycle, best: Valued, end: Deadline, clock: Clock) -> list[CycleMove]:

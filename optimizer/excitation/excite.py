@@ -8,6 +8,7 @@ removed by a longer period; collisions are proven absent, or the start is droppe
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from scipy.optimize import OptimizeResult, minimize
@@ -16,6 +17,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.collision.model import CollisionModel, collision_model
 from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.declared import Axes, Count, Internal, PerJoint, Ratio, Seconds, Unit
 from joulepath.optimizer.energy.plant import Plant
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.excitation.errors import ExcitationInfeasible
@@ -49,32 +51,59 @@ _WAY_BACK = (1.0, 0.9, 0.7, 0.4, 0.0)
 # share of its part of the time left that the search of a start may use: its certificate needs some
 _SHARE = 0.9
 
+Coefficients = Annotated[Array, Axes(("joint", "harmonic")), Unit("rad/s")]
+
 
 @dataclass(frozen=True)
+class Series:
+    """The Fourier series of every joint: q = centre + Σ_k a_k sin(kωt) / (kω) - b_k cos(kωt) / (kω),
+    ω = 2π / period. A row of `a` and `b` is that of a joint."""
+
+    period: Seconds
+    """Period; longer than asked for if the limits need it."""
+    centre: Annotated[PerJoint, Unit("rad")]
+    """Centre of every joint."""
+    a: Coefficients
+    """Coefficients of the sines of a joint."""
+    b: Coefficients
+    """Coefficients of the cosines of a joint."""
+
+
+@dataclass(frozen=True)
+class PredictedDeviation:
+    """How well one period would tell a parameter."""
+
+    parameter: str
+    """A base parameter as a sum of parameters of bodies (`m`, `mx` …, `Ixx` …) and rotors (`Ia`),
+    each with the number of its joint; or `coulomb`, `viscous`, `offset` or `load` of a joint."""
+    sd: Annotated[float, Unit("SI")]
+    """Standard deviation after one period, with 10 independent samples of every joint per second."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Excitation:
-    """A motion that tells parameters apart.
+    """A motion that tells parameters apart."""
 
-    `centre` (nq,) [rad], `a`, `b` (nq, harmonics) [rad/s] and `period` [s] are those of the series; `trajectory` is the
-    same motion as a spline, with samples, and `energy` what it needs. `condition` and `scaled_condition` are those of
-    the columns over the noise, as they are and scaled to one length. `names` and `predicted_sd` are the parameters and
-    their standard deviations after one period. `cost` is what the criterion lowers. `starts` were completed, of which
-    `feasible` gave a motion.
-    """
-
-    period: float
-    centre: Array
-    a: Array
-    b: Array
+    coefficients: Series
+    """The motion as a series."""
     trajectory: Trajectory
+    """The same motion as a spline, with samples."""
     energy: Energy
-    condition: float
-    scaled_condition: float
-    names: tuple[str, ...]
-    predicted_sd: Array
-    cost: float
+    """Energy of one period."""
+    condition: Ratio
+    """Condition of the columns, over the noise."""
+    scaled_condition: Ratio
+    """Condition of the columns, scaled to one length."""
+    predicted_sd: list[PredictedDeviation]
+    """Predicted standard deviations."""
+    cost: Annotated[float, Internal]
+    """What the criterion lowers."""
+    starts: Count
+    """Starts that were completed."""
+    feasible: Count
+    """Starts that gave a motion within all limits."""
     certificate: Certificate
-    starts: int
-    feasible: int
+    """Independent check of the motion."""
 
 
 @one_thread()
@@ -201,22 +230,22 @@ class _Design:
             spline = retimed(spline, stretch)
             certificate, energy = self._certificate(spline)
         # of the coefficients, which are speeds: a longer period makes them smaller
-        centre, a, b = basis.coefficients(np.vstack([coordinates[:1], coordinates[1:] / stretch]))
+        stretched = np.vstack([coordinates[:1], coordinates[1:] / stretch])
         t = np.linspace(0.0, spline.duration, STATES, endpoint=False)
         W = self.columns.values(*(np.asarray(spline.curve(t, order)) for order in range(3)))
         noise = np.asarray(self.problem.noise)
         information = Information((W[:, :, self.columns.wanted] / noise[:, None]).reshape(-1, len(self.columns.wanted)))
+        deviations = information.deviations(INDEPENDENT_RATE * spline.duration * self.arm.robot.nq)
         return Excitation(
-            period=basis.period,
-            centre=centre,
-            a=a,
-            b=b,
+            coefficients=Series(basis.period, *basis.coefficients(stretched)),
             trajectory=self.plant.trajectory(spline, self.problem.sample_period),
             energy=energy,
             condition=information.condition(scaled=False),
             scaled_condition=information.condition(scaled=True),
-            names=tuple(self.columns.names[k] for k in self.columns.wanted),
-            predicted_sd=information.deviations(INDEPENDENT_RATE * spline.duration * self.arm.robot.nq),
+            predicted_sd=[
+                PredictedDeviation(self.columns.names[k], sd)
+                for k, sd in zip(self.columns.wanted, deviations.tolist(), strict=True)
+            ],
             cost=information.criterion(self.problem.criterion)[0],
             certificate=certificate,
             starts=0,

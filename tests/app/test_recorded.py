@@ -11,16 +11,16 @@ from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.compare.task import CompareAnswer
+from joulepath.app.api.cycle.task import CycleAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.api.pareto.task import ParetoAnswer
-from joulepath.app.schemas.cycle import CycleResponse
 from tests.app.recorded import FOLDER, TASKS, record
 
 SCHEMAS: dict[str, type[BaseModel]] = {
     "optimize": model_of(OptimizeAnswer),
     "compare": model_of(CompareAnswer),
     "pareto": model_of(ParetoAnswer),
-    "cycle": CycleResponse,
+    "cycle": model_of(CycleAnswer),
 }
 
 

@@ -12,9 +12,9 @@ import pytest
 
 from benchmarks.agreement import request
 from benchmarks.tasks import as_pose, flange
-from joulepath.app.convert.cycle import to_cycle
+from joulepath.app.api.cycle.problem import to_cycle
+from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.convert.request import to_problem
-from joulepath.app.schemas.cycle import CycleRequest
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory

@@ -1,7 +1,8 @@
 """Examples of requests and answers, from the files in the folder `examples` of the repository.
 
-`examples/openapi/<path>.json` has an answer, and lists the requests that the OpenAPI document shows, by the names of
-their files in `examples/<path>`, each with its summary and description.
+`examples/openapi/<path>.json` lists the requests that the OpenAPI document shows, by the names of
+their files in `examples/<path>`, each with its summary and description. It has an answer, too, unless
+the models of the answer have examples of their own.
 """
 
 from __future__ import annotations

@@ -2,25 +2,7 @@
 
 from __future__ import annotations
 
-from joulepath.app.schemas.examples.files import Example
-from joulepath.app.schemas.examples.values import ANSWER_PATH, EVALUATE, HOME, NEAR
-
-PAYLOAD = {"mass": 2.0, "com": [0.0, 0.0, 0.05]}
-
-NEW_JOB_EXAMPLES: dict[str, Example] = {
-    "moves": {
-        "summary": "Three moves, and the energy of a given motion",
-        "value": {
-            "name": "Night run, cell 4",
-            "requests": [
-                {"optimize": {"start": {"q": HOME}, "goal": {"q": NEAR}}},
-                {"optimize": {"start": {"q": NEAR}, "goal": {"q": HOME}, "payload": PAYLOAD}},
-                {"optimize": {"start": {"q": HOME}, "goal": {"q": NEAR}, "duration": 0.01}},
-                {"evaluate": EVALUATE},
-            ],
-        },
-    }
-}
+from joulepath.app.schemas.examples.values import ANSWER_PATH
 
 RESULTS_CSV = (
     "index,kind,state,attempt,wall_time_s,energy_J,duration_s,status,answer,problem\n"

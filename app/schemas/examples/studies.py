@@ -6,17 +6,6 @@ from joulepath.app.schemas.examples.files import Example, body_examples
 from joulepath.app.schemas.examples.values import ANSWER_ID, HOME
 
 _OPTIMIZE = body_examples("/optimize")["application/json"]
-STUDY_EXAMPLES: dict[str, Example] = {
-    "electrical": {
-        "summary": "At most 60 J of electrical energy",
-        "value": {"name": "Pick and place, cell 4", "robot": "ur5e", "threshold": 60.0},
-    },
-    "mechanical": {
-        "summary": "At most 35 J of mechanical work",
-        "value": {"name": "Paper, pose 1", "threshold": 35.0, "objective": "mechanical"},
-    },
-}
-
 ITERATION_EXAMPLES: dict[str, Example] = {
     "evaluate": {
         "summary": "The energy of the present motion",

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from joulepath.app.answers.declared import model_of
+from joulepath.app.api.cycle.task import CycleAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
-from joulepath.app.schemas.cycle import CycleResponse
 from joulepath.app.schemas.evaluate import EvaluateResponse
 from joulepath.app.schemas.examples.files import body_examples
 from joulepath.app.settings import Settings
@@ -33,7 +33,7 @@ def test_cycle_answers_as_the_service_does() -> None:
     stops = [{"name": "there", "target": {"q": NEAR}, "payload": {"mass": 1.0, "com": [0.0, 0.0, 0.05]}}]
     finished = run("cycle", "-", stdin=json.dumps({"start": {"q": HOME}, "stops": stops, **PATIENT}))
     assert (finished.returncode, finished.stderr) == (0, b"")
-    answer = CycleResponse.model_validate_json(finished.stdout)
+    answer = model_of(CycleAnswer).model_validate_json(finished.stdout)
     assert [leg.payload_mass for leg in answer.legs] == [0.0, 1.0]
     assert answer.legs[0].goal.q == pytest.approx(NEAR) and answer.legs[1].goal.q == pytest.approx(HOME)
 

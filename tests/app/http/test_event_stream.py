@@ -13,11 +13,11 @@ import pytest
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.compare.task import CompareAnswer
+from joulepath.app.api.cycle.task import CycleAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.api.pareto.task import ParetoAnswer
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.queue import TooManyRequests, WorkerLost
-from joulepath.app.schemas.cycle import CycleResponse
 from joulepath.optimizer.exceptions import DeclaredError, UnreachablePose
 from joulepath.optimizer.search.errors import DurationTooShort
 from tests.app.live import CLIENT, GRACE, Server, serving, until
@@ -86,7 +86,7 @@ def test_other_paths_tell_too(one: Server) -> None:
     model_of(CompareAnswer).model_validate_json(orjson.dumps(compared[-1][1]))
     assert [content["index"] for name, content in compared if name == "candidate"] == [0, 1]
     cycle = told(one, "/cycle", {"start": start, "stops": [{"target": goal}], "windings": False, **SHORT})
-    CycleResponse.model_validate_json(orjson.dumps(cycle[-1][1]))
+    model_of(CycleAnswer).model_validate_json(orjson.dumps(cycle[-1][1]))
     for events in (front, compared, cycle):
         assert names(events) == ["candidates", "candidate", "incumbent", "answer"]
 

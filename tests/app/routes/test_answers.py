@@ -11,11 +11,11 @@ from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.answers.envelope import AnswerFigures
+from joulepath.app.api.answers.models import AnswerList
+from joulepath.app.api.cycle.task import CycleAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.base import InvalidRequest
-from joulepath.app.schemas.answers import AnswerList
-from joulepath.app.schemas.cycle import CycleResponse
 from joulepath.app.settings import Settings
 from joulepath.app.store.store import Store
 from joulepath.app.store.store_answers import keep_answer
@@ -128,7 +128,7 @@ def test_the_answers_of_a_front_and_a_cycle_have_their_paths_and_candidates(clie
         assert sum(kept["candidate_counts"].values()) > 0
     work = {"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], "candidates": "none", **PATIENT}
     answer = client.post("/cycle", json=work)
-    CycleResponse.model_validate_json(answer.content)
+    model_of(CycleAnswer).model_validate_json(answer.content)
     for leg in answer.json()["legs"]:
         kept = client.get(leg["answer"]).json()["answer"]
         assert (kept["answer"], kept["candidates"]) == (leg["answer"], [])

@@ -10,10 +10,11 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
+from joulepath.app.api.cycle.request import CycleRequest
+from joulepath.app.api.cycle.task import CycleAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.convert.warnings import NO_DEFAULT_MOTION
 from joulepath.app.routes.parameters import deadline_of
-from joulepath.app.schemas.cycle import CycleRequest, CycleResponse
 from tests.app.requests import HOME, PATIENT
 
 # relative: sums of the same numbers in another order
@@ -39,7 +40,7 @@ def answered(client: TestClient, asked: dict[str, Any]) -> dict[str, Any]:
     """The answer to a cycle, which keeps to its schema."""
     reply = client.post("/cycle", json=asked)
     assert reply.status_code == 200, reply.text
-    CycleResponse.model_validate_json(reply.content)
+    model_of(CycleAnswer).model_validate_json(reply.content)
     content: dict[str, Any] = reply.json()
     return content
 
@@ -253,7 +254,7 @@ def test_a_free_order_is_told(client: TestClient) -> None:
     content["stops"].append({"name": "look", "target": down(0.3, 0.3, 0.4)})
     reply = client.post("/cycle", json=content)
     assert reply.status_code == 200, reply.text
-    order = CycleResponse.model_validate_json(reply.content).order
+    order = model_of(CycleAnswer).model_validate_json(reply.content).order
     assert sorted(order) == ["look", "pick", "place"] and order.index("place") == order.index("pick") + 1
 
 

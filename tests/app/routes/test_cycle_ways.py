@@ -8,8 +8,8 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
+from joulepath.app.api.cycle.task import CycleAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
-from joulepath.app.schemas.cycle import CycleResponse
 from tests.app.routes.test_cycle import a_cycle, down
 
 LINES = {
@@ -29,7 +29,7 @@ def with_lines(**fields: Any) -> dict[str, Any]:
 def test_lines_are_legs_of_their_own(client: TestClient) -> None:
     reply = client.post("/cycle", json=with_lines())
     assert reply.status_code == 200, reply.text
-    CycleResponse.model_validate_json(reply.content)
+    model_of(CycleAnswer).model_validate_json(reply.content)
     content = reply.json()
     assert [(leg["kind"], leg["goal"]["stop"]) for leg in content["legs"]][:4] == [
         ("move", "pick/approach"),
@@ -93,7 +93,7 @@ def with_path(**fields: Any) -> dict[str, Any]:
 def test_a_path_is_a_leg_of_its_own(client: TestClient) -> None:
     reply = client.post("/cycle", json=with_path())
     assert reply.status_code == 200, reply.text
-    CycleResponse.model_validate_json(reply.content)
+    model_of(CycleAnswer).model_validate_json(reply.content)
     content = reply.json()
     legs = content["legs"]
     assert [(leg["kind"], leg["goal"]["stop"]) for leg in legs] == [
@@ -161,7 +161,7 @@ def test_a_path_is_divided_on_request(client: TestClient) -> None:
     content = a_cycle(stops=[stop], limits={"position": {"lower": low, "upper": high}}, collisions=False)
     reply = client.post("/cycle", json=content)
     assert reply.status_code == 200, reply.text
-    answer = CycleResponse.model_validate_json(reply.content)
+    answer = model_of(CycleAnswer).model_validate_json(reply.content)
     assert answer.order == ["glue/1", "glue"] and answer.status == "feasible"
     assert [(leg.kind, leg.goal.stop) for leg in answer.legs] == [
         ("move", "glue/1/entry"),

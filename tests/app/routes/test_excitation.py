@@ -8,22 +8,24 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.excitation.task import ExcitationAnswer
 from joulepath.app.exceptions.base import InvalidRequest
-from joulepath.app.schemas.examples.excitation import EXCITATION_EXAMPLES
-from joulepath.app.schemas.excitation import ExcitationResponse
+from joulepath.app.schemas.examples.files import body_examples
 from joulepath.optimizer.exceptions import DeadlineExceeded, OutsideLimits
 from joulepath.optimizer.excitation.errors import ExcitationInfeasible
 from tests.app.requests import HOME
 from tests.app.routes.test_problems import refused
 
-SHORT: dict[str, Any] = EXCITATION_EXAMPLES["friction_and_rotors"]["value"] | {"deadline": 100.0, "centre": HOME}
+EXAMPLE = body_examples("/excitation")["application/json"]["friction_and_rotors"]["value"]
+SHORT: dict[str, Any] = EXAMPLE | {"deadline": 100.0, "centre": HOME}
 
 
 @pytest.fixture(scope="module")
 def found(client: TestClient) -> dict[str, Any]:
     answer = client.post("/excitation", json=SHORT)
     assert answer.status_code == 200, answer.text
-    ExcitationResponse.model_validate_json(answer.content)
+    model_of(ExcitationAnswer).model_validate_json(answer.content)
     content: dict[str, Any] = answer.json()
     return content
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.api.excitation.task import ExcitationRequest
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import UnknownIdentification, UnknownLog
-from joulepath.app.schemas.excitation import ExcitationRequest
 from joulepath.app.schemas.identifications import (
     Identification,
     IdentificationList,

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.api.studies.suggest.models import Suggestions
 from joulepath.app.convert.pose import to_matrix
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.queue import ShuttingDown
 from joulepath.app.exceptions.stored import EmptyStudy, UnknownStudy
 from joulepath.app.schemas.common import QuaternionPose
-from joulepath.app.schemas.suggestions import Suggestions
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.tcp import rotated_poses

@@ -23,9 +23,9 @@ from alembic.migration import MigrationContext
 from sqlalchemy import func, select, text, update
 from starlette.testclient import TestClient
 
+from joulepath.app.api.answers import models as schemas
 from joulepath.app.engine.result import StoredAnswer, TaskResult
 from joulepath.app.exceptions.stored import StoreUnavailable, UnknownAnswer
-from joulepath.app.schemas import answers as schemas
 from joulepath.app.settings import Settings
 from joulepath.app.store import answers, database
 from joulepath.app.store.database import OtherVersion, create_database_engine, migrate

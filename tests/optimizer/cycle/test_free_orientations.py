@@ -188,8 +188,8 @@ def test_a_free_stop_has_lines_and_is_passed() -> None:
     assert_reached(found, asked.arm, "pick/approach", (0.5, -0.2, 0.15))
     assert_reached(found, asked.arm, "pick", (0.5, -0.2, 0.1))
     (on_way,) = found.moves[-1].passes
-    T = tcp_pose(on_way.at.q, asked.arm.T_flange_tcp).T
-    assert np.abs(T[:3, 3] - (0.45, 0.1, 0.35)).max() < ON_MANIFOLD and on_way.at.target == 0
+    T = tcp_pose(on_way.q, asked.arm.T_flange_tcp).T
+    assert np.abs(T[:3, 3] - (0.45, 0.1, 0.35)).max() < ON_MANIFOLD and on_way.target == 0
 
 
 def test_the_poses_at_the_end_of_a_line_are_known_where_they_are_one() -> None:

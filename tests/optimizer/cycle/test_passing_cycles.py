@@ -85,7 +85,7 @@ def test_every_pass_is_where_its_target_says_and_when_the_answer_says() -> None:
     assert 0 < move.passes[0].t < move.passes[1].t < move.solution.duration
     for stop, each in zip(asked.stops, move.passes, strict=False):
         q = move.solution.trajectory.spline.curve(each.t)
-        assert np.abs(q - each.at.q).max() < ROUNDING
+        assert np.abs(q - each.q).max() < ROUNDING
         assert isinstance(stop.target, Pose)
         assert np.abs(tcp_pose(ARM, q) - stop.target.T).max() < 1e-6
         assert np.abs(move.solution.trajectory.spline.curve(each.t, 1)).max() > 0.05
@@ -102,7 +102,7 @@ def test_the_best_of_all_configurations_is_found() -> None:
         ).solution().energy.electrical.total
         for a, b in product(range(2), repeat=2)
     }  # fmt: skip
-    chosen = tuple(each.at.target for each in found.moves[0].passes)
+    chosen = tuple(each.target for each in found.moves[0].passes)
     assert energies[chosen] <= min(energies.values()) * (1 + 1e-3)
     assert found.energy.electrical.total <= min(energies.values()) * (1 + 1e-3)
     assert found.lower_bound <= min(energies.values())

@@ -35,11 +35,12 @@ def found() -> Excitation:
 
 
 def test_the_series_is_at_rest_at_its_ends_and_the_spline_is_the_series(found: Excitation) -> None:
-    k = np.arange(1, found.a.shape[1] + 1)
-    w = 2 * np.pi / found.period * k
-    assert np.abs(found.a.sum(axis=1)).max() < 1e-12 and np.abs((found.b * k).sum(axis=1)).max() < 1e-12
-    t = np.linspace(0, found.period, 301)
-    q = found.centre + np.sin(np.outer(t, w)) @ (found.a / w).T - np.cos(np.outer(t, w)) @ (found.b / w).T
+    series = found.coefficients
+    k = np.arange(1, series.a.shape[1] + 1)
+    w = 2 * np.pi / series.period * k
+    assert np.abs(series.a.sum(axis=1)).max() < 1e-12 and np.abs((series.b * k).sum(axis=1)).max() < 1e-12
+    t = np.linspace(0, series.period, 301)
+    q = series.centre + np.sin(np.outer(t, w)) @ (series.a / w).T - np.cos(np.outer(t, w)) @ (series.b / w).T
     # the spline has 24 spans for every harmonic
     assert np.abs(found.trajectory.spline.curve(t) - q).max() < 1e-6
     v, a = (np.asarray(found.trajectory.spline.curve(t[[0, -1]], order)) for order in (1, 2))
@@ -54,14 +55,13 @@ def test_limits_clearance_and_condition(found: Excitation) -> None:
     assert found.scaled_condition <= 60 < found.condition
     assert (found.starts, found.feasible) == (1, 1)
     # the load of shoulder and elbow varies enough to tell its friction
-    assert found.names[40 + 18 :] == ("load2", "load3")
-    assert len(found.names) == len(found.predicted_sd)
+    assert [each.parameter for each in found.predicted_sd[40 + 18 :]] == ["load2", "load3"]
 
 
 def test_the_plane_that_the_arm_stands_on_is_kept(found: Excitation) -> None:
     model = ARM.robot.model
     data, flange = model.createData(), model.getFrameId("flange")
-    for t in np.linspace(0, found.period, 200):
+    for t in np.linspace(0, found.coefficients.period, 200):
         pin.framesForwardKinematics(model, data, found.trajectory.spline.curve(t))
         assert data.oMf[flange].translation[2] > 0
 

@@ -6,6 +6,7 @@ import csv
 from io import StringIO
 
 from joulepath.optimizer.cycle.cycle_solution import CycleMove, CycleSolution
+from joulepath.optimizer.result.cycle import LegReport
 
 Row = list[float | str]
 
@@ -20,19 +21,14 @@ def to_cycle_csv(found: CycleSolution) -> str:
     writer = csv.writer(text, lineterminator="\n")
     names = ("q", "v", "a", "tau_motor")
     writer.writerow(["t", "leg", "kind", *(f"{name}{joint}" for name in names for joint in joints), "power"])
-    leg = 0
-    for move in found.moves:
-        writer.writerows(_of_move(move, leg))
-        leg, t = leg + 1, move.t0 + move.solution.duration
-        rests = (("dwell", move.planned.dwell, move.dwell_energy), ("wait", move.wait, move.wait_energy))
-        for kind, length, energy in rests:
-            if length > 0:
-                writer.writerows(_of_rest(move, leg, kind, t, length, energy / length))
-                leg, t = leg + 1, t + length
+    legs = ((move, leg) for move in found.moves for leg in move.legs(found.objective))
+    for number, (move, leg) in enumerate(legs):
+        rests = leg.kind in ("dwell", "wait")
+        writer.writerows(_of_rest(leg, number) if rests else _of_move(move, number))
     return text.getvalue()
 
 
-def _of_move(move: CycleMove, leg: int) -> list[Row]:
+def _of_move(move: CycleMove, number: int) -> list[Row]:
     samples, kind = move.solution.trajectory, move.planned.kind
     table = zip(
         (samples.t + move.t0).tolist(),
@@ -40,10 +36,11 @@ def _of_move(move: CycleMove, leg: int) -> list[Row]:
         samples.power.tolist(),
         strict=True,
     )
-    return [[t, leg, kind, *q, *v, *a, *tau, power] for t, q, v, a, tau, power in table]
+    return [[t, number, kind, *q, *v, *a, *tau, power] for t, q, v, a, tau, power in table]
 
 
-def _of_rest(move: CycleMove, leg: int, kind: str, t: float, length: float, power: float) -> list[Row]:
-    q = move.solution.goal.q.tolist()
+def _of_rest(leg: LegReport, number: int) -> list[Row]:
+    q, power = leg.goal.q.tolist(), leg.electrical / leg.duration
     still: Row = [0.0] * len(q)
-    return [[at, leg, kind, *q, *still, *still, *[""] * len(q), power] for at in (t, t + length)]
+    ends = (leg.t0, leg.t0 + leg.duration)
+    return [[t, number, leg.kind, *q, *still, *still, *[""] * len(q), power] for t in ends]

@@ -11,6 +11,7 @@ import orjson
 from fastapi import APIRouter, Query, Request, Response
 
 from joulepath.app.api.optimize.task import OptimizeTask
+from joulepath.app.api.studies.suggest.models import Suggestions, SuggestQuery
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.base import InternalError, InvalidRequest
 from joulepath.app.exceptions.queue import Busy, ShuttingDown, WorkerLost
@@ -22,7 +23,6 @@ from joulepath.app.http.problems import reported
 from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
 from joulepath.app.routes.parameters import StudyId, allowed_deadline
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.app.schemas.suggestions import Suggestions, SuggestQuery
 from joulepath.app.store import answers, studies
 from joulepath.app.store.store import Store
 from joulepath.app.studies.suggestions import Proposal, base_of, proposals

@@ -8,6 +8,7 @@ from typing import Annotated
 import orjson
 from fastapi import APIRouter, Path, Query, Response
 
+from joulepath.app.api.answers.models import AnswerList, AnswerPage, AnswerSummary, StoredAnswer
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import InvalidRequest
@@ -15,7 +16,6 @@ from joulepath.app.exceptions.stored import AnswerInUse, StoreUnavailable, Unkno
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import ServiceClient, ServiceStore
-from joulepath.app.schemas.answers import AnswerList, AnswerPage, AnswerSummary, StoredAnswer
 from joulepath.app.schemas.examples.values import ANSWER_ID
 from joulepath.app.store import answers
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.convert.arm_fields import arm_fields
 from joulepath.app.schemas.arm import Payload
-from joulepath.app.schemas.cycle import CycleRequest
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.problem.arm import LIMIT_NAMES, Arm
 

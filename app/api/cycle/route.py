@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.cycle.request import CycleRequest
+from joulepath.app.api.cycle.task import CycleAnswer, CycleTask
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.stored import KeyReused
 from joulepath.app.http.openapi import problem_responses
@@ -19,9 +22,7 @@ from joulepath.app.routes.later import ACCEPTED, ServiceLater
 from joulepath.app.routes.parameters import WantedFormat, deadline_of
 from joulepath.app.routes.problem_lists import CYCLE_PROBLEMS
 from joulepath.app.routes.reply import BY_EVENTS, ServiceReply
-from joulepath.app.schemas.cycle import CycleRequest, CycleResponse
 from joulepath.app.store.store_answers import keep_answer, store_answers
-from joulepath.app.tasks.cycle import CycleTask
 from joulepath.app.tasks.read_body import HeldBody
 from joulepath.app.tasks.request_key import cell_of
 from joulepath.optimizer.progress import Tell
@@ -32,7 +33,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 @router.post(
     "/cycle",
     summary="A cycle of stops with least energy",
-    response_model=CycleResponse,
+    response_model=model_of(CycleAnswer),
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}}, **BY_EVENTS}},
         **ACCEPTED,

@@ -1,0 +1,1 @@
+"""`GET /answers`: answers that the service keeps."""

@@ -1,0 +1,1 @@
+"""`POST /cycle`: a cycle of stops with least energy."""

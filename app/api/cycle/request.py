@@ -1,0 +1,184 @@
+"""What `POST /cycle` takes."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, Tag, ValidationInfo, field_validator, model_validator
+from pydantic_core import PydanticCustomError
+
+from joulepath.app.api.cycle.stop import PlainName, StopRequest
+from joulepath.app.schemas.arm import ArmRequest
+from joulepath.app.schemas.common import described
+from joulepath.app.schemas.request import (
+    SECONDS_OR_RANGE,
+    Branch,
+    DurationRange,
+    Holding,
+    Target,
+    WhichCandidates,
+    which_candidates,
+)
+from joulepath.app.settings import LONGEST_DEADLINE
+from joulepath.optimizer.problem.cycle import LONGEST_ROUND, MOST_STOPS
+from joulepath.optimizer.problem.free_order import MOST_FREE_STOPS
+from joulepath.optimizer.problem.problem import MethodName
+from joulepath.optimizer.result.energy import Objective
+
+# of a cycle with more stops, the default deadline is longer, and samples are no closer: answers stay as large as before
+_MANY_STOPS, _LONG_DEADLINE, _LEAST_PERIOD = 100, 120.0, 1e-3
+
+LongTime = Annotated[float, Field(gt=0, le=LONGEST_ROUND)]
+
+
+class TimeRange(DurationRange):
+    """Bounds on the duration of a cycle; each is optional."""
+
+    min: LongTime | None = described("Smallest duration. Null: no bound.", "s", 10.0, default=None)
+    max: LongTime | None = described("Largest duration. Null: no bound.", "s", 12.0, default=None)
+
+
+CycleTime = Annotated[Annotated[LongTime, Tag("seconds")] | Annotated[TimeRange, Tag("range")], SECONDS_OR_RANGE]
+
+
+class CycleRequest(ArmRequest):
+    """A cycle of stops. `payload` is what the arm carries to the first stop that changes it."""
+
+    start: Target = described(
+        "Where the arm rests before the first move: joint positions, a pose of the TCP, or one of several targets.",
+        None,
+        {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]},
+    )
+    stops: Annotated[list[StopRequest], Field(min_length=1, max_length=MOST_STOPS)] = described(
+        "The stops; in the order in which they are visited, unless `order` is free.",
+        None,
+        [
+            {
+                "name": "pick",
+                "target": {"pose": {"position": [0.4, -0.2, 0.1], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
+                "payload": {"mass": 2.0, "com": [0.0, 0.0, 0.1]},
+            },
+            {
+                "name": "place",
+                "target": {"pose": {"position": [0.1, 0.5, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
+                "payload": None,
+            },
+        ],
+    )
+    order: Literal["given", "free"] = described(
+        "`given`: the stops are visited in the order of `stops`. `free`: in the order that needs the least energy, for "
+        f"at most {MOST_FREE_STOPS} stops. The arm then carries the same between groups of stops as at the start.",
+        None,
+        "given",
+        default="given",
+    )
+    before: Annotated[list[Annotated[list[PlainName], Field(min_length=2, max_length=2)]], Field(max_length=132)] = (
+        described(
+            "With a free order: pairs of stops, of which the first is visited earlier than the second.",
+            None,
+            [["pick", "inspect"]],
+            default=[],
+        )
+    )
+    together: Annotated[
+        list[Annotated[list[PlainName], Field(min_length=2, max_length=MOST_FREE_STOPS)]],
+        Field(max_length=MOST_FREE_STOPS),
+    ] = described(
+        "With a free order: lists of stops that are visited one directly after the other, as they are listed, like the "
+        "one where a part is taken up and the one where it is put down.",
+        None,
+        [["pick", "place"]],
+        default=[],
+    )
+    closed: bool = described(
+        "Whether the arm returns to the start after the last stop: to the same joint positions, full turns included.",
+        None,
+        True,
+        default=True,
+    )
+    time: CycleTime | None = described(
+        "Duration of the cycle, dwells and waiting included, or bounds on it. Time is shared among the moves so that "
+        "the energy is least; what is left over is waited out where that costs least. Null: the optimiser chooses.",
+        "s",
+        12.0,
+        default=None,
+    )
+    objective: Objective = described(
+        "`electrical`: the energy drawn by the whole cycle. `mechanical`: the work of its moves, ∫ Σ |tau_j v_j| dt; "
+        "rests need none, and slower moves less, so it needs a `time` or a `time.max`.",
+        None,
+        "electrical",
+        default="electrical",
+    )
+    hold: Holding = described(
+        "How the arm is held while it dwells and waits.",
+        None,
+        {"hold": "brakes", "brake_delay": 0.5},
+        default=Holding(),
+    )
+    wait: PlainName | None = described(
+        "Where time that is left over is waited out: `start`, or the name of a stop. Null: where that costs least.",
+        None,
+        "start",
+        default=None,
+    )
+    branch: Branch | None = described(
+        "Allowed branches of the arm configurations at the start. Null: all branches.",
+        None,
+        {"shoulder": "left"},
+        default=None,
+    )
+    method: MethodName = described(
+        "How the moves are parametrised: see `POST /optimize`.", None, "bspline", default="bspline"
+    )
+    windings: bool = described(
+        "Whether full-turn alternatives q + 2πk within the joint range count at every stop. If not, each configuration "
+        "has the joint positions nearest to the middle of the joint range.",
+        None,
+        True,
+        default=True,
+    )
+    candidates: WhichCandidates = which_candidates()
+    sample_period: float = described(
+        f"Time between the samples of the answers of the moves. With more than {_MANY_STOPS} stops, at least "
+        f"{_LEAST_PERIOD:g} s.",
+        "s",
+        0.008,
+        default=0.008,
+        ge=1e-4,
+        le=1,
+    )
+    deadline: float = described(
+        "Wall time from the arrival of the request, including the wait for a worker. When it nears, the service "
+        f"returns the best certified cycle found so far. With more than {_MANY_STOPS} stops, the default is "
+        f"{_LONG_DEADLINE:g} s.",
+        "s",
+        60.0,
+        default=60.0,
+        ge=1e-3,
+        le=LONGEST_DEADLINE,
+    )
+
+    @field_validator("sample_period")
+    @classmethod
+    def _few_enough_samples(cls, period: float, info: ValidationInfo) -> float:
+        if len(info.data.get("stops", ())) > _MANY_STOPS and period < _LEAST_PERIOD:
+            raise PydanticCustomError(
+                "too_many_samples",
+                "With more than {stops} stops, `sample_period` must be at least {least} s",
+                {"stops": _MANY_STOPS, "least": _LEAST_PERIOD},
+            )
+        return period
+
+    @model_validator(mode="after")
+    def _long_enough(self) -> Self:
+        if "deadline" not in self.model_fields_set and len(self.stops) > _MANY_STOPS:
+            # still a default: it is no longer than the service allows
+            object.__setattr__(self, "deadline", _LONG_DEADLINE)
+        return self
+
+    @model_validator(mode="after")
+    def _order_is_free(self) -> Self:
+        if self.order == "given" and (self.before or self.together):
+            raise PydanticCustomError("order", "`before` and `together` need `order` to be free")
+        return self

@@ -1,0 +1,160 @@
+"""What `POST /cycle` answers, and its work in a worker."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Literal, Self
+
+from joulepath.app.answers.bounded_energy import EnergyAndBound
+from joulepath.app.answers.envelope import Answer, AnswerFigures
+from joulepath.app.api.cycle.arms import arms_of_moves
+from joulepath.app.api.cycle.problem import to_cycle
+from joulepath.app.api.cycle.request import CycleRequest
+from joulepath.app.api.cycle.table import to_cycle_csv
+from joulepath.app.api.optimize.task import OptimizeAnswer
+from joulepath.app.convert.known_motions import to_kept, to_known_motions
+from joulepath.app.convert.warnings import DIVIDED, MISSED, NO_DEFAULT_MOTION, certified_warnings
+from joulepath.app.engine.listening import listener
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.tasks.answer_collector import AnswerCollector
+from joulepath.app.tasks.certified import certified
+from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleSolution
+from joulepath.optimizer.cycle.known_motions import knowing
+from joulepath.optimizer.declared import Joules, NotEmpty, Seconds, Watts
+from joulepath.optimizer.plan_cycle import plan_cycle
+from joulepath.optimizer.problem.problem import MethodName
+from joulepath.optimizer.result.cycle import CycleCertificate, CycleSearchReport, LegReport
+from joulepath.optimizer.result.energy import Objective
+
+
+@dataclass(frozen=True, kw_only=True)
+class CycleEnergy(EnergyAndBound):
+    """Energy of the cycle: the moves, and dwells and waiting in `electrical.dwell`."""
+
+    lower_bound: Joules
+    """Lower bound of the objective: no cycle that rests at these stops, or goes through those with
+    `via`, of any configurations, shapes and durations, needs less."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CycleLeg(LegReport):
+    """A move from one place to the next, the dwell at a stop, or a wait."""
+
+    answer: str | None = None
+    """Path of the complete answer of `POST /optimize` for this move; null for a rest."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CycleAnswer(Answer):
+    """The cycle of least energy, its moves, and its certificate."""
+
+    method: MethodName
+    """How the moves are parametrised."""
+    objective: Objective
+    """The energy that is minimised."""
+    order: list[str]
+    """Names of the stops, as they are visited."""
+    duration: Seconds
+    """Duration of the cycle, dwells and waiting included."""
+    status: Literal["optimal", "feasible"]
+    """`optimal`: every move converged, and no other chain of arm configurations has a lower bound
+    below what was found. It does not say that no better cycle exists: see `optimality_gap`.
+    `feasible`: the cycle is certified, but the search was not complete, or arm configurations may
+    have been missed."""
+    price_of_time: Watts
+    """What one more second would save; negative if it would cost energy. 0 if the cycle takes its
+    own time."""
+    energy: CycleEnergy
+    """Energy and power of the cycle."""
+    legs: Annotated[list[CycleLeg], NotEmpty]
+    """Moves and dwells in their order."""
+    baselines: list[CycleBaseline]
+    """The same cycle in other ways; without what was not found in time."""
+    certificate: CycleCertificate
+    """Independent check of all moves."""
+    warnings: list[str]
+    """Remarks on the cycle and on its moves, as in `POST /optimize`; those on a move name its ends.
+    Empty if there are none."""
+    search: CycleSearchReport
+    """Size and effort of the search for the cycle."""
+    answer: str | None = None
+    """Path of this answer: `GET` returns it again. Null if it could not be kept."""
+
+    @classmethod
+    def of(cls, request: CycleRequest, request_id: str, found: CycleSolution, legs: list[CycleLeg]) -> Self:
+        """The answer to a request, not kept yet; `legs` name the answers of their moves."""
+        return cls(
+            request=request_id,
+            robot=request.robot,
+            method=request.method,
+            objective=request.objective,
+            order=found.order,
+            duration=found.duration,
+            status=found.status,
+            price_of_time=found.price_of_time,
+            energy=CycleEnergy.bounded(found.energy, found.lower_bound, found.objective),
+            legs=legs,
+            baselines=found.baselines,
+            certificate=found.certificate,
+            warnings=_warnings(found),
+            search=found.search,
+        )
+
+    @property
+    def figures(self) -> AnswerFigures:
+        """What lists show of this answer."""
+        return AnswerFigures(self.robot, self.energy.of(self.objective), self.duration, self.status)
+
+
+@dataclass(frozen=True)
+class CycleTask:
+    """A validated request and its id; the media type of the answer is `wanted`.
+
+    `motions` are kept ones of the same cell, see `store.known_motions`.
+    """
+
+    request: CycleRequest
+    request_id: str
+    wanted: Literal["json", "csv"] = "json"
+    motions: Mapping[str, bytes] = field(default_factory=dict)
+
+    def run(self, deadline: float) -> TaskResult:
+        """The answer of `POST /cycle`, within about `deadline` seconds."""
+        motions = to_known_motions(self.motions)
+        with knowing(motions):
+            found = plan_cycle(to_cycle(self.request, deadline), tell=listener())
+        return replace(self._result(found), motions=to_kept(motions))
+
+    def _result(self, found: CycleSolution) -> TaskResult:
+        if self.wanted == "csv":
+            return TaskResult.of_csv(to_cycle_csv(found))
+        collector, legs = AnswerCollector(), list[CycleLeg]()
+        for move, arm in zip(found.moves, arms_of_moves(self.request, found), strict=True):
+            solution = certified(move.solution)
+            path = collector.add(OptimizeAnswer.of(self.request, self.request_id, solution, arm))
+            first, *rests = (CycleLeg(**vars(leg)) for leg in move.legs(found.objective))
+            legs += [replace(first, answer=path), *rests]
+        answer = CycleAnswer.of(self.request, self.request_id, found, legs)
+        return TaskResult.of_kept_json(answer, answer.figures, collector.stored)
+
+
+def _warnings(found: CycleSolution) -> list[str]:
+    """Warnings of the cycle, then those of single moves, which they name."""
+    of_all = [] if found.complete else [MISSED]
+    if found.moves[0].planned.arm.robot.default_motion is None:
+        of_all.append(NO_DEFAULT_MOTION)
+    of_all += [DIVIDED.format(name, last) for name, last in _divided(found)]
+    return of_all + [
+        f"{move.planned.start} to {move.planned.goal}: {words}"
+        for move in found.moves
+        for words in certified_warnings(move.solution)
+        if words != NO_DEFAULT_MOTION
+    ]
+
+
+def _divided(found: CycleSolution) -> list[tuple[str, float]]:
+    """Where paths are divided: the stop at which a part ends, and the share of the path until there."""
+    paths = [(move.planned.goal, move.planned.tool_path) for move in found.moves]
+    parts = [(name, path.section) for name, path in paths if path is not None and path.section is not None]
+    return [(name, section.last) for name, section in parts if section.last < 1]

@@ -1,0 +1,1 @@
+"""`POST /excitation`: a motion that tells the parameters of an arm apart."""

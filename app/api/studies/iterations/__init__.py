@@ -1,0 +1,1 @@
+"""`/studies/{id}/iterations`: the steps of a study."""

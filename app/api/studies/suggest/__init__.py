@@ -1,0 +1,1 @@
+"""`GET /studies/{id}/suggest`: changes to try next."""
