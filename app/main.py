@@ -13,6 +13,8 @@ from starlette.middleware.cors import CORSMiddleware
 from joulepath import __version__
 from joulepath.app.access.key_ring import KeyRing
 from joulepath.app.access.start import key_ring
+from joulepath.app.api.ik import route as ik
+from joulepath.app.api.ik.path import route as ik_path
 from joulepath.app.api.optimize import route as optimize
 from joulepath.app.cluster.link import Cluster
 from joulepath.app.engine.pool import Engine
@@ -38,8 +40,6 @@ from joulepath.app.routes import (
     figures,
     health,
     identifications,
-    ik,
-    ik_path,
     iterations,
     jobs,
     logs,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 from importlib import import_module
+from pkgutil import walk_packages
 
 from joulepath.app.engine.imports import importing
 
@@ -12,11 +13,8 @@ TASKS = (
     "cycle",
     "evaluate",
     "export",
-    "ik",
-    "ik_path",
     "job_body",
     "job_request",
-    "optimize",
     "own_robot",
     "pareto",
     "read_body",
@@ -25,6 +23,10 @@ TASKS = (
 )
 
 with importing():
+    endpoints = import_module("joulepath.app.api")
+    for module in walk_packages(endpoints.__path__, "joulepath.app.api."):
+        if module.name.endswith(".task"):
+            import_module(module.name)
     for name in TASKS:
         import_module(f"joulepath.app.tasks.{name}")
     # imported where it is called, because the process that answers HTTP does not need it

@@ -8,7 +8,6 @@ from joulepath.app.schemas.examples.export import EXPORT_EXAMPLES
 from joulepath.app.schemas.examples.figures import FIGURES_EXAMPLES
 from joulepath.app.schemas.examples.files import Example, body_examples, shown
 from joulepath.app.schemas.examples.identifications import IDENTIFY_EXAMPLES
-from joulepath.app.schemas.examples.ik import IK_EXAMPLES, IK_PATH_EXAMPLES
 from joulepath.app.schemas.examples.jobs import NEW_JOB_EXAMPLES
 from joulepath.app.schemas.examples.logs import LOG_EXAMPLES
 from joulepath.app.schemas.examples.own_arm import NEW_ROBOT_EXAMPLES, PUT_EXAMPLES
@@ -25,8 +24,6 @@ BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     "/whatif": {JSON: WHATIF_EXAMPLES},
     "/export/{format}": {JSON: EXPORT_EXAMPLES},
     "/replay": {JSON: REPLAY_EXAMPLES},
-    "/ik": {JSON: IK_EXAMPLES},
-    "/ik/path": {JSON: IK_PATH_EXAMPLES},
     "/excitation": {JSON: EXCITATION_EXAMPLES},
     "/identifications": {JSON: IDENTIFY_EXAMPLES},
     "/logs": {CSV: LOG_EXAMPLES},
