@@ -13,6 +13,7 @@ from starlette.middleware.cors import CORSMiddleware
 from joulepath import __version__
 from joulepath.app.access.key_ring import KeyRing
 from joulepath.app.access.start import key_ring
+from joulepath.app.api.evaluate import route as evaluate
 from joulepath.app.api.ik import route as ik
 from joulepath.app.api.ik.path import route as ik_path
 from joulepath.app.api.optimize import route as optimize
@@ -34,7 +35,6 @@ from joulepath.app.routes import (
     compare,
     cycle,
     docs,
-    evaluate,
     excitation,
     export,
     figures,

@@ -9,8 +9,8 @@ from typing import Any
 
 import orjson
 
+from joulepath.app.api.evaluate.task import EvaluateAnswer, evaluated
 from joulepath.app.api.optimize.task import OptimizeTask
-from joulepath.app.convert.evaluation import to_evaluate_response
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.compare import CompareRequest
@@ -24,7 +24,6 @@ from joulepath.app.store.leases import FoundFigures
 from joulepath.app.tasks.answer_figures import figures_of
 from joulepath.app.tasks.compare import CompareTask
 from joulepath.app.tasks.cycle import CycleTask
-from joulepath.app.tasks.evaluate import evaluated
 from joulepath.app.tasks.figures import replacing
 from joulepath.app.tasks.identify import IdentifyTask, Stored
 from joulepath.app.tasks.pareto import ParetoTask
@@ -105,7 +104,7 @@ def _identified(answer: dict[str, Any]) -> FoundFigures:
 
 def _evaluate(body: bytes, request_id: str, deadline: float) -> TaskResult:
     request = EvaluateRequest.model_validate_json(body)
-    return TaskResult.of_json(to_evaluate_response(request_id, evaluated(request, Deadline.after(deadline))))
+    return TaskResult.of_json(EvaluateAnswer.of(request_id, evaluated(request, Deadline.after(deadline))))
 
 
 _RUN: dict[str, Callable[[bytes, str, float], TaskResult]] = {

@@ -7,10 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
+from joulepath.app.api.evaluate.task import EvaluateAnswer, Evaluated
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.convert.arm import to_arm
 from joulepath.app.convert.arm_fields import arm_fields
-from joulepath.app.convert.evaluation import Evaluated, to_evaluate_response, to_motion
+from joulepath.app.convert.given_motion import to_motion
 from joulepath.app.convert.recorded import as_logged
 from joulepath.app.convert.request import to_problem
 from joulepath.app.convert.until import time_left, until
@@ -159,7 +160,7 @@ class _Evaluated(_Work):
             arms = [self._arm(asked, k) for k in range(len(self.request.changes))]
         base = _located(lambda: self._evaluate(arm, asked), "evaluate")
         content = {
-            "answer": self.collector.add(to_evaluate_response(self.request_id, Evaluated(asked, base))),
+            "answer": self.collector.add(EvaluateAnswer.of(self.request_id, Evaluated(asked, base))),
             "status": None,
             "holds": _holds(base),
             **of_base(base.total.energy, base.total.duration),
@@ -186,9 +187,7 @@ class _Evaluated(_Work):
         same = {
             "holds": _holds(found),
             "certificate": None,
-            "answer": self.collector.add(
-                to_evaluate_response(self.request_id, Evaluated(_changed(asked, change), found))
-            ),
+            "answer": self.collector.add(EvaluateAnswer.of(self.request_id, Evaluated(_changed(asked, change), found))),
             **differences(content, found.total.energy, found.total.duration),
         }
         return self.row(change, same_motion=same)

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.api.evaluate.task import EvaluateTask
 from joulepath.app.api.ik.task import IKRequest, IKTask
 from joulepath.app.convert.mesh_file import mesh_from_file
 from joulepath.app.convert.request import to_problem
@@ -25,7 +26,6 @@ from joulepath.app.schemas.identifications import IdentifyRequest
 from joulepath.app.schemas.logs import LogSettings
 from joulepath.app.schemas.own_arm import OwnArm
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.app.tasks.evaluate import EvaluateTask
 from joulepath.app.tasks.identify import IdentifyTask
 from joulepath.app.tasks.own_robot import OwnRobotTask
 from joulepath.app.tasks.read_log import ReadLogTask

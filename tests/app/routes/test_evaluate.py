@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.evaluate.task import EvaluateAnswer
 from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.errors import ProblemDetails
-from joulepath.app.schemas.evaluate import EvaluateResponse
 from joulepath.app.schemas.examples.files import body_examples
 from tests.app.requests import HOME, NEAR, move
 
@@ -57,7 +58,7 @@ def refused(answer: Any, kind: type[ProblemDetails]) -> dict[str, Any]:
 def test_answers_the_documented_requests(name: str, client: TestClient) -> None:
     answer = client.post("/evaluate", json=REQUESTS[name])
     assert answer.status_code == 200, answer.text
-    EvaluateResponse.model_validate_json(answer.content)
+    model_of(EvaluateAnswer).model_validate_json(answer.content)
     content = answer.json()
     assert content["segment_count"] == len(content["segments"])
     assert content["total"]["balance_error"] < 1e-6

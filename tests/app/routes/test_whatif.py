@@ -9,9 +9,9 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
+from joulepath.app.api.evaluate.task import EvaluateAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.exceptions import InvalidRequest
-from joulepath.app.schemas.evaluate import EvaluateResponse
 from joulepath.app.schemas.whatif import WhatifResponse
 from joulepath.app.tasks import answer_collector
 from joulepath.app.tasks.answer_collector import AnswerCollector
@@ -48,7 +48,7 @@ def kept(client: TestClient, path: str, kind: str) -> dict[str, Any]:
     answer = client.get(path).json()
     assert answer["kind"] == kind
     content: dict[str, Any] = answer["answer"]
-    (model_of(OptimizeAnswer) if kind == "optimize" else EvaluateResponse).model_validate(content)
+    (model_of(OptimizeAnswer) if kind == "optimize" else model_of(EvaluateAnswer)).model_validate(content)
     return content
 
 
