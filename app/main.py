@@ -17,6 +17,7 @@ from joulepath.app.api.evaluate import route as evaluate
 from joulepath.app.api.ik import route as ik
 from joulepath.app.api.ik.path import route as ik_path
 from joulepath.app.api.optimize import route as optimize
+from joulepath.app.api.replay import route as replay
 from joulepath.app.cluster.link import Cluster
 from joulepath.app.engine.pool import Engine
 from joulepath.app.engine.warm_up import warm
@@ -46,7 +47,6 @@ from joulepath.app.routes import (
     metrics,
     pareto,
     problems,
-    replay,
     robots,
     studies,
     studio,

@@ -190,7 +190,7 @@ def test_inverse_kinematics_says_what_is_out_of_reach() -> None:
 def test_replay() -> None:
     found = joulepath.replay(solution(), ("feed_forward",), 1e-3, {"friction": 0.3}, problem=problem())
     assert found.torque_error is not None and found.torque_error < 1e-9
-    run = found.runs["feed_forward"]
+    run = found.under("feed_forward")
     assert electrical(run.energy) == pytest.approx(electrical(solution().energy), rel=5e-3)
     assert not run.collides
     assert {each.name for each in found.savings} == {each.name for each in solution().baselines}
@@ -202,7 +202,7 @@ def test_replay_of_a_cycle_plays_every_move() -> None:
     found = joulepath.replay(cycle_solution(), ("feed_forward",), 1e-3)
     assert len(found) == len(cycle_solution().moves)
     for replayed, move in zip(found, cycle_solution().moves, strict=True):
-        energy = electrical(replayed.runs["feed_forward"].energy)
+        energy = electrical(replayed.under("feed_forward").energy)
         assert energy == pytest.approx(electrical(move.solution.energy), rel=5e-3)
 
 

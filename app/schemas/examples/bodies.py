@@ -12,7 +12,6 @@ from joulepath.app.schemas.examples.jobs import NEW_JOB_EXAMPLES
 from joulepath.app.schemas.examples.logs import LOG_EXAMPLES
 from joulepath.app.schemas.examples.own_arm import NEW_ROBOT_EXAMPLES, PUT_EXAMPLES
 from joulepath.app.schemas.examples.pareto import PARETO_EXAMPLES
-from joulepath.app.schemas.examples.replay import REPLAY_EXAMPLES
 from joulepath.app.schemas.examples.studies import ITERATION_EXAMPLES, STUDY_EXAMPLES
 from joulepath.app.schemas.examples.whatif import WHATIF_EXAMPLES
 
@@ -23,7 +22,6 @@ BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     "/pareto": {JSON: PARETO_EXAMPLES},
     "/whatif": {JSON: WHATIF_EXAMPLES},
     "/export/{format}": {JSON: EXPORT_EXAMPLES},
-    "/replay": {JSON: REPLAY_EXAMPLES},
     "/excitation": {JSON: EXCITATION_EXAMPLES},
     "/identifications": {JSON: IDENTIFY_EXAMPLES},
     "/logs": {CSV: LOG_EXAMPLES},

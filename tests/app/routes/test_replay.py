@@ -7,9 +7,10 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.replay.task import ReplayAnswer
 from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.examples.own_arm import ARM
-from joulepath.app.schemas.replay import ReplayResponse
 from tests.app.requests import HOME, NEAR, PATIENT, move
 from tests.app.routes.test_problems import refused
 
@@ -23,7 +24,7 @@ def replayed(client: TestClient, **body: Any) -> dict[str, Any]:
     """The answer of POST /replay."""
     answer = client.post("/replay", json=COARSE | body)
     assert answer.status_code == 200, answer.text
-    ReplayResponse.model_validate_json(answer.content)
+    model_of(ReplayAnswer).model_validate_json(answer.content)
     content: dict[str, Any] = answer.json()
     return content
 
