@@ -14,6 +14,7 @@ from joulepath import __version__
 from joulepath.app.access.key_ring import KeyRing
 from joulepath.app.access.start import key_ring
 from joulepath.app.api.evaluate import route as evaluate
+from joulepath.app.api.export import route as export
 from joulepath.app.api.ik import route as ik
 from joulepath.app.api.ik.path import route as ik_path
 from joulepath.app.api.optimize import route as optimize
@@ -37,7 +38,6 @@ from joulepath.app.routes import (
     cycle,
     docs,
     excitation,
-    export,
     figures,
     health,
     identifications,

@@ -11,7 +11,6 @@ from joulepath.app.engine.imports import importing
 TASKS = (
     "compare",
     "cycle",
-    "export",
     "job_body",
     "job_request",
     "own_robot",

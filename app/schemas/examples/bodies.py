@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from joulepath.app.schemas.examples.compare import COMPARE_EXAMPLES
 from joulepath.app.schemas.examples.excitation import EXCITATION_EXAMPLES
-from joulepath.app.schemas.examples.export import EXPORT_EXAMPLES
 from joulepath.app.schemas.examples.figures import FIGURES_EXAMPLES
 from joulepath.app.schemas.examples.files import Example, body_examples, shown
 from joulepath.app.schemas.examples.identifications import IDENTIFY_EXAMPLES
@@ -21,7 +20,6 @@ BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     "/compare": {JSON: COMPARE_EXAMPLES},
     "/pareto": {JSON: PARETO_EXAMPLES},
     "/whatif": {JSON: WHATIF_EXAMPLES},
-    "/export/{format}": {JSON: EXPORT_EXAMPLES},
     "/excitation": {JSON: EXCITATION_EXAMPLES},
     "/identifications": {JSON: IDENTIFY_EXAMPLES},
     "/logs": {CSV: LOG_EXAMPLES},
