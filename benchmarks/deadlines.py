@@ -27,7 +27,7 @@ from benchmarks.tasks import as_pose, collision_free, flange
 from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.engine.result import json_document
 from joulepath.app.engine.task import Task
-from joulepath.app.http.problem_details import problem_content
+from joulepath.app.http.problems import problem_of
 from joulepath.app.schemas.pareto import ParetoRequest
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.tasks.pareto import ParetoTask
@@ -156,10 +156,10 @@ def run(kind: str, seed: int, index: int) -> Outcome:
         document = task.run(deadline).document
         result = "optimal" if b'"status":"optimal"' in document else "answered"
     except DeadlineExceeded as error:
-        json_document(problem_content(error, "benchmark"))
+        json_document(problem_of(error, "benchmark"))
         result = "deadline exceeded"
     except JoulepathError as error:
-        json_document(problem_content(error, "benchmark"))
+        json_document(problem_of(error, "benchmark"))
         result = type(error).__name__
     return Outcome(kind, index, deadline, time.perf_counter() - began - deadline, result)
 

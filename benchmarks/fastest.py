@@ -21,13 +21,14 @@ from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.exceptions import DurationTooShort, JoulepathError
+from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.methods.duration_intervals import fastest
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.problem import LEAST_DURATION, Problem
 from joulepath.optimizer.search.attempts import in_time, solver_of
+from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.trajectories import quintic
 from joulepath.optimizer.trajectories.seven_segment import shortest_duration

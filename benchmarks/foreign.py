@@ -26,7 +26,7 @@ from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
 from joulepath import optimize
 from joulepath.app.convert.request import to_problem
-from joulepath.app.http.problem_details import problem_content
+from joulepath.app.http.problems import problem_of
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.optimize import warm_up
@@ -118,7 +118,7 @@ def run(problem: ForeignProblem, kind: Kind, deadline: float) -> Outcome:
         solution = optimize(asked)
     except JoulepathError as error:
         took = {"wall": time.perf_counter() - began, "cpu": time.process_time() - used}
-        type_ = str(problem_content(error, "benchmark")["type"]).rsplit("/", 1)[-1]
+        type_ = str(problem_of(error, "benchmark")["type"]).rsplit("/", 1)[-1]
         return outcome(**took, problem=type_, detail=str(error))
     took = {"wall": time.perf_counter() - began, "cpu": time.process_time() - used}
     best = min((c for c in solution.candidates if c.energy is not None), key=lambda c: c.energy or 0.0)

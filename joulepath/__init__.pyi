@@ -7,6 +7,8 @@ from .models.uncertainty.document import InvalidFigures
 from .optimizer.collision.model import ClosestPair
 from .optimizer.compare import Compared, Comparison, compare
 from .optimizer.cycle.cycle_solution import CycleBaseline, CycleMove, CycleSolution
+from .optimizer.cycle.errors import CycleTooShort, NoSequence
+from .optimizer.evaluate.errors import NotCertified
 from .optimizer.evaluate.evaluate import Evaluation, evaluate
 from .optimizer.evaluate.interval_energy import IntervalEnergy
 from .optimizer.evaluate.limit_report import LimitReport
@@ -14,30 +16,19 @@ from .optimizer.evaluate.nearest_contact import LeastClearance
 from .optimizer.evaluate.recording import RecordedRows, Recording, Waypoints
 from .optimizer.exceptions import (
     ContradictoryOrder,
-    CycleTooShort,
     DeadlineExceeded,
-    DurationTooShort,
-    FormatUnsuitable,
-    GoalInCollision,
-    InCollision,
     InvalidProblem,
     InvalidTable,
     JoulepathError,
-    NoCollisionFreeTrajectory,
-    NoReachableTarget,
-    NoSequence,
-    NotCertified,
     NoTrajectory,
     OutsideLimits,
-    PathInfeasible,
     SingularPose,
-    StartInCollision,
-    StopInCollision,
-    TorqueInfeasible,
     UnknownRobot,
     UnreachablePose,
+    UnreachableTargets,
 )
 from .optimizer.excitation.errors import ExcitationInfeasible
+from .optimizer.export.errors import FormatUnsuitable
 from .optimizer.export.export import ExportedFile, export
 from .optimizer.export.franka import FrankaOptions
 from .optimizer.export.krl import KrlOptions
@@ -119,6 +110,16 @@ from .optimizer.result.solution import (
     Solution,
     SolverReport,
     Trajectory,
+)
+from .optimizer.search.errors import (
+    DurationTooShort,
+    GoalInCollision,
+    InCollision,
+    NoCollisionFreeTrajectory,
+    PathInfeasible,
+    StartInCollision,
+    StopInCollision,
+    TorqueInfeasible,
 )
 from .optimizer.trajectories.spline import Spline
 from .optimizer.what_if import WhatIf, what_if
@@ -204,7 +205,6 @@ __all__ = [
     "MoveitOptions",
     "NoCollisionFreeTrajectory",
     "NoPowerChannel",
-    "NoReachableTarget",
     "NoSequence",
     "NoTrajectory",
     "NotCertified",
@@ -259,6 +259,7 @@ __all__ = [
     "UnknownRobot",
     "UnreachablePose",
     "UnreachableTarget",
+    "UnreachableTargets",
     "UrscriptOptions",
     "Validation",
     "Voxels",

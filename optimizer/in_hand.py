@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 
 class InHand(Protocol[T_co]):
-    """A motion, or a round of motions, that may be feasible."""
+    """A motion, or a cycle of motions, that may be feasible."""
 
     @property
     def cost(self) -> float:

@@ -31,7 +31,7 @@ def optimize(problem: Problem, clock: Clock = time.perf_counter, tell: Tell = no
     Raises:
         UnreachablePose: no configuration within the limits reaches a pose.
         SingularPose: a pose is reached only on a self-motion of unknown form.
-        NoReachableTarget: none of several targets can be reached.
+        UnreachableTargets: none of several targets can be reached.
         InCollision: every configuration at the start, or at the goal, collides.
         TorqueInfeasible: the arm cannot hold or move its load.
         PathInfeasible: no configuration leads along the whole tool path.

@@ -1,16 +1,15 @@
 """Public entry point: `pareto(problem, points)` returns the front of energy and duration.
 
-The last point is the answer of `optimize`. A motion of another duration that needs less by no more than solves from
-different initial guesses differ is the same optimum and no point of its own.
+The last point is the answer of `optimize`. A motion that needs less only by the spread of solves is the same optimum.
 
 Between two neighbours the front lies within the rectangle that they span: a motion that is slower than the left one is
 dominated unless it needs less energy, and no motion needs less energy than the right one. Durations are therefore
-chosen one by one. Each is the geometric mean of the two neighbours whose rectangle has the longest sides, relative to
-those of the whole front, in log T and in energy.
+chosen one by one: each is the geometric mean of the two neighbours whose rectangle has the longest sides in log T and
+energy.
 
 If two neighbours belong to different candidates, the front may jump between them. The candidate of the right one has a
 fastest motion of its own. If this is slower than the left point, the jump is at its duration. That duration is tried
-next, and one just below it, because halving would only converge to it.
+next, and one just below it, as halving would only converge to it.
 
 Each duration is solved with a warm start from the motions on both sides and without one. Every other candidate whose
 lower bound for this duration is below the best energy is solved, too.
@@ -27,11 +26,12 @@ from typing import Literal
 import numpy as np
 
 from joulepath.optimizer.deadline import Clock
-from joulepath.optimizer.exceptions import DeadlineExceeded, DurationTooShort, InvalidProblem, NoTrajectory
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, NoTrajectory
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, forward, nobody
 from joulepath.optimizer.result.solution import Solution
+from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.fastest import fastest, fastest_of
 from joulepath.optimizer.search.reserve import report_time
 from joulepath.optimizer.search.run import Run

@@ -21,7 +21,6 @@ from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleMove, C
 from joulepath.optimizer.cycle.cycles_in_hand import CycleInHand, shared, simple_cycles
 from joulepath.optimizer.cycle.divided_paths import with_divided_paths
 from joulepath.optimizer.cycle.free_orientations import with_free_orientations
-from joulepath.optimizer.cycle.last_posture import with_last_posture
 from joulepath.optimizer.cycle.move_problem import LEAST_TIME
 from joulepath.optimizer.cycle.moves import moves_of
 from joulepath.optimizer.cycle.order_search import OrderSearch
@@ -65,9 +64,7 @@ def plan_cycle(cycle: Cycle, clock: Clock = time.perf_counter, tell: Tell = nobo
     with one_thread():
         began, tell = clock(), forward(tell)
         asked = _divided(cycle, clock)
-        end = Deadline.after(asked.deadline, clock)
         found = with_free_orientations(asked, lambda other: _valued(other, clock, tell), clock)
-        found = with_last_posture(asked, found, end, clock)
         _tell_found(tell, found)
         return replace(found, wall_time=clock() - began)
 

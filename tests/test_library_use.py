@@ -31,7 +31,7 @@ ERRORS = {
     "EffortNotUsable", "ExcitationInfeasible", "FormatUnsuitable", "GoalInCollision",
     "InCollision", "InvalidArm", "InvalidFigures", "InvalidProblem", "InvalidTable",
     "JoulepathError", "LogTooLarge", "MethodNotApplicable", "NoCollisionFreeTrajectory", "NoPowerChannel",
-    "NoReachableTarget", "NoSequence", "NoTrajectory", "NotCertified", "NotExcited",
+    "UnreachableTargets", "NoSequence", "NoTrajectory", "NotCertified", "NotExcited",
     "NothingHeldOut", "OutsideLimits", "PathInfeasible", "PayloadUnknown", "SingularPose",
     "StartInCollision", "StopInCollision", "TorqueInfeasible", "UnknownRobot",
     "UnreachablePose",
@@ -98,7 +98,9 @@ def test_one_except_clause_catches_every_error() -> None:
         assert issubclass(getattr(joulepath, name), base)
     for module in pkgutil.walk_packages(joulepath.optimizer.__path__, "joulepath.optimizer."):
         importlib.import_module(module.name)
-    assert {each.__name__ for each in subclasses(joulepath.JoulepathError)} <= ERRORS
+    assert {
+        each.__name__ for each in subclasses(joulepath.JoulepathError) if not each.__name__.startswith("_")
+    } <= ERRORS
 
 
 def subclasses(base: type) -> Iterator[type]:

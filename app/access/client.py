@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from ipaddress import IPv4Address, IPv6Address, ip_address
-from typing import Literal
+
+from joulepath.app.exceptions.access import Role
 
 Address = IPv4Address | IPv6Address
-Role = Literal["read", "compute", "admin"]
-"""What a client may do. Each role includes those before it."""
 
 _IPV6_PREFIX = 64
 """Bits that one customer's IPv6 addresses have in common: whoever has one of them has all."""

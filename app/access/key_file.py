@@ -16,7 +16,7 @@ from typing import Annotated
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from joulepath.app.access.client import Role
+from joulepath.app.exceptions.access import Role
 
 _NAME_LENGTH = 64
 """Of a name, at most: the database keeps it as the owner of what the client created."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from typing import get_args
 
-from joulepath.app.access.client import Client, Role
-from joulepath.app.exceptions import NotOwner, RoleTooLow
+from joulepath.app.access.client import Client
+from joulepath.app.exceptions.access import NotOwner, Role, RoleTooLow
 
 PUBLIC = re.compile(r"/healthz|/readyz|/openapi\.json|/redoc|/docs(/[^/]+)?|/problems/[^/]+|/|/studio(/\w[\w.-]*)*")
 """Paths without anything of a user's: probes, the documentation, the pages that explain problems, the studio page."""

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 import orjson
 
+from joulepath.app.cli.exit_codes import of_error
+
 if TYPE_CHECKING:
     from joulepath.app.engine.result import TaskResult
     from joulepath.app.engine.task import Task
@@ -30,11 +32,11 @@ OUTPUT: Callable[[Any], Any] = click.option(
 
 
 class Refused(Exception):
-    """The request is answered with a problem: `problem` is its JSON (RFC 9457)."""
+    """The request is answered with a problem: its JSON (RFC 9457), and the exit code of the command."""
 
-    def __init__(self, problem: bytes) -> None:
+    def __init__(self, problem: bytes, exit_code: int) -> None:
         super().__init__(problem)
-        self.problem = problem
+        self.problem, self.exit_code = problem, exit_code
 
 
 def new_id() -> str:
@@ -52,8 +54,8 @@ def validated(model: type[M], body: bytes, request_id: str) -> M:
     from pydantic import ValidationError
 
     from joulepath.app.convert.json_text import parsed_json
-    from joulepath.app.exceptions import InvalidRequest
-    from joulepath.app.http.problem_details import invalid_request
+    from joulepath.app.exceptions.base import InvalidRequest
+    from joulepath.app.http.problems import invalid_request
 
     try:
         return model.model_validate(parsed_json(body))
@@ -65,20 +67,19 @@ def validated(model: type[M], body: bytes, request_id: str) -> M:
 
 def answered(task: Task, deadline: float, request_id: str) -> bytes:
     """The answer of a task for which `deadline` [s] is left. Raises Refused."""
-    from joulepath.app.exceptions import ServiceError
-    from joulepath.optimizer.exceptions import JoulepathError
+    from joulepath.optimizer.exceptions import DeclaredError
 
     try:
         result = _run(task, deadline)
         return (result if result.kept_as is None else result.not_kept()).document
-    except (JoulepathError, ServiceError) as error:
+    except DeclaredError as error:
         raise refused(error, request_id) from None
 
 
 def _run(task: Task, deadline: float) -> TaskResult:
     """The result of a task, with the log, the robot and the figures that it takes from the database."""
     from joulepath.app.cli.store import with_figures, with_log, with_own_robot
-    from joulepath.app.exceptions import UnknownFigures, UnknownLog
+    from joulepath.app.exceptions.stored import UnknownFigures, UnknownLog
     from joulepath.optimizer.exceptions import UnknownRobot
 
     try:
@@ -99,9 +100,9 @@ def _run(task: Task, deadline: float) -> TaskResult:
 def refused(error: Exception, request_id: str | None = None) -> Refused:
     """What a command raises for an error of the library or the service."""
     from joulepath.app.engine.result import json_document
-    from joulepath.app.http.problem_details import problem_content
+    from joulepath.app.http.problems import problem_of
 
-    return Refused(json_document(problem_content(error, request_id or new_id())))
+    return Refused(json_document(problem_of(error, request_id or new_id())), of_error(error))
 
 
 def compile_kernel_of(robot_name: str) -> None:
@@ -110,7 +111,7 @@ def compile_kernel_of(robot_name: str) -> None:
     Without a C compiler, and for a robot that nobody knows, nothing happens. One that hangs is told and given up.
     """
     from joulepath.app.cli.store import robot_named
-    from joulepath.app.exceptions import StoreUnavailable
+    from joulepath.app.exceptions.stored import StoreUnavailable
     from joulepath.optimizer.energy.kernel_cache import compile_kernel
     from joulepath.optimizer.exceptions import UnknownRobot
     from joulepath.optimizer.native.library_cache import PATIENCE, CompilerHangs

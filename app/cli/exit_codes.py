@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import orjson
-
 ANSWERED, PROBLEM, INVALID = 0, 1, 2
 # 128 + SIGINT, as shells report it
 INTERRUPTED = 130
 
-_ABOUT_THE_INPUT = ("/problems/validation", "/problems/invalid-table", "/problems/unknown-robot")
 
+def of_error(error: Exception) -> int:
+    """INVALID for an error of the input itself, PROBLEM for any other."""
+    from joulepath.app.exceptions.base import InvalidRequest
+    from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable, UnknownRobot
 
-def of_problem(problem: bytes) -> int:
-    """INVALID for a problem (its JSON) of the input itself, PROBLEM for any other."""
-    return INVALID if orjson.loads(problem)["type"] in _ABOUT_THE_INPUT else PROBLEM
+    return INVALID if isinstance(error, InvalidRequest | InvalidProblem | InvalidTable | UnknownRobot) else PROBLEM

@@ -1,4 +1,4 @@
-"""Tasks that need kept answers, such as the moves of a round: here they come from the database."""
+"""Tasks that need kept answers, such as the moves of a cycle: here they come from the database."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class WithStore:
 
     def run(self, deadline: float) -> TaskResult:
         """The task's result."""
-        from joulepath.app.exceptions import PartsNeeded
+        from joulepath.app.exceptions.stored import PartsNeeded
 
         try:
             self.result = self.task.run(deadline)

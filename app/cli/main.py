@@ -11,7 +11,7 @@ from joulepath.app.cli.answer import Refused
 from joulepath.app.cli.cluster_worker import cluster_worker
 from joulepath.app.cli.cycle import cycle
 from joulepath.app.cli.evaluate import evaluate
-from joulepath.app.cli.exit_codes import ANSWERED, INTERRUPTED, INVALID, of_problem
+from joulepath.app.cli.exit_codes import ANSWERED, INTERRUPTED, INVALID
 from joulepath.app.cli.export import export
 from joulepath.app.cli.identify import identify
 from joulepath.app.cli.interrupts import interruptible
@@ -56,7 +56,7 @@ def main() -> None:
             code = joulepath.main(prog_name="joulepath", standalone_mode=False) or ANSWERED
     except Refused as refusal:
         click.echo(refusal.problem, err=True)
-        code = of_problem(refusal.problem)
+        code = refusal.exit_code
     except click.ClickException as error:
         error.show()
         # click's own code for a file that cannot be written is 1

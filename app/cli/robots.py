@@ -50,7 +50,7 @@ def add(file: Path, name: str | None, replace: bool) -> None:
     FILE is a YAML file that names a URDF and says what a URDF does not hold: see docs/own_robot.md.
     """
     from joulepath.app.access.client import OPERATOR
-    from joulepath.app.exceptions import ServiceError
+    from joulepath.app.exceptions.base import ServiceError
     from joulepath.app.schemas.own_arm import NAME_PATTERN
     from joulepath.app.settings import Settings
     from joulepath.app.store import robots as stored
@@ -90,7 +90,7 @@ Example:
 def remove(name: str) -> None:
     """Deletes a robot that was added. Studies and stored answers about it stay."""
     from joulepath.app.access.client import OPERATOR
-    from joulepath.app.exceptions import ServiceError
+    from joulepath.app.exceptions.base import ServiceError
     from joulepath.app.store import robots as stored
     from joulepath.optimizer.exceptions import UnknownRobot
 
@@ -102,7 +102,7 @@ def remove(name: str) -> None:
 
 def _table() -> str:
     """Bundled robots, then those in the database; without these where the database does not answer."""
-    from joulepath.app.exceptions import StoreUnavailable
+    from joulepath.app.exceptions.stored import StoreUnavailable
     from joulepath.app.store import robots as stored
     from joulepath.models.registry import load_robot, robot_names
     from joulepath.models.trust import ENERGY_SECTIONS, trust_letters

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from joulepath.app.cluster.machine import RESOURCES, compute, resource, version
 from joulepath.app.engine.work import Ended, Take, Work
-from joulepath.app.exceptions import ClusterUnavailable, WorkerDied
+from joulepath.app.exceptions.queue import ClusterUnavailable, WorkerLost
 from joulepath.optimizer.progress import nobody
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ class Cluster:
         """Runs works on some machine, one after another: several short ones as one task of Dask, which costs more than
         each of them.
 
-        Each ends with what it raises if it fails, DeadlineExceeded, or WorkerDied. If cancelled, the work is stopped.
+        Each ends with what it raises if it fails, DeadlineExceeded, or WorkerLost. If cancelled, the work is stopped.
         Raises ClusterUnavailable.
         """
         works, expected = list[Work](), 0.0
@@ -98,7 +98,7 @@ class Cluster:
         try:
             ended: list[Ended] = await future.result()
         except KilledWorker:
-            ended = [WorkerDied()]
+            ended = [WorkerLost()]
         except (Cancelled, OSError) as error:
             ids = [work.task.request_id for work in works]
             logger.warning("the cluster lost tasks", extra={"request_ids": ids, "reason": str(error)})

@@ -19,7 +19,7 @@ from joulepath.app.engine.pool import Engine
 from joulepath.app.engine.task import Task
 from joulepath.app.engine.warm_up import warm
 from joulepath.app.engine.work import Ended, Work, taking
-from joulepath.app.exceptions import WorkerDied
+from joulepath.app.exceptions.queue import WorkerLost
 from joulepath.app.settings import read_settings
 from joulepath.optimizer.progress import Event, nobody
 
@@ -96,7 +96,7 @@ async def compute(asked: list[Asked], key: str, topic: str) -> list[Ended]:
         if not working.done():
             raise Reschedule
         working.result()
-        if engine.draining and any(isinstance(each, WorkerDied) for each in ended.values()):
+        if engine.draining and any(isinstance(each, WorkerLost) for each in ended.values()):
             raise Reschedule
         return [ended[index] for index in range(len(works))]
     finally:

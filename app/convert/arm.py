@@ -28,7 +28,7 @@ def robot_named(name: str) -> Robot:
         return load_robot(name)
     figures = own_figures_of(name)
     if figures is None:
-        raise UnknownRobot(name, robot_names())
+        raise UnknownRobot(name, list(robot_names()))
     return own_robot_of(name, figures)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from joulepath.app.convert.arm import to_arm
-from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.arm import ArmRequest
 from joulepath.app.schemas.common import RobotName
 from joulepath.models.robot import Array
@@ -100,7 +100,7 @@ _MOTION = "answer must be one of POST /optimize, of POST /cycle, or of POST /eva
 def to_program(answer: dict[str, Any], arm: ArmRequest | None, kept: Callable[[list[str]], list[Any]]) -> Program:
     """The motion of an answer at full speed, its samples checked.
 
-    `kept` gives the kept answers of paths: those of the moves of a round. Raises ValidationError (of pydantic),
+    `kept` gives the kept answers of paths: those of the moves of a cycle. Raises ValidationError (of pydantic),
     InvalidRequest, InvalidProblem, NotCertified or UnknownRobot.
     """
     if "legs" in answer:
@@ -113,19 +113,19 @@ def to_program(answer: dict[str, Any], arm: ArmRequest | None, kept: Callable[[l
 
 
 def paths_of_moves(answer: dict[str, Any]) -> list[str]:
-    """The paths of the answers of a round's moves; empty for another answer. Raises ValidationError or
+    """The paths of the answers of a cycle's moves; empty for another answer. Raises ValidationError or
     InvalidProblem."""
     if "legs" not in answer:
         return []
     legs = [leg for leg in _Cycle.model_validate(answer).legs if leg.kind in MOVING]
     if any(leg.answer is None for leg in legs):
-        raise InvalidProblem("answer", "The moves of the round are not kept: send the round to POST /cycle again.")
+        raise InvalidProblem("answer", "The moves of the cycle are not kept: send the cycle to POST /cycle again.")
     return [leg.answer for leg in legs if leg.answer is not None]
 
 
 def _cycle(found: _Cycle, arm: ArmRequest | None, kept: Callable[[list[str]], list[Any]]) -> Program:
     if arm is not None:
-        raise InvalidProblem("arm", "The moves of a round have arms of their own: leave `arm` out.")
+        raise InvalidProblem("arm", "The moves of a cycle have arms of their own: leave `arm` out.")
     moves = iter(kept([leg.answer for leg in found.legs if leg.answer is not None]))
     steps = list[Move | Rest]()
     for leg in found.legs:

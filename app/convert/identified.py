@@ -8,7 +8,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any
 
-from joulepath.app.exceptions import UnknownFigures
+from joulepath.app.exceptions.stored import UnknownFigures
 from joulepath.models.own_arm.robots import own_robot
 from joulepath.models.robot import Robot
 from joulepath.models.uncertainty.document import merged

@@ -7,7 +7,7 @@ from typing import Any
 
 import jiter
 
-from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.exceptions.base import InvalidRequest
 
 _PLACE = re.compile(r"(?s)(.*) at line (\d+) column (\d+)")
 _REPEATED = re.compile(r'(?s)Detected duplicate key "(.*)"')

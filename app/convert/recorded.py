@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from joulepath.app.convert.arm import robot_named, to_payload
 from joulepath.app.convert.logs import to_log_options
-from joulepath.app.exceptions import UnknownLog
+from joulepath.app.exceptions.stored import UnknownLog
 from joulepath.app.schemas.arm import Payload
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
 from joulepath.app.schemas.logs import LogSettings

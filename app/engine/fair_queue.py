@@ -10,7 +10,7 @@ from contextlib import asynccontextmanager, contextmanager
 from enum import Enum, auto
 
 from joulepath.app.engine.worker import Worker
-from joulepath.app.exceptions import Busy, TooManyRequests
+from joulepath.app.exceptions.queue import Busy, TooManyRequests
 
 PATIENCE = 2.0
 """Time [s] that a client without a worker waits, before a client that has several gives one back."""

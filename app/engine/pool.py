@@ -17,7 +17,7 @@ from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.spare import SpareWorkers
 from joulepath.app.engine.task import Task
 from joulepath.app.engine.worker import Worker
-from joulepath.app.exceptions import Preempted, ShuttingDown, WorkerDied
+from joulepath.app.exceptions.queue import Preempted, ShuttingDown, WorkerLost
 from joulepath.app.settings import Settings
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.progress import Tell, nobody
@@ -117,7 +117,7 @@ class Engine:
         Clients have their turns, see `FairQueue`. A task whose worker another client needs begins again later, and once
         one whose worker died. `tell` gets what the task finds, after a new begin from the first on.
         If cancelled, the task leaves the queue or is stopped. Raises what the task raises (see `Task.run`), Busy,
-        TooManyRequests, ShuttingDown, DeadlineExceeded, or WorkerDied if two workers died of it.
+        TooManyRequests, ShuttingDown, DeadlineExceeded, or WorkerLost if two workers died of it.
         """
         if self._draining.is_set():
             raise ShuttingDown
@@ -153,7 +153,7 @@ class Engine:
                     return await worker.ask(task, left, tell)
                 except Preempted:
                     reason = "gave its worker back"
-                except WorkerDied:
+                except WorkerLost:
                     deaths += 1
                     if self._draining.is_set():
                         raise ShuttingDown from None
@@ -175,7 +175,7 @@ class Engine:
                 await worker.start()
             except Exception as error:
                 # also without memory, files or threads for it: there may be some later
-                is_told = isinstance(error, WorkerDied)
+                is_told = isinstance(error, WorkerLost)
                 logger.error("worker did not start", exc_info=None if is_told else error, extra={"retry_in": delay})
                 await asyncio.sleep(delay)
                 delay = min(2 * delay, _LONGEST_RESTART_DELAY)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from joulepath.app.engine.fair_queue import PATIENCE, FairQueue
 from joulepath.app.engine.work import Ended, Take, Work
 from joulepath.app.engine.worker import Worker
-from joulepath.app.exceptions import Preempted, WorkerDied
+from joulepath.app.exceptions.queue import Preempted, WorkerLost
 from joulepath.optimizer.exceptions import DeadlineExceeded
 
 
@@ -52,7 +52,7 @@ class SpareWorkers:
         """Runs works one after another on one worker, once it is idle and no caller waits for one.
 
         It ends if there is no more work, a caller waits, or the worker is gone. The work that it was at then has ended
-        with DeadlineExceeded, WorkerDied, or, if it is `stoppable`, Preempted: a caller took the worker. If cancelled,
+        with DeadlineExceeded, WorkerLost, or, if it is `stoppable`, Preempted: a caller took the worker. If cancelled,
         the work is stopped, and has not ended.
         """
         async with self._queue.spare() as worker:
@@ -82,7 +82,7 @@ class SpareWorkers:
                 await worker.ask_all(first, following, turn)
         except TimeoutError:
             run.end(DeadlineExceeded([]))
-        except (WorkerDied, Preempted) as error:
+        except (WorkerLost, Preempted) as error:
             run.end(error)
         finally:
             run.over = True

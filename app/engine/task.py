@@ -6,9 +6,9 @@ import logging
 from typing import Protocol
 
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.exceptions import ServiceError, TaskFailed
+from joulepath.app.exceptions.base import InternalError
 from joulepath.optimizer.deadline import Stopped, checkpoint, is_stopped
-from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.exceptions import DeclaredError
 
 logger = logging.getLogger(__name__)
 
@@ -24,23 +24,23 @@ class Task(Protocol):
         """The result, within about `deadline` seconds. What it finds before goes to `listener()`.
 
         A JoulepathError or ServiceError reaches the caller of `Engine.run` as it is. Any other exception is a defect:
-        the worker logs it, and the caller gets TaskFailed.
+        the worker logs it, and the caller gets InternalError.
         """
 
 
-def outcome(task: Task, deadline: float) -> TaskResult | JoulepathError | ServiceError | Stopped:
+def outcome(task: Task, deadline: float) -> TaskResult | DeclaredError | Stopped:
     """The task's result, the error that its caller gets, or that it was stopped; all can be pickled."""
-    ended: TaskResult | JoulepathError | ServiceError
+    ended: TaskResult | DeclaredError
     try:
         checkpoint()
         ended = task.run(deadline)
-    except (JoulepathError, ServiceError) as error:
+    except DeclaredError as error:
         ended = error
     except Stopped as stopped:
         return stopped
     except Exception:
         if not is_stopped():
             logger.exception("unforeseen error", extra={"request_id": task.request_id})
-        ended = TaskFailed()
+        ended = InternalError()
     # a task that is stopped may end as if its deadline had passed: that is no answer for whoever gave its worker back
     return Stopped() if is_stopped() else ended

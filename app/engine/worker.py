@@ -25,7 +25,7 @@ from joulepath.app.engine.listening import listening
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.task import Task, outcome
 from joulepath.app.engine.work import Ended, Take, Work
-from joulepath.app.exceptions import Preempted, WorkerDied
+from joulepath.app.exceptions.queue import Preempted, WorkerLost
 from joulepath.app.logs import configure_logging
 from joulepath.optimizer.deadline import Stopped, stoppable
 from joulepath.optimizer.progress import Event, Tell, nobody
@@ -86,7 +86,7 @@ class Worker:
             self._exchange.add_done_callback(lambda _: call())
 
     async def start(self) -> None:
-        """Starts the process and waits until it is warm. If cancelled, it kills it. Raises WorkerDied."""
+        """Starts the process and waits until it is warm. If cancelled, it kills it. Raises WorkerLost."""
         loop = asyncio.get_running_loop()
         try:
             await loop.run_in_executor(self._threads, self._start)
@@ -94,14 +94,14 @@ class Worker:
         except BaseException as error:
             self.kill()
             if isinstance(error, EOFError | OSError):
-                raise WorkerDied from None
+                raise WorkerLost from None
             raise
 
     async def ask(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
         """The task's result. If cancelled, it stops the task.
 
         `tell` gets what the task finds, before the result. Raises what the task raises (see `Task.run`), Preempted if
-        the task was stopped, or WorkerDied.
+        the task was stopped, or WorkerLost.
         """
         heard = _heard(tell, asyncio.get_running_loop())
         ended = await self._exchanged(lambda number: self._ask(number, task, deadline, heard))
@@ -110,7 +110,7 @@ class Worker:
         return ended
 
     async def ask_all(self, first: Work, take: Take, turn: Turn) -> None:
-        """Runs works one after another, until there is none. If cancelled, it stops. Raises Preempted or WorkerDied.
+        """Runs works one after another, until there is none. If cancelled, it stops. Raises Preempted or WorkerLost.
 
         Each gets to the process as soon as the last one has ended: the event loop, which calls `turn`, may be late.
         """
@@ -138,7 +138,7 @@ class Worker:
             self.kill()
 
     async def _exchanged(self, call: Callable[[int], T]) -> T:
-        """The result of an exchange with the process, in a thread. Raises WorkerDied, or Preempted if it was stopped.
+        """The result of an exchange with the process, in a thread. Raises WorkerLost, or Preempted if it was stopped.
 
         The exchange goes on after a cancellation until the process has ended the task: see `when_free`.
         """
@@ -152,7 +152,7 @@ class Worker:
         try:
             return await asyncio.shield(exchange)
         except (EOFError, OSError):
-            raise (Preempted() if self._is_stopped(number) else WorkerDied()) from None
+            raise (Preempted() if self._is_stopped(number) else WorkerLost()) from None
         except asyncio.CancelledError:
             self.stop()
             raise

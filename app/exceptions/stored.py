@@ -2,133 +2,232 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from dataclasses import dataclass
+from typing import Annotated, Literal
 
 from joulepath.app.exceptions.base import ServiceError
+from joulepath.optimizer.declared import Internal, Unit
 
 StoreFault = Literal["full", "read-only", "locked", "deleted", "unreachable"]
 """What is wrong with the database."""
+_FAULTS: dict[StoreFault, str] = {
+    "full": "The disk of the database is full: delete studies that are not needed, or enlarge the disk. Deleting "
+    "works.",
+    "read-only": "The database is read-only: reading works, and the operator of the service must make it writable.",
+    "locked": "Another process locks the database: try again later, or ask the operator of the service to end that "
+    "process.",
+    "deleted": "The file of the database was deleted or replaced: the operator of the service must put it back, or "
+    "restart the service, which then begins an empty one.",
+    "unreachable": "The database does not answer: try again later, or ask the operator of the service.",
+}
 
 
+@dataclass(eq=False)
 class StoreUnavailable(ServiceError):
-    """The database cannot be reached, read or written; the log has the driver's words."""
+    """The database of studies and answers cannot be reached, read or written; `cause` says why, and the service's log
+    has more. Nothing of the request was stored. Requests that need no database, for example `POST /optimize`, still
+    work. On a full disk, `DELETE` works, so that space can be freed."""
 
-    MESSAGES: ClassVar[dict[StoreFault, str]] = {
-        "full": "The disk of the database is full: delete studies that are not needed, or enlarge the disk. Deleting "
-        "works.",
-        "read-only": "The database is read-only: reading works, and the operator of the service must make it writable.",
-        "locked": "Another process locks the database: try again later, or ask the operator of the service to end that "
-        "process.",
-        "deleted": "The file of the database was deleted or replaced: the operator of the service must put it back, or "
-        "restart the service, which then begins an empty one.",
-        "unreachable": "The database does not answer: try again later, or ask the operator of the service.",
-    }
+    status = 503
+    retry_after = 5
+    title = "Database unavailable"
+    remedy = "Try again after the time [s] in the header `Retry-After`."
 
-    def __init__(self, cause: StoreFault) -> None:
-        Exception.__init__(self, self.MESSAGES[cause])
-        self.cause = cause
+    cause: StoreFault
+    """`full`: no space is left. `read-only`: it takes no changes. `locked`: another process locks it. `deleted`: its
+    file was deleted or replaced while the service ran. `unreachable`: it does not answer, or cannot be read."""
+
+    def __str__(self) -> str:
+        return _FAULTS[self.cause]
 
 
 class UnknownAnswer(ServiceError):
-    """No stored answer has that id."""
+    """No answer with this id is stored. It never existed, its study was deleted, or it was deleted to make space for
+    newer answers."""
 
-    MESSAGE = "No stored answer has this id: send the request that produced the answer again."
+    status = 404
+    title = "Unknown answer"
+    remedy = "To get it again, repeat the request that produced it."
+    detail = "No stored answer has this id: send the request that produced the answer again."
 
 
+@dataclass(eq=False)
 class PartsNeeded(UnknownAnswer):
-    """An export refers to kept answers, by their ids or paths `names`, that are not at hand."""
+    """An export refers to kept answers that are not at hand."""
 
-    MESSAGE = "The answer refers to kept answers that are not at hand: export it where the service keeps them."
+    detail = "The answer refers to kept answers that are not at hand: export it where the service keeps them."
 
-    def __init__(self, names: list[str]) -> None:
-        super().__init__()
-        self.names = names
+    names: Annotated[list[str], Internal]
+    """Ids or paths of these answers."""
+
+
+class AnswerInUse(ServiceError):
+    """The answer belongs to a study or a job, which refers to it."""
+
+    status = 409
+    title = "Answer in use"
+    remedy = "Delete the study or the job: `DELETE /studies/{id}` or `DELETE /jobs/{id}`."
+    detail = "This answer belongs to a study or a job: delete the study or the job."
 
 
 class UnknownStudy(ServiceError):
-    """No study has that id."""
+    """No study has this id, or the study has no iteration with this number. It never existed, or the study was
+    deleted."""
 
-    MESSAGE = "No study has this id: GET /studies lists all studies."
+    status = 404
+    title = "Unknown study"
+    remedy = "Use a study that `GET /studies` lists."
+    detail = "No study has this id: GET /studies lists all studies."
 
 
 class UnknownIteration(UnknownStudy):
     """The study has no iteration of that number."""
 
-    MESSAGE = "The study has no iteration of this number: GET /studies/{id} lists its iterations."
-
-
-class UnknownJob(ServiceError):
-    """No job has that id."""
-
-    MESSAGE = "No job has this id: GET /jobs lists all jobs."
-
-
-class JobNotCancellable(ServiceError):
-    """The job has ended."""
-
-    MESSAGE = "The job has ended: there is nothing left to cancel. DELETE /jobs/{id} deletes it with its answers."
+    detail = "The study has no iteration of this number: GET /studies/{id} lists its iterations."
 
 
 class EmptyStudy(ServiceError):
-    """The study has no iteration that suggestions could start from."""
+    """The request needs an iteration of the study, but the study has none."""
 
-    MESSAGE = "The study has no iteration yet: add a first iteration, then ask for suggestions."
+    status = 409
+    title = "Empty study"
+    remedy = "Add one with `POST /studies/{id}/iterations`."
+    detail = "The study has no iteration yet: add a first iteration, then ask for suggestions."
+
+
+class UnknownJob(ServiceError):
+    """No job has this id. It never existed, it was deleted, or it ended longer ago than jobs are kept."""
+
+    status = 404
+    title = "Unknown job"
+    remedy = "Use a job that `GET /jobs` lists."
+    detail = "No job has this id: GET /jobs lists all jobs."
+
+
+class JobNotCancellable(ServiceError):
+    """The job has ended, so that there is nothing left to cancel."""
+
+    status = 409
+    title = "Job not cancellable"
+    remedy = "Its answers stay until it is deleted with `DELETE /jobs/{id}`."
+    detail = "The job has ended: there is nothing left to cancel. DELETE /jobs/{id} deletes it with its answers."
 
 
 class RobotExists(ServiceError):
-    """The name of a robot is taken."""
+    """The name of the robot is taken."""
 
-    MESSAGE = "A robot has this name: use another name, or replace the robot (`PUT`, on the command line `--replace`)."
+    status = 409
+    title = "Robot exists"
+    remedy = (
+        "Use another name, or `PUT /robots/{name}` to replace a robot that was added. The robots that come with the "
+        "service can be neither replaced nor deleted."
+    )
+    detail = "A robot has this name: use another name, or replace the robot (`PUT`, on the command line `--replace`)."
 
 
 class BundledRobot(RobotExists):
     """The robot comes with the service: nobody adds, replaces or deletes it."""
 
-    MESSAGE = (
+    detail = (
         "This robot comes with the service and can be neither replaced nor deleted: only robots that were added can. "
         "Give a robot of your own another name."
     )
 
 
 class TooManyRobots(ServiceError):
-    """The service holds as many robots of users as it may."""
+    """The service holds as many added robots as `JOULEPATH_MAX_ROBOTS` allows."""
 
-    MESSAGE = "The service holds as many added robots as it may: delete one that is not used."
+    status = 409
+    title = "Too many robots"
+    remedy = "Delete one that is not used with `DELETE /robots/{name}`."
+    detail = "The service holds as many added robots as it may: delete one that is not used."
 
 
+class NoMeshes(ServiceError):
+    """The meshes of this robot are not installed, as `has_meshes` of `GET /robots/{name}` says."""
+
+    status = 404
+    title = "No meshes"
+    remedy = (
+        "Those of ur3e and ur5e come with `pip install 'joulepath[meshes]'`. The capsules of `GET /robots/{name}` show "
+        "every robot."
+    )
+    detail = "No meshes of this robot are installed: the extra `meshes` has those of ur3e and ur5e."
+
+
+@dataclass(eq=False)
 class UnknownLog(ServiceError):
-    """No log has the `id` that the request names."""
+    """No log has this id. It never existed, or it was deleted."""
 
-    MESSAGE = "No log has this id: GET /logs lists all logs."
+    status = 404
+    title = "Unknown log"
+    remedy = "Use a log that `GET /logs` lists."
+    detail = "No log has this id: GET /logs lists all logs."
 
-    def __init__(self, id: str = "") -> None:
-        super().__init__()
-        self.id = id
+    id: Annotated[str, Internal] = ""
+    """The id that the request names."""
+
+
+@dataclass(eq=False)
+class TooManyLogs(ServiceError):
+    """The stored logs and this one would exceed `JOULEPATH_LOGS_MAX_BYTES`."""
+
+    status = 409
+    title = "Too many logs"
+    remedy = "Delete logs that are not needed with `DELETE /logs/{id}`; what was identified from them stays."
+
+    limit: Annotated[int, Unit("byte")]
+    """Largest total size of the logs, compressed."""
+
+    def __str__(self) -> str:
+        return f"The stored logs would exceed {self.limit} bytes, compressed: delete some that are not needed."
 
 
 class UnknownIdentification(ServiceError):
-    """No identification has that id."""
+    """No identification has this id. It never existed, or it was deleted: an identification is a job, which is kept as
+    long as `JOULEPATH_ANSWERS_MAX_AGE` says."""
 
-    MESSAGE = "No identification has this id: it may be older than the service keeps jobs. Send it again."
+    status = 404
+    title = "Unknown identification"
+    remedy = "Send it again with `POST /identifications`."
+    detail = "No identification has this id: it may be older than the service keeps jobs. Send it again."
 
 
-class TooManyLogs(ServiceError):
-    """The stored logs and a new one would exceed `limit` bytes."""
+@dataclass(eq=False)
+class UnknownFigures(ServiceError):
+    """No figures have this id, or no longer."""
 
-    def __init__(self, limit: int) -> None:
-        Exception.__init__(
-            self, f"The stored logs would exceed {limit} bytes, compressed: delete some that are not needed."
-        )
-        self.limit = limit
+    status = 404
+    title = "Unknown figures"
+    remedy = "Use figures that `GET /figures` lists, or send their document again with `PUT /figures`."
+    detail = "No figures have this id: GET /figures lists all figures."
+
+    id: Annotated[str, Internal] = ""
+    """The id that the request names."""
+
+
+class FiguresInUse(ServiceError):
+    """A study uses these figures."""
+
+    status = 409
+    title = "Figures in use"
+    remedy = "Delete the study first, with `DELETE /studies/{id}`, or keep the figures."
+    detail = "A study uses these figures: delete the study first, with DELETE /studies/{id}."
+
+
+class TooManyFigures(ServiceError):
+    """The service holds as many figures as `JOULEPATH_MAX_FIGURES` allows."""
+
+    status = 409
+    title = "Too many figures"
+    remedy = "Delete some that are not used with `DELETE /figures/{id}`."
+    detail = "The service holds as many figures as it may: delete some that are not used."
 
 
 class KeyReused(ServiceError):
-    """The Idempotency-Key was used for a different request."""
+    """This `Idempotency-Key` was already used for a different request. A key belongs to one request and its
+    repetitions."""
 
-    MESSAGE = "This Idempotency-Key was already used for a different request: use a new key for each new request."
-
-
-class AnswerInUse(ServiceError):
-    """The answer belongs to a study or a job, which refers to it."""
-
-    MESSAGE = "This answer belongs to a study or a job: delete that."
+    title = "Idempotency-Key reused"
+    remedy = "Use a new key for each new request."
+    detail = "This Idempotency-Key was already used for a different request: use a new key for each new request."

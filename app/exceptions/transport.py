@@ -2,54 +2,86 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Annotated
+
 from joulepath.app.exceptions.base import ServiceError
+from joulepath.optimizer.declared import Internal, Seconds, Unit
 
 
 class NotFound(ServiceError):
-    """The path does not exist."""
+    """The service has nothing at this path."""
 
-    MESSAGE = "This path does not exist: GET /openapi.json lists all paths."
+    status = 404
+    title = "Not found"
+    remedy = "Use one of the paths that `GET /openapi.json` lists."
+    detail = "This path does not exist: GET /openapi.json lists all paths."
 
 
 class MethodNotAllowed(ServiceError):
-    """The path does not accept the HTTP method."""
+    """This path does not support the HTTP method of the request."""
 
-    MESSAGE = "This path does not accept this HTTP method: use one from the Allow header."
+    status = 405
+    title = "Method not allowed"
+    remedy = "Use one of the methods in the header `Allow`."
+    detail = "This path does not accept this HTTP method: use one from the Allow header."
 
 
 class BodyTooLarge(ServiceError):
-    """The body is larger than the limit."""
+    """The body exceeds the service's limit, as it arrives or unpacked. A normal request needs a few
+    kilobytes. Motions sent to `POST /evaluate` may be about a thousand times larger."""
 
-    MESSAGE = "The body is larger than the service accepts: send a smaller body."
+    status = 413
+    title = "Body too large"
+    remedy = "Send a smaller body, for example with fewer samples."
+    detail = "The body is larger than the service accepts: send a smaller body."
 
 
+@dataclass(eq=False)
 class HeadTooLarge(ServiceError):
-    """Line and headers of the request are larger than the limit [byte]."""
+    """The request's line and headers exceed `JOULEPATH_MAX_HEAD_BYTES`. The connection is closed."""
 
-    MESSAGE = "The line and the headers of the request are too large."
+    status = 431
+    title = "Request head too large"
+    remedy = "Requests to this service need few headers: leave out cookies and headers that it does not use."
 
-    def __init__(self, most: int) -> None:
-        super().__init__()
-        self.args = (f"The line and the headers of the request have more than {most} bytes: send shorter ones.",)
+    limit: Annotated[int, Unit("byte"), Internal]
+    """Largest size of the line and the headers."""
+
+    def __str__(self) -> str:
+        return f"The line and the headers of the request have more than {self.limit} bytes: send shorter ones."
 
 
+@dataclass(eq=False)
 class RequestTimeout(ServiceError):
-    """The request did not arrive within the limit [s]."""
+    """The request did not arrive in time: its line and headers within `JOULEPATH_HEAD_TIMEOUT`, its body within
+    `JOULEPATH_BODY_TIMEOUT`."""
 
-    MESSAGE = "The request did not arrive in time."
+    status = 408
+    title = "Request not received in time"
+    remedy = "Send it again, over a faster connection or with a smaller body."
 
-    def __init__(self, most: float) -> None:
-        super().__init__()
-        self.args = (
-            f"The request did not arrive whole within {most:g} s: send it again, over a faster connection or with a "
-            "smaller body.",
+    limit: Annotated[Seconds, Internal]
+    """Time in which the request had to arrive."""
+
+    def __str__(self) -> str:
+        return (
+            f"The request did not arrive whole within {self.limit:g} s: send it again, over a faster connection or "
+            "with a smaller body."
         )
 
 
 class UnsupportedMediaType(ServiceError):
-    """The path does not accept the media type of the body."""
+    """The header `Content-Type` declares a body that this path does not take."""
 
-    MESSAGE = (
+    status = 415
+    title = "Unsupported media type"
+    remedy = (
+        "JSON is `application/json`; the CSV of `POST /evaluate` and `POST /logs` is `text/csv`. `text/plain`, a form, "
+        "and no header at all are read as JSON, too, where a path takes JSON. The body is the document itself: "
+        "`curl --data-binary @file`, not `curl -F file=@file`."
+    )
+    detail = (
         "The header Content-Type declares something else than this path takes: send JSON as application/json, and to "
         "POST /evaluate also CSV as text/csv, to POST /logs CSV only. The body is the document itself, not a form with "
         "a file."
@@ -57,21 +89,32 @@ class UnsupportedMediaType(ServiceError):
 
 
 class UnsupportedCoding(ServiceError):
-    """The body is packed in a way that the service cannot unpack."""
+    """The header `Content-Encoding` names a coding that the service cannot unpack, or several at once."""
 
-    MESSAGE = "The header Content-Encoding names something else than gzip, deflate or zstd: use one of them, or none."
+    status = 415
+    title = "Unsupported content coding"
+    remedy = "Pack the body with `gzip`, `deflate` or `zstd`, or send it as it is, without this header."
+    detail = "The header Content-Encoding names something else than gzip, deflate or zstd: use one of them, or none."
 
 
 class MalformedHttp(ServiceError):
-    """What arrived is no HTTP."""
+    """What arrived at the port is no HTTP/1.1 request, or contradicts itself: a TLS handshake, a request line or header
+    with other characters, two lengths of the body, or a chunk without a length. The service closes the connection."""
 
-    MESSAGE = (
+    status = 400
+    title = "Malformed HTTP"
+    remedy = "Speak HTTP to this port, or HTTPS to the proxy before it."
+    detail = (
         "What arrived is no HTTP/1.1 request: check the address and that the client speaks HTTP, not HTTPS, to this "
         "port, and the request line, the headers and the chunks of the body."
     )
 
 
 class NotAcceptable(ServiceError):
-    """The header `Accept-Encoding` allows no coding that the service has."""
+    """The header `Accept-Encoding` allows no coding in which the service could answer: it has `zstd`, `gzip` and
+    `identity`, which is no coding. Nothing was computed."""
 
-    MESSAGE = "The header Accept-Encoding excludes all of zstd, gzip and identity: allow one of them."
+    status = 406
+    title = "No acceptable coding"
+    remedy = "Allow one of them, or leave the header out."
+    detail = "The header Accept-Encoding excludes all of zstd, gzip and identity: allow one of them."

@@ -8,7 +8,7 @@ from starlette.requests import Request
 
 from joulepath.app.access.key_ring import KeyRing
 from joulepath.app.access.rules import check_role, needed_role
-from joulepath.app.exceptions import NoKey, WrongKey
+from joulepath.app.exceptions.access import Unauthenticated, WrongKey
 from joulepath.app.http.client import client_of
 
 SCHEME = "Bearer"
@@ -18,7 +18,7 @@ REALM = "joulepath"
 def authenticate(request: Request, keys: KeyRing) -> None:
     """Checks the header Authorization, and puts the key's name and role into the request's client.
 
-    Raises NoKey, WrongKey or RoleTooLow.
+    Raises Unauthenticated, WrongKey or RoleTooLow.
     """
     # without a key, a client may read at most
     client = request.state.client = replace(client_of(request), role="read")
@@ -28,7 +28,7 @@ def authenticate(request: Request, keys: KeyRing) -> None:
     given = request.headers.getlist("authorization")
     scheme, _, secret = given[0].partition(" ") if len(given) == 1 else ("", "", "")
     if scheme.lower() != SCHEME.lower() or not secret.strip():
-        raise NoKey
+        raise Unauthenticated
     key = keys.find(secret.strip())
     if key is None:
         raise WrongKey
@@ -36,6 +36,6 @@ def authenticate(request: Request, keys: KeyRing) -> None:
     check_role(client, needed)
 
 
-def challenge(error: NoKey) -> str:
+def challenge(error: Unauthenticated) -> str:
     """The header WWW-Authenticate of a refusal (RFC 6750)."""
     return f'{SCHEME} realm="{REALM}"' + (', error="invalid_token"' if isinstance(error, WrongKey) else "")

@@ -16,13 +16,9 @@ import zstandard
 from starlette.requests import Request
 from starlette.types import Message, Receive
 
-from joulepath.app.exceptions import (
-    BodyTooLarge,
-    InvalidRequest,
-    RequestTimeout,
-    ShuttingDown,
-    UnsupportedCoding,
-)
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.queue import ShuttingDown
+from joulepath.app.exceptions.transport import BodyTooLarge, RequestTimeout, UnsupportedCoding
 from joulepath.app.http.bytes_in_flight import Held
 from joulepath.app.settings import Settings
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 
-from joulepath.app.exceptions import TooManyBytes, TooManyBytesOfClient
+from joulepath.app.exceptions.queue import TooManyBytes, TooManyBytesOfClient
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import zstandard
 from starlette.datastructures import MutableHeaders
 from starlette.types import Message
 
-from joulepath.app.exceptions import NotAcceptable
+from joulepath.app.exceptions.transport import NotAcceptable
 from joulepath.app.http.weights import weights
 
 Coding = Literal["zstd", "gzip", "identity"]

@@ -24,16 +24,11 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from joulepath.app.access.client import Client, address_of
 from joulepath.app.engine.result import json_document
-from joulepath.app.exceptions import (
-    HeadTooLarge,
-    MalformedHttp,
-    RequestTimeout,
-    ServiceError,
-    TooManyConnections,
-    TooManyConnectionsOfClient,
-)
+from joulepath.app.exceptions.base import ServiceError
+from joulepath.app.exceptions.queue import TooManyConnections, TooManyConnectionsOfClient
+from joulepath.app.exceptions.transport import HeadTooLarge, MalformedHttp, RequestTimeout
 from joulepath.app.http.handlers import PROBLEM_MEDIA_TYPE
-from joulepath.app.http.problem_details import problem_content, problem_type
+from joulepath.app.http.problems import problem_of
 from joulepath.app.settings import Settings
 
 logger = logging.getLogger("app.connection")
@@ -203,15 +198,14 @@ class _Wire:
 
 def _response(error: ServiceError) -> bytes:
     """A whole response with a problem, after which the connection is closed."""
-    problem, request_id = problem_type(error), str(uuid.uuid4())
-    status = HTTPStatus(problem.model_fields["status"].default)
-    body = json_document(problem_content(error, request_id))
+    request_id, status = str(uuid.uuid4()), HTTPStatus(error.status)
+    body = json_document(problem_of(error, request_id))
     lines = [
         f"HTTP/1.1 {status} {status.phrase}",
         f"Content-Type: {PROBLEM_MEDIA_TYPE}",
         f"Content-Length: {len(body)}",
         f"X-Request-ID: {request_id}",
         "Connection: close",
-        *([] if problem.retry_after is None else [f"Retry-After: {problem.retry_after}"]),
+        *([] if error.retry_after is None else [f"Retry-After: {error.retry_after}"]),
     ]
     return "\r\n".join([*lines, "", ""]).encode() + body

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from fastapi import Request
 
-from joulepath.app.exceptions import ClientDisconnected
+from joulepath.app.exceptions.queue import ClientDisconnected
 
 T = TypeVar("T")
 

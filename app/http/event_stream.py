@@ -15,10 +15,9 @@ from starlette.types import Message, Receive, Scope, Send
 
 from joulepath.app.convert.progress import to_event
 from joulepath.app.engine.result import TaskResult, json_document
-from joulepath.app.exceptions import ServiceError
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import problem_response
-from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.exceptions import DeclaredError
 from joulepath.optimizer.progress import Event, Tell, forward
 
 logger = logging.getLogger(__name__)
@@ -90,7 +89,7 @@ class EventStream(StreamingResponse):
         except Exception as error:
             if not self._begun:
                 raise
-            if not isinstance(error, JoulepathError | ServiceError):
+            if not isinstance(error, DeclaredError):
                 logger.exception("unforeseen error", extra={"request_id": self._request.state.id})
             response = await problem_response(self._request, error)
             await self._send(send, "problem", bytes(response.body))

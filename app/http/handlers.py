@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import asyncio
-
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
 from joulepath.app.engine.result import TaskResult, json_document
-from joulepath.app.exceptions import (
-    InvalidRequest,
-    MethodNotAllowed,
-    NoKey,
-    NotFound,
-    ServiceError,
-    UnsupportedMediaType,
-)
+from joulepath.app.exceptions.access import Unauthenticated
+from joulepath.app.exceptions.base import InvalidRequest, ServiceError
+from joulepath.app.exceptions.transport import MethodNotAllowed, NotFound, UnsupportedMediaType
 from joulepath.app.http.authentication import challenge
-from joulepath.app.http.problem_details import invalid_request, problem_content, problem_type
-from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.app.http.problems import invalid_request, problem_of, reported
+from joulepath.optimizer.exceptions import DeclaredError
 
 CACHE_HEADER = "Joulepath-Cache"
 PROBLEM_MEDIA_TYPE = "application/problem+json"
@@ -28,7 +21,7 @@ PROBLEM_MEDIA_TYPE = "application/problem+json"
 
 def install_handlers(app: FastAPI) -> None:
     """Answers every exception of the routes with a problem. `RequestContext` handles those that no route expects."""
-    for kind in (JoulepathError, ServiceError, RequestValidationError, HTTPException):
+    for kind in (DeclaredError, RequestValidationError, HTTPException):
         app.add_exception_handler(kind, problem_response)
 
 
@@ -42,23 +35,14 @@ async def problem_response(request: Request, error: Exception) -> Response:
         if error.status_code == 405:
             headers["Allow"] = ", ".join(_allowed(request))
         error = _from_framework(error)
-    elif isinstance(error, NoKey):
+    elif isinstance(error, Unauthenticated):
         headers["WWW-Authenticate"] = challenge(error)
-    problem = problem_type(error)
-    request.state.problem = problem.slug()
-    if problem.retry_after is not None:
-        headers["Retry-After"] = str(problem.retry_after)
-    if hasattr(
-        error, "candidates"
-    ):  # thousands of them: a thread encodes it, and the event loop serves others meanwhile
-        body = await asyncio.to_thread(_encoded, error, request.state.id)
-    else:
-        body = _encoded(error, request.state.id)
-    return Response(body, problem.model_fields["status"].default, headers, PROBLEM_MEDIA_TYPE)
-
-
-def _encoded(error: Exception, request_id: str) -> bytes:
-    return json_document(problem_content(error, request_id))
+    told = reported(error)
+    request.state.problem = told.slug()
+    if told.retry_after is not None:
+        headers["Retry-After"] = str(told.retry_after)
+    body = json_document(problem_of(told, request.state.id))
+    return Response(body, told.status, headers, PROBLEM_MEDIA_TYPE)
 
 
 def result_response(result: TaskResult) -> Response:

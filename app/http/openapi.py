@@ -11,52 +11,48 @@ from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
 from joulepath.app.access.rules import needed_role
+from joulepath.app.exceptions.access import CrossSite, RoleTooLow, Unauthenticated, WrongHost
+from joulepath.app.exceptions.base import InternalError
+from joulepath.app.exceptions.queue import Busy, TooManyRequests
+from joulepath.app.exceptions.transport import HeadTooLarge
 from joulepath.app.http.answer_examples import add_examples
 from joulepath.app.http.authentication import SCHEME
+from joulepath.app.http.problems import model_of_problem, path_of, problem_of, types_of_error
 from joulepath.app.http.sites import PROBES
-from joulepath.app.schemas.errors import (
-    PROBLEMS,
-    Busy,
-    CrossSite,
-    HeadTooLarge,
-    Internal,
-    ProblemDetails,
-    RoleTooLow,
-    TooManyRequests,
-    Unauthenticated,
-    WrongHost,
-)
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
 from joulepath.app.schemas.examples.bodies import BODY_EXAMPLES
 from joulepath.app.schemas.examples.files import shown
+from joulepath.app.schemas.examples.problems import example_of
+from joulepath.app.schemas.examples.values import REQUEST_ID
 from joulepath.app.schemas.jobs import NewJob
 from joulepath.app.schemas.logs import LogSettings
 from joulepath.app.settings import Settings
+from joulepath.optimizer.exceptions import DeclaredError
 
 _SECURITY = "apiKey"
 _REF = "#/components/schemas/{model}"
 
 
-def problem_responses(*problems: type[ProblemDetails]) -> dict[int | str, dict[str, Any]]:
+def problem_responses(*problems: type[DeclaredError]) -> dict[int | str, dict[str, Any]]:
     """The `responses` of a route for its problems. Those of every request are always among them."""
-    by_status: defaultdict[int | str, list[type[ProblemDetails]]] = defaultdict(list)
-    every: tuple[type[ProblemDetails], ...] = (*problems, HeadTooLarge, Busy, TooManyRequests, Internal)
+    by_status: defaultdict[int | str, list[type[DeclaredError]]] = defaultdict(list)
+    every: tuple[type[DeclaredError], ...] = (*problems, HeadTooLarge, Busy, TooManyRequests, InternalError)
     for problem in dict.fromkeys(every):
-        by_status[problem.model_fields["status"].default].append(problem)
+        by_status[problem.status].append(problem)
     return {status: _response(same) for status, same in by_status.items()}
 
 
-def _response(same_status: list[type[ProblemDetails]]) -> dict[str, Any]:
+def _response(same_status: list[type[DeclaredError]]) -> dict[str, Any]:
     references = {problem: _REF.format(model=problem.__name__) for problem in same_status}
     schema: dict[str, Any] = {"$ref": references[same_status[0]]}
     if len(same_status) > 1:
-        mapping = {problem.model_fields["type"].default: reference for problem, reference in references.items()}
+        mapping = {path_of(problem): reference for problem, reference in references.items()}
         schema = {
             "oneOf": [{"$ref": reference} for reference in references.values()],
             "discriminator": {"propertyName": "type", "mapping": mapping},
         }
     response: dict[str, Any] = {
-        "description": " / ".join(str(problem.model_fields["title"].default) for problem in same_status),
+        "description": " / ".join(problem.title for problem in same_status),
         "content": {"application/problem+json": {"schema": schema}},
     }
     if any(problem.retry_after for problem in same_status):
@@ -97,12 +93,14 @@ def _document(app: FastAPI, settings: Settings, with_keys: bool) -> dict[str, An
     )
     schemas = document["components"]["schemas"]
     _, others = models_json_schema(
-        [(problem, "serialization") for problem in PROBLEMS]
+        [(model_of_problem(kind), "serialization") for kind in types_of_error()]
         # the routes read these bodies themselves, so that FastAPI does not know their schemas
         + [(model, "validation") for model in (EvaluateRequest, EvaluateCsvSettings, LogSettings, NewJob)],
         ref_template=_REF,
     )
     schemas.update(others["$defs"])
+    for kind in types_of_error():
+        schemas[kind.__name__]["examples"] = [problem_of(example_of(kind), REQUEST_ID)]
     # FastAPI's own error model: no route answers with it
     for name in ("HTTPValidationError", "ValidationError"):
         schemas.pop(name, None)
@@ -134,7 +132,7 @@ def _add_access(document: dict[str, Any], with_keys: bool) -> None:
     for path, operations in document["paths"].items():
         for method, operation in operations.items():
             needed = needed_role(method.upper(), path)
-            refusals: list[type[ProblemDetails]] = [] if path in PROBES else [WrongHost]
+            refusals: list[type[DeclaredError]] = [] if path in PROBES else [WrongHost]
             if needed not in (None, "read"):
                 refusals.append(CrossSite)
             if with_keys and needed is not None:
@@ -145,13 +143,13 @@ def _add_access(document: dict[str, Any], with_keys: bool) -> None:
                 _add_problem(operation["responses"], problem)
 
 
-def _add_problem(responses: dict[str, Any], problem: type[ProblemDetails]) -> None:
-    status = str(problem.model_fields["status"].default)
-    known: list[type[ProblemDetails]] = []
+def _add_problem(responses: dict[str, Any], problem: type[DeclaredError]) -> None:
+    status = str(problem.status)
+    known: list[type[DeclaredError]] = []
     if status in responses:
         schema = responses[status]["content"]["application/problem+json"]["schema"]
         names = [each["$ref"].rpartition("/")[2] for each in schema.get("oneOf", [schema])]
-        known = [each for each in PROBLEMS if each.__name__ in names]
+        known = [each for each in types_of_error() if each.__name__ in names]
     responses[status] = _response([*known, problem])
 
 

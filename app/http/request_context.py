@@ -16,7 +16,9 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from joulepath.app.exceptions import ClientDisconnected, HeadTooLarge, ServiceError
+from joulepath.app.exceptions.base import ServiceError
+from joulepath.app.exceptions.queue import ClientDisconnected
+from joulepath.app.exceptions.transport import HeadTooLarge
 from joulepath.app.http.client import sender
 from joulepath.app.http.handlers import problem_response
 from joulepath.app.http.metrics import Metrics

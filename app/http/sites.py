@@ -11,7 +11,7 @@ from starlette.requests import Request
 
 from joulepath.app.access.client import address_of
 from joulepath.app.access.rules import needed_role
-from joulepath.app.exceptions import CrossSite, WrongHost
+from joulepath.app.exceptions.access import CrossSite, WrongHost
 
 EVERYONE = "*"
 _HOST = re.compile(r"(\[(?P<address>[0-9A-Fa-f:.]+)\]|(?P<name>[^:\[\]]+))(:[0-9]*)?")

@@ -7,7 +7,8 @@ from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from joulepath.app.access.key_ring import KeyRing
-from joulepath.app.exceptions import Busy, ServiceError
+from joulepath.app.exceptions.base import ServiceError
+from joulepath.app.exceptions.queue import Busy
 from joulepath.app.http.authentication import authenticate
 from joulepath.app.http.bodies import Bodies, Body
 from joulepath.app.http.bytes_in_flight import BytesInFlight, Held

@@ -13,6 +13,7 @@ from typing import Any, get_args, get_origin
 from pydantic.fields import FieldInfo
 
 from joulepath.app.convert.json_text import EMPTY, PLAIN_NAME
+from joulepath.app.exceptions.base import FieldError
 from joulepath.app.schemas.common import KEY_HEADER, NO_CONTROLS, UNKNOWN_FIELD, nearest
 from joulepath.app.schemas.common import Request as RequestModel
 from joulepath.app.schemas.own_arm import NAME_PATTERN
@@ -43,9 +44,9 @@ _PATTERNS = {
 }
 
 
-def told(error: Mapping[str, Any], where: tuple[str, ...]) -> Iterator[dict[str, Any]]:
+def told(error: Mapping[str, Any], where: tuple[str, ...]) -> Iterator[FieldError]:
     """What is told of one error of pydantic: one entry, or one for each unknown field."""
-    loc = [*where]
+    loc: list[str | int] = [*where]
     for part in error["loc"]:
         keyed = bool(loc) and loc[-1] in _keyed_fields() and PLAIN_NAME.fullmatch(str(part)) is not None
         # the names of parameters are the service's own

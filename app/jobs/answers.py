@@ -12,7 +12,7 @@ from typing import Any
 import orjson
 
 from joulepath.app.convert.packed import unpacked
-from joulepath.app.schemas.errors import PREFIX
+from joulepath.app.http.problems import PREFIX
 from joulepath.app.store import jobs
 from joulepath.app.store.job_events import eta, progress
 from joulepath.app.store.jobs import JobView

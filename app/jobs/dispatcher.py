@@ -10,7 +10,8 @@ from datetime import datetime, timedelta
 from functools import partial
 
 from joulepath.app.engine.work import Ended
-from joulepath.app.exceptions import StoreUnavailable, TaskFailed
+from joulepath.app.exceptions.base import InternalError
+from joulepath.app.exceptions.stored import StoreUnavailable
 from joulepath.app.jobs.changes import Changes
 from joulepath.app.jobs.equals import Equals, Sorted
 from joulepath.app.jobs.executor import Executor
@@ -142,7 +143,7 @@ class Dispatcher:
             error = None if working.cancelled() else working.exception()
             if error is not None:
                 for held in left:
-                    self._ended(held, error if isinstance(error, Exception) else TaskFailed())
+                    self._ended(held, error if isinstance(error, Exception) else InternalError())
                 continue
             self._heap.put_back(held for held in left if not held.dropped)
             for held in left:

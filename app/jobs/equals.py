@@ -13,7 +13,7 @@ from joulepath import __version__
 from joulepath.app.answers.envelope import AnswerFigures
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.exceptions import StoreUnavailable
+from joulepath.app.exceptions.stored import StoreUnavailable
 from joulepath.app.jobs.heap import Held
 from joulepath.app.jobs.work import request_id_of
 from joulepath.app.store import cache, known_motions
@@ -63,7 +63,7 @@ class Equals:
         return Sorted(to_compute, known)
 
     async def _recall(self, held: Held) -> None:
-        """Gives a round the motions that it may have in common with others."""
+        """Gives a cycle the motions that it may have in common with others."""
         meaning = held.lease.meaning
         if meaning is not None and "cell" in meaning:
             with suppress(StoreUnavailable):

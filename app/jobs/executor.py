@@ -13,13 +13,14 @@ from joulepath.app.engine.pool import Engine
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.task import Task
 from joulepath.app.engine.work import Ended, Take, Work, result_of
-from joulepath.app.exceptions import Preempted, ServiceError, UnknownFigures, UnknownLog
+from joulepath.app.exceptions.queue import Preempted
+from joulepath.app.exceptions.stored import UnknownFigures, UnknownLog
 from joulepath.app.schemas.identifications import IdentifyRequest
 from joulepath.app.store import logs
 from joulepath.app.store.store import Store
 from joulepath.app.tasks.arm_engine import ArmEngine
 from joulepath.app.tasks.job_request import IDENTIFY, JobRequestTask
-from joulepath.optimizer.exceptions import JoulepathError, UnknownRobot
+from joulepath.optimizer.exceptions import DeclaredError, UnknownRobot
 from joulepath.optimizer.progress import Tell, nobody
 
 
@@ -34,7 +35,7 @@ class Executor(Protocol):
     async def run(self, take: Take) -> None:
         """Runs works until there is none, or a caller of the service needs the worker.
 
-        Each ends with its result, what its task raises, DeadlineExceeded, WorkerDied, or, if it is `stoppable`,
+        Each ends with its result, what its task raises, DeadlineExceeded, WorkerLost, or, if it is `stoppable`,
         Preempted. If cancelled, the work is stopped at once. Raises ClusterUnavailable; what has not ended then is to
         be run again.
         """
@@ -92,7 +93,7 @@ async def _run(run: Callable[[Take], Awaitable[None]], store: Store, take: Take)
         try:
             task = await _with_logs(work.task, store)
             work.ended(await ArmEngine(alone, store).run(task, work.deadline, work.tell))
-        except (JoulepathError, ServiceError, Preempted) as error:
+        except (DeclaredError, Preempted) as error:
             work.ended(error)
 
 

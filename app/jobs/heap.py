@@ -24,7 +24,7 @@ SMALL = 1 << 12
 class Held:
     """A lease and the work on it. `began` [s] is its start by `perf_counter`; `dropped`: nobody wants it any more.
 
-    `leads`: equal requests may wait for it. `motions` are known ones of the cell of a round.
+    `leads`: equal requests may wait for it. `motions` are known ones of the cell of a cycle.
     """
 
     lease: Lease

@@ -11,20 +11,13 @@ import orjson
 
 from joulepath.app.engine.result import TaskResult, json_document
 from joulepath.app.engine.work import Ended
-from joulepath.app.exceptions import (
-    ClusterUnavailable,
-    Preempted,
-    ServiceError,
-    ShuttingDown,
-    StoreUnavailable,
-    TaskFailed,
-    TooManyDeaths,
-    WorkerDied,
-)
-from joulepath.app.http.problem_details import problem_content
+from joulepath.app.exceptions.base import InternalError
+from joulepath.app.exceptions.queue import ClusterUnavailable, Preempted, ShuttingDown, WorkerDied, WorkerLost
+from joulepath.app.exceptions.stored import StoreUnavailable
+from joulepath.app.http.problems import problem_of
 from joulepath.app.store.leases import Lease, Outcome
 from joulepath.app.tasks.job_request import JobRequestTask, JobResult
-from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.exceptions import DeclaredError
 
 logger = logging.getLogger(__name__)
 
@@ -35,7 +28,7 @@ MOST_PREEMPTIONS = 2
 
 
 def task_of(lease: Lease, motions: Mapping[str, bytes]) -> JobRequestTask:
-    """The task of a lease; `motions` are known ones of the cell of a round."""
+    """The task of a lease; `motions` are known ones of the cell of a cycle."""
     return JobRequestTask(lease.kind, lease.body, request_id_of(lease), motions=motions)
 
 
@@ -47,10 +40,10 @@ def outcome_of(lease: Lease, ended: Ended, began: float) -> Outcome:
         return Outcome(lease, "waiting", preempted=True)
     if isinstance(ended, ShuttingDown | StoreUnavailable | ClusterUnavailable):
         return Outcome(lease, "waiting")
-    if isinstance(ended, WorkerDied) and lease.deaths + 1 < MOST_DEATHS:
+    if isinstance(ended, WorkerLost) and lease.deaths + 1 < MOST_DEATHS:
         return Outcome(lease, "waiting", died=True)
-    error = TooManyDeaths() if isinstance(ended, WorkerDied) else ended
-    if isinstance(error, JoulepathError | ServiceError):
+    error = WorkerDied() if isinstance(ended, WorkerLost) else ended
+    if isinstance(error, DeclaredError):
         return _failed(lease, error, began)
     logger.error("unforeseen error", exc_info=error, extra={"request_id": request_id_of(lease)})
     return defect(lease)
@@ -75,7 +68,7 @@ def _done(lease: Lease, result: TaskResult) -> Outcome:
 
 def defect(lease: Lease) -> Outcome:
     """The outcome of a request that a defect of the service ends; the log has it."""
-    return Outcome(lease, "failed", problem=_content(TaskFailed(), request_id_of(lease)))
+    return Outcome(lease, "failed", problem=_content(InternalError(), request_id_of(lease)))
 
 
 def request_id_of(lease: Lease) -> str:
@@ -89,5 +82,5 @@ def _failed(lease: Lease, error: Exception, began: float) -> Outcome:
 
 def _content(error: Exception, request_id: str) -> dict[str, Any]:
     # as it is sent: without arrays, and null for what is not finite
-    content: dict[str, Any] = orjson.loads(json_document(problem_content(error, request_id)))
+    content: dict[str, Any] = orjson.loads(json_document(problem_of(error, request_id)))
     return content

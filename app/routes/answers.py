@@ -9,10 +9,12 @@ import orjson
 from fastapi import APIRouter, Path, Query, Response
 
 from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions.access import NotOwner
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.stored import AnswerInUse, StoreUnavailable, UnknownAnswer
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import ServiceClient, ServiceStore
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.answers import AnswerList, AnswerPage, AnswerSummary, StoredAnswer
 from joulepath.app.schemas.examples.values import ANSWER_ID
 from joulepath.app.store import answers
@@ -26,7 +28,7 @@ AnswerId = Annotated[str, Path(description="The answer's id.", examples=[ANSWER_
     "",
     summary="List stored answers",
     response_model=AnswerList,
-    responses=problem_responses(problems.Validation, problems.StoreUnavailable),
+    responses=problem_responses(InvalidRequest, StoreUnavailable),
 )
 async def list_answers(page: Annotated[AnswerPage, Query()], store: ServiceStore) -> AnswerList:
     """All answers that are kept, newest first, page by page: also the motions of fronts and rounds, and the answers of
@@ -41,7 +43,7 @@ async def list_answers(page: Annotated[AnswerPage, Query()], store: ServiceStore
     "/{id}",
     summary="A stored answer",
     response_model=StoredAnswer,
-    responses=problem_responses(problems.UnknownAnswer, problems.StoreUnavailable),
+    responses=problem_responses(UnknownAnswer, StoreUnavailable),
 )
 async def show(id: AnswerId, store: ServiceStore) -> Response:
     """The complete answer that another answer refers to."""
@@ -54,9 +56,7 @@ async def show(id: AnswerId, store: ServiceStore) -> Response:
     "/{id}",
     summary="Delete a stored answer",
     status_code=204,
-    responses=problem_responses(
-        problems.UnknownAnswer, problems.AnswerInUse, problems.NotOwner, problems.StoreUnavailable
-    ),
+    responses=problem_responses(UnknownAnswer, AnswerInUse, NotOwner, StoreUnavailable),
 )
 async def delete(id: AnswerId, store: ServiceStore, client: ServiceClient) -> None:
     """Deletes an answer. One of a study is deleted with its study."""

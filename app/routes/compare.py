@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
+from joulepath.app.exceptions.stored import KeyReused
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from joulepath.app.routes.large_bodies import LargeBodyRoute
@@ -11,7 +12,6 @@ from joulepath.app.routes.later import ACCEPTED, ServiceLater
 from joulepath.app.routes.parameters import deadline_of
 from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
 from joulepath.app.routes.reply import BY_EVENTS, ServiceReply
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.compare import CompareRequest, CompareResponse
 from joulepath.app.tasks.compare import CompareTask
 
@@ -22,7 +22,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     "/compare",
     summary="The same motion by several methods",
     response_model=CompareResponse,
-    responses={200: {"content": BY_EVENTS}, **ACCEPTED, **problem_responses(*MOTION_PROBLEMS, problems.KeyReused)},
+    responses={200: {"content": BY_EVENTS}, **ACCEPTED, **problem_responses(*MOTION_PROBLEMS, KeyReused)},
 )
 async def compare(
     request: Request,

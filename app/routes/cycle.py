@@ -5,6 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter, Request, Response
 
 from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions.stored import KeyReused
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import (
     ServiceArmEngine,
@@ -18,7 +19,6 @@ from joulepath.app.routes.later import ACCEPTED, ServiceLater
 from joulepath.app.routes.parameters import WantedFormat, deadline_of
 from joulepath.app.routes.problem_lists import CYCLE_PROBLEMS
 from joulepath.app.routes.reply import BY_EVENTS, ServiceReply
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.cycle import CycleRequest, CycleResponse
 from joulepath.app.store.store_answers import keep_answer, store_answers
 from joulepath.app.tasks.cycle import CycleTask
@@ -36,7 +36,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}}, **BY_EVENTS}},
         **ACCEPTED,
-        **problem_responses(*CYCLE_PROBLEMS, problems.KeyReused),
+        **problem_responses(*CYCLE_PROBLEMS, KeyReused),
     },
 )
 async def cycle(

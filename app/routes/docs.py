@@ -9,7 +9,7 @@ from fastapi import APIRouter, Request
 from fastapi.openapi.docs import get_redoc_html, get_swagger_ui_html
 from fastapi.responses import HTMLResponse, Response
 
-from joulepath.app.exceptions import NotFound
+from joulepath.app.exceptions.transport import NotFound
 
 router = APIRouter(include_in_schema=False)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
+from joulepath.app.exceptions.stored import UnknownFigures
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
@@ -11,9 +12,10 @@ from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from joulepath.app.routes.large_bodies import LargeBodyRoute
 from joulepath.app.routes.parameters import WantedFormat, deadline_of
 from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.excitation import ExcitationRequest, ExcitationResponse
 from joulepath.app.tasks.excitation import ExcitationTask
+from joulepath.optimizer.exceptions import OutsideLimits
+from joulepath.optimizer.excitation.errors import ExcitationInfeasible
 
 router = APIRouter(tags=["logs"], route_class=LargeBodyRoute)
 _CSV = "t,q1,…,q6,v1,…,v6,a1,…,a6\n0.0,0.0,-1.57,…\n0.008,0.0001,-1.5699,…\n"
@@ -25,9 +27,7 @@ _CSV = "t,q1,…,q6,v1,…,v6,a1,…,a6\n0.0,0.0,-1.57,…\n0.008,0.0001,-1.5699
     response_model=ExcitationResponse,
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}, "example": _CSV}}},
-        **problem_responses(
-            *WORKER_PROBLEMS, problems.UnknownFigures, problems.OutsideLimits, problems.ExcitationInfeasible
-        ),
+        **problem_responses(*WORKER_PROBLEMS, UnknownFigures, OutsideLimits, ExcitationInfeasible),
     },
 )
 async def excitation(

@@ -11,6 +11,8 @@ from fastapi import APIRouter, Path, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
+from joulepath.app.exceptions.access import NotOwner
+from joulepath.app.exceptions.stored import FiguresInUse, StoreUnavailable, TooManyFigures, UnknownFigures
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.http.weights import is_wanted
@@ -18,7 +20,6 @@ from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceClient, S
 from joulepath.app.routes.large_bodies import LargeBodyRoute
 from joulepath.app.routes.parameters import LOCATION_HEADER
 from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.examples.figures import FIGURES, UNKNOWN_ID
 from joulepath.app.schemas.figures import FiguresDetail, FiguresDocument, FiguresList, FiguresSummary
 from joulepath.app.store import figures
@@ -27,6 +28,7 @@ from joulepath.app.store.tables import Figures
 from joulepath.app.tasks.arm_engine import robot_in
 from joulepath.app.tasks.figures import FiguresTask
 from joulepath.models.uncertainty.document import merged
+from joulepath.optimizer.exceptions import UnknownRobot
 
 router = APIRouter(prefix="/figures", tags=["robots"], route_class=LargeBodyRoute)
 
@@ -40,7 +42,7 @@ YAML = "application/yaml"
     response_model=FiguresDetail,
     responses={
         201: {"model": FiguresDetail, "description": "Stored", "headers": LOCATION_HEADER},
-        **problem_responses(*WORKER_PROBLEMS, problems.TooManyFigures),
+        **problem_responses(*WORKER_PROBLEMS, TooManyFigures),
     },
 )
 async def put(
@@ -72,7 +74,7 @@ async def put(
     "",
     summary="All identified figures",
     response_model=FiguresList,
-    responses=problem_responses(problems.StoreUnavailable),
+    responses=problem_responses(StoreUnavailable),
 )
 async def list_figures(store: ServiceStore) -> FiguresList:
     """Ids, robots and owners of all identified figures."""
@@ -85,7 +87,7 @@ async def list_figures(store: ServiceStore) -> FiguresList:
     response_model=FiguresDetail,
     responses={
         200: {"content": {YAML: {"schema": {"type": "string"}, "example": yaml.safe_dump(FIGURES, sort_keys=False)}}},
-        **problem_responses(problems.UnknownFigures, problems.UnknownRobot, problems.StoreUnavailable),
+        **problem_responses(UnknownFigures, UnknownRobot, StoreUnavailable),
     },
 )
 async def show(request: Request, id: FiguresIdPath, store: ServiceStore) -> Any:
@@ -102,9 +104,7 @@ async def show(request: Request, id: FiguresIdPath, store: ServiceStore) -> Any:
     "/{id}",
     summary="Delete identified figures",
     status_code=204,
-    responses=problem_responses(
-        problems.UnknownFigures, problems.FiguresInUse, problems.NotOwner, problems.StoreUnavailable
-    ),
+    responses=problem_responses(UnknownFigures, FiguresInUse, NotOwner, StoreUnavailable),
 )
 async def delete(id: FiguresIdPath, store: ServiceStore, client: ServiceClient) -> None:
     """Deletes figures that no study uses. Stored answers that used them stay."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from joulepath.app.exceptions import NotReady, StoreUnavailable
+from joulepath.app.exceptions.queue import NotReady
+from joulepath.app.exceptions.stored import StoreUnavailable
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import ServiceEngine, ServiceStore
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.health import Alive, Ready
 
 router = APIRouter(tags=["health"])
@@ -23,7 +23,7 @@ async def healthz() -> Alive:
     "/readyz",
     summary="Are the workers warm, and is the database there?",
     response_model=Ready,
-    responses=problem_responses(problems.NotReady, problems.StoreUnavailable),
+    responses=problem_responses(NotReady, StoreUnavailable),
 )
 async def readyz(engine: ServiceEngine, store: ServiceStore) -> Ready:
     """200 from the time when all workers are warm until the service stops, while the database can be read and written,

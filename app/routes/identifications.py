@@ -11,13 +11,14 @@ from sqlalchemy.orm import Session
 
 from joulepath.app.convert.packed import unpacked
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.exceptions import InvalidRequest, UnknownIdentification, UnknownJob
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.queue import Busy
+from joulepath.app.exceptions.stored import KeyReused, StoreUnavailable, UnknownIdentification, UnknownJob, UnknownLog
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import ServiceClient, ServiceJobs, ServiceStore
 from joulepath.app.routes.later import deadlines
 from joulepath.app.routes.parameters import CREATED_HEADERS, Key, set_location
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.examples.values import IDENTIFICATION_ID
 from joulepath.app.schemas.identifications import (
     Identification,
@@ -48,11 +49,11 @@ _STATES = {"waiting": "queued"}
     responses={
         202: {"headers": CREATED_HEADERS},
         **problem_responses(
-            problems.Validation,
-            problems.UnknownLog,
-            problems.KeyReused,
-            problems.Busy,
-            problems.StoreUnavailable,
+            InvalidRequest,
+            UnknownLog,
+            KeyReused,
+            Busy,
+            StoreUnavailable,
         ),
     },
 )
@@ -82,7 +83,7 @@ async def add(
     "",
     summary="List identifications",
     response_model=IdentificationList,
-    responses=problem_responses(problems.Validation, problems.StoreUnavailable),
+    responses=problem_responses(InvalidRequest, StoreUnavailable),
 )
 async def list_identifications(page: Annotated[IdentificationPage, Query()], store: ServiceStore) -> IdentificationList:
     """All identifications, newest first, page by page. They are deleted with their jobs."""
@@ -94,7 +95,7 @@ async def list_identifications(page: Annotated[IdentificationPage, Query()], sto
     "/{id}",
     summary="An identification",
     response_model=Identification,
-    responses=problem_responses(problems.UnknownIdentification, problems.StoreUnavailable),
+    responses=problem_responses(UnknownIdentification, StoreUnavailable),
 )
 async def show(id: IdentificationId, store: ServiceStore) -> Identification:
     """The state of an identification and, once it is done, what was found."""
@@ -105,7 +106,7 @@ async def show(id: IdentificationId, store: ServiceStore) -> Identification:
     "/{id}/residuals",
     summary="The residuals of an identification",
     response_model=ResidualCurves,
-    responses=problem_responses(problems.UnknownIdentification, problems.StoreUnavailable),
+    responses=problem_responses(UnknownIdentification, StoreUnavailable),
 )
 async def residuals(id: IdentificationId, store: ServiceStore) -> Response:
     """Measured and modelled torques and power over time, move by move. Moves that were held out are predicted by a fit

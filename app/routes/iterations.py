@@ -13,7 +13,9 @@ from joulepath.app.access.rules import check_owner
 from joulepath.app.api.evaluate.task import EvaluateTask
 from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.engine.result import StoredAnswer, TaskResult
-from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.exceptions.access import NotOwner
+from joulepath.app.exceptions.base import FieldError, InvalidRequest
+from joulepath.app.exceptions.stored import KeyReused, StoreUnavailable, UnknownLog, UnknownStudy
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import (
@@ -27,7 +29,6 @@ from joulepath.app.routes.large_bodies import LargeBodyRoute
 from joulepath.app.routes.parameters import CREATED_HEADERS, Key, StudyId, deadline_of, set_location
 from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
 from joulepath.app.routes.uploads import upload
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.studies import IterationBody, IterationDetail
 from joulepath.app.store import studies
 from joulepath.app.store.cache import Answered, Asked
@@ -38,7 +39,8 @@ from joulepath.app.tasks.answer_figures import figures_of
 from joulepath.app.tasks.arm_engine import ArmEngine
 from joulepath.app.tasks.read_body import HeldBody
 from joulepath.app.tasks.study_step import StudyStep, StudyStepTask, large_step, study_step
-from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable, OutsideLimits
+from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
+from joulepath.optimizer.search.errors import PathInfeasible
 
 T = TypeVar("T")
 router = APIRouter(route_class=LargeBodyRoute, prefix="/studies", tags=["studies"])
@@ -56,13 +58,13 @@ MOST_ITERATIONS = 2**31 - 1
         201: {"headers": CREATED_HEADERS},
         **problem_responses(
             *MOTION_PROBLEMS,
-            problems.PathInfeasible,
-            problems.InvalidTable,
-            problems.UnknownLog,
-            problems.KeyReused,
-            problems.UnknownStudy,
-            problems.NotOwner,
-            problems.StoreUnavailable,
+            PathInfeasible,
+            InvalidTable,
+            UnknownLog,
+            KeyReused,
+            UnknownStudy,
+            NotOwner,
+            StoreUnavailable,
         ),
     },
 )
@@ -109,11 +111,9 @@ async def _located(kind: str, work: Coroutine[Any, Any, T]) -> T:
     try:
         return await work
     except InvalidRequest as error:
-        moved = [{**each, "loc": [each["loc"][0], kind, *each["loc"][1:]]} for each in error.errors]
+        moved = [FieldError(loc=[each["loc"][0], kind, *each["loc"][1:]], msg=each["msg"]) for each in error.errors]
         raise InvalidRequest(moved) from None
     except InvalidProblem as error:
-        if isinstance(error, InvalidTable | OutsideLimits):
-            raise  # about the motion
         raise InvalidProblem(f"{kind}.{error.field}", str(error)) from None
 
 
@@ -138,7 +138,7 @@ async def _made(
     "/{id}/iterations/{number}",
     summary="One iteration of a study",
     response_model=IterationDetail,
-    responses=problem_responses(problems.Validation, problems.UnknownStudy, problems.StoreUnavailable),
+    responses=problem_responses(InvalidRequest, UnknownStudy, StoreUnavailable),
 )
 async def show(
     id: StudyId,

@@ -8,7 +8,11 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
-from joulepath.app.exceptions import UnsupportedMediaType
+from joulepath.app.exceptions.access import NotOwner
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.queue import Busy, ShuttingDown, WorkerLost
+from joulepath.app.exceptions.stored import JobNotCancellable, KeyReused, StoreUnavailable, UnknownJob
+from joulepath.app.exceptions.transport import BodyTooLarge, RequestTimeout, UnsupportedMediaType
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.event_stream import EVENT_SCHEMA, EVENT_STREAM, EVENT_STREAM_HEADERS
 from joulepath.app.http.json_route import UNDECLARED, media_type
@@ -26,12 +30,12 @@ from joulepath.app.routes.dependencies import (
 from joulepath.app.routes.later import deadlines
 from joulepath.app.routes.parameters import CREATED_HEADERS, Key, WantedFormat, is_fresh, set_location
 from joulepath.app.routes.uploads import upload
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.examples.jobs import RESULTS_CSV, RESULTS_LINES
 from joulepath.app.schemas.examples.values import JOB_ID
 from joulepath.app.schemas.jobs import Job, JobDetail, JobList, JobPage, NewJob, RequestPage
 from joulepath.app.store import jobs as stored_jobs
 from joulepath.app.tasks.job_body import JobBodyTask, Validated
+from joulepath.optimizer.exceptions import DeadlineExceeded
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 
@@ -44,7 +48,7 @@ LastEventId = Annotated[
         examples=["17"],
     ),
 ]
-_OF_ONE = (problems.UnknownJob, problems.StoreUnavailable)
+_OF_ONE = (UnknownJob, StoreUnavailable)
 
 
 @router.post(
@@ -55,16 +59,16 @@ _OF_ONE = (problems.UnknownJob, problems.StoreUnavailable)
     responses={
         202: {"headers": CREATED_HEADERS},
         **problem_responses(
-            problems.Validation,
-            problems.KeyReused,
-            problems.BodyTooLarge,
-            problems.RequestTimeout,
-            problems.UnsupportedMediaType,
-            problems.Busy,
-            problems.ShuttingDown,
-            problems.DeadlineExceeded,
-            problems.WorkerLost,
-            problems.StoreUnavailable,
+            InvalidRequest,
+            KeyReused,
+            BodyTooLarge,
+            RequestTimeout,
+            UnsupportedMediaType,
+            Busy,
+            ShuttingDown,
+            DeadlineExceeded,
+            WorkerLost,
+            StoreUnavailable,
         ),
     },
     openapi_extra={
@@ -103,7 +107,7 @@ async def create(
     "",
     summary="List jobs",
     response_model=JobList,
-    responses=problem_responses(problems.Validation, problems.StoreUnavailable),
+    responses=problem_responses(InvalidRequest, StoreUnavailable),
 )
 async def list_jobs(page: Annotated[JobPage, Query()], store: ServiceStore) -> JobList:
     """All jobs with their progress, newest first, page by page."""
@@ -116,7 +120,7 @@ async def list_jobs(page: Annotated[JobPage, Query()], store: ServiceStore) -> J
     "/{id}",
     summary="A job and its requests",
     response_model=JobDetail,
-    responses=problem_responses(problems.Validation, *_OF_ONE),
+    responses=problem_responses(InvalidRequest, *_OF_ONE),
 )
 async def show(id: JobId, page: Annotated[RequestPage, Query()], jobs: ServiceJobs, store: ServiceStore) -> JobDetail:
     """The job with its progress and a page of its requests. Each request that is done refers to its answer, which is
@@ -126,9 +130,7 @@ async def show(id: JobId, page: Annotated[RequestPage, Query()], jobs: ServiceJo
     return JobDetail(**detail(view, await store.read(read), page.limit))
 
 
-@router.delete(
-    "/{id}", summary="Delete a job", status_code=204, responses=problem_responses(*_OF_ONE, problems.NotOwner)
-)
+@router.delete("/{id}", summary="Delete a job", status_code=204, responses=problem_responses(*_OF_ONE, NotOwner))
 async def delete(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> None:
     """Deletes the job with its answers. What runs is stopped."""
     await jobs.delete(id, client)
@@ -139,7 +141,7 @@ async def delete(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> None:
     summary="Cancel a job",
     status_code=202,
     response_model=Job,
-    responses=problem_responses(*_OF_ONE, problems.NotOwner, problems.JobNotCancellable),
+    responses=problem_responses(*_OF_ONE, NotOwner, JobNotCancellable),
 )
 async def cancel(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> Job:
     """Cancels what waits, and stops what runs within a second. Answers that are there stay. A job that is cancelled
@@ -153,7 +155,7 @@ async def cancel(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> Job:
     summary="Retry a job",
     status_code=202,
     response_model=Job,
-    responses=problem_responses(*_OF_ONE, problems.NotOwner, problems.Busy),
+    responses=problem_responses(*_OF_ONE, NotOwner, Busy),
 )
 async def retry(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> Job:
     """Lets the requests wait again that failed or were cancelled. Those that are done stay as they are."""

@@ -7,13 +7,13 @@ from typing import Protocol, Self
 
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.task import Task
-from joulepath.app.exceptions import PartsNeeded
+from joulepath.app.exceptions.stored import PartsNeeded
 from joulepath.app.store import answers
 from joulepath.app.store.store import Store
 from joulepath.app.tasks.arm_engine import ArmEngine
 
 PREFIX = "/answers/"
-# an id, then the moves of a round
+# an id, then the moves of a cycle
 _LOOK_UPS = 2
 
 

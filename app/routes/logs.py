@@ -10,7 +10,10 @@ import orjson
 from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
-from joulepath.app.exceptions import UnsupportedMediaType
+from joulepath.app.exceptions.access import NotOwner
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.stored import StoreUnavailable, TooManyLogs, UnknownLog
+from joulepath.app.exceptions.transport import UnsupportedMediaType
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.json_route import UNDECLARED, media_type
 from joulepath.app.http.openapi import problem_responses
@@ -19,12 +22,13 @@ from joulepath.app.routes.parameters import LOCATION_HEADER, set_location
 from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
 from joulepath.app.routes.query_settings import query_parameters, settings_of
 from joulepath.app.routes.uploads import upload
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.examples.values import LOG_ID
 from joulepath.app.schemas.logs import LogDetail, LogList, LogPage, LogSettings, LogSummary
 from joulepath.app.store import logs
 from joulepath.app.store.tables import StoredLog, new_id, now
 from joulepath.app.tasks.read_log import ReadLogTask
+from joulepath.optimizer.exceptions import InvalidTable
+from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
 
 router = APIRouter(prefix="/logs", tags=["logs"])
 
@@ -43,11 +47,11 @@ _SHOWN = tuple(name for name in LogSummary.model_fields if name not in ("tags", 
         201: {"headers": LOCATION_HEADER},
         **problem_responses(
             *WORKER_PROBLEMS,
-            problems.InvalidTable,
-            problems.EffortNotUsable,
-            problems.LogTooLarge,
-            problems.TooManyLogs,
-            problems.UnsupportedMediaType,
+            InvalidTable,
+            EffortNotUsable,
+            LogTooLarge,
+            TooManyLogs,
+            UnsupportedMediaType,
         ),
     },
     openapi_extra={
@@ -96,7 +100,7 @@ async def add(
     "",
     summary="List logs",
     response_model=LogList,
-    responses=problem_responses(problems.Validation, problems.StoreUnavailable),
+    responses=problem_responses(InvalidRequest, StoreUnavailable),
 )
 async def list_logs(page: Annotated[LogPage, Query()], store: ServiceStore) -> LogList:
     """All logs, newest first, page by page."""
@@ -109,7 +113,7 @@ async def list_logs(page: Annotated[LogPage, Query()], store: ServiceStore) -> L
     "/{id}",
     summary="A log",
     response_model=LogDetail,
-    responses=problem_responses(problems.UnknownLog, problems.StoreUnavailable),
+    responses=problem_responses(UnknownLog, StoreUnavailable),
 )
 async def show(id: LogId, store: ServiceStore) -> LogDetail:
     """What is known of a log: its channels, moves, efforts, and what is odd in it. Not its samples."""
@@ -120,7 +124,7 @@ async def show(id: LogId, store: ServiceStore) -> LogDetail:
     "/{id}",
     summary="Delete a log",
     status_code=204,
-    responses=problem_responses(problems.UnknownLog, problems.NotOwner, problems.StoreUnavailable),
+    responses=problem_responses(UnknownLog, NotOwner, StoreUnavailable),
 )
 async def delete(id: LogId, store: ServiceStore, client: ServiceClient) -> None:
     """Deletes a log. What was identified from it stays."""

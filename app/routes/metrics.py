@@ -6,7 +6,7 @@ import asyncio
 
 from fastapi import APIRouter, Request, Response
 
-from joulepath.app.exceptions import StoreUnavailable
+from joulepath.app.exceptions.stored import StoreUnavailable
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import ServiceEngine, ServiceMetrics, ServiceStore
 from joulepath.app.store.store import Store

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Protocol
 
 from fastapi import Depends, Header, Path, Request, Response
 
-from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.http.event_stream import EVENT_STREAM
 from joulepath.app.http.handlers import CACHE_HEADER
 from joulepath.app.http.weights import is_wanted

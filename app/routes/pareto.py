@@ -5,6 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter, Request, Response
 
 from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions.stored import KeyReused, StoreUnavailable
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
 from joulepath.app.routes.large_bodies import LargeBodyRoute
@@ -12,7 +13,6 @@ from joulepath.app.routes.later import ACCEPTED, ServiceLater
 from joulepath.app.routes.parameters import WantedFormat, deadline_of
 from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
 from joulepath.app.routes.reply import BY_EVENTS, ServiceReply
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.pareto import ParetoRequest, ParetoResponse
 from joulepath.app.store.store_answers import store_answers
 from joulepath.app.tasks.pareto import ParetoTask
@@ -28,7 +28,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}}, **BY_EVENTS}},
         **ACCEPTED,
-        **problem_responses(*MOTION_PROBLEMS, problems.StoreUnavailable, problems.KeyReused),
+        **problem_responses(*MOTION_PROBLEMS, StoreUnavailable, KeyReused),
     },
 )
 async def pareto(

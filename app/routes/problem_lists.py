@@ -2,61 +2,85 @@
 
 from __future__ import annotations
 
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.queue import ShuttingDown, WorkerLost
+from joulepath.app.exceptions.stored import StoreUnavailable, TooManyRobots, UnknownFigures
+from joulepath.app.exceptions.transport import BodyTooLarge, RequestTimeout
+from joulepath.optimizer.cycle.errors import CycleTooShort, NoSequence
+from joulepath.optimizer.exceptions import (
+    ContradictoryOrder,
+    DeadlineExceeded,
+    DeclaredError,
+    NoTrajectory,
+    OutsideLimits,
+    SingularPose,
+    UnknownRobot,
+    UnreachablePose,
+    UnreachableTargets,
+)
+from joulepath.optimizer.search.errors import (
+    DurationTooShort,
+    GoalInCollision,
+    NoCollisionFreeTrajectory,
+    PathInfeasible,
+    StartInCollision,
+    StopInCollision,
+    TorqueInfeasible,
+)
 
-WORKER_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
-    problems.Validation,
-    problems.UnknownRobot,
-    problems.BodyTooLarge,
-    problems.RequestTimeout,
-    problems.ShuttingDown,
-    problems.DeadlineExceeded,
-    problems.WorkerLost,
-    problems.StoreUnavailable,
+WORKER_PROBLEMS: tuple[type[DeclaredError], ...] = (
+    InvalidRequest,
+    UnknownRobot,
+    BodyTooLarge,
+    RequestTimeout,
+    ShuttingDown,
+    DeadlineExceeded,
+    WorkerLost,
+    StoreUnavailable,
 )
 """Of every request that a worker computes."""
 
-ADDING_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
-    problems.Validation,
-    problems.BodyTooLarge,
-    problems.RequestTimeout,
-    problems.ShuttingDown,
-    problems.DeadlineExceeded,
-    problems.WorkerLost,
-    problems.TooManyRobots,
-    problems.StoreUnavailable,
+ADDING_PROBLEMS: tuple[type[DeclaredError], ...] = (
+    InvalidRequest,
+    BodyTooLarge,
+    RequestTimeout,
+    ShuttingDown,
+    DeadlineExceeded,
+    WorkerLost,
+    TooManyRobots,
+    StoreUnavailable,
 )
 """Of every request that adds a robot."""
 
-MOTION_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
+MOTION_PROBLEMS: tuple[type[DeclaredError], ...] = (
     *WORKER_PROBLEMS,
-    problems.UnknownFigures,
-    problems.UnreachablePose,
-    problems.SingularPose,
-    problems.UnreachableTargets,
-    problems.OutsideLimits,
-    problems.StartInCollision,
-    problems.GoalInCollision,
-    problems.DurationTooShort,
-    problems.TorqueInfeasible,
-    problems.NoTrajectory,
-    problems.NoCollisionFreeTrajectory,
+    UnknownFigures,
+    UnreachablePose,
+    SingularPose,
+    UnreachableTargets,
+    OutsideLimits,
+    StartInCollision,
+    GoalInCollision,
+    DurationTooShort,
+    TorqueInfeasible,
+    NoTrajectory,
+    NoCollisionFreeTrajectory,
 )
 """Of every request that optimises a motion."""
 
-CYCLE_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
+CYCLE_PROBLEMS: tuple[type[DeclaredError], ...] = (
     *WORKER_PROBLEMS,
-    problems.UnknownFigures,
-    problems.UnreachablePose,
-    problems.SingularPose,
-    problems.UnreachableTargets,
-    problems.OutsideLimits,
-    problems.StartInCollision,
-    problems.StopInCollision,
-    problems.TorqueInfeasible,
-    problems.ContradictoryOrder,
-    problems.DwellTooShort,
-    problems.NoSequence,
-    problems.PathInfeasible,
+    UnknownFigures,
+    UnreachablePose,
+    SingularPose,
+    UnreachableTargets,
+    OutsideLimits,
+    StartInCollision,
+    StopInCollision,
+    TorqueInfeasible,
+    ContradictoryOrder,
+    CycleTooShort,
+    NoSequence,
+    PathInfeasible,
 )
-"""Of a request for a round."""
+"""Of a request for a cycle."""

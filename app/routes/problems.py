@@ -2,53 +2,64 @@
 
 from __future__ import annotations
 
-import inspect
 import re
 from functools import cache
 from html import escape
 from typing import Annotated
 
+import orjson
 from fastapi import APIRouter, Path
 from fastapi.responses import HTMLResponse
 
-from joulepath.app.exceptions import NotFound
+from joulepath.app.exceptions.transport import NotFound
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.schemas import errors as problems
-from joulepath.app.schemas.errors import PROBLEMS, ProblemDetails
+from joulepath.app.http.problems import occasion, own_fields, problem_of, types_of_error
+from joulepath.app.schemas.examples.problems import example_of
+from joulepath.app.schemas.examples.values import REQUEST_ID
+from joulepath.optimizer.exceptions import DeclaredError
 
 router = APIRouter(prefix="/problems", tags=["problems"])
 
-_PAGES = {problem.slug(): problem for problem in PROBLEMS}
-_STYLE = "body{font:1rem/1.5 sans-serif;max-width:42rem;margin:3rem auto;padding:0 1rem}dt{margin-top:.5rem}"
+_STYLE = (
+    "body{font:1rem/1.5 sans-serif;max-width:42rem;margin:3rem auto;padding:0 1rem}dt{margin-top:.5rem}"
+    "pre{overflow:auto;background:#eee;padding:.5rem}"
+)
 
 
 @router.get(
     "/{slug}",
     summary="What a type of problem means",
     response_class=HTMLResponse,
-    responses=problem_responses(problems.NotFound),
+    responses=problem_responses(NotFound),
 )
 async def explain(
-    slug: Annotated[str, Path(description="Last part of the `type` of a problem.", examples=["validation"])],
+    slug: Annotated[str, Path(description="Last part of the `type` of a problem.", examples=["invalid-request"])],
 ) -> HTMLResponse:
     """A page that explains a type of problem."""
-    if slug not in _PAGES:
+    if slug not in _types():
         raise NotFound
-    return HTMLResponse(_page(_PAGES[slug]))
+    return HTMLResponse(_page(slug))
 
 
 @cache
-def _page(problem: type[ProblemDetails]) -> str:
-    title, status = (problem.model_fields[name].default for name in ("title", "status"))
-    explanation = inspect.cleandoc(problem.__doc__ or "")
+def _types() -> dict[str, type[DeclaredError]]:
+    return {kind.slug(): kind for kind in types_of_error()}
+
+
+@cache
+def _page(slug: str) -> str:
+    kind = _types()[slug]
     fields = "".join(
-        f"<dt><code>{name}</code></dt><dd>{_text(problem.model_fields[name].description or '')}</dd>"
-        for name in problem.own_fields()
+        f"<dt><code>{name}</code></dt><dd>{_text(meaning)}</dd>" for name, meaning in own_fields(kind).items()
     )
+    example = orjson.dumps(problem_of(example_of(kind), REQUEST_ID), option=orjson.OPT_INDENT_2).decode()
     return (
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{escape(title)}</title><style>{_STYLE}</style>'
-        f"<h1>{escape(title)}</h1><p><code>{problem.slug()}</code>, HTTP status {status}</p>"
-        f"<p>{_text(explanation)}</p>" + (f"<h2>Fields of its own</h2><dl>{fields}</dl>" if fields else "")
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{escape(kind.title)}</title>'
+        f"<style>{_STYLE}</style><h1>{escape(kind.title)}</h1>"
+        f"<p><code>{slug}</code>, HTTP status {kind.status}</p>"
+        f"<p>{_text(occasion(kind))}</p><p>{_text(kind.remedy)}</p>"
+        + (f"<h2>Fields of its own</h2><dl>{fields}</dl>" if fields else "")
+        + f"<h2>Example</h2><pre>{escape(example)}</pre>"
     )
 
 

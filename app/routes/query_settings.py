@@ -9,8 +9,8 @@ from fastapi import Request
 from pydantic import ValidationError
 
 from joulepath.app.convert.query import query_values
-from joulepath.app.exceptions import InvalidRequest
-from joulepath.app.http.problem_details import invalid_request
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.http.problems import invalid_request
 from joulepath.app.schemas.common import Request as RequestModel
 
 M = TypeVar("M", bound=RequestModel)

@@ -12,7 +12,9 @@ from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
 from joulepath.app.access.client import Client
-from joulepath.app.exceptions import NoMeshes, RobotExists
+from joulepath.app.exceptions.access import NotOwner
+from joulepath.app.exceptions.queue import ShuttingDown, WorkerLost
+from joulepath.app.exceptions.stored import NoMeshes, RobotExists, StoreUnavailable
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.entity_tag import is_known
 from joulepath.app.http.openapi import problem_responses
@@ -20,7 +22,6 @@ from joulepath.app.routes.dependencies import ServiceClient, ServiceClientEngine
 from joulepath.app.routes.large_bodies import LargeBodyRoute
 from joulepath.app.routes.parameters import LOCATION_HEADER
 from joulepath.app.routes.problem_lists import ADDING_PROBLEMS
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.own_arm import NewRobot, OwnArm, OwnName
 from joulepath.app.schemas.robots import Friction, FrictionLaw, RobotDetail, RobotList, RobotSummary
 from joulepath.app.store import robots
@@ -33,6 +34,7 @@ from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import FrictionLaw as Law
 from joulepath.models.trust import TRUST, energy_trust
 from joulepath.models.urdf import urdf_of
+from joulepath.optimizer.exceptions import DeadlineExceeded, UnknownRobot
 
 router = APIRouter(prefix="/robots", tags=["robots"], route_class=LargeBodyRoute)
 
@@ -42,7 +44,7 @@ NewName = Annotated[OwnName, Path(description="Name of the robot.", examples=["m
 _SECTIONS = ("kinematics", "inertials", "limits", "collision", "drives", "electronics", "default_motion")
 
 
-@router.get("", summary="All robots", response_model=RobotList, responses=problem_responses(problems.StoreUnavailable))
+@router.get("", summary="All robots", response_model=RobotList, responses=problem_responses(StoreUnavailable))
 async def list_robots(store: ServiceStore) -> RobotList:
     """Names, titles and joints of all robots, and what their energies rest on."""
     bundled = await run_in_threadpool(lambda: {name: load_robot(name).figures for name in robot_names()})
@@ -60,7 +62,7 @@ async def list_robots(store: ServiceStore) -> RobotList:
     summary="Add a robot",
     status_code=201,
     response_model=RobotDetail,
-    responses={201: {"headers": LOCATION_HEADER}, **problem_responses(*ADDING_PROBLEMS, problems.RobotExists)},
+    responses={201: {"headers": LOCATION_HEADER}, **problem_responses(*ADDING_PROBLEMS, RobotExists)},
 )
 async def add(
     request: Request,
@@ -87,7 +89,7 @@ async def add(
     "/{name}",
     summary="All parameters of a robot",
     response_model=RobotDetail,
-    responses=problem_responses(problems.UnknownRobot, problems.StoreUnavailable),
+    responses=problem_responses(UnknownRobot, StoreUnavailable),
 )
 async def show_robot(name: Name, store: ServiceStore) -> RobotDetail:
     """Kinematics, inertials, limits, drives and electronics, each parameter with its source and trust letter. Also the
@@ -103,7 +105,7 @@ async def show_robot(name: Name, store: ServiceStore) -> RobotDetail:
     response_class=Response,
     responses={
         200: {"content": {"application/xml": {"schema": {"type": "string"}}}, "description": "The URDF"},
-        **problem_responses(problems.UnknownRobot, problems.StoreUnavailable),
+        **problem_responses(UnknownRobot, StoreUnavailable),
     },
 )
 async def urdf(name: Name, store: ServiceStore) -> Response:
@@ -122,12 +124,12 @@ async def urdf(name: Name, store: ServiceStore) -> Response:
         200: {"content": {MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}}}, "description": "The file"},
         304: {"description": "The client has it, by `If-None-Match`"},
         **problem_responses(
-            problems.UnknownRobot,
-            problems.NoMeshes,
-            problems.ShuttingDown,
-            problems.DeadlineExceeded,
-            problems.WorkerLost,
-            problems.StoreUnavailable,
+            UnknownRobot,
+            NoMeshes,
+            ShuttingDown,
+            DeadlineExceeded,
+            WorkerLost,
+            StoreUnavailable,
         ),
     },
 )
@@ -157,7 +159,7 @@ async def meshes(
     response_model=RobotDetail,
     responses={
         201: {"model": RobotDetail, "description": "Added", "headers": LOCATION_HEADER},
-        **problem_responses(*ADDING_PROBLEMS, problems.RobotExists, problems.NotOwner),
+        **problem_responses(*ADDING_PROBLEMS, RobotExists, NotOwner),
     },
 )
 async def put(
@@ -189,9 +191,7 @@ async def put(
     "/{name}",
     summary="Delete a robot",
     status_code=204,
-    responses=problem_responses(
-        problems.UnknownRobot, problems.RobotExists, problems.NotOwner, problems.StoreUnavailable
-    ),
+    responses=problem_responses(UnknownRobot, RobotExists, NotOwner, StoreUnavailable),
 )
 async def delete(name: Name, store: ServiceStore, client: ServiceClient) -> None:
     """Deletes a robot that was added. Studies and stored answers about it stay."""

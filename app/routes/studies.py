@@ -10,16 +10,21 @@ from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
 from joulepath.app.convert.identified import identified_as, with_figures
+from joulepath.app.exceptions.access import NotOwner
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.queue import ShuttingDown, WorkerLost
+from joulepath.app.exceptions.stored import KeyReused, StoreUnavailable, UnknownFigures, UnknownStudy
+from joulepath.app.exceptions.transport import BodyTooLarge, RequestTimeout
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import ServiceClient, ServiceStore
 from joulepath.app.routes.large_bodies import LargeBodyRoute
 from joulepath.app.routes.parameters import CREATED_HEADERS, Key, StudyId, WantedFormat, set_location
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.examples.studies import STUDY_CSV
 from joulepath.app.schemas.studies import Study, StudyList, StudyPage, StudyRequest, StudySummary
 from joulepath.app.store import studies
 from joulepath.app.studies.answers import as_csv, full, summary
 from joulepath.app.tasks.arm_engine import identified, robot_in
+from joulepath.optimizer.exceptions import DeadlineExceeded, UnknownRobot
 
 router = APIRouter(prefix="/studies", tags=["studies"], route_class=LargeBodyRoute)
 
@@ -32,16 +37,16 @@ router = APIRouter(prefix="/studies", tags=["studies"], route_class=LargeBodyRou
     responses={
         201: {"headers": CREATED_HEADERS},
         **problem_responses(
-            problems.Validation,
-            problems.KeyReused,
-            problems.UnknownRobot,
-            problems.UnknownFigures,
-            problems.BodyTooLarge,
-            problems.RequestTimeout,
-            problems.ShuttingDown,
-            problems.DeadlineExceeded,
-            problems.WorkerLost,
-            problems.StoreUnavailable,
+            InvalidRequest,
+            KeyReused,
+            UnknownRobot,
+            UnknownFigures,
+            BodyTooLarge,
+            RequestTimeout,
+            ShuttingDown,
+            DeadlineExceeded,
+            WorkerLost,
+            StoreUnavailable,
         ),
     },
 )
@@ -71,7 +76,7 @@ async def create(
     "",
     summary="List studies",
     response_model=StudyList,
-    responses=problem_responses(problems.Validation, problems.StoreUnavailable),
+    responses=problem_responses(InvalidRequest, StoreUnavailable),
 )
 async def list_studies(page: Annotated[StudyPage, Query()], store: ServiceStore) -> StudyList:
     """All studies with their state, newest first, page by page."""
@@ -85,7 +90,7 @@ async def list_studies(page: Annotated[StudyPage, Query()], store: ServiceStore)
     response_model=Study,
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}, "example": STUDY_CSV}}},
-        **problem_responses(problems.UnknownStudy, problems.StoreUnavailable),
+        **problem_responses(UnknownStudy, StoreUnavailable),
     },
 )
 async def show(id: StudyId, wanted: WantedFormat, store: ServiceStore) -> Response:
@@ -101,7 +106,7 @@ async def show(id: StudyId, wanted: WantedFormat, store: ServiceStore) -> Respon
     "/{id}",
     summary="Delete a study",
     status_code=204,
-    responses=problem_responses(problems.UnknownStudy, problems.NotOwner, problems.StoreUnavailable),
+    responses=problem_responses(UnknownStudy, NotOwner, StoreUnavailable),
 )
 async def delete(id: StudyId, store: ServiceStore, client: ServiceClient) -> None:
     """Deletes the study with its iterations and their answers."""

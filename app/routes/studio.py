@@ -13,7 +13,7 @@ from pathlib import PurePosixPath
 from fastapi import APIRouter, Request
 from fastapi.responses import RedirectResponse, Response
 
-from joulepath.app.exceptions import NotFound
+from joulepath.app.exceptions.transport import NotFound
 from joulepath.app.http.entity_tag import is_known
 
 router = APIRouter(include_in_schema=False)

@@ -12,21 +12,22 @@ from fastapi import APIRouter, Query, Request, Response
 
 from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.exceptions import Busy, EmptyStudy, TaskFailed, WorkerDied
+from joulepath.app.exceptions.base import InternalError, InvalidRequest
+from joulepath.app.exceptions.queue import Busy, ShuttingDown, WorkerLost
+from joulepath.app.exceptions.stored import EmptyStudy, StoreUnavailable, UnknownStudy
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.http.problem_details import problem_type
+from joulepath.app.http.problems import reported
 from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
 from joulepath.app.routes.parameters import StudyId, allowed_deadline
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.schemas.suggestions import Suggestions, SuggestQuery
 from joulepath.app.store import answers, studies
 from joulepath.app.store.store import Store
 from joulepath.app.studies.suggestions import Proposal, base_of, proposals
 from joulepath.app.tasks.arm_engine import ArmEngine, known_here
-from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
+from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError, UnknownRobot
 
 router = APIRouter(prefix="/studies", tags=["studies"])
 
@@ -38,12 +39,12 @@ Outcome = dict[str, Any]
     summary="Suggestions for the next iteration",
     response_model=Suggestions,
     responses=problem_responses(
-        problems.Validation,
-        problems.UnknownStudy,
-        problems.UnknownRobot,
-        problems.EmptyStudy,
-        problems.ShuttingDown,
-        problems.StoreUnavailable,
+        InvalidRequest,
+        UnknownStudy,
+        UnknownRobot,
+        EmptyStudy,
+        ShuttingDown,
+        StoreUnavailable,
     ),
 )
 async def suggest(
@@ -123,8 +124,8 @@ class _Computing:
                 if left <= 0:
                     raise DeadlineExceeded([])
                 result = await self.engine.run(OptimizeTask(asked, self.request_id), left)
-            except (JoulepathError, Busy, WorkerDied, TaskFailed) as error:
-                return outcome | {"problem": problem_type(error).slug()}
+            except (JoulepathError, Busy, WorkerLost, InternalError) as error:
+                return outcome | {"problem": reported(error).slug()}
         answer = orjson.loads(result.document)
         energy = answer["energy"][objective]["total"]
         return outcome | {"energy": energy, "duration": answer["duration"], "status": answer["status"]}

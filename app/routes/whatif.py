@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
+from joulepath.app.exceptions.stored import KeyReused, StoreUnavailable, UnknownLog
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
@@ -12,10 +13,11 @@ from joulepath.app.routes.large_bodies import LargeBodyRoute
 from joulepath.app.routes.later import ACCEPTED, ServiceLater
 from joulepath.app.routes.parameters import deadline_of
 from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.whatif import WhatifRequest, WhatifResponse
 from joulepath.app.store.store_answers import store_answers
 from joulepath.app.tasks.whatif import WhatifTask
+from joulepath.optimizer.exceptions import InvalidTable
+from joulepath.optimizer.search.errors import PathInfeasible
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
@@ -28,11 +30,11 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
         **ACCEPTED,
         **problem_responses(
             *MOTION_PROBLEMS,
-            problems.PathInfeasible,
-            problems.InvalidTable,
-            problems.UnknownLog,
-            problems.StoreUnavailable,
-            problems.KeyReused,
+            PathInfeasible,
+            InvalidTable,
+            UnknownLog,
+            StoreUnavailable,
+            KeyReused,
         ),
     },
 )

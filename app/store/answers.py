@@ -13,7 +13,7 @@ from joulepath.app.access.client import Client
 from joulepath.app.access.rules import check_owner
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.result import StoredAnswer
-from joulepath.app.exceptions import AnswerInUse, UnknownAnswer
+from joulepath.app.exceptions.stored import AnswerInUse, UnknownAnswer
 from joulepath.app.store.paging import position_after, position_of
 from joulepath.app.store.tables import Answer, Job, is_id, now
 

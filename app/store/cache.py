@@ -16,7 +16,7 @@ from joulepath.app.store.tables import Answer, CachedAnswer
 class Meaning(TypedDict):
     """What a request means to a version of the service: the hash of its canonical form, and the name of its robot.
 
-    Of a round also its cell, see `KnownMotion`.
+    Of a cycle also its cell, see `KnownMotion`.
     """
 
     version: str

@@ -8,7 +8,7 @@ from typing import Any
 
 from sqlalchemy.exc import DBAPIError
 
-from joulepath.app.exceptions import StoreFault
+from joulepath.app.exceptions.stored import StoreFault
 
 LEAST_ROOM = 1 << 20
 """Below this many free bytes the disk counts as full: a commit of an ordinary answer may fail."""

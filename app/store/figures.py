@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from joulepath.app.access.client import Client
 from joulepath.app.access.rules import check_owner
-from joulepath.app.exceptions import FiguresInUse, TooManyFigures, UnknownFigures
+from joulepath.app.exceptions.stored import FiguresInUse, TooManyFigures, UnknownFigures
 from joulepath.app.store.tables import Figures, Study, is_id, now
 
 _SPACE = uuid.UUID("6d0c5a0e-7b0e-5d5f-9a53-1d1f5b1c4a9e")

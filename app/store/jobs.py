@@ -13,7 +13,8 @@ from sqlalchemy.orm import Session, defer
 
 from joulepath.app.access.client import Client
 from joulepath.app.access.rules import check_owner
-from joulepath.app.exceptions import JobNotCancellable, KeyReused, TooManyWaiting, UnknownJob
+from joulepath.app.exceptions.queue import TooManyWaiting
+from joulepath.app.exceptions.stored import JobNotCancellable, KeyReused, UnknownJob
 from joulepath.app.store.cache import Meaning
 from joulepath.app.store.job_events import ENDED, Counts, conclude, counts_of, record, request_ended, set_state
 from joulepath.app.store.paging import position_after, position_of

@@ -17,7 +17,7 @@ from sqlalchemy.orm import Session, defer
 
 from joulepath.app.answers.envelope import AnswerFigures
 from joulepath.app.engine.result import StoredAnswer
-from joulepath.app.exceptions import TooManyFigures
+from joulepath.app.exceptions.stored import TooManyFigures
 from joulepath.app.store import answers, cache, figures, jobs, known_motions
 from joulepath.app.store.cache import Answered, Asked, Meaning
 from joulepath.app.store.job_events import Report, conclude, progress_is_due, record_progress, request_ended, set_state
@@ -63,7 +63,7 @@ class Outcome:
     `wall_time` [s] is that of the work. `answer` is the compressed document, and `answer_id` its id, if it says so
     itself. `parts` are the answers that it refers to, compressed, of the endpoint `parts_kind`. `identified` are the
     figures of an arm that were found, if any. `is_optimal`: no more time would make the answer better. It answers what
-    was `asked`, too. `motions` are those that a round used or found in its cell.
+    was `asked`, too. `motions` are those that a cycle used or found in its cell.
     """
 
     lease: Lease

@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session, defer
 
 from joulepath.app.access.client import Client
 from joulepath.app.access.rules import check_owner
-from joulepath.app.exceptions import TooManyLogs, UnknownLog
+from joulepath.app.exceptions.stored import TooManyLogs, UnknownLog
 from joulepath.app.store.paging import position_after, position_of
 from joulepath.app.store.tables import StoredLog, is_id
 

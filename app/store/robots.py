@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 
 from joulepath.app.access.client import Client
 from joulepath.app.access.rules import check_owner
-from joulepath.app.exceptions import BundledRobot, RobotExists, TooManyRobots
+from joulepath.app.exceptions.stored import BundledRobot, RobotExists, TooManyRobots
 from joulepath.app.store.tables import OwnRobot
 from joulepath.models.registry import robot_names
 from joulepath.optimizer.exceptions import UnknownRobot

@@ -17,7 +17,7 @@ from sqlalchemy.exc import DBAPIError, IntegrityError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 from sqlalchemy.orm import Session
 
-from joulepath.app.exceptions import StoreFault, StoreUnavailable
+from joulepath.app.exceptions.stored import StoreFault, StoreUnavailable
 from joulepath.app.store.database import OPENED, create_database_engine, is_writable, migrate, room_inside, sqlite_file
 from joulepath.app.store.faults import LEAST_ROOM, DatabaseMoved, fault_of, room
 from joulepath.app.store.pruning import Pruning

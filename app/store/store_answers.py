@@ -10,7 +10,7 @@ from functools import partial
 from sqlalchemy.orm import Session
 
 from joulepath.app.engine.result import StoredAnswer, TaskResult
-from joulepath.app.exceptions import StoreUnavailable
+from joulepath.app.exceptions.stored import StoreUnavailable
 from joulepath.app.settings import Settings
 from joulepath.app.store import answers, cache, known_motions
 from joulepath.app.store.cache import Answered, Asked

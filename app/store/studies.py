@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session, defer
 from joulepath.app.access.client import Client
 from joulepath.app.access.rules import check_owner
 from joulepath.app.engine.result import StoredAnswer
-from joulepath.app.exceptions import KeyReused, UnknownIteration, UnknownStudy
+from joulepath.app.exceptions.stored import KeyReused, UnknownIteration, UnknownStudy
 from joulepath.app.store import answers, cache
 from joulepath.app.store.cache import Answered
 from joulepath.app.store.paging import position_after, position_of

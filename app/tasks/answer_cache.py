@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from joulepath.app.convert.packed import unpacked
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.exceptions import StoreUnavailable
+from joulepath.app.exceptions.stored import StoreUnavailable
 from joulepath.app.schemas.common import Request
 from joulepath.app.store import cache, known_motions
 from joulepath.app.store.cache import Asked, Meaning
@@ -62,7 +62,7 @@ class AnswerCache:
         return replace(result, age=0).for_request(request_id) if is_anothers else result
 
     async def motions(self, cell: str | None) -> dict[str, bytes]:
-        """Motions that rounds in this cell may have in common, by their keys; none for a round whose cell is not known.
+        """Motions that cycles in this cell may have in common, by their keys; none for a cycle whose cell is not known.
 
         They are shared by all clients: no answer hangs on them.
         """

@@ -9,7 +9,7 @@ from typing import Any
 from joulepath.app.answers.declared import shown_fields
 from joulepath.app.answers.envelope import Answer
 from joulepath.app.engine.result import StoredAnswer, json_document
-from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.tasks.answer_figures import figures_of
 
 MOST_BYTES = 1 << 26

@@ -10,7 +10,7 @@ from joulepath.optimizer.result.energy import Energy
 
 
 def figures_of(answer: Mapping[str, Any]) -> AnswerFigures:
-    """The figures of the answer of any endpoint. Only a motion or a round has an energy: of its objective, electrical
+    """The figures of the answer of any endpoint. Only a motion or a cycle has an energy: of its objective, electrical
     for `evaluate`."""
     given = answer.get("total", answer)
     energy, objective = given.get("energy"), answer.get("objective", "electrical")

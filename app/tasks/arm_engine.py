@@ -12,7 +12,7 @@ from joulepath.app.convert.own_robots import own_robot_named, own_robot_of
 from joulepath.app.convert.recorded import GivenLog, log_given
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.task import Task
-from joulepath.app.exceptions import UnknownFigures, UnknownLog
+from joulepath.app.exceptions.stored import UnknownFigures, UnknownLog
 from joulepath.app.store import figures, logs, robots
 from joulepath.app.store.store import Store
 from joulepath.models.registry import load_robot, robot_names

@@ -12,7 +12,7 @@ from joulepath.app.convert.comparison import to_compare_response, to_optimize_re
 from joulepath.app.convert.request import to_problem
 from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult, json_document
-from joulepath.app.http.problem_details import problem_content
+from joulepath.app.http.problems import problem_of
 from joulepath.app.schemas.compare import CompareRequest
 from joulepath.app.tasks.certified import certified
 from joulepath.optimizer.compare import compare
@@ -35,9 +35,7 @@ class CompareTask:
         problem = to_problem(to_optimize_request(self.request, self.request.methods[0]), deadline)
         found = compare(problem, self.request.methods, tell=listener())
         problems = {
-            each.method: problem_content(each.error, self.request_id)
-            for each in found.methods
-            if each.error is not None
+            each.method: problem_of(each.error, self.request_id) for each in found.methods if each.error is not None
         }
         answers = {method: self._answer(method, certified(each)) for method, each in found.solutions.items()}
         return TaskResult.of_json(to_compare_response(self.request, self.request_id, found, problems, answers))

@@ -13,7 +13,7 @@ from joulepath.app.convert.identification import identification_fields, residual
 from joulepath.app.convert.logs import stored_log
 from joulepath.app.convert.until import until
 from joulepath.app.engine.result import StoredAnswer, TaskResult, json_document
-from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.identifications import IdentifyRequest
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.exceptions import InvalidProblem

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.exceptions import ServiceError, WorkerDied
+from joulepath.app.exceptions.base import ServiceError
+from joulepath.app.exceptions.queue import WorkerLost
 from joulepath.app.store.cache import Asked
 
 Compute = Callable[[float], Coroutine[Any, Any, TaskResult]]
@@ -38,7 +39,7 @@ class InFlight:
         if (known := self._works.get(asked)) is not None:
             try:
                 return await self._awaited(asked, known), True
-            except WorkerDied:
+            except WorkerLost:
                 raise  # it would die of this one, too
             except ServiceError:
                 return await compute(end - loop.time()), False

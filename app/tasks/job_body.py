@@ -12,8 +12,8 @@ from pydantic import ValidationError
 from joulepath.app.convert.json_text import parsed_json
 from joulepath.app.convert.packed import packed
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.exceptions import InvalidRequest
-from joulepath.app.http.problem_details import MOST_ERRORS, invalid_request
+from joulepath.app.exceptions.base import FieldError, InvalidRequest
+from joulepath.app.http.problems import MOST_ERRORS, invalid_request
 from joulepath.app.schemas.common import Request
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.jobs import NewJob as JobModel
@@ -96,7 +96,8 @@ def job_of_one(kind: str, asked: Request, deadlines: Deadlines, fresh: bool) -> 
 
 
 def _job(asked: JobModel, deadlines: Deadlines, fresh: bool) -> NewJob:
-    wrong, requests = [], []
+    wrong: list[FieldError] = []
+    requests = []
     for index, each in enumerate(asked.requests):
         ((kind, request),) = ((name, getattr(each, name)) for name in type(each).model_fields)
         too_long = _too_long(request, deadlines)

@@ -58,7 +58,7 @@ class JobRequestTask:
     logs: tuple[Stored, ...] = ()
     """Those that an identification names."""
     motions: Mapping[str, bytes] = field(default_factory=dict)
-    """Those of the cell of a round."""
+    """Those of the cell of a cycle."""
 
     def run(self, deadline: float) -> TaskResult:
         """The answer of the endpoint, within about `deadline` seconds."""

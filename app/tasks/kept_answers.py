@@ -1,4 +1,4 @@
-"""Kept answers that a task needs: those that its request names, and the moves of a round among them."""
+"""Kept answers that a task needs: those that its request names, and the moves of a cycle among them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Any, Self
 import orjson
 
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.exceptions import InvalidRequest, PartsNeeded
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.stored import PartsNeeded
 
 
 @dataclass(frozen=True, kw_only=True)

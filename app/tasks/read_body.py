@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 
 from joulepath.app.convert.json_text import parsed_json
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.http.problem_details import invalid_request
+from joulepath.app.http.problems import invalid_request
 
 _SMALL = 1024
 """Most bytes, pickled, of a field that the service's process gets to see."""

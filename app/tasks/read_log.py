@@ -10,10 +10,10 @@ from joulepath.app.convert.fields import location
 from joulepath.app.convert.logs import report_fields, to_log_options
 from joulepath.app.convert.until import until
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.logs import LogSettings
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
+from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.logs.reading import read_log
 
 
@@ -36,7 +36,5 @@ class ReadLogTask:
             with until(Deadline.after(deadline)):
                 reading = read_log(Path(self.file), robot, to_log_options(self.request, self.most_bytes))
         except InvalidProblem as error:
-            if isinstance(error, InvalidTable):
-                raise  # about the log
             raise InvalidRequest([{"loc": location(error, "query"), "msg": str(error)}]) from None
         return TaskResult.of_json(report_fields(reading))

@@ -32,7 +32,7 @@ def meaning_of(kind: str, body: Any) -> Meaning:
 
 
 def cell_of(body: CycleRequest) -> str:
-    """What a round says of the arm and its cell: rounds that agree in it may have moves in common."""
+    """What a cycle says of the arm and its cell: cycles that agree in it may have moves in common."""
     return _hash([__version__, body.model_dump(mode="json", include=_CELL)])
 
 

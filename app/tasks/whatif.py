@@ -16,7 +16,7 @@ from joulepath.app.convert.recorded import as_logged
 from joulepath.app.convert.request import to_problem
 from joulepath.app.convert.until import time_left, until
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.http.problem_details import problem_content
+from joulepath.app.http.problems import problem_of
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.schemas.whatif import Change, WhatifRequest
@@ -25,7 +25,7 @@ from joulepath.app.tasks.certified import certified
 from joulepath.app.tasks.differences import differences, of_base
 from joulepath.optimizer.deadline import Deadline, DeadlineShares
 from joulepath.optimizer.evaluate.evaluate import Evaluation, evaluate
-from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, InvalidTable, OutsideLimits
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, OutsideLimits
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
@@ -77,7 +77,7 @@ class _Work:
 
     def row(self, change: Change, error: Exception | None = None, **given: Any) -> dict[str, Any]:
         """The entry of a change in the answer: the fields in `given`, and `error` as a problem."""
-        problem = None if error is None else problem_content(error, self.request_id)
+        problem = None if error is None else problem_of(error, self.request_id)
         empty = dict.fromkeys(("same_motion", "reoptimised", "reoptimisation"))
         return {"name": change.name, **empty, **given, "problem": problem}
 
@@ -204,10 +204,9 @@ def _located(work: Callable[[], T], where: str, change: Change | None = None) ->
 def _moved(error: Exception, where: str, change: Change | None = None) -> Exception:
     """The error with its field path prefixed by `where`.
 
-    If the change does not set that field, the path is `where` alone. Errors about the motion, not about a field, are
-    returned unchanged.
+    If the change does not set that field, the path is `where` alone. Other errors are returned unchanged.
     """
-    if not isinstance(error, InvalidProblem) or isinstance(error, OutsideLimits | InvalidTable):
+    if not isinstance(error, InvalidProblem):
         return error
     is_set = change is None or error.field.partition(".")[0] in change.arm.model_fields_set
     return InvalidProblem(f"{where}.{error.field}" if is_set else where, str(error))

@@ -1,4 +1,4 @@
-"""Cycles with stops, or ends of their paths, that leave the orientation free in part: cycles at given orientations.
+"""Cycles with stops, or ends of their paths, that leave the orientation or the posture free.
 
 At given orientations a cycle is one of stops with several targets; a path leads from each of them to a pose of its own.
 So the orientations are chosen with the configurations, for the whole cycle. Near those that are found, others are tried
@@ -6,7 +6,8 @@ in the same way, so that no answer needs more than the one before.
 
 Every orientation at a stop brings all its full turns with it. So that they do not multiply, the orientations of stops
 without a path are looked for without full turns first; these come with the orientations found. Then the configurations
-at these stops move (`configurations_beside`).
+at these stops move (`configurations_beside`). So do those at poses that leave the posture free: they
+begin from what moves by themselves choose, or from the samples of a cycle.
 """
 
 from __future__ import annotations
@@ -20,9 +21,10 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.cycle.configurations_beside import beside
+from joulepath.optimizer.cycle.configurations_beside import beside, has_free_postures
 from joulepath.optimizer.cycle.cycle_baselines import compared_again
 from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleMove, CycleSolution
+from joulepath.optimizer.cycle.errors import NoSequence
 from joulepath.optimizer.cycle.known_motions import knowing, known_motions
 from joulepath.optimizer.cycle.move_problem import LEAST_TIME
 from joulepath.optimizer.cycle.successive_moves import successively_chosen
@@ -31,17 +33,16 @@ from joulepath.optimizer.exceptions import (
     DeadlineExceeded,
     InvalidProblem,
     JoulepathError,
-    NoReachableTarget,
-    NoSequence,
     NoTrajectory,
     UnreachablePose,
+    UnreachableTargets,
 )
 from joulepath.optimizer.kinematics.orientation_tolerance import nearest_orientation, sample_orientations
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.stops import Stop
-from joulepath.optimizer.problem.targets import PosesAround
+from joulepath.optimizer.problem.targets import AnyOf, PosesAround
 
 # angles [rad] about an axis at first, and orientations that are free otherwise
 ALL_AROUND, SPREAD = tuple(np.arange(12) * (np.pi / 6)), 24
@@ -71,17 +72,21 @@ def with_free_orientations(asked: Cycle, search: Search, clock: Clock) -> CycleS
     Raises the errors of `search`; UnreachablePose for a stop, or a path whose start, is out of reach at every
     orientation that is tried.
     """
-    free = {stop.name: stop for stop in asked.stops if any(stop.free_ends)}
-    if not free:
-        return search(asked)
     end = Deadline.after(asked.deadline, clock)
+    free = {stop.name: stop for stop in asked.stops if any(stop.free_ends)}
+    tried, best = dict[str, list[Turns]](), None if free else search(asked)
+    # one that is optimal has no samples of postures
+    if best is not None and (best.status == "optimal" or not has_free_postures(asked)):
+        return best
     with knowing(known_motions()):
         try:
-            tried, best = _first(asked, free, search, end)
-        except NoReachableTarget as error:
+            if best is None:
+                tried, best = _first(asked, free, search, end)
+        except UnreachableTargets as error:
             raise _at_any_angle(error, [f"stops/{stop.entry}" for stop in free.values()]) from None
         compared, at_paths = best.baselines, _found_at(best, tried)
-        if _is_compared_once(asked) and all(len(stop.places) == 1 for stop in asked.stops):
+        plain = all(len(stop.places) == 1 and not isinstance(stop.target, AnyOf) for stop in asked.stops)
+        if _is_compared_once(asked) and plain:
             best, compared = _with_successive_moves(asked, best, search, end.within(FEW * end.left), clock)
         steps = MORE if all(stop.path is None for stop in free.values()) else STEPS
         gained = True
@@ -101,7 +106,7 @@ def with_free_orientations(asked: Cycle, search: Search, clock: Clock) -> CycleS
                     gained = found.needed.of(asked.objective) < before * (1 - LITTLE)
     if _is_compared_once(asked):
         best = replace(best, baselines=[compared_again(asked, each, best.needed) for each in compared])
-    places = {place for stop in free.values() for place in stop.places}
+    places = {place for stop in asked.stops if not isinstance(stop.target, AnyOf) for place in stop.places}
     return replace(best, moves=[_of_one_target(move, places) for move in best.moves])
 
 
@@ -270,7 +275,7 @@ def _turned(pose: ConeOrientedPose, reference: Array, turn: Array) -> Pose:
     return pose.with_orientation(reference @ pin.exp3(turn))
 
 
-def _at_any_angle(error: NoReachableTarget, stops: Sequence[str]) -> JoulepathError:
+def _at_any_angle(error: UnreachableTargets, stops: Sequence[str]) -> JoulepathError:
     """The error for what is out of reach at every orientation, if it is one of the `stops`."""
     if error.target not in stops:
         return error

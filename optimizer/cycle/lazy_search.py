@@ -13,9 +13,10 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from joulepath.optimizer.cycle.chains import LeastChain
+from joulepath.optimizer.cycle.errors import NoSequence
 from joulepath.optimizer.cycle.legs import Leg
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError, NoSequence
+from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from joulepath.optimizer.trajectories.spline import Spline
 
 # share of the search's time left that one leg may take: among obstacles, one without a way would take all of it

@@ -1,13 +1,16 @@
-"""The configurations that moves choose one after the other, at stops whose orientation is free in part.
+"""The configurations that moves choose one after the other, at stops that leave some freedom.
 
-A cycle chooses among orientations that are given; a move by itself looks for its own. So the cycle that chooses move by
-move, and what is saved against it, are what successive calls of `optimize` make of it.
+A cycle chooses among orientations and postures that are given; a move by itself looks for its own.
+So the cycle that chooses move by move, and what is saved against it, are what successive calls of
+`optimize` make of it. Their motions are known then.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+from joulepath.optimizer.cycle.known_motions import KnownMotion, known_motions
+from joulepath.optimizer.cycle.move_problem import problem_of
 from joulepath.optimizer.deadline import Clock, Deadline
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.problem.cycle import Cycle
@@ -26,6 +29,7 @@ def successively_chosen(asked: Cycle, end: Deadline, clock: Clock) -> Cycle | No
     for k, (stop, move) in enumerate(zip(asked.stops, asked.moves, strict=False)):
         if end.passed:
             return None
+        left, share = end.left, end.left / (len(asked.stops) - k)
         problem = Problem(
             arm=move.arm,
             start=start,
@@ -34,7 +38,7 @@ def successively_chosen(asked: Cycle, end: Deadline, clock: Clock) -> Cycle | No
             method=asked.method,
             windings=asked.windings,
             sample_period=asked.sample_period,
-            deadline=end.left / (len(asked.stops) - k),
+            deadline=share,
         )
         try:
             found = Run(problem, (), clock).solution()
@@ -43,5 +47,10 @@ def successively_chosen(asked: Cycle, end: Deadline, clock: Clock) -> Cycle | No
         if k == 0:
             asked = replace(asked, start=found.start.q)
         start = found.goal.q
+        if end.left > left - share / 2:
+            # more time would not make it better
+            own, motions = problem_of(asked, move, found.start.q, start, share), known_motions()
+            motion = KnownMotion(found.trajectory.spline, found.solver.stationarity)
+            motions.keep(motions.key("finished", own, []), motion)
         stops.append(replace(stop, target=start))
     return replace(asked, stops=stops)

@@ -17,10 +17,11 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.chains import LeastChain
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
+from joulepath.optimizer.cycle.errors import CycleTooShort, NoSequence
 from joulepath.optimizer.cycle.priced_search import MoveOfALeg, PricedMotion, PricedSearch, fastest_motion
 from joulepath.optimizer.cycle.rests import holding_powers, long_wait_powers, rest_energy
 from joulepath.optimizer.cycle.time_sharing import PRICES, Shared, TimeSharing, duration_of
-from joulepath.optimizer.exceptions import CycleTooShort, DeadlineExceeded, NoSequence, NoTrajectory
+from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 
 # chains that are tried, each better than the one before at the price of time that shares this one's

@@ -8,7 +8,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.energy.plant import Plant
-from joulepath.optimizer.exceptions import NotCertified
+from joulepath.optimizer.evaluate.errors import NotCertified
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.trajectories.spline import Spline, sample
 

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from joulepath.optimizer.exceptions import JoulepathError
 
 
+@dataclass(eq=False)
 class ExcitationInfeasible(JoulepathError):
-    """No start of an excitation gave a motion within all limits; `limit` names the one that the last one broke."""
+    """No excitation was found that keeps its limits from any start. `limit` names the one that the last start broke."""
 
-    def __init__(self, limit: str) -> None:
+    title = "No excitation within the limits"
+    remedy = (
+        "For `clearance`, move obstacles, ask for less, or give a `centre` with more room; else relax the limit or "
+        "give a longer `period`."
+    )
+
+    limit: str
+    """`clearance`, or a name of `worst_ratio` in a certificate: `position`, `velocity`, `torque`, …"""
+
+    def __str__(self) -> str:
         remedy = "relax it, or give a longer period"
-        if limit == "clearance":
+        if self.limit == "clearance":
             remedy = "move the obstacles, ask for less clearance, or give a centre with more room"
-        super().__init__(f"No excitation was found that keeps its limits, the last one broke {limit}: {remedy}.")
-        self.limit = limit
+        return f"No excitation was found that keeps its limits, the last one broke {self.limit}: {remedy}."

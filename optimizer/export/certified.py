@@ -7,7 +7,8 @@ import numpy as np
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.energy.plant import Plant
-from joulepath.optimizer.exceptions import InvalidProblem, NotCertified, OutsideLimits
+from joulepath.optimizer.evaluate.errors import NotCertified
+from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
 from joulepath.optimizer.export.program import Program
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.problem.problem import LONGEST_DURATION, Problem

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.program import Program
 
 NOT_RUN = "Not run on hardware: run it in the simulator of the maker, then slowly, with a hand at the stop button."
@@ -53,7 +53,7 @@ def header(program: Program, title: str, notes: tuple[str, ...]) -> list[str]:
 
 
 def output_note(program: Program, output: int | str | None) -> tuple[str, ...]:
-    """A note for the program of a round that switches no output."""
+    """A note for the program of a cycle that switches no output."""
     if output is not None or all(timed.payload is None for timed in program.timed):
         return ()
     return ("no output is switched where the payload changes: give digital_output, or add the gripper commands",)

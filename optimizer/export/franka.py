@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.facts import WrittenFile, check_joints, header
 from joulepath.optimizer.export.program import Program
 from joulepath.optimizer.export.rows import MOST_ROWS, ticks

@@ -70,7 +70,7 @@ class Program:
         jumps = [np.abs(a.spline.control_points[-1] - b.spline.control_points[0]) for a, b in pairwise(self.moves)]
         if max((float(jump.max()) for jump in jumps), default=0.0) > JOIN:
             raise InvalidProblem(
-                "answer", "A move does not begin where the one before it ends: ask for the round again."
+                "answer", "A move does not begin where the one before it ends: ask for the cycle again."
             )
 
     @cached_property
@@ -140,7 +140,7 @@ class Program:
 
 
 def program_of_cycle(found: CycleSolution) -> Program:
-    """The moves of a round, its dwells and waits."""
+    """The moves of a cycle, its dwells and waits."""
     steps = list[Move | Rest]()
     for move in found.moves:
         planned = move.planned

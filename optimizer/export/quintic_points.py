@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.pieces import breaks
 from joulepath.optimizer.export.program import Move, Program
 from joulepath.optimizer.trajectories.spline import Spline, sample

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.even_points import EvenPoints, even_points, rounded, straight
 from joulepath.optimizer.export.facts import WrittenFile, check_joints, comment, header, output_note
 from joulepath.optimizer.export.point_options import PointOptions

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.program import Program
 
 MOST_ROWS = 100_000

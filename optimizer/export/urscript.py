@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.facts import WrittenFile, check_joints, comment, header, output_note
 from joulepath.optimizer.export.pieces import pieces
 from joulepath.optimizer.export.program import Move, Program, Timed

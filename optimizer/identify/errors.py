@@ -1,67 +1,96 @@
-"""The errors of an identification, each with its data."""
+"""The errors of an identification."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
+from joulepath.optimizer.declared import Count, Internal, Unit
 from joulepath.optimizer.exceptions import JoulepathError
 
 
+@dataclass(eq=False)
 class NotExcited(JoulepathError):
-    """The logs of a `robot` tell nothing of what was asked; `parameters` are its names.
+    """Nothing that was asked for can be identified from the logs."""
 
-    `excite` are the parameters that an excitation is to tell apart, with a payload of `mass` [kg] at `com` (3,) [m].
-    `advice` is the request for it.
-    """
+    title = "Not excited"
+    remedy = (
+        "Log motions in which every joint moves, at several speeds and in both directions, with motor currents or the "
+        "power of the arm's bus."
+    )
+    detail = (
+        "Nothing that was asked for can be identified from these logs: log motions in which every joint moves, at "
+        "several speeds and in both directions."
+    )
 
-    def __init__(
-        self, parameters: Sequence[str], robot: str, excite: Sequence[str], mass: float = 0.0, com: Sequence[float] = ()
-    ) -> None:
-        super().__init__(
-            "Nothing that was asked for can be identified from these logs: log motions in which every joint moves, at "
-            "several speeds and in both directions."
-        )
-        self.parameters = list(parameters)
-        carried = {"payload": {"mass": mass, "com": list(com)}} if mass > 0 else {}
-        self.advice: dict[str, Any] = {"robot": robot, "parameters": list(excite), **carried}
+    parameters: list[str]
+    """Parameters that cannot be identified."""
+    advice: dict[str, Any]
+    """A body for `POST /excitation`, whose motion tells these parameters. Add the scene of your cell."""
 
 
+@dataclass(eq=False)
 class NothingHeldOut(JoulepathError):
-    """The logs have `moves` moves, along fewer than two different motions."""
+    """The logs have fewer than two different motions, so that no move can be held out for the validation. A motion and
+    its repetitions, in either direction, count as one."""
 
-    def __init__(self, moves: int) -> None:
-        super().__init__(
-            f"The logs have {moves} moves along fewer than two different motions, so that none can be held out: log at "
-            "least two different motions, or name other logs in `validate`."
+    title = "Nothing held out"
+    remedy = "Log more motions, or name other logs in `validate`."
+
+    moves: Count
+    """Number of moves in the logs."""
+
+    def __str__(self) -> str:
+        return (
+            f"The logs have {self.moves} moves along fewer than two different motions, so that none can be held out: "
+            "log at least two different motions, or name other logs in `validate`."
         )
-        self.moves = moves
 
 
 class NoPowerChannel(JoulepathError):
-    """Power was asked for, and no log has it."""
+    """Power is to be identified, and no log has the power of the arm's bus."""
 
-    def __init__(self) -> None:
-        super().__init__(
-            "No log has the power of the arm's bus: log voltage and current of the arm, or its power. Joint currents "
-            "are not taken for it, as they are no DC currents."
-        )
+    title = "No power channel"
+    remedy = (
+        "Log `actual_robot_voltage` and `actual_robot_current`, or a column `P`. Joint currents are not taken for it: "
+        "they are no DC currents."
+    )
+    detail = (
+        "No log has the power of the arm's bus: log voltage and current of the arm, or its power. Joint currents are "
+        "not taken for it, as they are no DC currents."
+    )
 
 
+@dataclass(eq=False)
 class MethodNotApplicable(JoulepathError):
-    """The logs do not have what the `method` needs."""
+    """The logs do not have what the `method` needs: `detail` says what is missing."""
 
-    def __init__(self, method: str, needs: str) -> None:
-        super().__init__(f"The method {method} does not fit these logs: {needs}")
-        self.method = method
+    title = "Method not applicable"
+    remedy = "Log it, or choose another method; `automatic` takes what the logs have."
+
+    method: str
+    """The method that was asked for."""
+    needs: Annotated[str, Internal]
+    """What the method needs, as a sentence."""
+
+    def __str__(self) -> str:
+        return f"The method {self.method} does not fit these logs: {self.needs}"
 
 
+@dataclass(eq=False)
 class PayloadUnknown(JoulepathError):
-    """Torque constants were asked for, and it is not known what the arm carried; `joints` carry too little to tell."""
+    """`torque_constant` is asked for, it is not known what the arm carried, and joints carry too little weight to tell
+    their constants."""
 
-    def __init__(self, joints: Sequence[int]) -> None:
-        super().__init__(
-            "Gravity does not tell the torque constants of all joints, and nobody said what the arm carried: give "
-            "`payload` with each log, of mass 0 if it was nothing, and find a payload and torque constants one by one."
-        )
-        self.joints = list(joints)
+    title = "Payload unknown"
+    remedy = (
+        'Send the logs again with `payload`: `{"mass": 0}` if the arm carried nothing. A payload is found from two '
+        'logs, by `"fit": ["payload"]` without `torque_constant`.'
+    )
+    detail = (
+        "Gravity does not tell the torque constants of all joints, and nobody said what the arm carried: give "
+        "`payload` with each log, of mass 0 if it was nothing, and find a payload and torque constants one by one."
+    )
+
+    joints: Annotated[list[int], Unit("1")]
+    """Joints at which gravity tells no torque constant, from 0."""

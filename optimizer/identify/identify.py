@@ -283,7 +283,8 @@ def _not_excited(parameters: Sequence[str], logs: Sequence[Log], options: Identi
     links = options.needs_regressor or {"torque_constant", "payload"} & set(options.fit)
     excite = [*(["inertials"] if links else []), *(["rotor"] if "rotor" in options.targets else []), "friction"]
     carried = logs[0].payload
-    return NotExcited(parameters, logs[0].robot, excite, carried.mass, carried.com.tolist())
+    payload = {"payload": {"mass": carried.mass, "com": carried.com.tolist()}} if carried.mass > 0 else {}
+    return NotExcited(list(parameters), {"robot": logs[0].robot, "parameters": excite, **payload})
 
 
 def _parameters(robot: Robot, estimate: Estimate, options: IdentificationOptions) -> tuple[Parameter, ...]:

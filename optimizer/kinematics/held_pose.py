@@ -1,4 +1,4 @@
-"""The curve of configurations of a redundant arm that hold one pose of the TCP, near any of them.
+"""The curve of configurations of a redundant or singular arm that hold one pose of the TCP.
 
 It is found by Newton's method on the arm itself. So it does not end where the charts of a closed form do.
 """
@@ -21,14 +21,16 @@ HELD, STEPS = 1e-11, 12
 INSIDE = 1e-9
 # of the curve's length [rad] for differences of its tangent
 STEP = 1e-4
+# a singular value of the Jacobian below this share of the largest is zero: the arm is singular
+SINGULAR = 1e-8
 
 
 @dataclass(frozen=True)
 class HeldPose:
     """What holds the TCP at T (4, 4), base frame, within joint limits (nq,) [rad].
 
-    The TCP is at `T_last` (4, 4) in the frame of the last link. The arm has one joint more than a pose fixes. `data` is
-    Pinocchio's memory for its `model`: for one thread.
+    The TCP is at `T_last` (4, 4) in the frame of the last link. The arm has one joint more than a
+    pose fixes, or is singular. `data` is Pinocchio's memory for its `model`: for one thread.
     """
 
     model: pin.Model
@@ -63,6 +65,11 @@ class HeldPose:
         """The direction (nq,) of the curve at q (nq,), of length 1."""
         return np.asarray(np.linalg.svd(self._tcp_and_jacobian(q)[1])[2][-1])
 
+    def moves(self, q: Array) -> bool:
+        """Whether the arm can move at q (nq,) [rad] while it holds the pose, to first order."""
+        values = np.linalg.svd(self._tcp_and_jacobian(q)[1], compute_uv=False)
+        return len(q) > len(values) or bool(values[-1] < SINGULAR * values[0])
+
     def bend(self, q: Array, tangent: Array) -> Array:
         """The change (nq,) of the tangent per length of the curve [1/rad]."""
         before, after = (self.tangent(q + step * tangent) for step in (-STEP, STEP))
@@ -77,7 +84,7 @@ class HeldPose:
             error = pose_error(T[None], self.T)[0]
             if np.abs(error).max() < HELD:
                 return q
-            q[moving] += np.linalg.lstsq(jacobian[:, moving], error, rcond=None)[0]
+            q[moving] += np.linalg.lstsq(jacobian[:, moving], error, rcond=SINGULAR)[0]
         return None
 
     def _tcp_and_jacobian(self, q: Array) -> tuple[Array, Array]:

@@ -199,7 +199,7 @@ class Cycle:
         if self.objective == "mechanical" and self.duration_max is None:
             raise InvalidProblem(
                 "time",
-                "The mechanical objective has no best duration of its own: give the round a time or a time.max.",
+                "The mechanical objective has no best duration of its own: give the cycle a time or a time.max.",
             )
 
     @property

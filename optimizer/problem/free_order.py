@@ -86,12 +86,11 @@ def check_order(order: FreeOrder, stops: Sequence[Stop], carried: Payload) -> No
 
 def _check_before(order: FreeOrder, stops: Sequence[Stop]) -> None:
     groups = groups_of(order, stops)
-    for k, (first, second) in enumerate(order.before):
+    for first, second in order.before:
         for group in groups:
             names = [stop.name for stop in group]
             if first in names and second in names and names.index(first) > names.index(second):
                 raise ContradictoryOrder(
-                    f"before.{k}",
                     f"before asks for {first!r} before {second!r}, but together lists {second!r} first: leave out one "
                     "of them.",
                     [first, second],
@@ -102,7 +101,6 @@ def _check_before(order: FreeOrder, stops: Sequence[Stop]) -> None:
         circle = [groups[k] for k in error.args[1]]
         needed = " before ".join(" and ".join(repr(stop.name) for stop in group) for group in circle)
         raise ContradictoryOrder(
-            "before",
             f"No order is possible: it would have {needed}. Leave out one of these pairs of before, or a list of "
             "together.",
             [stop.name for group in circle[:-1] for stop in group],

@@ -38,7 +38,7 @@ class AnyOf:
 
 @dataclass(frozen=True)
 class PosesAround(AnyOf):
-    """Some of the poses that `around` allows; the bound of a round that has them is that of all configurations of all
+    """Some of the poses that `around` allows; the bound of a cycle that has them is that of all configurations of all
     of these poses. Without it, they are some of infinitely many that are not bounded."""
 
     around: ConeOrientedPose | None = None

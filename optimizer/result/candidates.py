@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, NamedTuple, TypedDict
@@ -81,3 +83,15 @@ class CandidateReport(NamedTuple):
     motion: asked for alone, this pair may need a few percent less. Null if not solved."""
     tried: Annotated[bool, Internal] = False
     """Whether a motion was computed, found or not."""
+
+
+def count_by_status(candidates: Sequence[CandidateReport]) -> CandidateCounts:
+    """How many of the candidates have each status."""
+    counted = Counter(each.status for each in candidates)
+    return CandidateCounts(
+        solved=counted[CandidateStatus.SOLVED],
+        pruned=counted[CandidateStatus.PRUNED],
+        infeasible=counted[CandidateStatus.INFEASIBLE],
+        failed=counted[CandidateStatus.FAILED],
+        unvisited=counted[CandidateStatus.UNVISITED],
+    )

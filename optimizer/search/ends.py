@@ -8,7 +8,7 @@ import numpy as np
 
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.deadline import checkpoint
-from joulepath.optimizer.exceptions import NoReachableTarget, OutsideLimits, SingularPose, UnreachablePose
+from joulepath.optimizer.exceptions import OutsideLimits, SingularPose, UnreachablePose, UnreachableTargets
 from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives
 from joulepath.optimizer.kinematics.inverse import (
     inverse_kinematics_for,
@@ -70,7 +70,7 @@ def ends_of(
 
     Of all of its poses of free orientation together so many `samples` are taken, or a few more.
 
-    Raises NoReachableTarget if none of several targets has a branch; for a single pose UnreachablePose (also if the
+    Raises UnreachableTargets if none of several targets has a branch; for a single pose UnreachablePose (also if the
     branch asked for does not reach it) or SingularPose; InvalidProblem for a pose of an arm without inverse kinematics.
     """
     if not isinstance(target, AnyOf):
@@ -85,7 +85,7 @@ def ends_of(
         except (UnreachablePose, SingularPose, OutsideLimits) as error:
             unreachable.append(UnreachableTarget(name, index, str(error)))
     if not reached:
-        raise NoReachableTarget(name, unreachable)
+        raise UnreachableTargets(name, unreachable)
     return reached, unreachable
 
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
-from joulepath.optimizer.exceptions import DurationTooShort
 from joulepath.optimizer.methods.duration_intervals import DurationInterval
 from joulepath.optimizer.methods.fastest_motion import FastestMotion, FastestSettings
 from joulepath.optimizer.methods.method import Method, SolveResult, SolveStatus
@@ -17,6 +16,7 @@ from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.search.attempts import solve_from, solver_of
 from joulepath.optimizer.search.candidates import Candidate, Reason
+from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.missed_branches import all_known
 from joulepath.optimizer.search.outer_turns import families_of
@@ -203,7 +203,7 @@ def find_fastest(incumbent: Incumbent, known: Sequence[Spline] = (), improve: bo
     found = fastest(incumbent, known, longest if longest >= shortest else None)
     if found is None:
         if shortest > longest:
-            raise DurationTooShort(least_duration(incumbent), late=incumbent.deadline.passed)
+            raise DurationTooShort(least_duration(incumbent), cut_short=incumbent.deadline.passed)
         return
     candidate = found.candidate
     # rounding may leave it a little longer than the same motion that was found before

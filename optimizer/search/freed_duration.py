@@ -32,7 +32,9 @@ def start_from_free_duration(incumbent: Incumbent, best: Candidate) -> None:
     free = replace(incumbent.problem, duration_min=None, duration_max=None)
     other = Incumbent(incumbent.prepared.sharing(free), incumbent.end, longest=incumbent.longest)
     twin = Candidate(best.start, best.goal, best.q_start, best.q_goal)
-    other.candidates = [twin]
+    # beside others, a candidate is solved coarsely first: as it was when no duration was asked for
+    beside = (each for each in incumbent.candidates if each is not best and each.holdable)
+    other.candidates = [twin, *(Candidate(each.start, each.goal, each.q_start, each.q_goal) for each in beside)]
     result = solve(other, twin)
     if result.spline is not None and duration / NEAR < result.spline.duration < duration * NEAR:
         other.accept_if_better(twin, result, other.prepared.energy(result.spline))

@@ -8,7 +8,6 @@ import numpy as np
 
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.exceptions import PathAttempt, PathInfeasible
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.course_tracing import Trace, traces, turned, with_turning, within
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -18,6 +17,7 @@ from joulepath.optimizer.problem.targets import Target
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason, bound, pairs
 from joulepath.optimizer.search.ends import EndConfiguration, ends, ends_of, label_of
+from joulepath.optimizer.search.errors import PathAttempt, PathInfeasible
 from joulepath.optimizer.search.free_ends_bound import backwards, bound_between
 from joulepath.optimizer.search.free_goal_bound import family_bound_of
 from joulepath.optimizer.search.missed_branches import bound_of_others

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from joulepath.optimizer.exceptions import NoCollisionFreeTrajectory, NoTrajectory
+from joulepath.optimizer.exceptions import NoTrajectory
 from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory
 
 
 def no_trajectory(candidates: Sequence[Candidate]) -> NoTrajectory:
@@ -16,4 +17,12 @@ def no_trajectory(candidates: Sequence[Candidate]) -> NoTrajectory:
         return NoTrajectory(reports)
     candidate, hit = max(hits, key=lambda each: each[1].min_clearance)
     cut_short = any(each.attempt is not None and each.attempt.cut_short for each in candidates)
-    return NoCollisionFreeTrajectory(reports, hit, candidate.start.label, candidate.goal.label, cut_short)
+    return NoCollisionFreeTrajectory(
+        reports,
+        pair=hit.pair,
+        depth=max(-hit.min_clearance, 0.0),
+        time=hit.time,
+        start=candidate.start.label,
+        goal=candidate.goal.label,
+        cut_short=cut_short,
+    )

@@ -10,7 +10,7 @@ import numpy as np
 
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
 from joulepath.optimizer.energy.interval import Known, with_interval
-from joulepath.optimizer.exceptions import DeadlineExceeded, DurationTooShort, NoTrajectory
+from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from joulepath.optimizer.methods.method import SolveResult, SolveStatus
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.bus import Bus
@@ -26,6 +26,7 @@ from joulepath.optimizer.search.branch_and_bound import explore
 from joulepath.optimizer.search.candidates import Candidate, Reason, bound, pairs
 from joulepath.optimizer.search.claims import may_be_optimal
 from joulepath.optimizer.search.ends import ends
+from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.fastest import explore_or_find_fastest, find_fastest
 from joulepath.optimizer.search.freed_duration import start_from_free_duration
 from joulepath.optimizer.search.incumbent import Incumbent
@@ -35,7 +36,7 @@ from joulepath.optimizer.search.near_goals import activate_near_goals
 from joulepath.optimizer.search.other_starts import start_beside
 from joulepath.optimizer.search.outer_turns import explore_families
 from joulepath.optimizer.search.path_ends import path_candidates
-from joulepath.optimizer.search.refinement import baselines_of, compare_with_baselines, refine
+from joulepath.optimizer.search.refinement import baselines_of, compare_with_baselines, refine, refine_rivals
 from joulepath.optimizer.search.refusals import no_trajectory
 from joulepath.optimizer.search.ruled_out import ruled_out
 from joulepath.optimizer.search.sampled_ends import activate_deferred, between
@@ -141,7 +142,10 @@ class Run:
         while (best := incumbent.best()) is not None:
             if not best.refused:
                 best = start_beside(incumbent, best)
+                coarse = best.energy or 0.0
                 refine(incumbent, best)
+                refine_rivals(incumbent, best, coarse)
+                best = incumbent.best() or best
                 start_from_free_duration(incumbent, best)
             longest = self.solved_beside(replace(problem, duration_min=problem.duration_max)) if may_rest else None
             if longest is not None:

@@ -15,10 +15,11 @@ from pathlib import Path
 
 import pytest
 
+from joulepath.app.exceptions.queue import ClusterUnavailable
 from joulepath.app.schemas.cluster import ClusterState
-from joulepath.app.schemas.errors import ClusterUnavailable
 from tests.app.job_clients import ended, evaluation, over, sent, shown
 from tests.app.live import EXIT, GRACE, ROOT, Server, alive, processor_time, serving, until
+from tests.app.problems import checked
 from tests.app.requests import long_search, move
 from tests.app.test_live_jobs import check_each_once, mixture
 from tests.app.test_server import AT_WORK
@@ -51,7 +52,7 @@ def machines(server: Server) -> list[int]:
     """Workers of each machine; none while the scheduler cannot be reached."""
     answer = server.get("/cluster")
     if answer.status_code != 200:
-        ClusterUnavailable.model_validate(answer.json())
+        checked(ClusterUnavailable, answer.json())
         return []
     return [each.workers for each in ClusterState.model_validate(answer.json()).machines]
 

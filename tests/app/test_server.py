@@ -19,8 +19,10 @@ import pytest
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.api.replay.task import ReplayAnswer
-from joulepath.app.schemas.errors import BodyTooLarge, Busy, MalformedHttp, ShuttingDown
+from joulepath.app.exceptions.queue import Busy, ShuttingDown
+from joulepath.app.exceptions.transport import BodyTooLarge, MalformedHttp
 from tests.app.live import CLIENT, EXIT, ROOT, WARM_UP, Server, alive, processor_time, serving, until
+from tests.app.problems import checked
 from tests.app.requests import EXAMPLES, long_search, move
 
 T = TypeVar("T")
@@ -128,7 +130,7 @@ def test_refuses_what_it_cannot_queue(server: Server) -> None:
         until(lambda: sum(request.answered for request in requests) == 2)
         assert [request.status() for request in requests if request.answered] == [503, 503]
         answer = server.post("/optimize", move())
-        Busy.model_validate_json(answer.content)
+        checked(Busy, answer.content)
         assert int(answer.headers["retry-after"]) > 0
     until_free(server, before)
     assert server.post("/optimize", move()).status_code == 200, "whoever hangs up leaves the queue"
@@ -160,7 +162,7 @@ def test_hanging_up_frees_the_worker(server: Server) -> None:
 def test_a_large_body_is_answered_before_it_is_sent(server: Server) -> None:
     answer = CLIENT.post(server.url + "/optimize", content=b" " * 20_000_000)
     assert answer.status_code == 413
-    BodyTooLarge.model_validate_json(answer.content)
+    checked(BodyTooLarge, answer.content)
 
 
 def test_logs_one_line_per_request(server: Server) -> None:
@@ -199,7 +201,7 @@ def test_garbage_on_the_socket_is_answered_with_a_problem(server: Server, garbag
             answer += piece
     head, _, body = answer.partition(b"\r\n\r\n")
     assert head.startswith(b"HTTP/1.1 400") and b"application/problem+json" in head
-    MalformedHttp.model_validate_json(body)
+    checked(MalformedHttp, body)
     assert server.get("/healthz").status_code == 200
 
 
@@ -218,7 +220,7 @@ def test_sigterm_answers_or_refuses_all_in_flight() -> None:
         assert {answer.status_code for answer in answers[:2]} <= {200, 504}
         assert [answer.status_code for answer in answers[2:]] == [503, 503, 503]
         for answer in answers[2:]:
-            ShuttingDown.model_validate_json(answer.content)
+            checked(ShuttingDown, answer.content)
             assert "retry-after" in answer.headers
         until(lambda: not any(alive(pid) for pid in everyone))
         with pytest.raises(httpx2.ConnectError):

@@ -12,13 +12,16 @@ import pytest
 
 from benchmarks.agreement import request
 from benchmarks.tasks import as_pose, flange
+from joulepath.app.convert.cycle import to_cycle
 from joulepath.app.convert.request import to_problem
+from joulepath.app.schemas.cycle import CycleRequest
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from joulepath.optimizer.methods import sqp_method
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.pareto import pareto
+from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.second_attempt import WITHIN_TIGHTER
 from tests.selection import long_but
@@ -76,12 +79,21 @@ def test_on_an_isolated_bus_no_fixed_duration_needs_less_than_a_free_one() -> No
         assert energy(solved(ISOLATED, duration=duration)) > (1 - AGREED) * energy(free)
 
 
-@pytest.mark.parametrize("index", long_but([5, 64], [5, 13, 21, 64]))
+@pytest.mark.parametrize("index", long_but([5, 64, 95], [5, 13, 21, 64, 95]))
 def test_its_own_duration_as_a_fixed_one_gives_the_same_energy(index: int) -> None:
-    """Moves with tight limits, with a payload, without either, and one whose answer is the fastest motion."""
+    """Moves with tight limits, with a payload, without either, the fastest motion, and one beside a saddle."""
     _, body = request(0, index)
     free = solved(body)
     assert energy(solved(body, duration=free.duration)) == pytest.approx(energy(free), rel=AGREED)
+
+
+@pytest.mark.parametrize("index", [73, 3, 7], ids=["a stretched wrist", "a redundant arm", "two near branches"])
+def test_a_cycle_of_one_stop_gives_the_same_energy(index: int) -> None:
+    _, body = request(0, index)
+    stops = [{"name": "goal", "target": body["goal"]}]
+    asked = {name: value for name, value in body.items() if name != "goal"} | {"stops": stops, "closed": False}
+    found = plan_cycle(to_cycle(CycleRequest.model_validate(asked), DEADLINE))
+    assert found.energy.electrical.total == pytest.approx(energy(solved(body)), rel=AGREED)
 
 
 def test_a_front_ends_with_the_answer_of_optimize() -> None:

@@ -13,7 +13,7 @@ from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Robot
-from joulepath.optimizer.exceptions import CycleTooShort, DurationTooShort
+from joulepath.optimizer.cycle.errors import CycleTooShort
 from joulepath.optimizer.methods.fastest_motion import FastestSettings
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.pareto import pareto
@@ -23,6 +23,7 @@ from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.problem import LEAST_DURATION, MethodName, Problem
 from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.search.errors import DurationTooShort
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import CEILING, GOAL, PAYLOAD, ROBOT, START, fixed, limits, problem, tcp_pose
 from tests.selection import long_but

@@ -1,7 +1,6 @@
 """Installations as the documentation has them, and surroundings that are hostile to the service.
 
-The deployment page's own steps are run, from a clean clone into an empty environment, as far as they need no root, no
-systemd and no container: what needs these is compared with the files of `deploy/` in `tests/deploy`.
+The deployment page's steps are run from a clean clone, as far as they need no root, no systemd and no container.
 """
 
 from __future__ import annotations
@@ -26,12 +25,13 @@ from urllib.parse import urljoin
 import pytest
 
 from joulepath.app.cli.answer import compile_kernel_of
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.queue import ClusterUnavailable
 from joulepath.optimizer.native import library_cache
 from joulepath.optimizer.native.library_cache import Patience
 from tests.app.cluster.test_link import scheduler_process
 from tests.app.job_clients import ended, evaluation, over, sent, shown
 from tests.app.live import ROOT, WARM_UP, serving, until
+from tests.app.problems import checked
 from tests.app.requests import move
 from tests.app.test_live_cluster import machines, process
 from tests.selection import long_but
@@ -338,7 +338,7 @@ def test_a_scheduler_without_the_package_fails_no_job(tmp_path: Path) -> None:
         path = sent(over(server), requests)
         refused = server.get("/cluster")
         assert refused.status_code == 503 and refused.headers["Retry-After"]
-        problems.ClusterUnavailable.model_validate_json(refused.content)
+        checked(ClusterUnavailable, refused.content)
         assert shown(over(server), path)["counts"]["waiting"] == len(requests)
         empty.close()
         port = address.rpartition(":")[2]

@@ -20,7 +20,8 @@ from joulepath.app.api.evaluate.task import EvaluateTask
 from joulepath.app.api.ik.task import IKRequest, IKTask
 from joulepath.app.convert.mesh_file import mesh_from_file
 from joulepath.app.convert.request import to_problem
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.transport import BodyTooLarge
 from joulepath.app.schemas.examples.own_arm import ARM, URDF
 from joulepath.app.schemas.identifications import IdentifyRequest
 from joulepath.app.schemas.logs import LogSettings
@@ -273,7 +274,7 @@ def test_gzip_that_yields_nothing_ends_at_the_deadline(content: bytes) -> None:
 def test_the_worker_answers_and_lives_on(client: TestClient, change: dict[str, Any]) -> None:
     """The last but one has three corners only, in 40,000 groups."""
     workers = sorted(client.app.state.engine.worker_pids)  # type: ignore[attr-defined]
-    errors = refused(client.post("/robots", json={"name": "attack", **ARM, **change}), problems.Validation)["errors"]
+    errors = refused(client.post("/robots", json={"name": "attack", **ARM, **change}), InvalidRequest)["errors"]
     assert errors[0]["loc"] in (["body", "urdf"], ["body", "meshes"])
     assert sorted(client.app.state.engine.worker_pids) == workers  # type: ignore[attr-defined]
 
@@ -291,5 +292,5 @@ def test_a_body_that_unpacks_to_more_than_the_limit_is_refused(client: TestClien
     content = b'{"urdf": "' + b" " * 70_000_000 + b'"}'
     headers = {"Content-Type": "application/json"}
     packed = client.post("/robots", content=gzip.compress(content), headers={**headers, "Content-Encoding": "gzip"})
-    refused(packed, problems.BodyTooLarge)
-    refused(client.post("/robots", content=content, headers=headers), problems.BodyTooLarge)
+    refused(packed, BodyTooLarge)
+    refused(client.post("/robots", content=content, headers=headers), BodyTooLarge)

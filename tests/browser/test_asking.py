@@ -48,7 +48,7 @@ def test_a_wrong_request_is_explained(page: Page) -> None:
     page.locator("#json").blur()
     page.locator("#optimise").click()
     expect(page.locator("#problem")).to_contain_text("sample_period")
-    assert page.locator("#problem a").get_attribute("href") == "problems/validation"
+    assert page.locator("#problem a").get_attribute("href") == "problems/invalid-request"
     for text in ("{", "3", '"x"', "null", "[]"):
         edit(page, text)
         expect(page.locator("#problem")).to_contain_text("no request")

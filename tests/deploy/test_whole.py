@@ -20,7 +20,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.access import CrossSite, Unauthenticated, WrongHost
 from tests.app.access.test_key_file import add
 from tests.app.databases import postgres, why_no_postgres
 from tests.app.live import ANSWER, ROOT, Server, serving, until
@@ -136,7 +136,7 @@ def key(whole: Whole) -> dict[str, str]:
 
 def test_answers_over_tls(whole: Whole, key: dict[str, str]) -> None:
     assert whole.send("GET", "/readyz").status_code == 200
-    refused(whole.send("POST", "/optimize", move()), problems.Unauthenticated)
+    refused(whole.send("POST", "/optimize", move()), Unauthenticated)
     assert whole.send("POST", "/optimize", move(), **key).status_code == 200
 
 
@@ -163,8 +163,8 @@ def test_a_page_behind_the_proxy_may_post(whole: Whole, key: dict[str, str]) -> 
     study = {"name": "page", "threshold": 1.0}
     own = f"https://{NAME}:{whole.url.rpartition(':')[2]}"
     assert whole.send("POST", "/studies", study, Origin=own, **key).status_code == 201
-    refused(whole.send("POST", "/studies", study, Origin="https://evil.example", **key), problems.CrossSite)
-    refused(whole.send("POST", "/studies", study, **key, Host="evil.example"), problems.WrongHost)
+    refused(whole.send("POST", "/studies", study, Origin="https://evil.example", **key), CrossSite)
+    refused(whole.send("POST", "/studies", study, **key, Host="evil.example"), WrongHost)
 
 
 def test_measurements_are_not_public(whole: Whole, key: dict[str, str]) -> None:

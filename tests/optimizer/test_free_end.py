@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import InvalidProblem, JoulepathError, PathInfeasible
+from joulepath.optimizer.exceptions import InvalidProblem, JoulepathError
 from joulepath.optimizer.kinematics.course_tracing import chain_of
 from joulepath.optimizer.kinematics.orientation_tolerance import excess_angle, nearest_orientation
 from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
@@ -25,6 +25,7 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.tool_path import ToolPath
 from joulepath.optimizer.result.solution import Solution
+from joulepath.optimizer.search.errors import PathInfeasible
 from tests.optimizer.moves import ROBOT, tcp_pose
 from tests.optimizer.test_turning_path import ARM, Z, down, over_the_base
 from tests.optimizer.tool_paths import HOME, along, moved

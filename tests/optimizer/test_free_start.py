@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from joulepath.optimizer.deadline import NEVER
-from joulepath.optimizer.exceptions import InvalidProblem, JoulepathError, PathInfeasible, UnreachablePose
+from joulepath.optimizer.exceptions import InvalidProblem, JoulepathError, UnreachablePose
 from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -22,6 +22,7 @@ from joulepath.optimizer.problem.tool_path import ToolPath
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.candidates import bound, pairs
 from joulepath.optimizer.search.ends import ends_of
+from joulepath.optimizer.search.errors import PathInfeasible
 from joulepath.optimizer.search.free_ends_bound import bound_between
 from joulepath.optimizer.search.path_ends import bound_beside, path_candidates
 from joulepath.optimizer.search.run import Run

@@ -13,14 +13,11 @@ import pinocchio as pin
 import pytest
 from scipy.interpolate import BSpline
 
-from joulepath.optimizer.exceptions import (
-    DurationTooShort,
-    JoulepathError,
-    TorqueInfeasible,
-)
+from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.search.errors import DurationTooShort, TorqueInfeasible
 from tests.optimizer.answers import CONDITIONS, CONVERGED, ONE_PERCENT, ROUNDING, shortest, solved, total
 from tests.optimizer.moves import (
     GOAL,

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from joulepath.optimizer.exceptions import DeadlineExceeded, DurationTooShort, InvalidProblem, JoulepathError
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, JoulepathError
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.pareto import CONVERGED, Front, pareto
 from joulepath.optimizer.problem.arm import Payload
@@ -21,6 +21,7 @@ from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.solution import Solution
+from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.run import Run
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
 from tests.optimizer.moves import PAYLOAD, START, changed, fixed, limits, problem, tcp_pose

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.certificate import certify
-from joulepath.optimizer.exceptions import InvalidProblem, NoCollisionFreeTrajectory, NoTrajectory, PathInfeasible
+from joulepath.optimizer.exceptions import InvalidProblem, NoTrajectory
 from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
 from joulepath.optimizer.kinematics.tool_course import ToolCourse
 from joulepath.optimizer.methods.duration_intervals import duration_intervals
@@ -25,6 +25,7 @@ from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.problem.tool_path import ToolPath
 from joulepath.optimizer.result.solution import Solution
+from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory, PathInfeasible
 from tests.optimizer.moves import AMPLE, ROBOT, limits, tcp_pose
 from tests.optimizer.tool_paths import ARM, HOME, along, moved, poses_of
 from tests.selection import long_but

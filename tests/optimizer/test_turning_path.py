@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.certificate import certify
-from joulepath.optimizer.exceptions import InvalidProblem, PathInfeasible
+from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.kinematics.course_tracing import chain_of
 from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
 from joulepath.optimizer.kinematics.tool_course import ToolCourse
@@ -24,6 +24,7 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.tool_path import ToolPath
 from joulepath.optimizer.result.solution import Solution
+from joulepath.optimizer.search.errors import PathInfeasible
 from tests.optimizer.moves import AMPLE, ROBOT
 from tests.optimizer.tool_paths import HOME, along, moved
 from tests.selection import long_but

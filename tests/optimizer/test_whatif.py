@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from joulepath.optimizer.certificate import certify
-from joulepath.optimizer.exceptions import DeadlineExceeded, TorqueInfeasible
+from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
 from joulepath.optimizer.result.solution import Solution
+from joulepath.optimizer.search.errors import TorqueInfeasible
 from joulepath.optimizer.what_if import what_if
 from tests.optimizer.cells import at
 from tests.optimizer.clocks import CountingClock

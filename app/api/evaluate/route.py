@@ -8,7 +8,9 @@ from fastapi import APIRouter, Request, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.evaluate.task import EvaluateAnswer, EvaluateTask
-from joulepath.app.exceptions import InvalidRequest, UnsupportedMediaType
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.stored import KeyReused, UnknownFigures, UnknownLog
+from joulepath.app.exceptions.transport import UnsupportedMediaType
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.json_route import UNDECLARED, media_type
@@ -19,9 +21,10 @@ from joulepath.app.routes.parameters import WantedFormat, is_fresh
 from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
 from joulepath.app.routes.query_settings import query_parameters
 from joulepath.app.routes.uploads import upload
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
 from joulepath.app.tasks.job_body import JobBodyTask
+from joulepath.optimizer.exceptions import InvalidTable
+from joulepath.optimizer.identify.logs.log_errors import LogTooLarge
 
 router = APIRouter(tags=["motion"])
 
@@ -66,12 +69,12 @@ def _kind_of(file: IO[bytes]) -> _Kind:
         **ACCEPTED,
         **problem_responses(
             *WORKER_PROBLEMS,
-            problems.UnknownFigures,
-            problems.UnknownLog,
-            problems.InvalidTable,
-            problems.LogTooLarge,
-            problems.UnsupportedMediaType,
-            problems.KeyReused,
+            UnknownFigures,
+            UnknownLog,
+            InvalidTable,
+            LogTooLarge,
+            UnsupportedMediaType,
+            KeyReused,
         ),
     },
     openapi_extra=_openapi(),

@@ -26,8 +26,8 @@ from joulepath.app.convert.recorded import as_logged, read_csv, reading_of, told
 from joulepath.app.convert.until import until
 from joulepath.app.convert.warnings import sampled_warnings
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.exceptions import InvalidRequest
-from joulepath.app.http.problem_details import invalid_request
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.http.problems import invalid_request
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
 from joulepath.optimizer.csv_table import FIRST_ROW
 from joulepath.optimizer.deadline import Deadline
@@ -37,7 +37,7 @@ from joulepath.optimizer.evaluate.interval_energy import IntervalEnergy
 from joulepath.optimizer.evaluate.limit_report import LimitReport
 from joulepath.optimizer.evaluate.nearest_contact import LeastClearance
 from joulepath.optimizer.evaluate.recording import Recording, Waypoints
-from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable, OutsideLimits
+from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.identify.logs.reading import LogReading
 from joulepath.optimizer.identify.logs.recorded import MeasuredEnergy, measured
 from joulepath.optimizer.result.solution import Samples
@@ -182,8 +182,6 @@ class EvaluateTask:
                     motion = _csv_motion(settings, table)
                 return Evaluated(settings, evaluate(arm, motion, settings.sample_period, end.left))
         except InvalidProblem as error:
-            if isinstance(error, InvalidTable | OutsideLimits):
-                raise  # about the motion
             raise InvalidRequest([{"loc": location(error, "query"), "msg": str(error)}]) from None
 
     def _evaluate_log(self, settings: EvaluateCsvSettings, end: Deadline, error: InvalidTable) -> Evaluated:

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.common import Request, described
 from joulepath.app.schemas.given_answer import AnswerRequest
 from joulepath.optimizer.export.export import FORMATS, ExportOptions

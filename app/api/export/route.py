@@ -9,6 +9,7 @@ from fastapi import APIRouter, Path, Request, Response
 
 from joulepath.app.api.export.request import ExportRequest
 from joulepath.app.api.export.task import ExportResult, ExportTask
+from joulepath.app.exceptions.stored import UnknownAnswer, UnknownFigures
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.http.weights import JSON, is_wanted
@@ -16,7 +17,8 @@ from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings,
 from joulepath.app.routes.kept_answers import with_kept_answers
 from joulepath.app.routes.large_bodies import LargeBodyRoute
 from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
-from joulepath.app.schemas import errors as problems
+from joulepath.optimizer.evaluate.errors import NotCertified
+from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.export import FORMATS
 from joulepath.optimizer.export.formats import FormatName
 
@@ -54,10 +56,10 @@ _FILE: dict[int | str, dict[str, Any]] = {
         **_FILE,
         **problem_responses(
             *WORKER_PROBLEMS,
-            problems.UnknownFigures,
-            problems.UnknownAnswer,
-            problems.NotCertified,
-            problems.FormatUnsuitable,
+            UnknownFigures,
+            UnknownAnswer,
+            NotCertified,
+            FormatUnsuitable,
         ),
     },
 )

@@ -10,7 +10,7 @@ from joulepath.app.api.export.request import ExportRequest, to_options
 from joulepath.app.convert.given_answer import paths_of_moves, to_program
 from joulepath.app.convert.until import until
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.http.problem_details import invalid_request
+from joulepath.app.http.problems import invalid_request
 from joulepath.app.tasks.kept_answers import WithKeptAnswers
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.export.export import export

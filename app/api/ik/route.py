@@ -13,7 +13,7 @@ from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from joulepath.app.routes.large_bodies import LargeBodyRoute
 from joulepath.app.routes.parameters import deadline_of
 from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
-from joulepath.app.schemas import errors as problems
+from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
@@ -22,7 +22,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     "/ik",
     summary="Every arm configuration that reaches a pose",
     response_model=model_of(IKAnswer),
-    responses=problem_responses(*WORKER_PROBLEMS, problems.UnreachablePose, problems.SingularPose),
+    responses=problem_responses(*WORKER_PROBLEMS, UnreachablePose, SingularPose),
 )
 async def solve(request: Request, body: IKRequest, settings: ServiceSettings, engine: ServiceArmEngine) -> Response:
     """Every solution within the joint range, with its branch, its distance to the limits and its smallest singular

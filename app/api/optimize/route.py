@@ -7,6 +7,7 @@ from fastapi import APIRouter, Request, Response
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.optimize.task import OptimizeAnswer, OptimizeTask
 from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions.stored import KeyReused
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import (
     ServiceArmEngine,
@@ -20,10 +21,10 @@ from joulepath.app.routes.later import ACCEPTED, ServiceLater
 from joulepath.app.routes.parameters import CACHED_HEADERS, deadline_of
 from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
 from joulepath.app.routes.reply import BY_EVENTS, ServiceReply
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.store.store_answers import keep_answer
 from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.search.errors import PathInfeasible
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
@@ -35,7 +36,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     responses={
         200: {"content": BY_EVENTS, "headers": CACHED_HEADERS},
         **ACCEPTED,
-        **problem_responses(*MOTION_PROBLEMS, problems.PathInfeasible, problems.KeyReused),
+        **problem_responses(*MOTION_PROBLEMS, PathInfeasible, KeyReused),
     },
 )
 async def optimize(

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Protocol, Self
 from joulepath.app.answers.bounded_energy import EnergyAndBound
 from joulepath.app.answers.envelope import AnswerFigures, MotionAnswer
 from joulepath.app.convert.arm_fields import arm_fields
-from joulepath.app.convert.candidates import candidate_counts, chosen
+from joulepath.app.convert.candidates import chosen
 from joulepath.app.convert.request import to_problem
 from joulepath.app.convert.warnings import certified_warnings
 from joulepath.app.engine.listening import listener
@@ -18,7 +18,7 @@ from joulepath.app.tasks.certified import certified
 from joulepath.optimizer.declared import NotEmpty, Seconds
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.problem import MethodName
-from joulepath.optimizer.result.candidates import CandidateCounts, CandidateReport, UnreachableTarget
+from joulepath.optimizer.result.candidates import CandidateCounts, CandidateReport, UnreachableTarget, count_by_status
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.energy import Objective
 from joulepath.optimizer.result.solution import (
@@ -117,7 +117,7 @@ class OptimizeAnswer(MotionAnswer):
             limits=solution.limits,
             baselines=solution.baselines,
             candidates=chosen(solution.candidates, request.candidates),
-            candidate_counts=candidate_counts(solution.candidates),
+            candidate_counts=count_by_status(solution.candidates),
             unreachable=solution.unreachable,
             certificate=solution.certificate,
             warnings=certified_warnings(solution),

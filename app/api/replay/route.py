@@ -6,6 +6,7 @@ from fastapi import APIRouter, Request, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.replay.task import ReplayAnswer, ReplayRequest, ReplayTask
+from joulepath.app.exceptions.stored import UnknownAnswer, UnknownFigures
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
@@ -14,7 +15,7 @@ from joulepath.app.routes.kept_answers import with_kept_answers
 from joulepath.app.routes.large_bodies import LargeBodyRoute
 from joulepath.app.routes.parameters import deadline_of
 from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
-from joulepath.app.schemas import errors as problems
+from joulepath.optimizer.evaluate.errors import NotCertified
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
@@ -25,9 +26,9 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     response_model=model_of(ReplayAnswer),
     responses=problem_responses(
         *WORKER_PROBLEMS,
-        problems.UnknownAnswer,
-        problems.UnknownFigures,
-        problems.NotCertified,
+        UnknownAnswer,
+        UnknownFigures,
+        NotCertified,
     ),
 )
 async def replay(

@@ -13,7 +13,7 @@ from joulepath.app.convert.given_answer import paths_of_moves, to_program
 from joulepath.app.convert.until import until
 from joulepath.app.convert.warnings import replay_warnings
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.http.problem_details import invalid_request
+from joulepath.app.http.problems import invalid_request
 from joulepath.app.schemas.common import Request, described
 from joulepath.app.schemas.given_answer import AnswerRequest
 from joulepath.app.settings import LONGEST_DEADLINE
@@ -93,7 +93,7 @@ class ReplayedMotion(Replay, _OfLeg):
 
     @classmethod
     def of(cls, leg: int | None, found: Replay) -> Self:
-        """The replay of a motion, and of a round the index of its leg."""
+        """The replay of a motion, and of a cycle the index of its leg."""
         return cls(leg=leg, **{each.name: getattr(found, each.name) for each in fields(Replay)})
 
 
@@ -144,7 +144,7 @@ class ReplayTask(WithKeptAnswers):
         return TaskResult.of_json(answer)
 
     def _planned(self) -> list[tuple[int | None, PlannedMotion]]:
-        """The motions of the answer, and of a round the index of each in `legs`."""
+        """The motions of the answer, and of a cycle the index of each in `legs`."""
         given = self.asked.answer
         answer = self.answers([given])[0] if isinstance(given, str) else given
         paths = paths_of_moves(answer)

@@ -11,9 +11,9 @@ from typing import Literal
 
 import pytest
 
-from joulepath.app.access.client import Role
 from joulepath.app.access.key_file import WrongKeyFile, changing, hash_of, new_key, read_keys
 from joulepath.app.access.key_ring import KeyRing
+from joulepath.app.exceptions.access import Role
 
 
 def add(file: Path, name: str, role: Role = "compute") -> str:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from joulepath.app.access.client import Client, Role
+from joulepath.app.access.client import Client
 from joulepath.app.access.rules import check_owner, check_role, needed_role
-from joulepath.app.exceptions import NotOwner, RoleTooLow
+from joulepath.app.exceptions.access import NotOwner, Role, RoleTooLow
 
 
 @pytest.mark.parametrize(

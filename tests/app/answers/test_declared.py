@@ -169,7 +169,9 @@ def test_only_one_module_reads_the_markers() -> None:
 
 def test_a_task_does_without_the_web_framework() -> None:
     """Workers and the command line import it."""
-    frameworks = "{'fastapi', 'starlette', 'sqlalchemy'}"
-    code = f"import sys, joulepath.app.api.optimize.task; print({frameworks} & sys.modules.keys())"
+    code = (
+        "import sys, joulepath.app.api.optimize.task\n"
+        "print({'fastapi', 'starlette', 'sqlalchemy'} & sys.modules.keys())"
+    )
     told = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert told.stdout == "set()\n"

@@ -61,7 +61,7 @@ def test_optimize_reads_standard_input_and_writes_a_file(tmp_path: Path) -> None
 )
 def test_an_invalid_request_is_a_validation_problem(here: Here, body: str | bytes, loc: list[str | int]) -> None:
     code, content = here.problem("optimize", "-", stdin=body)
-    assert (code, content["type"]) == (2, "/problems/validation")
+    assert (code, content["type"]) == (2, "/problems/invalid-request")
     assert [error["loc"] for error in content["errors"]] == [loc]
 
 
@@ -124,11 +124,11 @@ def test_evaluate_writes_a_csv_table(here: Here, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "stdin", "kind"),
     [
-        (("-",), "[]", "validation"),
+        (("-",), "[]", "invalid-request"),
         (("-", "--input", "csv"), "q1,q2\n1,nan\n", "invalid-table"),
         (("-", "--input", "csv", "--robot", "r2d2"), CSV.read_bytes(), "unknown-robot"),
-        (("-", "--input", "csv", "--sample-period", "nan"), CSV.read_bytes(), "validation"),
-        (("-", "--input", "csv", "--units", "deg"), CSV.read_bytes(), "validation"),  # no time_per_segment
+        (("-", "--input", "csv", "--sample-period", "nan"), CSV.read_bytes(), "invalid-request"),
+        (("-", "--input", "csv", "--units", "deg"), CSV.read_bytes(), "invalid-request"),  # no time_per_segment
     ],
 )
 def test_an_invalid_motion_is_a_problem(here: Here, arguments: tuple[str, ...], stdin: str | bytes, kind: str) -> None:

@@ -33,9 +33,9 @@ def test_an_altered_answer_is_a_problem_and_wrong_usage_is_told(here: Here, answ
     code, content = here.problem("export", "csv", "-", stdin=altered)
     assert (code, content["type"]) == (1, "/problems/not-certified")
     code, content = here.problem("export", "csv", "-", stdin="")
-    assert (code, content["type"]) == (2, "/problems/validation")
+    assert (code, content["type"]) == (2, "/problems/invalid-request")
     code, content = here.problem("export", "csv", "-", stdin=json.dumps({"robot": "ur5e", "legs": []}))
-    assert (code, content["type"]) == (2, "/problems/validation")
+    assert (code, content["type"]) == (2, "/problems/invalid-request")
     leg = {"kind": "move", "start": {"stop": "a"}, "goal": {"stop": "b"}, "duration": 1.0, "answer": "/answers/none"}
     code, content = here.problem("export", "csv", "-", stdin=json.dumps({"robot": "ur5e", "legs": [leg]}))
     assert (code, content["type"]) == (1, "/problems/unknown-answer")

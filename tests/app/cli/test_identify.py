@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from joulepath.app.cli.identify import identify, summary_of
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.identifications import IdentificationResult, Method, Target, Term
 from joulepath.models.registry import load_robot
+from joulepath.optimizer.identify.errors import MethodNotApplicable, NoPowerChannel, NothingHeldOut
 from joulepath.optimizer.problem.arm import Payload
 from tests.app.cli.console import Here
+from tests.app.problems import checked
 from tests.identification_logs import csv_of, recorded, truth_of
 
 ROBOT = load_robot("ur5e")
@@ -72,7 +73,7 @@ def test_power_is_refused_of_logs_without(here: Here, tmp_path: Path) -> None:
     file.write_bytes(csv_of(recorded(ROBOT, truth_of(ROBOT), moves=3), without="P"))
     code, content = here.problem("identify", str(file), "--fit", "power", "--payload", "0")
     assert code == 1
-    problems.NoPowerChannel.model_validate(content)
+    checked(NoPowerChannel, content)
 
 
 def test_a_method_is_asked_for_by_its_name(here: Here, logs: list[str], tmp_path: Path) -> None:
@@ -85,7 +86,7 @@ def test_a_method_is_asked_for_by_its_name(here: Here, logs: list[str], tmp_path
     assert "inertials" not in result.document
     code, content = here.problem(*command, "--method", "periodic", "--period", "5", "--validate", logs[1])
     assert code == 1
-    assert problems.MethodNotApplicable.model_validate(content).method == "periodic"
+    assert checked(MethodNotApplicable, content).method == "periodic"
 
 
 @pytest.mark.parametrize(("option", "literal"), [("fit", Target), ("method", Method), ("terms", Term)])
@@ -100,7 +101,7 @@ def test_a_log_of_one_motion_is_a_problem(here: Here, tmp_path: Path) -> None:
     file.write_bytes(csv_of(recorded(ROBOT, truth_of(ROBOT), moves=1)))
     code, content = here.problem("identify", str(file), "--payload", "0")
     assert code == 1
-    problems.NothingHeldOut.model_validate(content)
+    checked(NothingHeldOut, content)
 
 
 def test_no_log_is_wrong_usage(here: Here) -> None:

@@ -24,7 +24,8 @@ from joulepath.app.cluster.machine import RESOURCES
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.task import Task
 from joulepath.app.engine.work import Ended, Work, result_of, taking
-from joulepath.app.exceptions import ClusterUnavailable, TaskFailed, WorkerDied
+from joulepath.app.exceptions.base import InternalError
+from joulepath.app.exceptions.queue import ClusterUnavailable, WorkerLost
 from joulepath.optimizer.exceptions import OutsideLimits
 from joulepath.optimizer.progress import CandidatesFound, Event
 from tests.app.engine.simple_tasks import Count, Die, Fail, Hold, ProcessId
@@ -89,9 +90,9 @@ def test_results_errors_and_what_is_found_come_back(monkeypatch: pytest.MonkeyPa
         with pytest.raises(OutsideLimits) as raised:
             await result_of(cluster.run, Fail(limits), LONG)
         assert vars(raised.value) == vars(limits)
-        with pytest.raises(TaskFailed):
+        with pytest.raises(InternalError):
             await result_of(cluster.run, Fail(ZeroDivisionError("caller-secret")), LONG)
-        with pytest.raises(WorkerDied):
+        with pytest.raises(WorkerLost):
             await result_of(cluster.run, Die(), LONG)
         assert first != await start(cluster, ProcessId()), "another one in its place"
 
@@ -199,7 +200,7 @@ def test_short_works_go_together(monkeypatch: pytest.MonkeyPatch) -> None:
         assert len(scheduler.tasks) <= before + 1, "one task of Dask"
         await running
         first, counted, died, last = ended
-        assert isinstance(died, WorkerDied)
+        assert isinstance(died, WorkerLost)
         assert isinstance(first, TaskResult) and isinstance(last, TaskResult)
         assert counted == first != last
         await until(lambda: len(told) == 3)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from joulepath.app.engine.fair_queue import PATIENCE
-from joulepath.app.exceptions import Busy, TooManyRequests
+from joulepath.app.exceptions.queue import Busy, TooManyRequests
 from tests.app.engine.simple_tasks import Hold, ProcessId
 from tests.app.engine.test_pool import LONG, Bench, until, with_engine
 

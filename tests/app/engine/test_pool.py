@@ -17,7 +17,8 @@ import pytest
 from joulepath.app.engine.pool import Engine
 from joulepath.app.engine.task import outcome
 from joulepath.app.engine.work import result_of
-from joulepath.app.exceptions import Busy, InvalidRequest, ShuttingDown, TaskFailed
+from joulepath.app.exceptions.base import InternalError, InvalidRequest
+from joulepath.app.exceptions.queue import Busy, ShuttingDown
 from joulepath.app.settings import Settings
 from joulepath.optimizer.exceptions import DeadlineExceeded, OutsideLimits
 from joulepath.optimizer.progress import CandidatesFound, Event
@@ -192,7 +193,7 @@ def test_errors_of_a_task_reach_its_caller_with_their_data(tmp_path: Path) -> No
         with pytest.raises(InvalidRequest) as refused:
             await bench.engine.run(Fail(InvalidRequest([{"loc": ["body"], "msg": "No"}])), LONG)
         assert refused.value.errors == [{"loc": ["body"], "msg": "No"}]
-        with pytest.raises(TaskFailed):
+        with pytest.raises(InternalError):
             await bench.engine.run(Fail(ZeroDivisionError("caller-secret")), LONG)
         assert await bench.pid() == pid, "an exception does not end the worker"
 
@@ -201,7 +202,7 @@ def test_errors_of_a_task_reach_its_caller_with_their_data(tmp_path: Path) -> No
 
 def test_an_unforeseen_error_is_logged_with_the_requests_id(caplog: pytest.LogCaptureFixture) -> None:
     failed = outcome(Fail(ZeroDivisionError("caller-secret"), request_id="the-id"), LONG)
-    assert isinstance(failed, TaskFailed)
+    assert isinstance(failed, InternalError)
     assert "caller-secret" not in str(failed)
     (record,) = caplog.records
     assert (record.levelno, vars(record)["request_id"]) == (logging.ERROR, "the-id")

@@ -17,7 +17,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from joulepath.app.engine import fair_queue
 from joulepath.app.engine.fair_queue import PATIENCE, FairQueue, Place, State
-from joulepath.app.exceptions import Busy
+from joulepath.app.exceptions.queue import Busy
 
 CAPACITY, SHARE = 8, 5
 CLIENTS = st.sampled_from("abc")

@@ -11,7 +11,7 @@ import pytest
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.spare import PATIENCE
 from joulepath.app.engine.work import Ended, Work, result_of, taking
-from joulepath.app.exceptions import Preempted, WorkerDied
+from joulepath.app.exceptions.queue import Preempted, WorkerLost
 from joulepath.optimizer.exceptions import DeadlineExceeded, OutsideLimits
 from tests.app.engine.simple_tasks import Die, Fail, Hold, ProcessId
 from tests.app.engine.test_pool import DEADLINE_GRACE, LONG, Bench, until, with_engine
@@ -113,7 +113,7 @@ def test_its_deadline_counts_from_its_start(tmp_path: Path) -> None:
 
 def test_a_crash_is_told(tmp_path: Path) -> None:
     async def test(bench: Bench) -> None:
-        with pytest.raises(WorkerDied):
+        with pytest.raises(WorkerLost):
             await result_of(bench.engine.spare.run, Die(), LONG)
         await result_of(bench.engine.spare.run, ProcessId(), LONG)
 
@@ -130,7 +130,7 @@ def test_one_after_another_on_one_worker(tmp_path: Path, is_short: bool) -> None
         works = [Work(task, LONG, ended.append, expected=0.0, is_small=is_short) for task in tasks]
         await bench.engine.spare.run(taking(*works))
         first, limits, second, died = ended
-        assert isinstance(limits, OutsideLimits) and isinstance(died, WorkerDied)
+        assert isinstance(limits, OutsideLimits) and isinstance(died, WorkerLost)
         assert isinstance(first, TaskResult) and first == second
         await bench.engine.spare.run(taking(works[4]))
         assert isinstance(ended[4], TaskResult) and ended[4] != first

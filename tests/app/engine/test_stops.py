@@ -14,7 +14,8 @@ import pytest
 from joulepath.app.engine import pool
 from joulepath.app.engine.fair_queue import PATIENCE
 from joulepath.app.engine.work import result_of
-from joulepath.app.exceptions import Preempted, ServiceError, ShuttingDown, WorkerDied
+from joulepath.app.exceptions.base import ServiceError
+from joulepath.app.exceptions.queue import Preempted, ShuttingDown, WorkerLost
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from tests.app.engine.simple_tasks import Die, DieOnce, EndEarly, Hold, HoldWatching, ProcessId
 from tests.app.engine.test_pool import DEADLINE_GRACE, LONG, SHUTDOWN_GRACE, Bench, until, with_engine
@@ -136,7 +137,7 @@ def test_a_task_whose_worker_dies_begins_again_once(tmp_path: Path, caplog: pyte
         assert int((await bench.engine.run(DieOnce(tmp_path), LONG)).document) in bench.engine.worker_pids
         deaths = tmp_path / "deaths"
         deaths.mkdir()
-        with pytest.raises(WorkerDied):
+        with pytest.raises(WorkerLost):
             await bench.engine.run(Die(deaths), LONG)
         assert len(list(deaths.iterdir())) == 2, "it kills no third one"
         await bench.pid()
@@ -240,7 +241,7 @@ def test_workers_killed_at_random_beside_everything(tmp_path: Path) -> None:
             while True:
                 try:
                     await result_of(engine.spare.run, ProcessId(), LONG)
-                except (Preempted, WorkerDied):
+                except (Preempted, WorkerLost):
                     continue
                 await asyncio.sleep(0.001)
 

@@ -14,8 +14,9 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.access.key_file import changing, hash_of
+from joulepath.app.exceptions.access import NotOwner, RoleTooLow, Unauthenticated
+from joulepath.app.exceptions.stored import AnswerInUse, KeyReused, UnknownAnswer
 from joulepath.app.main import create_app
-from joulepath.app.schemas import errors as problems
 from joulepath.app.schemas.examples.own_arm import PUT_EXAMPLES
 from joulepath.app.schemas.examples.values import STUDY_ID
 from joulepath.app.settings import Settings
@@ -93,13 +94,13 @@ def test_needs_no_key(guarded: Guarded, path: str) -> None:
 
 def test_everything_else_needs_one(guarded: Guarded, document: dict[str, Any]) -> None:
     for template, operations in document["paths"].items():
-        path = template.format(id=STUDY_ID, name="ur5e", number=1, slug="validation", format="csv")
+        path = template.format(id=STUDY_ID, name="ur5e", number=1, slug="invalid-request", format="csv")
         for method, operation in operations.items():
             answer = guarded.send(None, method.upper(), path)
             if path in PUBLIC or template.startswith("/problems/"):
                 assert answer.status_code == 200 and "security" not in operation
             else:
-                refused(answer, problems.Unauthenticated)
+                refused(answer, Unauthenticated)
                 assert answer.headers["www-authenticate"] == 'Bearer realm="joulepath"'
                 assert {"401"} <= operation["responses"].keys() and operation["security"]
 
@@ -127,14 +128,14 @@ def test_no_spelling_of_a_path_gets_around(guarded: Guarded, path: str) -> None:
 def test_what_is_no_key(guarded: Guarded, given: str) -> None:
     header = given.format(press=guarded.keys["press"], hash=hash_of(guarded.keys["press"])).encode("latin-1")
     answer = CLIENT.get(guarded.server.url + "/studies", headers={b"Authorization": header})
-    refused(answer, problems.Unauthenticated)
+    refused(answer, Unauthenticated)
     assert answer.headers["www-authenticate"].startswith('Bearer realm="joulepath"')
     assert guarded.keys["press"] not in answer.text
 
 
 def test_two_keys_are_none(guarded: Guarded) -> None:
     headers = [("Authorization", f"Bearer {guarded.keys[who]}") for who in ("press", "boss")]
-    refused(CLIENT.get(guarded.server.url + "/studies", headers=headers), problems.Unauthenticated)
+    refused(CLIENT.get(guarded.server.url + "/studies", headers=headers), Unauthenticated)
 
 
 def test_the_scheme_is_of_any_case(guarded: Guarded) -> None:
@@ -167,7 +168,7 @@ def test_a_reader_only_reads(guarded: Guarded) -> None:
         ("DELETE", study),
         ("PATCH", study),
     ):
-        content = refused(guarded.send("viewer", method, path), problems.RoleTooLow)
+        content = refused(guarded.send("viewer", method, path), RoleTooLow)
         assert (content["role"], content["needed"]) == ("read", "compute")
 
 
@@ -175,7 +176,7 @@ def test_a_study_is_its_owners(guarded: Guarded) -> None:
     study = guarded.study("press")
     assert guarded.send("cell", "GET", study).json()["owner"] == "press"
     for method, path, body in (("DELETE", study, None), ("POST", f"{study}/iterations", STEP)):
-        assert refused(guarded.send("cell", method, path, body), problems.NotOwner)["owner"] == "press"
+        assert refused(guarded.send("cell", method, path, body), NotOwner)["owner"] == "press"
     assert guarded.send("press", "POST", f"{study}/iterations", STEP).status_code == 201
     assert guarded.send("press", "DELETE", study).status_code == 204
     study = guarded.study("press")
@@ -187,14 +188,14 @@ def test_the_same_idempotency_key_of_another_client_is_not_replayed(guarded: Gua
     assert guarded.send("press", "POST", "/studies", STUDY, **key).status_code == 201
     again = guarded.send("press", "POST", "/studies", STUDY, **key)
     assert again.headers["idempotency-replayed"] == "true"
-    refused(guarded.send("cell", "POST", "/studies", STUDY, **key), problems.KeyReused)
+    refused(guarded.send("cell", "POST", "/studies", STUDY, **key), KeyReused)
 
 
 def test_a_robot_is_its_owners(guarded: Guarded) -> None:
     robot = "/robots/press_arm"
     assert guarded.send("press", "PUT", robot, ARM).json()["owner"] == "press"
-    refused(guarded.send("cell", "PUT", robot, ARM), problems.NotOwner)
-    refused(guarded.send("cell", "DELETE", robot), problems.NotOwner)
+    refused(guarded.send("cell", "PUT", robot, ARM), NotOwner)
+    refused(guarded.send("cell", "DELETE", robot), NotOwner)
     assert guarded.send("boss", "PUT", robot, ARM).json()["owner"] == "press", "a replaced robot keeps its owner"
     assert guarded.send("press", "DELETE", robot).status_code == 204
 
@@ -204,8 +205,8 @@ def test_a_job_is_its_owners(guarded: Guarded) -> None:
     job = sent.headers["location"]
     assert (sent.status_code, sent.json()["owner"]) == (202, "press")
     for method, path in (("POST", f"{job}/cancel"), ("POST", f"{job}/retry"), ("DELETE", job)):
-        assert refused(guarded.send("cell", method, path), problems.NotOwner)["owner"] == "press"
-        refused(guarded.send("viewer", method, path), problems.RoleTooLow)
+        assert refused(guarded.send("cell", method, path), NotOwner)["owner"] == "press"
+        refused(guarded.send("viewer", method, path), RoleTooLow)
     assert guarded.send("press", "POST", f"{job}/retry").status_code == 202
     later = guarded.send("press", "POST", "/evaluate", STEP["evaluate"], Prefer="respond-async")
     assert (later.status_code, later.json()["owner"]) == (202, "press")
@@ -225,17 +226,17 @@ def test_an_answer_is_its_owners(guarded: Guarded) -> None:
     owned, free = (f"/answers/{id}" for id in ids)
     assert guarded.send("viewer", "GET", owned).json()["owner"] == "press"
     for path in (owned, free):
-        refused(guarded.send("cell", "DELETE", path), problems.NotOwner)
+        refused(guarded.send("cell", "DELETE", path), NotOwner)
     assert guarded.send("press", "DELETE", owned).status_code == 204
-    refused(guarded.send("press", "DELETE", free), problems.NotOwner)
+    refused(guarded.send("press", "DELETE", free), NotOwner)
     assert guarded.send("boss", "DELETE", free).status_code == 204
-    refused(guarded.send("boss", "DELETE", free), problems.UnknownAnswer)
+    refused(guarded.send("boss", "DELETE", free), UnknownAnswer)
 
 
 def test_an_answer_of_a_study_goes_with_it(guarded: Guarded) -> None:
     study = guarded.study("press")
     step = guarded.send("press", "POST", f"{study}/iterations", STEP).json()
-    refused(guarded.send("press", "DELETE", f"/answers/{step['answer']}"), problems.AnswerInUse)
+    refused(guarded.send("press", "DELETE", f"/answers/{step['answer']}"), AnswerInUse)
     assert guarded.send("press", "GET", study).json()["history"]
 
 
@@ -244,7 +245,7 @@ def test_a_removed_key_is_refused_from_the_next_request_on(guarded: Guarded) -> 
     assert guarded.send("guest", "GET", "/studies").status_code == 200
     with changing(guarded.file) as entries:
         entries[:] = [entry for entry in entries if entry.name != "guest"]
-    refused(guarded.send("guest", "GET", "/studies"), problems.Unauthenticated)
+    refused(guarded.send("guest", "GET", "/studies"), Unauthenticated)
 
 
 def test_the_log_has_names_and_no_keys(guarded: Guarded) -> None:

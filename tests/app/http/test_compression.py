@@ -15,13 +15,14 @@ from starlette.responses import Response, StreamingResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from joulepath.app.access.client import Client
-from joulepath.app.exceptions import NotAcceptable
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.transport import BodyTooLarge, NotAcceptable, UnsupportedCoding
 from joulepath.app.http.bodies import Bodies
 from joulepath.app.http.compression import Compression
 from joulepath.app.http.transfers import Transfers
-from joulepath.app.schemas import errors as problems
 from joulepath.app.settings import Settings
 from tests.app.live import ANSWER, Server
+from tests.app.problems import checked
 from tests.app.requests import move
 
 POSE = {"pose": {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
@@ -99,7 +100,7 @@ def test_answers_are_the_same_in_every_coding(server: Server, header: str, codin
 def test_a_coding_that_nobody_has_is_refused_before_any_work(server: Server) -> None:
     answer, content = sent(server, "/optimize", json.dumps(move()).encode(), Accept_Encoding="br, identity;q=0")
     assert answer.status == 406
-    problems.NotAcceptable.model_validate_json(content)
+    checked(NotAcceptable, content)
 
 
 def test_small_answers_stay_as_they_are(server: Server) -> None:
@@ -182,7 +183,7 @@ def test_packed_bodies_are_taken(server: Server, coding: str, pack: Any, path: s
 def test_other_codings_are_told_so(server: Server, coding: str) -> None:
     answer, content = sent(server, "/ik", b"{}", Content_Encoding=coding)
     assert answer.status == 415
-    problems.UnsupportedCoding.model_validate_json(content)
+    checked(UnsupportedCoding, content)
 
 
 WHOLE = gzip.compress(json.dumps(POSE).encode(), mtime=0)
@@ -207,7 +208,7 @@ LARGE_WINDOW = b"\x28\xb5\x2f\xfd\x00\x88" + b"\x01\x00\x00"
 def test_damaged_bodies_are_told_so(server: Server, coding: str, body: bytes) -> None:
     answer, content = sent(server, "/ik", body, Content_Encoding=coding)
     assert answer.status == 422
-    assert problems.Validation.model_validate_json(content).errors[0].loc == ["body"]
+    assert checked(InvalidRequest, content).errors[0].loc == ["body"]
 
 
 PACKS: dict[str, Any] = {"gzip": gzip.compress, "zstd": zstandard.compress}
@@ -220,7 +221,7 @@ def test_a_bomb_is_refused(server: Server, path: str, coding: str) -> None:
     bomb = PACKS[coding](b" " * 80_000_000)
     answer, content = sent(server, path, bomb, Content_Encoding=coding)
     assert answer.status == 413
-    problems.BodyTooLarge.model_validate_json(content)
+    checked(BodyTooLarge, content)
 
 
 @pytest.mark.parametrize("coding", PACKS)

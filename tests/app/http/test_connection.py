@@ -18,15 +18,10 @@ from uvicorn import Config
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import ServerState
 
-from joulepath.app.schemas.errors import (
-    Busy,
-    HeadTooLarge,
-    MalformedHttp,
-    RequestTimeout,
-    ShuttingDown,
-    TooManyRequests,
-)
+from joulepath.app.exceptions.queue import Busy, ShuttingDown, TooManyRequests
+from joulepath.app.exceptions.transport import HeadTooLarge, MalformedHttp, RequestTimeout
 from tests.app.live import EXIT, Server, serving, until
+from tests.app.problems import checked
 from tests.app.raw import answer_on, connected, ends, is_reset, post
 from tests.selection import long_but
 
@@ -78,7 +73,7 @@ def test_a_large_head_is_refused(strict: Server, head: bytes) -> None:
         answer = answer_on(connection)
         if head.startswith(GET) and answer.status == 200:
             answer = answer_on(connection)
-        HeadTooLarge.model_validate(answer.problem)
+        checked(HeadTooLarge, answer.problem)
         assert str(MOST_HEAD) in answer.problem["detail"]
         assert ends(connection)
 
@@ -89,7 +84,7 @@ def test_large_trailers_are_refused(strict: Server) -> None:
         connection.sendall(head + b"1\r\n{\r\n0\r\n")
         until(lambda: any(entry.get("path") == "/optimize" for entry in strict.logged()))
         connection.sendall(b"X: " + b"a" * 2 * MOST_HEAD)
-        HeadTooLarge.model_validate(answer_on(connection).problem)
+        checked(HeadTooLarge, answer_on(connection).problem)
 
 
 def test_a_head_of_the_largest_size_is_taken(strict: Server) -> None:
@@ -103,7 +98,7 @@ def test_a_head_of_the_largest_size_is_taken(strict: Server) -> None:
 def test_half_a_head_is_not_waited_for(strict: Server, sent: bytes) -> None:
     with connected(strict) as connection:
         connection.sendall(sent)
-        RequestTimeout.model_validate(answer_on(connection).problem)
+        checked(RequestTimeout, answer_on(connection).problem)
         assert ends(connection)
 
 
@@ -119,7 +114,7 @@ def test_half_a_head_after_an_answer_is_not_waited_for(strict: Server) -> None:
 def test_half_a_body_is_not_waited_for(strict: Server, path: str) -> None:
     with connected(strict) as connection:
         connection.sendall(post(path, b"{", declared=1000))
-        RequestTimeout.model_validate(answer_on(connection).problem)
+        checked(RequestTimeout, answer_on(connection).problem)
         assert ends(connection)
     assert strict.request_logged(path)["status"] == 408
 
@@ -143,7 +138,7 @@ def test_a_malformed_body_ends_the_connection(strict: Server, is_answered: bool)
             assert is_reset(connection)
         else:
             connection.sendall(b"no chunk\r\n")
-            MalformedHttp.model_validate(answer_on(connection).problem)
+            checked(MalformedHttp, answer_on(connection).problem)
             assert ends(connection)
     assert not [entry for entry in strict.logged() if entry["level"] == "error"]
 
@@ -194,14 +189,14 @@ def test_one_client_has_its_share_of_connections(strict: Server) -> None:
         own = [stack.enter_context(connected(strict)) for _ in range(MOST_OF_CLIENT)]
         with connected(strict) as further:
             answer = answer_on(further)
-            TooManyRequests.model_validate(answer.problem)
+            checked(TooManyRequests, answer.problem)
             assert int(answer.headers["retry-after"]) > 0
         others = [stack.enter_context(connected(strict, OTHER)) for _ in range(MOST - MOST_OF_CLIENT)]
         for connection in (*own, *others):
             connection.sendall(GET)
             assert answer_on(connection).status == 200
         with connected(strict, THIRD) as further:
-            Busy.model_validate(answer_on(further).problem)
+            checked(Busy, answer_on(further).problem)
 
 
 def test_sigterm_waits_for_no_client() -> None:
@@ -220,6 +215,6 @@ def test_sigterm_waits_for_no_client() -> None:
         until(lambda: sum(entry["message"] == "received" for entry in server.logged() if "path" in entry) >= 3)
         server.process.send_signal(signal.SIGTERM)
         for connection in (upload, body):
-            ShuttingDown.model_validate(answer_on(connection).problem)
+            checked(ShuttingDown, answer_on(connection).problem)
         assert server.process.wait(EXIT) == 0
         assert not [entry for entry in server.logged() if entry["level"] == "error"]

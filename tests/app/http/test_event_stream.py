@@ -13,18 +13,15 @@ import pytest
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.optimize.task import OptimizeAnswer
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.queue import TooManyRequests, WorkerLost
 from joulepath.app.schemas.compare import CompareResponse
 from joulepath.app.schemas.cycle import CycleResponse
-from joulepath.app.schemas.errors import (
-    DurationTooShort,
-    ProblemDetails,
-    TooManyRequests,
-    UnreachablePose,
-    Validation,
-    WorkerLost,
-)
 from joulepath.app.schemas.pareto import ParetoResponse
+from joulepath.optimizer.exceptions import DeclaredError, UnreachablePose
+from joulepath.optimizer.search.errors import DurationTooShort
 from tests.app.live import CLIENT, GRACE, Server, serving, until
+from tests.app.problems import checked
 from tests.app.requests import HOME, NEAR, long_search, move
 
 Event = tuple[str, Any]
@@ -96,27 +93,27 @@ def test_other_paths_tell_too(one: Server) -> None:
 
 def test_what_fails_before_its_search_is_answered_as_ever(one: Server) -> None:
     far = move(goal={"pose": {"position": [5.0, 0.0, 0.0], "quaternion": [0.0, 1.0, 0.0, 0.0]}})
-    wrong: list[tuple[Any, type[ProblemDetails]]] = [({"start": 1}, Validation), (far, UnreachablePose)]
+    wrong: list[tuple[Any, type[DeclaredError]]] = [({"start": 1}, InvalidRequest), (far, UnreachablePose)]
     for body, problem in wrong:
         answer = one.post("/optimize", body, headers=LISTEN)
         assert answer.headers["content-type"] == "application/problem+json"
-        assert answer.status_code == problem.model_validate(answer.json()).status
+        assert answer.status_code == checked(problem, answer.json()).status
 
 
 def test_what_fails_in_its_search_is_an_event(one: Server) -> None:
     name, content = told(one, "/optimize", move(duration=0.01))[-1]
     assert name == "problem"
-    problem = DurationTooShort.model_validate(content)
+    problem = checked(DurationTooShort, content)
     # written once the stream has ended
     until(lambda: one.request_logged("/optimize")["request_id"] == problem.instance)
 
 
 def test_an_answer_without_room_is_a_problem(one: Server) -> None:
     large = move(**SHORT, duration=4.0, sample_period=0.002)
-    TooManyRequests.model_validate(one.post("/optimize", large).json())
+    checked(TooManyRequests, one.post("/optimize", large).json())
     name, content = told(one, "/optimize", large)[-1]
     assert name == "problem"
-    TooManyRequests.model_validate(content)
+    checked(TooManyRequests, content)
     until(lambda: one.request_logged("/optimize")["problem"] == "too-many-requests")
 
 
@@ -140,7 +137,7 @@ def test_a_search_that_dies_is_a_problem(one: Server) -> None:
             until(lambda killed=worker: one.workers() not in ([], [killed]))
         *_, (name, content) = parsed("event: candidates\n" + "".join(f"{line}\n" for line in lines))
     assert name == "problem"
-    WorkerLost.model_validate(content)
+    checked(WorkerLost, content)
 
 
 def test_leaving_stops_the_work(one: Server) -> None:

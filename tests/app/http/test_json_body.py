@@ -19,4 +19,4 @@ def test_json_is_taken_however_it_is_declared(client: TestClient, declared: str 
 def test_a_form_is_refused(client: TestClient) -> None:
     answer = client.post("/optimize", data={"start": "home", "goal": "away"})
     assert answer.status_code == 422
-    assert answer.json()["type"] == "/problems/validation"
+    assert answer.json()["type"] == "/problems/invalid-request"

@@ -10,8 +10,8 @@ import httpx2
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.exceptions.access import CrossSite, WrongHost
 from joulepath.app.main import create_app
-from joulepath.app.schemas import errors as problems
 from joulepath.app.settings import Settings
 from tests.app.live import CLIENT, Server, serving
 from tests.app.routes.test_problems import refused
@@ -58,9 +58,9 @@ ATTACKS: dict[str, dict[str, str]] = {
 def test_no_page_of_another_site_posts_or_deletes(service: Server, attack: str) -> None:
     before = planted(service)
     study = service.post("/studies", {"name": "there", "threshold": 1.0}).json()["id"]
-    refused(send(service, "POST", "/studies", BODY, **ATTACKS[attack]), problems.CrossSite)
-    refused(send(service, "DELETE", f"/studies/{study}", **ATTACKS[attack]), problems.CrossSite)
-    refused(send(service, "GET", f"/studies/{study}/suggest", **ATTACKS[attack]), problems.CrossSite)
+    refused(send(service, "POST", "/studies", BODY, **ATTACKS[attack]), CrossSite)
+    refused(send(service, "DELETE", f"/studies/{study}", **ATTACKS[attack]), CrossSite)
+    refused(send(service, "GET", f"/studies/{study}/suggest", **ATTACKS[attack]), CrossSite)
     assert planted(service) == before + 1, "nothing is planted and nothing is gone"
 
 
@@ -92,7 +92,7 @@ def test_a_page_behind_tls(service: Server) -> None:
 def test_a_preflight(service: Server, method: str) -> None:
     asked = {"Access_Control_Request_Method": method, "Access_Control_Request_Headers": "authorization,content-type"}
     answer = send(service, "OPTIONS", "/studies", Origin="https://evil.example", **asked)
-    refused(answer, problems.CrossSite)
+    refused(answer, CrossSite)
     assert not [name for name in answer.headers if name.startswith("access-control-")]
     allowed = send(service, "OPTIONS", "/studies", Origin=PAGE, **asked)
     assert allowed.status_code == 200
@@ -140,7 +140,7 @@ def by_host(service: Server, *hosts: str, path: str = "/studies", version: str =
     ],
 )
 def test_no_name_is_rebound_to_this_service(service: Server, hosts: list[str]) -> None:
-    refused(by_host(service, *hosts), problems.WrongHost)
+    refused(by_host(service, *hosts), WrongHost)
 
 
 @pytest.mark.parametrize(

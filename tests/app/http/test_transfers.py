@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from joulepath.app.exceptions import TooManyBytes, TooManyBytesOfClient
+from joulepath.app.exceptions.queue import Busy, TooManyBytes, TooManyBytesOfClient, TooManyRequests
 from joulepath.app.http.bytes_in_flight import BytesInFlight, Held
-from joulepath.app.schemas.errors import Busy, TooManyRequests
 from tests.app.live import Server, serving, until
+from tests.app.problems import checked
 from tests.app.raw import RawAnswer, answer_on, connected, post
 
 BODY = 1 << 20
@@ -56,17 +56,17 @@ def test_bodies_count_against_a_share_and_a_total(tight: Server, path: str) -> N
         for _ in range(2):
             begun(tight, stack, path, "127.0.0.1")
         refused = asked(tight, "127.0.0.1", post(path, b"{", declared=BODY))
-        TooManyRequests.model_validate(refused.problem)
+        checked(TooManyRequests, refused.problem)
         assert int(refused.headers["retry-after"]) > 0
         begun(tight, stack, path, OTHER)
-        Busy.model_validate(asked(tight, THIRD, post(path, b"{", declared=BODY)).problem)
+        checked(Busy, asked(tight, THIRD, post(path, b"{", declared=BODY)).problem)
         # small ones still fit
         assert asked(tight, THIRD, post("/optimize", b"{}")).status == 422
         assert asked(tight, THIRD, b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n").status == 200
         # and an answer, too, needs room
         large = b"GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n"
-        TooManyRequests.model_validate(asked(tight, "127.0.0.1", large).problem)
-        Busy.model_validate(asked(tight, THIRD, large).problem)
+        checked(TooManyRequests, asked(tight, "127.0.0.1", large).problem)
+        checked(Busy, asked(tight, THIRD, large).problem)
     until(lambda: len(left(tight, path)) == gone + 3)
     assert asked(tight, "127.0.0.1", large).status == 200, "whoever leaves gives its bytes back"
 

@@ -14,7 +14,7 @@ from joulepath.app.access.client import OPERATOR
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.work import Take
-from joulepath.app.exceptions import ClusterUnavailable, Preempted, WorkerDied
+from joulepath.app.exceptions.queue import ClusterUnavailable, Preempted, WorkerLost
 from joulepath.app.jobs import dispatcher as module
 from joulepath.app.jobs.dispatcher import LEASE, Dispatcher
 from joulepath.app.jobs.holder import is_gone, new_holder
@@ -166,7 +166,7 @@ def test_a_long_request_is_not_taken_over(tmp_path: Path) -> None:
 def test_a_request_that_kills_three_workers_fails(tmp_path: Path) -> None:
     async def test(store: Store) -> None:
         service = Service("only", store)
-        service.work.errors = [WorkerDied(), WorkerDied(), WorkerDied()]
+        service.work.errors = [WorkerLost(), WorkerLost(), WorkerLost()]
         service.work.free.set()
         job_id = await sent(service)
         service.dispatcher.start()

@@ -14,7 +14,7 @@ from joulepath.app.access.client import OPERATOR
 from joulepath.app.answers.envelope import AnswerFigures
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.exceptions import TaskFailed
+from joulepath.app.exceptions.base import InternalError
 from joulepath.app.store import jobs
 from joulepath.app.store.cache import Meaning
 from joulepath.app.store.jobs import NewJob, NewRequest
@@ -116,7 +116,9 @@ def test_answers_that_refer_to_others_stay_in_their_job(tmp_path: Path) -> None:
     with_store(tmp_path, test)
 
 
-@pytest.mark.parametrize(("error", "begun"), [(OutsideLimits("start", 1, 9.0, -1.0, 1.0), [0]), (TaskFailed(), [0, 1])])
+@pytest.mark.parametrize(
+    ("error", "begun"), [(OutsideLimits("start", "elbow_joint", 9.0, -1.0, 1.0), [0]), (InternalError(), [0, 1])]
+)
 def test_only_a_request_that_is_wrong_fails_for_all(tmp_path: Path, error: Exception, begun: list[int]) -> None:
     async def test(store: Store) -> None:
         service = service_of(store, workers=2)

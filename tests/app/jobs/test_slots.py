@@ -13,7 +13,8 @@ import pytest
 
 from joulepath.app.convert.packed import packed
 from joulepath.app.engine.work import Ended, Take, Work, taking
-from joulepath.app.exceptions import ClusterUnavailable, TaskFailed
+from joulepath.app.exceptions.base import InternalError
+from joulepath.app.exceptions.queue import ClusterUnavailable
 from joulepath.app.jobs.executor import ClusterExecutor, LocalExecutor
 from joulepath.app.store import job_events, logs
 from joulepath.app.store.store import Store
@@ -111,7 +112,7 @@ class Runner:
     async def run(self, take: Take) -> None:
         while (work := take()) is not None:
             self.tasks.append(work.task)
-            work.ended(TaskFailed())
+            work.ended(InternalError())
 
     @property
     def spare(self) -> Runner:
@@ -132,6 +133,6 @@ def test_an_identification_gets_its_logs_wherever_it_is_computed(tmp_path: Path,
         others = [Work(JobRequestTask(kind, body, "job.0"), 1.0, ended.append) for kind in (IDENTIFY, "optimize")]
         await executor.run(taking(*others))
         assert [task.logs for task in runner.tasks] == [(), (({"robot": "ur5e"}, b"log"),)]
-        assert [type(each) for each in ended] == [TaskFailed, TaskFailed]
+        assert [type(each) for each in ended] == [InternalError, InternalError]
 
     with_store(tmp_path, test)

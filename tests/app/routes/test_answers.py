@@ -12,15 +12,14 @@ from starlette.testclient import TestClient
 from joulepath.app.answers.declared import model_of
 from joulepath.app.answers.envelope import AnswerFigures
 from joulepath.app.api.optimize.task import OptimizeAnswer
-from joulepath.app.convert.candidates import MOST_IN_A_PROBLEM, most_telling
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.answers import AnswerList
 from joulepath.app.schemas.cycle import CycleResponse
 from joulepath.app.settings import Settings
 from joulepath.app.store.store import Store
 from joulepath.app.store.store_answers import keep_answer
-from joulepath.optimizer.result.candidates import CandidateReport, CandidateStatus
+from tests.app.problems import checked
 from tests.app.requests import EXAMPLES, HOME, NEAR, PATIENT, move
 from tests.app.store.test_store import with_store
 
@@ -95,7 +94,7 @@ def test_the_answers_are_listed(recorded: TestClient) -> None:
 def test_a_wrong_page_is_refused(recorded: TestClient, query: str) -> None:
     answer = recorded.get(f"/answers?{query}")
     assert answer.status_code == 422
-    problems.Validation.model_validate_json(answer.content)
+    checked(InvalidRequest, answer.content)
 
 
 def test_a_result_that_is_not_kept_says_so() -> None:
@@ -143,11 +142,3 @@ def test_a_study_keeps_all_candidates_for_its_suggestions(client: TestClient) ->
     kept = client.get(f"/answers/{step['answer']}").json()["answer"]
     assert len(kept["candidates"]) == 256
     assert kept["answer"] == f"/answers/{step['answer']}"
-
-
-def test_a_problem_lists_the_most_telling_candidates() -> None:
-    statuses = [CandidateStatus.PRUNED] * 100 + [CandidateStatus.INFEASIBLE] * 30 + [CandidateStatus.FAILED] * 20
-    reports = [CandidateReport("a", 0, "b", 0, [0.0], [0.0], status, "", 1.0) for status in statuses]  # type: ignore[arg-type]
-    listed = Counter(each.status for each in most_telling(reports))
-    assert listed == {CandidateStatus.FAILED: 20, CandidateStatus.INFEASIBLE: 30, CandidateStatus.PRUNED: 14}
-    assert listed.total() == MOST_IN_A_PROBLEM

@@ -12,11 +12,12 @@ from scipy.interpolate import BSpline
 from starlette.testclient import TestClient
 
 from joulepath.app.convert.arm import to_arm
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.nlp.clearance_constraint import RESERVE
 from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.search.errors import GoalInCollision, NoCollisionFreeTrajectory, StartInCollision
 from tests.app.requests import EXAMPLES, HOME, move
 from tests.app.routes.test_examples import EXAMPLES as FILES
 from tests.app.routes.test_problems import DOWN, refused
@@ -73,8 +74,8 @@ def test_out_of_a_bin_onto_a_shelf(client: TestClient) -> None:
 
 
 def test_start_and_goal_in_collision(client: TestClient) -> None:
-    start = refused(client.post("/optimize", json=move(start={"q": FOLDED})), problems.StartInCollision)
-    goal = refused(client.post("/optimize", json=move(goal={"q": FOLDED})), problems.GoalInCollision)
+    start = refused(client.post("/optimize", json=move(start={"q": FOLDED})), StartInCollision)
+    goal = refused(client.post("/optimize", json=move(goal={"q": FOLDED})), GoalInCollision)
     assert start["pair"] == goal["pair"] == ["upper_arm", "wrist_1"]
     assert start["branches"] == goal["branches"] and goal["branches"][0]["q"] == FOLDED
     arm = Arm(robot=ROBOT)
@@ -88,7 +89,7 @@ def test_every_branch_in_collision_is_listed(client: TestClient) -> None:
     block = {"name": "block", "shape": "box", "size": [0.2, 0.2, 0.4], "pose": at(*position)}
     goal = {"pose": {"position": position, "quaternion": DOWN}}
     request = {"start": {"q": HOME}, "goal": goal, "scene": {"obstacles": [block]}}
-    content = refused(client.post("/optimize", json=request), problems.GoalInCollision)
+    content = refused(client.post("/optimize", json=request), GoalInCollision)
     labels = [branch["label"] for branch in content["branches"]]
     assert len(set(labels)) == len(labels) == 8
     depths = [branch["depth"] for branch in content["branches"]]
@@ -99,7 +100,7 @@ def test_every_branch_in_collision_is_listed(client: TestClient) -> None:
 def test_margin_counts_at_the_ends(client: TestClient) -> None:
     lowest = answered(client, move(scene=floor(-0.1)))
     assert lowest["certificate"]["clearance"]["min_clearance"] > 0
-    content = refused(client.post("/optimize", json=move(scene=floor(-0.1, margin=0.9))), problems.StartInCollision)
+    content = refused(client.post("/optimize", json=move(scene=floor(-0.1, margin=0.9))), StartInCollision)
     assert content["pair"][0] == "floor" and 0.5 < content["depth"] < 0.9
 
 
@@ -117,7 +118,7 @@ def test_no_way(client: TestClient) -> None:
     # a wall outwards from the base, between start and goal, higher and wider than the arm reaches
     wall = {"name": "post", "shape": "box", "size": [1.4, 0.02, 3.0], "margin": 0.0, "pose": at(-0.85, 0.0, 1.0)}
     request = EXAMPLES["over_a_post"] | {"method": "time_scaling", "scene": {"obstacles": [wall]}, "deadline": 3.0}
-    content = refused(client.post("/optimize", json=request), problems.NoCollisionFreeTrajectory)
+    content = refused(client.post("/optimize", json=request), NoCollisionFreeTrajectory)
     assert "post" in content["pair"] and content["depth"] > 0 and content["time"] > 0
     assert content["candidates"][0]["status"] == "failed" and "post and" in content["candidates"][0]["reason"]
     assert content["start"] == content["candidates"][0]["start"]
@@ -174,7 +175,7 @@ def test_ends_outside_the_cone(client: TestClient) -> None:
     q = [*HOME[:4], -1.57 + 0.5, 0.0]
     for end in ("start", "goal"):
         answer = client.post("/optimize", json=move(**{end: {"q": q}}, tool_cone=CONE))
-        content = refused(answer, problems.Validation)
+        content = refused(answer, InvalidRequest)
         assert content["errors"][0]["loc"] == ["body", "tool_cone"]
         # the wrist turned by 0.5 rad tilts the tool by as much
         assert "0.4" in content["detail"] and end in content["detail"]
@@ -209,7 +210,7 @@ def test_refused_fields(client: TestClient, fields: dict[str, Any], where: list[
         ("/optimize", move(**fields)),
         ("/evaluate", {"configurations": [HOME, HOME[::-1]], "time_per_segment": 2.0, **fields}),
     ):
-        errors = refused(client.post(path, json=request), problems.Validation)["errors"]
+        errors = refused(client.post(path, json=request), InvalidRequest)["errors"]
         assert errors[0]["loc"][: len(where)] == where
 
 
@@ -277,7 +278,7 @@ def test_a_close_pass_is_warned_of(client: TestClient) -> None:
     near = request | {"scene": floor(lowest - 1.0 - 1e-3, margin=0.0)}
     (warning,) = answered(client, near)["warnings"]
     assert "floor and " in warning and "closer than 2 mm" in warning.lower()
-    refused(client.post("/optimize", json=request | {"scene": floor(lowest - 1.0 - 1e-3)}), problems.StartInCollision)
+    refused(client.post("/optimize", json=request | {"scene": floor(lowest - 1.0 - 1e-3)}), StartInCollision)
 
 
 def test_a_given_motion_is_warned_of_too(client: TestClient) -> None:
@@ -290,7 +291,7 @@ def test_a_given_motion_is_warned_of_too(client: TestClient) -> None:
 def test_a_tool_declares_what_it_touches(client: TestClient) -> None:
     """A sleeve around wrist 2 is in collision with it, unless it touches it by design."""
     sleeve = {"start": [0.0, 0.0, -0.03], "end": [0.0, 0.0, 0.0], "radius": 0.03}
-    content = refused(client.post("/optimize", json=move(tool={"capsules": [sleeve]})), problems.StartInCollision)
+    content = refused(client.post("/optimize", json=move(tool={"capsules": [sleeve]})), StartInCollision)
     assert content["pair"] == ["wrist_2", "tool"]
     by_design = {"capsules": [sleeve | {"touches": ["wrist_2", "wrist_3"]}]}
     assert answered(client, move(tool=by_design))["status"] in ("optimal", "feasible")

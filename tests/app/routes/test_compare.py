@@ -116,5 +116,5 @@ def test_where_no_method_finds_a_motion_the_answer_is_a_problem(client: TestClie
 )
 def test_bad_input_is_refused(client: TestClient, given: dict[str, Any]) -> None:
     answer = client.post("/compare", json=MOVE | given)
-    assert answer.status_code == 422 and answer.json()["type"] == "/problems/validation"
+    assert answer.status_code == 422 and answer.json()["type"] == "/problems/invalid-request"
     assert "simplex" not in answer.text

@@ -115,21 +115,21 @@ def test_a_payload_that_is_left_out_stays_and_null_puts_it_down(client: TestClie
 
 
 REFUSED: dict[str, tuple[str, list[Any] | None, dict[str, Any]]] = {
-    "no stops": ("validation", ["body", "stops"], {"stops": []}),
-    "unknown field": ("validation", ["body", "stops", 0], {"stops": [{"target": {"q": HOME}, "speed": 1}]}),
+    "no stops": ("invalid-request", ["body", "stops"], {"stops": []}),
+    "unknown field": ("invalid-request", ["body", "stops", 0], {"stops": [{"target": {"q": HOME}, "speed": 1}]}),
     "same names": (
-        "validation",
+        "invalid-request",
         ["body", "stops", 1, "name"],
         {"stops": [{"name": "a", "target": {"q": HOME}}, {"name": "A", "target": {"q": HOME}}]},
     ),
     "number of another": (
-        "validation",
+        "invalid-request",
         ["body", "stops", 1, "name"],
         {"stops": [{"name": "2", "target": {"q": HOME}}, {"target": {"q": HOME}}]},
     ),
-    "joints": ("validation", ["body", "stops", 0, "target", "q"], {"stops": [{"target": {"q": [0.0]}}]}),
+    "joints": ("invalid-request", ["body", "stops", 0, "target", "q"], {"stops": [{"target": {"q": [0.0]}}]}),
     "free orientation of one of several": (
-        "validation",
+        "invalid-request",
         ["body", "stops", 0, "target"],
         {
             "stops": [
@@ -138,12 +138,12 @@ REFUSED: dict[str, tuple[str, list[Any] | None, dict[str, Any]]] = {
         },
     ),
     "free orientation at the start": (
-        "validation",
+        "invalid-request",
         ["body", "start"],
         {"start": {"pose": {"position": [0.4, 0.0, 0.3], "orientation": "free"}}},
     ),
     "overloaded": (
-        "validation",
+        "invalid-request",
         ["body", "stops", 0, "payload", "mass"],
         {"stops": [{"target": {"q": HOME}, "payload": {"mass": 50.0, "com": [0, 0, 0]}}]},
     ),
@@ -165,13 +165,17 @@ REFUSED: dict[str, tuple[str, list[Any] | None, dict[str, Any]]] = {
             }
         },
     ),
-    "deadline": ("validation", ["body", "deadline"], {"deadline": 1e5}),
-    "too many stops": ("validation", ["body", "stops"], {"stops": [REST] * 257}),
-    "samples of many stops": ("validation", ["body", "sample_period"], {"stops": [REST] * 101, "sample_period": 1e-4}),
-    "no time": ("validation", ["body", "time"], {"time": 0.0}),
-    "turned cycle": ("validation", ["body", "time"], {"time": {"min": 9.0, "max": 8.0}}),
-    "text": ("validation", ["body", "time"], {"time": "long"}),
-    "work without a time": ("validation", ["body", "time"], {"objective": "mechanical"}),
+    "deadline": ("invalid-request", ["body", "deadline"], {"deadline": 1e5}),
+    "too many stops": ("invalid-request", ["body", "stops"], {"stops": [REST] * 257}),
+    "samples of many stops": (
+        "invalid-request",
+        ["body", "sample_period"],
+        {"stops": [REST] * 101, "sample_period": 1e-4},
+    ),
+    "no time": ("invalid-request", ["body", "time"], {"time": 0.0}),
+    "turned cycle": ("invalid-request", ["body", "time"], {"time": {"min": 9.0, "max": 8.0}}),
+    "text": ("invalid-request", ["body", "time"], {"time": "long"}),
+    "work without a time": ("invalid-request", ["body", "time"], {"objective": "mechanical"}),
 }
 
 
@@ -240,7 +244,7 @@ def test_a_cycle_in_a_given_time_waits_on_its_brakes(client: TestClient, answer:
 def test_a_cycle_that_cannot_be_so_fast_says_how_fast_it_can_be(client: TestClient, answer: dict[str, Any]) -> None:
     reply = client.post("/cycle", json=a_cycle(time=1.0))
     problem = reply.json()
-    assert (reply.status_code, problem["type"], problem["dwells"]) == (422, "/problems/dwell-too-short", 0.5)
+    assert (reply.status_code, problem["type"], problem["dwells"]) == (422, "/problems/cycle-too-short", 0.5)
     assert 1.0 < problem["shortest"] <= answer["duration"]
 
 

@@ -90,7 +90,7 @@ WRONG = {
 def test_what_needs_a_rest_is_refused_by_its_field(field: str, client: TestClient) -> None:
     stops = a_cycle()["stops"]
     reply = client.post("/cycle", json=a_cycle(stops=[stops[0], stops[1] | WRONG[field], stops[2]]))
-    assert reply.status_code == 422 and reply.json()["type"].endswith("/validation")
+    assert reply.status_code == 422 and reply.json()["type"].endswith("/invalid-request")
     assert reply.json()["errors"][0]["loc"] == ["body", "stops", 1, field]
     assert "via to false" in reply.text
 

@@ -14,9 +14,12 @@ from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.evaluate.task import EvaluateAnswer
-from joulepath.app.schemas import errors as problems
-from joulepath.app.schemas.errors import ProblemDetails
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.transport import BodyTooLarge
+from joulepath.app.http.problems import path_of
 from joulepath.app.schemas.examples.files import body_examples
+from joulepath.optimizer.exceptions import DeclaredError, InvalidTable, UnknownRobot
+from tests.app.problems import checked
 from tests.app.requests import HOME, NEAR, move
 
 JSON_EXAMPLES = body_examples("/evaluate")["application/json"]
@@ -45,11 +48,11 @@ def upload(client: TestClient, content: str | bytes, accept: str = "*/*", **quer
     return client.post("/evaluate", content=content, headers=headers, params=query)
 
 
-def refused(answer: Any, kind: type[ProblemDetails]) -> dict[str, Any]:
+def refused(answer: Any, kind: type[DeclaredError]) -> dict[str, Any]:
     """The content of an answer that must be a problem of that kind."""
     content: dict[str, Any] = answer.json()
-    assert content["type"] == kind.model_fields["type"].default, content
-    kind.model_validate_json(answer.content)
+    assert content["type"] == path_of(kind), content
+    checked(kind, answer.content)
     assert answer.status_code == content["status"]
     return content
 
@@ -133,7 +136,7 @@ def test_refuses_ten_million_rows_by_their_size(client: TestClient) -> None:
             yield chunk
 
     answer = client.post("/evaluate", content=chunks(), headers={"content-type": "text/csv"})
-    refused(answer, problems.BodyTooLarge)
+    refused(answer, BodyTooLarge)
 
 
 GOOD = "0,0,-1.57,1.57,-1.57,-1.57,0"
@@ -174,7 +177,7 @@ THEN = "1,0,-1.57,1.57,-1.57,-1.57,0"
 def test_says_where_a_csv_is_wrong(
     content: str | bytes, row: int | None, column: str | None, says: str, client: TestClient
 ) -> None:
-    problem = refused(upload(client, content), problems.InvalidTable)
+    problem = refused(upload(client, content), InvalidTable)
     assert (problem["row"], problem["column"]) == (row, column), problem
     assert says in problem["detail"]
     assert "secret" not in json.dumps(problem)
@@ -194,7 +197,7 @@ def test_says_where_a_csv_is_wrong(
     ],
 )
 def test_refuses_settings_of_a_csv(content: str, query: dict[str, str], client: TestClient) -> None:
-    refused(upload(client, content, **query), problems.Validation)
+    refused(upload(client, content, **query), InvalidRequest)
 
 
 @pytest.mark.parametrize(
@@ -220,7 +223,7 @@ def test_refuses_settings_of_a_csv(content: str, query: dict[str, str], client: 
     ],
 )
 def test_refuses_json(body: dict[str, Any], client: TestClient) -> None:
-    problem = refused(client.post("/evaluate", json=body), problems.Validation)
+    problem = refused(client.post("/evaluate", json=body), InvalidRequest)
     assert problem["errors"]
     assert "secret" not in json.dumps(problem)
 
@@ -237,20 +240,20 @@ def test_refuses_json(body: dict[str, Any], client: TestClient) -> None:
 def test_says_where_a_trajectory_is_wrong(
     trajectory: dict[str, Any], row: int, column: str, client: TestClient
 ) -> None:
-    problem = refused(client.post("/evaluate", json={"trajectory": trajectory}), problems.InvalidTable)
+    problem = refused(client.post("/evaluate", json={"trajectory": trajectory}), InvalidTable)
     assert (problem["row"], problem["column"]) == (row, column)
 
 
 def test_a_number_that_is_none_is_named_by_row(client: TestClient) -> None:
     body = json.dumps({"trajectory": {"t": [0, 1], "q": [HOME, [0, 0, float("nan"), 0, 0, 0]]}})
     answer = client.post("/evaluate", content=body, headers={"content-type": "application/json"})
-    errors = refused(answer, problems.Validation)["errors"]
+    errors = refused(answer, InvalidRequest)["errors"]
     assert errors[0]["loc"] == ["body", "trajectory", "q", 1, 2]
 
 
 def test_unknown_robot(client: TestClient) -> None:
-    refused(client.post("/evaluate", json=through(HOME, NEAR, robot="r2d2")), problems.UnknownRobot)
-    refused(upload(client, f"{HEADER}\n{GOOD}\n{THEN}\n", robot="r2d2"), problems.UnknownRobot)
+    refused(client.post("/evaluate", json=through(HOME, NEAR, robot="r2d2")), UnknownRobot)
+    refused(upload(client, f"{HEADER}\n{GOOD}\n{THEN}\n", robot="r2d2"), UnknownRobot)
 
 
 def test_leaves_no_file_behind(client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,9 +13,12 @@ from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.evaluate.task import EvaluateAnswer
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.stored import UnknownLog
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidTable
+from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
 from joulepath.optimizer.problem.arm import Payload
 from tests.app.job_clients import ended
 from tests.app.routes.test_problems import refused
@@ -137,7 +140,7 @@ def test_units_of_a_log(client: TestClient, recording: Recording) -> None:
     found = evaluated(client, degrees, units="deg")
     assert found["duration"] == pytest.approx(recording.time[-1], rel=1e-6), "milliseconds are recognised"
     assert any("ms" in said for said in found["warnings"])
-    refused(client.post("/evaluate", content=degrees, headers=CSV), problems.InvalidTable)
+    refused(client.post("/evaluate", content=degrees, headers=CSV), InvalidTable)
 
 
 def test_a_stored_log_brings_its_arm(client: TestClient, recording: Recording, stored: str) -> None:
@@ -175,13 +178,13 @@ def test_a_stored_log_in_other_requests(client: TestClient, stored: str) -> None
     ids=["another robot", "times", "two motions"],
 )
 def test_contradictions_are_refused(client: TestClient, stored: str, body: Any, loc: list[str]) -> None:
-    content = refused(client.post("/evaluate", json={"log": stored, **body}), problems.Validation)
+    content = refused(client.post("/evaluate", json={"log": stored, **body}), InvalidRequest)
     assert [error["loc"] for error in content["errors"]] == [loc]
 
 
 @pytest.mark.parametrize("id", [ABSENT, "none", "", "x" * 36])
 def test_an_absent_log_is_unknown(client: TestClient, id: str) -> None:
-    refused(client.post("/evaluate", json={"log": id}), problems.UnknownLog)
+    refused(client.post("/evaluate", json={"log": id}), UnknownLog)
 
 
 def test_efforts_that_say_nothing_do_not_stop_it(client: TestClient, recording: Recording) -> None:
@@ -191,7 +194,7 @@ def test_efforts_that_say_nothing_do_not_stop_it(client: TestClient, recording: 
         np.column_stack([recording.time, recording.q, np.ones_like(recording.q)]),
         ",",
     )
-    refused(client.post("/logs", content=body, headers=CSV), problems.EffortNotUsable)
+    refused(client.post("/logs", content=body, headers=CSV), EffortNotUsable)
     found = evaluated(client, body)
     assert found["total"]["measured"] is None and any("never change" in said for said in found["warnings"])
 
@@ -202,7 +205,7 @@ def test_efforts_that_say_nothing_do_not_stop_it(client: TestClient, recording: 
     ids=["no names", "empty", "no positions", "too few joints", "too few joints of RTDE"],
 )
 def test_what_is_neither_says_what_is_missing(client: TestClient, text: str, row: int | None) -> None:
-    content = refused(client.post("/evaluate", content=text, headers=CSV), problems.InvalidTable)
+    content = refused(client.post("/evaluate", content=text, headers=CSV), InvalidTable)
     assert content["row"] == row
 
 

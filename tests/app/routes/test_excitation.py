@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.examples.excitation import EXCITATION_EXAMPLES
 from joulepath.app.schemas.excitation import ExcitationResponse
+from joulepath.optimizer.exceptions import DeadlineExceeded, OutsideLimits
+from joulepath.optimizer.excitation.errors import ExcitationInfeasible
 from tests.app.requests import HOME
 from tests.app.routes.test_problems import refused
 
@@ -58,7 +60,7 @@ def test_no_room(client: TestClient) -> None:
     shape = {"shape": "sphere", "radius": 0.5}
     ball = {"name": "ball", **shape, "pose": {"position": [0.0, 0.0, 0.3], "rotvec": [0.0, 0.0, 0.0]}}
     body = SHORT | {"scene": {"obstacles": [ball]}}
-    assert refused(client.post("/excitation", json=body), problems.ExcitationInfeasible)["limit"] == "clearance"
+    assert refused(client.post("/excitation", json=body), ExcitationInfeasible)["limit"] == "clearance"
 
 
 WRONG: list[tuple[dict[str, Any], list[str]]] = [
@@ -76,11 +78,11 @@ WRONG: list[tuple[dict[str, Any], list[str]]] = [
 
 @pytest.mark.parametrize(("wrong", "loc"), WRONG, ids=[next(iter(wrong)) for wrong, _ in WRONG])
 def test_wrong_requests(client: TestClient, wrong: dict[str, Any], loc: list[str]) -> None:
-    content = refused(client.post("/excitation", json=SHORT | wrong), problems.Validation)
+    content = refused(client.post("/excitation", json=SHORT | wrong), InvalidRequest)
     assert [[str(part) for part in error["loc"]] for error in content["errors"]] == [loc]
 
 
 def test_a_centre_beyond_the_range_and_too_little_time(client: TestClient) -> None:
-    far = refused(client.post("/excitation", json=SHORT | {"centre": [0.0, 20.0, 0, 0, 0, 0]}), problems.OutsideLimits)
+    far = refused(client.post("/excitation", json=SHORT | {"centre": [0.0, 20.0, 0, 0, 0, 0]}), OutsideLimits)
     assert far["joint"] == "shoulder_lift_joint"
-    refused(client.post("/excitation", json=SHORT | {"deadline": 1e-3}), problems.DeadlineExceeded)
+    refused(client.post("/excitation", json=SHORT | {"deadline": 1e-3}), DeadlineExceeded)

@@ -10,9 +10,13 @@ import pytest
 import yaml
 from starlette.testclient import TestClient
 
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.stored import UnknownAnswer
 from joulepath.models.registry import load_robot
 from joulepath.models.urdf import urdf_of
+from joulepath.optimizer.evaluate.errors import NotCertified
+from joulepath.optimizer.exceptions import UnknownRobot
+from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.export import FORMATS
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_problems import refused
@@ -70,7 +74,7 @@ def test_a_kept_answer_is_exported_as_it_is_when_sent_whole(client: TestClient, 
     by_id, by_path, whole = (export(client, format, each) for each in names)
     if format in ("franka", "rapid", "krl"):
         # other makers
-        assert refused(by_id, problems.FormatUnsuitable)["format"] == format
+        assert refused(by_id, FormatUnsuitable)["format"] == format
         return
     assert by_id.status_code == 200, by_id.text
     if format != "npz":  # its archive holds the time
@@ -119,14 +123,14 @@ def test_an_evaluated_motion_is_exported_by_its_samples(client: TestClient) -> N
     last = yaml.safe_load(exported.text)["trajectory"]["points"][-1]
     assert last["positions"] == pytest.approx(NEAR) and last["time_from_start"] == {"sec": 3, "nanosec": 0}
     without = client.post("/evaluate", json=body).json()
-    assert "sample_period" in refused(export(client, "ros2", without), problems.Validation)["detail"]
+    assert "sample_period" in refused(export(client, "ros2", without), InvalidRequest)["detail"]
 
 
 def test_a_motion_that_is_evaluated_as_too_fast_is_not_exported(client: TestClient) -> None:
     body = {"configurations": [HOME, NEAR], "time_per_segment": 0.1, "sample_period": 0.01}
     evaluated = client.post("/evaluate", json=body).json()
     assert not evaluated["within_limits"]
-    assert max(refused(export(client, "csv", evaluated), problems.NotCertified)["worst_ratio"].values()) > 1
+    assert max(refused(export(client, "csv", evaluated), NotCertified)["worst_ratio"].values()) > 1
 
 
 def test_an_iteration_of_a_study_and_a_point_of_a_front(client: TestClient) -> None:
@@ -135,7 +139,7 @@ def test_an_iteration_of_a_study_and_a_point_of_a_front(client: TestClient) -> N
     assert export(client, "json", step["answer"]).status_code == 200
     front = client.post("/pareto", json=move(points=2)).json()
     assert export(client, "json", front["points"][0]["answer"]).status_code == 200
-    assert "points" in refused(export(client, "json", front), problems.Validation)["detail"]
+    assert "points" in refused(export(client, "json", front), InvalidRequest)["detail"]
 
 
 SPLINE = ("trajectory", "spline")
@@ -159,12 +163,12 @@ def test_an_answer_altered_by_hand_is_not_exported(client: TestClient, answer: J
     for name in path[:-1]:
         before = before[name]
     old = before.get(path[-1]) if isinstance(before, dict) else before[path[-1]]
-    refused(export(client, "urscript", altered(answer, *path, value=change(old))), problems.NotCertified)
+    refused(export(client, "urscript", altered(answer, *path, value=change(old))), NotCertified)
 
 
 def test_an_obstacle_in_the_way_is_not_driven_through(client: TestClient, answer: Json) -> None:
     in_the_way = {"obstacles": [BOX | {"pose": {"position": [-0.5, -0.15, 0.4], "rpy": [0, 0, 0]}}]}
-    told = refused(export(client, "csv", altered(answer, "arm", "scene", value=in_the_way)), problems.NotCertified)
+    told = refused(export(client, "csv", altered(answer, "arm", "scene", value=in_the_way)), NotCertified)
     assert "box" in told["detail"]
 
 
@@ -184,33 +188,33 @@ def test_an_obstacle_in_the_way_is_not_driven_through(client: TestClient, answer
     ],
 )
 def test_an_answer_of_another_form_names_the_field(client: TestClient, answer: Json, path: Any, value: Any) -> None:
-    told = refused(export(client, "csv", altered(answer, *path, value=value)), problems.Validation)
+    told = refused(export(client, "csv", altered(answer, *path, value=value)), InvalidRequest)
     assert told["errors"][0]["loc"][:2] == ["body", "answer"]
 
 
 def test_nan_in_the_body_is_no_json(client: TestClient) -> None:
     body = b'{"answer": {"robot": "ur5e", "trajectory": {"t": [NaN]}}}'
-    refused(client.post("/export/csv", content=body, headers={"content-type": "application/json"}), problems.Validation)
+    refused(client.post("/export/csv", content=body, headers={"content-type": "application/json"}), InvalidRequest)
 
 
 def test_unknown_answers_and_robots(client: TestClient, answer: Json) -> None:
     for unknown in ("nope", "/answers/0b0f3b0e-4c4f-4a43-9d6b-1f6f2f1f6a55", "../robots", ""):
-        refused(export(client, "csv", unknown), problems.UnknownAnswer)
-    refused(export(client, "csv", altered(answer, "robot", value="r2d2")), problems.UnknownRobot)
+        refused(export(client, "csv", unknown), UnknownAnswer)
+    refused(export(client, "csv", altered(answer, "robot", value="r2d2")), UnknownRobot)
 
 
 def test_an_answer_without_its_arm_needs_one(client: TestClient, answer: Json) -> None:
     bare = altered(answer, "arm", value=None)
-    assert refused(export(client, "csv", bare), problems.Validation)["errors"][0]["loc"] == ["body", "arm"]
+    assert refused(export(client, "csv", bare), InvalidRequest)["errors"][0]["loc"] == ["body", "arm"]
     assert export(client, "csv", bare, arm=answer["arm"]).status_code == 200
-    refused(export(client, "csv", bare, arm={"payload": {"mass": 3.0, "com": [0, 0, 0]}}), problems.NotCertified)
-    refused(export(client, "csv", bare, arm={**answer["arm"], "robot": "ur3e"}), problems.Validation)
+    refused(export(client, "csv", bare, arm={"payload": {"mass": 3.0, "com": [0, 0, 0]}}), NotCertified)
+    refused(export(client, "csv", bare, arm={**answer["arm"], "robot": "ur3e"}), InvalidRequest)
 
 
 def test_a_robot_of_seven_joints_gets_the_formats_that_remain(client: TestClient) -> None:
     q = [0.0, -0.4, 0.0, -2.0, 0.0, 1.6, 0.8]
     found = client.post("/optimize", json=move(robot="fr3", start={"q": q}, goal={"q": [0.2, *q[1:]]})).json()
-    told = refused(export(client, "urscript", found), problems.FormatUnsuitable)
+    told = refused(export(client, "urscript", found), FormatUnsuitable)
     assert told["format"] == "urscript" and "use ros2" in told["detail"]
     assert export(client, "ros2", found).status_code == 200
 
@@ -227,16 +231,16 @@ def test_a_robot_of_seven_joints_gets_the_formats_that_remain(client: TestClient
     ],
 )
 def test_wrong_options_are_named(client: TestClient, answer: Json, fields: Json, field: str) -> None:
-    told = refused(export(client, "urscript", answer["answer"], **fields), problems.Validation)
+    told = refused(export(client, "urscript", answer["answer"], **fields), InvalidRequest)
     assert any(field in map(str, error["loc"]) or field in error["msg"] for error in told["errors"])
 
 
 def test_a_controllers_name_cannot_hold_a_command(client: TestClient, answer: Json) -> None:
-    refused(export(client, "ros2", answer["answer"], ros2={"controller": "x; rm -rf /"}), problems.Validation)
+    refused(export(client, "ros2", answer["answer"], ros2={"controller": "x; rm -rf /"}), InvalidRequest)
 
 
 def test_an_unknown_format_names_the_known_ones(client: TestClient, answer: Json) -> None:
-    told = refused(client.post("/export/gcode", json={"answer": answer["answer"]}), problems.Validation)
+    told = refused(client.post("/export/gcode", json={"answer": answer["answer"]}), InvalidRequest)
     assert "urscript" in told["errors"][0]["msg"]
 
 
@@ -271,19 +275,19 @@ def test_an_arm_of_a_users_own_gets_programs_of_any_maker(client: TestClient) ->
     exported = export(client, "rapid", found["answer"], rapid=options)
     assert exported.status_code == 200 and exported.text.startswith("MODULE Joulepath"), exported.text
     client.delete("/robots/irb")
-    refused(export(client, "csv", found), problems.UnknownRobot)
+    refused(export(client, "csv", found), UnknownRobot)
 
 
 @pytest.mark.parametrize("factor", [1e-300, 1e-9, 1e4])
 def test_absurd_durations_are_refused(client: TestClient, answer: Json, factor: float) -> None:
     knots = [factor * each for each in answer["trajectory"]["spline"]["knots"]]
     absurd = altered(answer, *SPLINE, "knots", value=knots)
-    refused(export(client, "urscript", absurd), problems.NotCertified)
+    refused(export(client, "urscript", absurd), NotCertified)
 
 
 def test_a_slow_table_has_a_bounded_number_of_rows(client: TestClient, answer: Json) -> None:
     told = export(client, "csv", answer["answer"], speed_scale=0.01, table={"period": 1e-4})
-    assert refused(told, problems.FormatUnsuitable)["format"] == "csv"
+    assert refused(told, FormatUnsuitable)["format"] == "csv"
 
 
 def test_an_arm_too_large_to_be_repeated_is_sent_with_the_export(client: TestClient) -> None:
@@ -292,6 +296,6 @@ def test_an_arm_too_large_to_be_repeated_is_sent_with_the_export(client: TestCli
     arm = {"payload": LOAD, "scene": {"obstacles": [cloud]}}
     found = client.post("/optimize", json=move(**arm)).json()
     assert found["arm"] is None
-    refused(export(client, "csv", found["answer"]), problems.Validation)
+    refused(export(client, "csv", found["answer"]), InvalidRequest)
     assert export(client, "csv", found["answer"], arm=arm).status_code == 200
     assert export(client, "csv", found, arm=arm).status_code == 200

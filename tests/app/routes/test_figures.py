@@ -12,7 +12,8 @@ import pytest
 import yaml
 from starlette.testclient import TestClient
 
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.stored import FiguresInUse, TooManyFigures, UnknownFigures
 from joulepath.app.schemas.examples.figures import FIGURES
 from joulepath.app.schemas.figures import FiguresDetail, FiguresList
 from joulepath.models.registry import load_robot
@@ -60,8 +61,8 @@ def test_figures_are_stored_shown_and_deleted(client: TestClient) -> None:
     assert [(each.id, each.parameters) for each in listed if each.id == made.id] == [(made.id, 2)]
     assert client.delete(f"/figures/{made.id}").status_code == 204
     for method in (client.get, client.delete):
-        refused(method(f"/figures/{made.id}"), problems.UnknownFigures)
-    refused(client.get("/figures/none"), problems.UnknownFigures)
+        refused(method(f"/figures/{made.id}"), UnknownFigures)
+    refused(client.get("/figures/none"), UnknownFigures)
 
 
 def test_a_file_for_the_library(client: TestClient, stored: str, tmp_path: Path) -> None:
@@ -116,8 +117,8 @@ def test_a_study_keeps_its_figures(client: TestClient, stored: str) -> None:
     assert step.json()["request"]["optimize"]["figures"] == stored
     wanted = client.post("/optimize", json=move(figures=stored)).json()["energy"]["electrical"]["total"]
     assert step.json()["energy"] == pytest.approx(wanted)
-    refused(client.delete(f"/figures/{stored}"), problems.FiguresInUse)
-    other = refused(client.post(f"{path}/iterations", json={"optimize": move(figures=NOWHERE)}), problems.Validation)
+    refused(client.delete(f"/figures/{stored}"), FiguresInUse)
+    other = refused(client.post(f"{path}/iterations", json={"optimize": move(figures=NOWHERE)}), InvalidRequest)
     assert other["errors"][0]["loc"][-2:] == ["optimize", "figures"]
     assert client.get(f"{path}/suggest", params={"deadline": 5.0}).status_code == 200
     assert client.delete(path).status_code == 204
@@ -125,18 +126,16 @@ def test_a_study_keeps_its_figures(client: TestClient, stored: str) -> None:
 
 
 def test_figures_that_are_not_there(client: TestClient, stored: str) -> None:
-    refused(client.post("/optimize", json=move(figures=NOWHERE)), problems.UnknownFigures)
-    refused(client.post("/studies", json={"name": "x", "threshold": 1.0, "figures": NOWHERE}), problems.UnknownFigures)
+    refused(client.post("/optimize", json=move(figures=NOWHERE)), UnknownFigures)
+    refused(client.post("/studies", json={"name": "x", "threshold": 1.0, "figures": NOWHERE}), UnknownFigures)
     motion = {"configurations": [HOME, NEAR], "time_per_segment": 1.5}
-    refused(client.post("/evaluate", json=motion | {"figures": NOWHERE}), problems.UnknownFigures)
-    refused(client.post("/optimize", json=move(figures="ur5e")), problems.Validation)
+    refused(client.post("/evaluate", json=motion | {"figures": NOWHERE}), UnknownFigures)
+    refused(client.post("/optimize", json=move(figures="ur5e")), InvalidRequest)
     # of another robot
-    (error,) = refused(client.post("/optimize", json=move(robot="ur10e", figures=stored)), problems.Validation)[
-        "errors"
-    ]
+    (error,) = refused(client.post("/optimize", json=move(robot="ur10e", figures=stored)), InvalidRequest)["errors"]
     assert error["loc"] == ["body", "figures"] and "ur5e" in error["msg"]
     change = [{"name": "x", "arm": {"figures": stored}}]
-    refused(client.post("/whatif", json={"optimize": move(), "changes": change}), problems.Validation)
+    refused(client.post("/whatif", json={"optimize": move(), "changes": change}), InvalidRequest)
 
 
 NO_BODY = {"value": [[1.0, 0, 0, 1.0, 0, 9.0]] * 6, "unit": "1", "source": "x", "trust": "B"}
@@ -169,7 +168,7 @@ BAD: dict[str, tuple[dict[str, Any], list[str]]] = {
 def test_what_makes_no_figures(client: TestClient, name: str) -> None:
     """The service names the place, and the library refuses the same."""
     document, place = BAD[name]
-    error = refused(client.put("/figures", json=document), problems.Validation)["errors"][0]
+    error = refused(client.put("/figures", json=document), InvalidRequest)["errors"][0]
     assert error["loc"][1 : 1 + len(place)] == place, error
     if place and "unknown" not in name and name not in ("absurd", "ragged"):
         with pytest.raises(InvalidFigures) as raised:
@@ -185,7 +184,7 @@ def test_a_document_names_its_robot() -> None:
 
 def test_no_more_than_the_service_holds() -> None:
     with recorded_service(max_figures=0) as client:
-        refused(client.put("/figures", json=FIGURES), problems.TooManyFigures)
+        refused(client.put("/figures", json=FIGURES), TooManyFigures)
 
 
 def test_refitted_inertials_have_a_kernel_of_their_own(client: TestClient) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.stored import UnknownIdentification, UnknownLog
 from joulepath.app.schemas.excitation import ExcitationRequest
 from joulepath.app.schemas.identifications import (
     Identification,
@@ -21,7 +22,16 @@ from joulepath.app.schemas.identifications import (
 )
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.energy.link_regressor import base_wrench_regressor, body_parameters
+from joulepath.optimizer.exceptions import DeclaredError
+from joulepath.optimizer.identify.errors import (
+    MethodNotApplicable,
+    NoPowerChannel,
+    NotExcited,
+    NothingHeldOut,
+    PayloadUnknown,
+)
 from joulepath.optimizer.problem.arm import Payload
+from tests.app.problems import checked
 from tests.app.requests import HOME
 from tests.app.routes.test_problems import refused
 from tests.identification_logs import Truth, csv_of, recorded, truth_of
@@ -164,7 +174,7 @@ def test_identifications_are_listed(client: TestClient, log: str) -> None:
     assert client.delete(f"/jobs/{found.id}").status_code == 204
     after = IdentificationList.model_validate_json(client.get("/identifications").content)
     assert [each.id for each in after.identifications] == [each.id for each in rest.identifications]
-    refused(client.get(f"/identifications/{found.id}/residuals"), problems.UnknownIdentification)
+    refused(client.get(f"/identifications/{found.id}/residuals"), UnknownIdentification)
 
 
 def test_other_logs_validate_and_inertials_are_refitted(client: TestClient, log: str) -> None:
@@ -183,9 +193,9 @@ def test_each_motion_in_its_turn(client: TestClient, log: str) -> None:
 @pytest.mark.parametrize(
     ("moves", "options", "body", "problem"),
     [
-        (1, {}, {}, problems.NothingHeldOut),
-        (2, {"without": "P"}, {"fit": ["power"]}, problems.NoPowerChannel),
-        (4, {"without": "iP"}, {}, problems.NotExcited),
+        (1, {}, {}, NothingHeldOut),
+        (2, {"without": "P"}, {"fit": ["power"]}, NoPowerChannel),
+        (4, {"without": "iP"}, {}, NotExcited),
     ],
 )
 def test_what_logs_do_not_tell_is_a_problem(
@@ -193,12 +203,12 @@ def test_what_logs_do_not_tell_is_a_problem(
     moves: int,
     options: dict[str, Any],
     body: dict[str, Any],
-    problem: type[problems.ProblemDetails],
+    problem: type[DeclaredError],
 ) -> None:
     found = ended(client, logs=[add_log(client, moves, **options)], **body)
     assert found.state == "failed" and found.result is None and found.problem is not None
     assert client.get(f"/identifications/{found.id}/residuals").json() == {"id": found.id, "moves": None}
-    problem.model_validate(found.problem)
+    checked(problem, found.problem)
     if "advice" in found.problem:
         assert ExcitationRequest.model_validate(found.problem["advice"]).robot == ROBOT.name
 
@@ -219,7 +229,7 @@ def test_methods_are_asked_for_by_name(client: TestClient, log: str, method: str
 def test_a_method_that_the_log_does_not_fit_is_a_problem(client: TestClient, log: str, method: str) -> None:
     found = ended(client, logs=[log], method=method, period=5.0)
     assert found.problem is not None
-    assert problems.MethodNotApplicable.model_validate(found.problem).method == method
+    assert checked(MethodNotApplicable, found.problem).method == method
 
 
 def test_links_from_a_log_with_the_wrench_beneath_the_base(client: TestClient) -> None:
@@ -253,22 +263,22 @@ def test_a_payload_is_the_difference_of_two_logs(client: TestClient, log: str) -
     mass = next(each for each in result.parameters if each.figure == "payload_mass")
     assert (mass.value, mass.sd) == (result.payload.mass, result.payload.mass_sd)
     wrong = ended(client, logs=[loaded, log], fit=["payload"])
-    assert wrong.problem is not None and "payload last" in str(problems.Validation.model_validate(wrong.problem).errors)
+    assert wrong.problem is not None and "payload last" in str(checked(InvalidRequest, wrong.problem).errors)
 
 
 def test_torque_constants_need_a_payload_that_is_known(client: TestClient) -> None:
     silent = add_log(client, moves=2, params={})
     found = ended(client, logs=[silent], fit=["torque_constant"])
-    joints = problems.PayloadUnknown.model_validate(found.problem).joints
+    joints = checked(PayloadUnknown, found.problem).joints
     assert {0, 5} <= set(joints) and not {1, 2} & set(joints)
 
 
 def test_unknown_logs_are_refused_at_once(client: TestClient, log: str) -> None:
-    refused(client.post("/identifications", json={"logs": [log, NOBODY]}), problems.UnknownLog)
-    refused(client.get(f"/identifications/{NOBODY}"), problems.UnknownIdentification)
-    refused(client.get("/identifications/x"), problems.UnknownIdentification)
-    refused(client.get("/identifications/x/residuals"), problems.UnknownIdentification)
-    refused(client.get("/identifications?limit=0"), problems.Validation)
+    refused(client.post("/identifications", json={"logs": [log, NOBODY]}), UnknownLog)
+    refused(client.get(f"/identifications/{NOBODY}"), UnknownIdentification)
+    refused(client.get("/identifications/x"), UnknownIdentification)
+    refused(client.get("/identifications/x/residuals"), UnknownIdentification)
+    refused(client.get("/identifications?limit=0"), InvalidRequest)
 
 
 @pytest.mark.parametrize(
@@ -284,7 +294,7 @@ def test_unknown_logs_are_refused_at_once(client: TestClient, log: str) -> None:
     ],
 )
 def test_malformed_requests_name_the_field(client: TestClient, body: dict[str, Any]) -> None:
-    refused(client.post("/identifications", json=body), problems.Validation)
+    refused(client.post("/identifications", json=body), InvalidRequest)
 
 
 def test_other_jobs_are_no_identifications(client: TestClient) -> None:
@@ -292,4 +302,4 @@ def test_other_jobs_are_no_identifications(client: TestClient) -> None:
         "/jobs", json={"requests": [{"evaluate": {"configurations": [HOME, HOME], "time_per_segment": 1.0}}]}
     ).json()
     for path in ("", "/residuals"):
-        refused(client.get(f"/identifications/{job['id']}{path}"), problems.UnknownIdentification)
+        refused(client.get(f"/identifications/{job['id']}{path}"), UnknownIdentification)

@@ -11,9 +11,11 @@ from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.ik.path.task import IKPathAnswer
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.examples.files import body_examples
 from joulepath.models.registry import load_robot
+from joulepath.optimizer.exceptions import OutsideLimits
+from tests.app.problems import checked
 from tests.app.requests import HOME
 
 GUESS = [2.7, -1.4, 1.8, -2.0, -1.57, 0.0]
@@ -126,10 +128,10 @@ def test_its_answer_is_a_motion_to_evaluate(client: TestClient) -> None:
 def test_refuses(request_: dict[str, Any], client: TestClient) -> None:
     answer = client.post("/ik/path", json=request_)
     assert answer.status_code == 422, answer.text
-    problems.Validation.model_validate_json(answer.content)
+    checked(InvalidRequest, answer.content)
     assert "secret" not in answer.text
 
 
 def test_refuses_a_guess_beyond_the_joints(client: TestClient) -> None:
     answer = client.post("/ik/path", json=path([[0.4, 0.0, 0.3]], guess=[0.0, 0.0, 3.5, 0.0, 0.0, 0.0]))
-    assert problems.OutsideLimits.model_validate_json(answer.content).joint == "elbow_joint"
+    assert checked(OutsideLimits, answer.content).joint == "elbow_joint"

@@ -12,9 +12,14 @@ from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.optimize.task import OptimizeAnswer
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.queue import Busy
+from joulepath.app.exceptions.stored import JobNotCancellable, KeyReused, UnknownAnswer, UnknownJob
+from joulepath.app.exceptions.transport import BodyTooLarge
 from joulepath.app.schemas.jobs import Job, JobList
+from joulepath.optimizer.search.errors import DurationTooShort
 from tests.app.job_clients import ended, evaluation, optimization, parsed, sent, shown
+from tests.app.problems import checked
 from tests.app.recorded import recorded_service
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_problems import refused
@@ -67,7 +72,7 @@ def test_every_kind_is_answered_as_by_its_endpoint(client: TestClient, mixed: An
 def test_a_failed_request_has_the_problem_of_its_endpoint(client: TestClient, mixed: Any) -> None:
     _, job = mixed
     problem = job["requests"][1]["problem"]
-    problems.DurationTooShort.model_validate(problem)
+    checked(DurationTooShort, problem)
     alone = client.post("/optimize", json=TOO_SHORT["optimize"]).json()
     assert problem | {"instance": ""} == alone | {"instance": ""}
 
@@ -158,13 +163,13 @@ def test_a_malformed_request_refuses_the_whole_job(recorded: TestClient) -> None
         ({"requests": [evaluation()], "name": "\n"}, ["name"]),
     ]
     for body, expected in wrong:
-        content = refused(recorded.post("/jobs", json=body), problems.Validation)
+        content = refused(recorded.post("/jobs", json=body), InvalidRequest)
         loc = content["errors"][0]["loc"]
         assert loc[: 1 + len(expected)] == ["body", *expected], content
     for text in (b"", b"{", b"\xff", b"[" * 100_000):
         answer = recorded.post("/jobs", content=text, headers={"Content-Type": "application/json"})
-        refused(answer, problems.Validation)
-    refused(recorded.post("/jobs", content=b"{}", headers={"Content-Type": "text/plain"}), problems.Validation)
+        refused(answer, InvalidRequest)
+    refused(recorded.post("/jobs", content=b"{}", headers={"Content-Type": "text/plain"}), InvalidRequest)
     assert recorded.get("/jobs?limit=1").json() == before, "nothing was stored"
 
 
@@ -176,8 +181,8 @@ def test_a_key_makes_one_job(recorded: TestClient) -> None:
     assert "idempotency-replayed" not in first.headers
     assert again.headers["idempotency-replayed"] == "true"
     for other in ({"requests": [evaluation(2.0)], "name": "once"}, {"requests": [evaluation()]}):
-        refused(recorded.post("/jobs", json=other, headers={"Idempotency-Key": "jobs-1"}), problems.KeyReused)
-    refused(recorded.post("/optimize", json=move(), headers=LATER | {"Idempotency-Key": "jobs-1"}), problems.KeyReused)
+        refused(recorded.post("/jobs", json=other, headers={"Idempotency-Key": "jobs-1"}), KeyReused)
+    refused(recorded.post("/optimize", json=move(), headers=LATER | {"Idempotency-Key": "jobs-1"}), KeyReused)
 
 
 def test_unknown_jobs(recorded: TestClient) -> None:
@@ -190,13 +195,13 @@ def test_unknown_jobs(recorded: TestClient) -> None:
         ]
         answers += [recorded.post(f"{path}/{word}") for word in ("cancel", "retry")]
         for answer in answers:
-            refused(answer, problems.UnknownJob)
+            refused(answer, UnknownJob)
 
 
 def test_an_ended_job_is_retried_or_deleted_but_not_cancelled(client: TestClient) -> None:
     path = sent(client, [evaluation(), TOO_SHORT])
     before = ended(client, path)
-    refused(client.post(f"{path}/cancel"), problems.JobNotCancellable)
+    refused(client.post(f"{path}/cancel"), JobNotCancellable)
     answer = client.post(f"{path}/retry")
     assert answer.status_code == 202
     after = ended(client, path)
@@ -205,8 +210,8 @@ def test_an_ended_job_is_retried_or_deleted_but_not_cancelled(client: TestClient
     names = [event.name for event in parsed(iter(client.get(f"{path}/events").text.splitlines()))]
     assert names.count("end") == 2, "and the stream goes on after the first"
     assert client.delete(path).status_code == 204
-    refused(client.get(path), problems.UnknownJob)
-    refused(client.get(before["requests"][0]["answer"]), problems.UnknownAnswer)
+    refused(client.get(path), UnknownJob)
+    refused(client.get(before["requests"][0]["answer"]), UnknownAnswer)
 
 
 POSTS: dict[str, Any] = {
@@ -237,7 +242,7 @@ def test_a_client_may_wait_for_the_answer_of_its_job(client: TestClient) -> None
     job = shown(client, answer.headers["location"])
     assert client.get(job["requests"][0]["answer"]).json()["answer"] == answer.json()
     answer = client.post("/optimize", json=TOO_SHORT["optimize"], headers=waiting)
-    refused(answer, problems.DurationTooShort)
+    refused(answer, DurationTooShort)
     assert answer.headers["preference-applied"] == "wait=100"
 
 
@@ -253,7 +258,7 @@ def test_settings_beside_a_json_body_are_refused(headers: dict[str, str], record
     """They would have no effect."""
     body, query = evaluation()["evaluate"], {"drives": '{"inverter": {"constant": 1.0}}'}
     answer = recorded.post("/evaluate", json=body, params=query, headers=headers)
-    (error,) = refused(answer, problems.Validation)["errors"]
+    (error,) = refused(answer, InvalidRequest)["errors"]
     assert error["loc"] == ["query"] and "JSON body" in error["msg"]
 
 
@@ -266,22 +271,22 @@ def test_a_table_is_evaluated_at_once(recorded: TestClient) -> None:
 
 def test_a_job_may_have_a_longer_deadline(recorded: TestClient) -> None:
     longer = move(deadline=300.0)
-    refused(recorded.post("/optimize", json=longer), problems.Validation)
+    refused(recorded.post("/optimize", json=longer), InvalidRequest)
     path = recorded.post("/optimize", json=longer, headers=LATER).headers["location"]
     assert ended(recorded, path)["counts"]["done"] == 1
 
 
 def test_limits_of_the_service() -> None:
     with recorded_service(max_waiting=3, max_job_bytes=4096, max_job_deadline=5.0) as small:
-        content = refused(small.post("/jobs", json={"requests": [evaluation()] * 4}), problems.Busy)
+        content = refused(small.post("/jobs", json={"requests": [evaluation()] * 4}), Busy)
         assert "jobs" in content["detail"]
         answer = small.post("/jobs", json={"requests": [optimization()] * 100})
-        refused(answer, problems.BodyTooLarge)
+        refused(answer, BodyTooLarge)
         late = {"requests": [evaluation(), {"optimize": move(deadline=6.0)}]}
-        (error,) = refused(small.post("/jobs", json=late), problems.Validation)["errors"]
+        (error,) = refused(small.post("/jobs", json=late), InvalidRequest)["errors"]
         assert error == {
             "loc": ["body", "requests", 1, "optimize", "deadline"],
             "msg": "deadline must be at most 5 s.",
         }
         answer = small.post("/optimize", json=move(deadline=6.0), headers=LATER)
-        assert refused(answer, problems.Validation)["errors"][0]["loc"] == ["body", "deadline"]
+        assert refused(answer, InvalidRequest)["errors"][0]["loc"] == ["body", "deadline"]

@@ -124,7 +124,7 @@ def test_a_large_iteration_has_all_candidates_and_is_stored_as_sent(client: Test
 @pytest.mark.parametrize("body", [b"{", b"\xff", b"[" * LARGE, b"9" * LARGE])
 def test_survives_what_is_no_json(client: TestClient, body: bytes) -> None:
     status, content = sent(client, "/optimize", padded(body))
-    assert (status, content["type"]) == (422, "/problems/validation")
+    assert (status, content["type"]) == (422, "/problems/invalid-request")
     assert content["errors"]
 
 

@@ -10,13 +10,17 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath.app.access.client import Role
 from joulepath.app.convert.logs import stored_log
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.access import NotOwner, Role, RoleTooLow, Unauthenticated
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.stored import TooManyLogs, UnknownLog
+from joulepath.app.exceptions.transport import BodyTooLarge, UnsupportedMediaType
 from joulepath.app.schemas.examples.logs import LOG_EXAMPLES
 from joulepath.app.schemas.examples.own_arm import ARM
 from joulepath.app.schemas.logs import LogDetail, LogList
 from joulepath.models.registry import load_robot
+from joulepath.optimizer.exceptions import InvalidTable, UnknownRobot
+from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
 from tests.app.access.test_key_file import add
 from tests.app.live import CLIENT, Server
 from tests.app.recorded import recorded_service
@@ -53,9 +57,9 @@ def test_a_log_is_added_listed_shown_and_deleted(client: TestClient, recording: 
     listed = LogList.model_validate_json(client.get("/logs", params={"limit": 1}).content)
     assert [each.id for each in listed.logs] == [made.id]
     assert client.delete(f"/logs/{made.id}").status_code == 204
-    refused(client.get(f"/logs/{made.id}"), problems.UnknownLog)
-    refused(client.delete(f"/logs/{made.id}"), problems.UnknownLog)
-    refused(client.get("/logs/no-id"), problems.UnknownLog)
+    refused(client.get(f"/logs/{made.id}"), UnknownLog)
+    refused(client.delete(f"/logs/{made.id}"), UnknownLog)
+    refused(client.get("/logs/no-id"), UnknownLog)
 
 
 def test_what_is_stored_is_read_again_as_it_was(recording: Recording) -> None:
@@ -70,7 +74,7 @@ def test_pages(client: TestClient) -> None:
     assert [each["id"] for each in first["logs"]] == made[:0:-1]
     second = client.get("/logs", params={"limit": 2, "after": first["next"]}).json()
     assert second["logs"][0]["id"] == made[0]
-    refused(client.get("/logs", params={"after": "nowhere"}), problems.Validation)
+    refused(client.get("/logs", params={"after": "nowhere"}), InvalidRequest)
     for each in made:
         client.delete(f"/logs/{each}")
 
@@ -95,17 +99,17 @@ def test_an_own_robot(client: TestClient) -> None:
     assert answer.status_code == 201 and answer.json()["robot"] == "logged", answer.text
     client.delete(answer.headers["location"])
     client.delete("/robots/logged")
-    refused(client.post("/logs", content=rows, params={"robot": "logged"}, headers=CSV), problems.UnknownRobot)
+    refused(client.post("/logs", content=rows, params={"robot": "logged"}, headers=CSV), UnknownRobot)
 
 
 def test_broken_logs_name_the_place_and_leave_nothing(client: TestClient, recording: Recording) -> None:
     before = client.get("/logs").json()
     lines = csv_of(recording, without="vaP").split(b"\n")
     lines[9] = lines[9].replace(b",", b",nan,", 1).rpartition(b",")[0]
-    content = refused(client.post("/logs", content=b"\n".join(lines), headers=CSV), problems.InvalidTable)
+    content = refused(client.post("/logs", content=b"\n".join(lines), headers=CSV), InvalidTable)
     assert (content["row"], content["column"]) == (10, "q1")
     for body in (b"", b"\x00" * 1000, b"PK\x03\x04", b"{}", gzip.compress(b"no,log")):
-        refused(client.post("/logs", content=body, headers=CSV), problems.InvalidTable)
+        refused(client.post("/logs", content=body, headers=CSV), InvalidTable)
     assert client.get("/logs").json() == before
 
 
@@ -122,14 +126,14 @@ WRONG: list[tuple[str, list[str]]] = [
 
 @pytest.mark.parametrize(("query", "loc"), WRONG, ids=[query for query, _ in WRONG])
 def test_wrong_settings(client: TestClient, query: str, loc: list[str]) -> None:
-    content = refused(client.post(f"/logs?{query}", content="t,q1\n", headers=CSV), problems.Validation)
+    content = refused(client.post(f"/logs?{query}", content="t,q1\n", headers=CSV), InvalidRequest)
     assert [error["loc"] for error in content["errors"]] == [loc]
 
 
 def test_efforts_without_gravity(client: TestClient, recording: Recording) -> None:
     rigid = rigid_torques(ROBOT, TRUTH, recording.exact_q, recording.exact_v, recording.a)
     body = csv_of(with_current(recording, recording.current - rigid / TRUTH.torque_constant))
-    content = refused(client.post("/logs", content=body, headers=CSV), problems.EffortNotUsable)
+    content = refused(client.post("/logs", content=body, headers=CSV), EffortNotUsable)
     assert content["meaning"] == "external" and set(content["slope"]) == {"shoulder_lift_joint", "elbow_joint"}
     answer = client.post("/logs", content=body, params={"effort": "external"}, headers=CSV)
     assert answer.status_code == 201 and answer.json()["effort"]["meaning"] == "external"
@@ -137,9 +141,7 @@ def test_efforts_without_gravity(client: TestClient, recording: Recording) -> No
 
 
 def test_other_media_types(client: TestClient) -> None:
-    refused(
-        client.post("/logs", content="{}", headers={"Content-Type": "application/json"}), problems.UnsupportedMediaType
-    )
+    refused(client.post("/logs", content="{}", headers={"Content-Type": "application/json"}), UnsupportedMediaType)
 
 
 def test_limits_of_size_and_number(recording: Recording, tmp_path: Path) -> None:
@@ -150,17 +152,17 @@ def test_limits_of_size_and_number(recording: Recording, tmp_path: Path) -> None
     database = f"sqlite:///{tmp_path}/logs.db"
     settings = {"max_upload_bytes": most, "logs_max_bytes": 10_000, "database_url": database}
     with recorded_service(**settings) as client:
-        refused(client.post("/logs", content=body, headers=CSV), problems.BodyTooLarge)
-        refused(client.post("/logs", content=packed, headers={"Content-Encoding": "gzip"}), problems.BodyTooLarge)
+        refused(client.post("/logs", content=body, headers=CSV), BodyTooLarge)
+        refused(client.post("/logs", content=packed, headers={"Content-Encoding": "gzip"}), BodyTooLarge)
         # packed without saying so: unpacked by the worker
-        content = refused(client.post("/logs", content=packed, headers=CSV), problems.LogTooLarge)
+        content = refused(client.post("/logs", content=packed, headers=CSV), LogTooLarge)
         assert content["limit"] == most
         short = LOG_EXAMPLES["positions"]["value"]
         made = 0
         while (answer := client.post("/logs", content=short, headers=CSV)).status_code == 201:
             made += 1
         assert 1 <= made < 20
-        assert refused(answer, problems.TooManyLogs)["limit"] == 10_000
+        assert refused(answer, TooManyLogs)["limit"] == 10_000
         client.delete(f"/logs/{client.get('/logs').json()['logs'][0]['id']}")
         assert client.post("/logs", content=short, headers=CSV).status_code == 201
 
@@ -180,11 +182,11 @@ def test_only_owners_and_admins_delete(tmp_path: Path) -> None:
             return CSV | {"Authorization": f"Bearer {keys[name]}"}
 
         body = LOG_EXAMPLES["positions"]["value"]
-        refused(client.post("/logs", content=body, headers=CSV), problems.Unauthenticated)
-        refused(client.post("/logs", content=body, headers=as_("reader")), problems.RoleTooLow)
+        refused(client.post("/logs", content=body, headers=CSV), Unauthenticated)
+        refused(client.post("/logs", content=body, headers=as_("reader")), RoleTooLow)
         paths = [client.post("/logs", content=body, headers=as_("mine")).headers["location"] for _ in range(2)]
         assert client.get(paths[0], headers=as_("reader")).json()["owner"] == "mine"
-        assert refused(client.delete(paths[0], headers=as_("other")), problems.NotOwner)["owner"] == "mine"
+        assert refused(client.delete(paths[0], headers=as_("other")), NotOwner)["owner"] == "mine"
         assert client.delete(paths[0], headers=as_("mine")).status_code == 204
         assert client.delete(paths[1], headers=as_("boss")).status_code == 204
 
@@ -192,7 +194,7 @@ def test_only_owners_and_admins_delete(tmp_path: Path) -> None:
 def test_unknown_columns_are_not_echoed(client: TestClient, recording: Recording) -> None:
     body = csv_of(recording).replace(b"q1", b"SECRET", 1)
     answer = client.post("/logs", content=body, headers=CSV)
-    refused(answer, problems.InvalidTable)
+    refused(answer, InvalidTable)
     assert b"SECRET" not in answer.content
 
 

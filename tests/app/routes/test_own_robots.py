@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.stored import RobotExists, TooManyRobots
 from joulepath.app.schemas.examples.own_arm import ARM
 from joulepath.app.schemas.robots import RobotDetail, RobotList
+from joulepath.optimizer.exceptions import UnknownRobot
 from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
 from tests.app.recorded import recorded_service
 from tests.app.requests import PATIENT
@@ -42,16 +44,16 @@ def test_a_robot_is_added_shown_and_deleted(client: TestClient) -> None:
     assert client.get("/robots/new_arm").json() == answer.json()
     listed = RobotList.model_validate_json(client.get("/robots").content).robots
     assert "new_arm" in [each.name for each in listed if each.added] and not listed[0].added
-    refused(client.post("/robots", json={"name": "new_arm", **ARM}), problems.RobotExists)
+    refused(client.post("/robots", json={"name": "new_arm", **ARM}), RobotExists)
     assert client.delete("/robots/new_arm").status_code == 204
-    assert "ur5e" in refused(client.get("/robots/new_arm"), problems.UnknownRobot)["known"]
-    refused(client.delete("/robots/new_arm"), problems.UnknownRobot)
+    assert "ur5e" in refused(client.get("/robots/new_arm"), UnknownRobot)["known"]
+    refused(client.delete("/robots/new_arm"), UnknownRobot)
 
 
 def test_the_robots_of_the_service_stay(client: TestClient) -> None:
-    refused(client.post("/robots", json={"name": "ur5e", **ARM}), problems.RobotExists)
-    refused(client.put("/robots/ur5e", json=ARM), problems.RobotExists)
-    refused(client.delete("/robots/ur5e"), problems.RobotExists)
+    refused(client.post("/robots", json={"name": "ur5e", **ARM}), RobotExists)
+    refused(client.put("/robots/ur5e", json=ARM), RobotExists)
+    refused(client.delete("/robots/ur5e"), RobotExists)
 
 
 def test_a_motion_of_least_energy(mine: TestClient) -> None:
@@ -74,7 +76,7 @@ def test_every_endpoint_knows_it(mine: TestClient) -> None:
     of_csv = mine.post("/evaluate", content=table, params=query, headers={"content-type": "text/csv"})
     assert of_csv.json()["total"]["energy"] == evaluated.json()["total"]["energy"]
     pose = {"position": [0.3, 0.0, 0.6], "quaternion": [0.0, 0.0, 0.0, 1.0]}
-    (error,) = refused(mine.post("/ik", json={"pose": pose, **MINE}), problems.Validation)["errors"]
+    (error,) = refused(mine.post("/ik", json={"pose": pose, **MINE}), InvalidRequest)["errors"]
     assert "give joint positions" in error["msg"]
     study = mine.post("/studies", json={"name": "own", "threshold": 10.0, **MINE}).json()["id"]
     step = {"optimize": {"start": {"q": START}, "goal": {"q": GOAL}, **PATIENT}}
@@ -99,11 +101,11 @@ def test_another_robot_of_the_same_name_is_used_at_once(mine: TestClient) -> Non
 
 
 def test_a_name_that_nobody_added(mine: TestClient) -> None:
-    known = refused(mine.post("/optimize", json={**MOVE, "robot": "yours"}), problems.UnknownRobot)["known"]
+    known = refused(mine.post("/optimize", json={**MOVE, "robot": "yours"}), UnknownRobot)["known"]
     assert "mine" in known and "ur5e" in known
     refused(mine.post("/ik", json={"pose": {"position": [0.3, 0, 0.6], "rpy": [0, 0, 0]}, "robot": "yours"}),
-            problems.UnknownRobot)  # fmt: skip
-    refused(mine.post("/studies", json={"name": "s", "threshold": 1.0, "robot": "yours"}), problems.UnknownRobot)
+            UnknownRobot)  # fmt: skip
+    refused(mine.post("/studies", json={"name": "s", "threshold": 1.0, "robot": "yours"}), UnknownRobot)
 
 
 @pytest.mark.parametrize(
@@ -123,9 +125,9 @@ def test_what_makes_no_robot(client: TestClient, changes: dict[str, Any], place:
         client.put("/robots/wrong", json=ARM | changes),
         client.post("/robots", json=ARM | changes | {"name": "w"}),
     ):
-        (error,) = refused(answer, problems.Validation)["errors"]
+        (error,) = refused(answer, InvalidRequest)["errors"]
         assert error["loc"][: len(place)] == place and words in error["msg"]
-    refused(client.get("/robots/wrong"), problems.UnknownRobot)
+    refused(client.get("/robots/wrong"), UnknownRobot)
 
 
 def test_meshes_that_are_no_base64_are_named(client: TestClient) -> None:
@@ -149,20 +151,20 @@ def test_meshes_come_as_a_zip_in_base64(client: TestClient) -> None:
     missing = client.put("/robots/meshed", json=ARM | {"urdf": urdf}).json()
     assert any("package://cell/arm.obj" in warning for warning in missing["warnings"])
     for meshes in ("?", "UEsF"):
-        (error,) = refused(client.put("/robots/meshed", json=arm | {"meshes": meshes}), problems.Validation)["errors"]
+        (error,) = refused(client.put("/robots/meshed", json=arm | {"meshes": meshes}), InvalidRequest)["errors"]
         assert error["loc"] == ["body", "meshes"]
     client.delete("/robots/meshed")
 
 
 @pytest.mark.parametrize("name", ["Mine", "../etc", "a b", "x" * 65, "-x"])
 def test_a_name_that_is_none(client: TestClient, name: str) -> None:
-    refused(client.post("/robots", json={"name": name, **ARM}), problems.Validation)
+    refused(client.post("/robots", json={"name": name, **ARM}), InvalidRequest)
 
 
 def test_no_more_than_the_service_holds() -> None:
     with recorded_service(max_robots=0) as client:
-        refused(client.put("/robots/one_more", json=ARM), problems.TooManyRobots)
-        refused(client.post("/robots", json={"name": "one_more", **ARM}), problems.TooManyRobots)
+        refused(client.put("/robots/one_more", json=ARM), TooManyRobots)
+        refused(client.post("/robots", json={"name": "one_more", **ARM}), TooManyRobots)
 
 
 def test_a_robot_of_seven_joints_keeps_its_shape(client: TestClient) -> None:

@@ -90,5 +90,5 @@ def test_as_csv(client: TestClient) -> None:
 def test_refuses_what_is_no_front(client: TestClient, fields: dict[str, Any], loc: str) -> None:
     answer = client.post("/pareto", json=move(**fields))
     assert answer.status_code == 422
-    assert answer.json()["type"] == "/problems/validation"
+    assert answer.json()["type"] == "/problems/invalid-request"
     assert answer.json()["errors"][0]["loc"][:2] == ["body", loc]

@@ -12,8 +12,9 @@ import pytest
 import trimesh
 from starlette.testclient import TestClient
 
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.stored import NoMeshes
 from joulepath.app.tasks.pictures import PictureTask, kept
+from joulepath.optimizer.exceptions import UnknownRobot
 from tests.app.live import ANSWER, ROOT
 from tests.app.routes.test_problems import refused
 
@@ -40,12 +41,12 @@ def test_the_meshes_are_sent_once(client: TestClient) -> None:
 @pytest.mark.parametrize("name", ["panda", "ur10e"])
 def test_a_robot_without_meshes(client: TestClient, name: str) -> None:
     assert not client.get(f"/robots/{name}").json()["has_meshes"]
-    refused(client.get(f"/robots/{name}/meshes.glb"), problems.NoMeshes)
+    refused(client.get(f"/robots/{name}/meshes.glb"), NoMeshes)
 
 
 @pytest.mark.parametrize("name", ["none", "%2e%2e", "x" * 5000])
 def test_an_unknown_robot(client: TestClient, name: str) -> None:
-    refused(client.get(f"/robots/{name}/meshes.glb"), problems.UnknownRobot)
+    refused(client.get(f"/robots/{name}/meshes.glb"), UnknownRobot)
 
 
 def test_two_processes_make_one_file(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -10,26 +10,37 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.api.ik.task import IKRequest, IKTask
-from joulepath.app.http.problem_details import TABLE, problem_content
+from joulepath.app.exceptions.base import InternalError
+from joulepath.app.exceptions.queue import NotReady
+from joulepath.app.exceptions.transport import BodyTooLarge, MethodNotAllowed, NotFound
+from joulepath.app.http.problems import own_fields, path_of, problem_of, types_of_error
 from joulepath.app.main import create_app
-from joulepath.app.schemas import errors as problems
-from joulepath.app.schemas.errors import PROBLEMS, ProblemDetails
 from joulepath.app.settings import Settings
 from joulepath.models.registry import robot_names
-from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.exceptions import (
+    DeadlineExceeded,
+    DeclaredError,
+    JoulepathError,
+    OutsideLimits,
+    SingularPose,
+    UnknownRobot,
+    UnreachablePose,
+)
 from joulepath.optimizer.kinematics.ur_closed_form import URClosedForm
+from joulepath.optimizer.search.errors import DurationTooShort, TorqueInfeasible
 from tests.app.live import LOCAL
+from tests.app.problems import checked
 from tests.app.requests import AMPLE, move
 from tests.optimizer.chains import serial_chain
 
 DOWN = [0.0, 1.0, 0.0, 0.0]
 
 
-def refused(answer: Any, kind: type[ProblemDetails]) -> dict[str, Any]:
+def refused(answer: Any, kind: type[DeclaredError]) -> dict[str, Any]:
     """The content of an answer that must be a problem of that kind."""
-    assert answer.status_code == kind.model_fields["status"].default, answer.text
+    assert answer.status_code == kind.status, answer.text
     assert answer.headers["content-type"] == "application/problem+json"
-    kind.model_validate_json(answer.content)
+    checked(kind, answer.content)
     content: dict[str, Any] = answer.json()
     assert content["instance"] == answer.headers["x-request-id"]
     assert re.fullmatch(r"[^.\n]([^\n]*[^.\n])?[.]", content["detail"]), "one sentence"
@@ -52,7 +63,7 @@ def test_unknown_robot(client: TestClient) -> None:
         client.get("/robots/r2d2"),
     ]
     for answer in answers:
-        assert refused(answer, problems.UnknownRobot)["known"][: len(robot_names())] == list(robot_names())
+        assert refused(answer, UnknownRobot)["known"][: len(robot_names())] == list(robot_names())
         assert "r2d2" not in answer.text
 
 
@@ -61,7 +72,7 @@ def test_unreachable_pose(client: TestClient) -> None:
         client.post("/optimize", json=to_pose([2.0, 0.0, 0.3])),
         client.post("/ik", json={"pose": {"position": [2.0, 0.0, 0.3], "quaternion": DOWN}}),
     ):
-        content = refused(answer, problems.UnreachablePose)
+        content = refused(answer, UnreachablePose)
         assert content["target"] == "goal"
         # the arm is 0.95 m long
         assert 0.9 < content["distance"] < 1.4
@@ -71,14 +82,14 @@ def problem_of_ik(pose: Any) -> dict[str, Any]:
     """The problem of a request whose task runs here, where a test can change what the arm can do."""
     with pytest.raises(JoulepathError) as raised:
         IKTask(IKRequest.model_validate({"pose": pose}), "the-id").run(AMPLE)
-    return problem_content(raised.value, "the-id")
+    return problem_of(raised.value, "the-id")
 
 
 def test_singular_pose(monkeypatch: pytest.MonkeyPatch) -> None:
     # a UR5e reaches no pose on a self-motion of unknown form only: here its known one is hidden
     monkeypatch.setattr(URClosedForm, "self_motions", lambda *_: [])
     content = problem_of_ik(UPRIGHT)
-    assert content["type"] == problems.SingularPose.model_fields["type"].default
+    assert content["type"] == path_of(SingularPose)
     assert content["target"] == "goal"
     assert content["smallest_singular_value"] == 0
 
@@ -103,7 +114,7 @@ def test_a_stretched_wrist_names_the_joints_that_are_free(client: TestClient) ->
 
 def test_outside_limits(client: TestClient) -> None:
     q = [0.0, -1.57, 3.5, -1.57, -1.57, 0.0]
-    content = refused(client.post("/optimize", json=move(start={"q": q})), problems.OutsideLimits)
+    content = refused(client.post("/optimize", json=move(start={"q": q})), OutsideLimits)
     assert content["joint"] == "elbow_joint"
     assert content["value"] == 3.5
     assert content["lower"] == pytest.approx(-3.14159265)
@@ -112,12 +123,12 @@ def test_outside_limits(client: TestClient) -> None:
 
 def test_outside_the_limits_of_the_request(client: TestClient) -> None:
     limits = {"position": {"upper": [1.0, 1.0, 1.5, 1.0, 1.0, 1.0]}}
-    content = refused(client.post("/optimize", json=move(limits=limits)), problems.OutsideLimits)
+    content = refused(client.post("/optimize", json=move(limits=limits)), OutsideLimits)
     assert (content["joint"], content["upper"]) == ("elbow_joint", 1.5)
 
 
 def test_duration_too_short(client: TestClient) -> None:
-    content = refused(client.post("/optimize", json=move(duration=0.05)), problems.DurationTooShort)
+    content = refused(client.post("/optimize", json=move(duration=0.05)), DurationTooShort)
     assert 0.1 < content["shortest"] < 1.5
     again = client.post("/optimize", json=move(duration=content["shortest"] * 1.01))
     assert again.status_code == 200, "what it says is the least feasible duration is feasible"
@@ -125,7 +136,7 @@ def test_duration_too_short(client: TestClient) -> None:
 
 def test_torque_infeasible(client: TestClient) -> None:
     request = move(payload={"mass": 5.0, "com": [0.0, 1.0, 0.0]})
-    content = refused(client.post("/optimize", json=request), problems.TorqueInfeasible)
+    content = refused(client.post("/optimize", json=request), TorqueInfeasible)
     assert content["joint"] == "wrist_1_joint"
     assert content["available"] == 28.0
     # 5 kg a metre away, give or take the arm's own weight
@@ -133,14 +144,14 @@ def test_torque_infeasible(client: TestClient) -> None:
 
 
 def test_deadline_exceeded(client: TestClient) -> None:
-    content = refused(client.post("/optimize", json=move(deadline=1e-3)), problems.DeadlineExceeded)
+    content = refused(client.post("/optimize", json=move(deadline=1e-3)), DeadlineExceeded)
     assert len(content["candidates"]) <= 64
     assert sum(content["candidate_counts"].values()) >= len(content["candidates"])
 
 
 @pytest.mark.parametrize("path", ["/nothing", "/optimize/", "/robots/", "/problems/nothing", "/docs/nothing"])
 def test_not_found(client: TestClient, path: str) -> None:
-    refused(client.get(path), problems.NotFound)
+    refused(client.get(path), NotFound)
 
 
 @pytest.mark.parametrize(
@@ -156,7 +167,7 @@ def test_not_found(client: TestClient, path: str) -> None:
 )
 def test_method_not_allowed(client: TestClient, method: str, path: str, allow: str) -> None:
     answer = client.request(method, path)
-    refused(answer, problems.MethodNotAllowed)
+    refused(answer, MethodNotAllowed)
     assert answer.headers["allow"] == allow
 
 
@@ -174,7 +185,7 @@ def test_body_too_large(client: TestClient, declared: bool) -> None:
 
     content = b" " * 10_000_000 if declared else chunks()
     answer = client.post("/optimize", content=content, headers={"content-type": "application/json"})
-    refused(answer, problems.BodyTooLarge)
+    refused(answer, BodyTooLarge)
 
 
 def test_not_ready(tmp_path: Any) -> None:
@@ -183,7 +194,7 @@ def test_not_ready(tmp_path: Any) -> None:
     with TestClient(app, base_url=LOCAL) as client:
         answer = client.get("/readyz")
         assert client.get("/healthz").json() == {"status": "alive"}
-    refused(answer, problems.NotReady)
+    refused(answer, NotReady)
     assert int(answer.headers["retry-after"]) > 0
 
 
@@ -200,21 +211,16 @@ def test_internal(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("joulepath.app.api.ik.route.deadline_of", fail)
     pose = {"position": [0.4, -0.2, 0.3], "quaternion": DOWN}
     answer = client.post("/ik", json={"pose": pose})
-    refused(answer, problems.Internal)
+    refused(answer, InternalError)
     assert "caller-secret" not in answer.text
 
 
-@pytest.mark.parametrize("kind", PROBLEMS)
-def test_has_a_page(client: TestClient, kind: type[ProblemDetails]) -> None:
-    page = client.get(kind.model_fields["type"].default)
+@pytest.mark.parametrize("kind", types_of_error())
+def test_has_a_page(client: TestClient, kind: type[DeclaredError]) -> None:
+    page = client.get(path_of(kind))
     assert page.status_code == 200
     assert page.headers["content-type"].startswith("text/html")
-    assert kind.model_fields["title"].default in page.text
-    for field in kind.own_fields():
+    assert kind.title in page.text
+    for field in own_fields(kind):
         assert f"<code>{field}</code>" in page.text
     assert "://" not in page.text
-
-
-def test_every_problem_is_in_the_table() -> None:
-    assert set(TABLE.values()) == set(PROBLEMS)
-    assert len({kind.slug() for kind in PROBLEMS}) == len(PROBLEMS)

@@ -9,8 +9,11 @@ from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.replay.task import ReplayAnswer
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.stored import UnknownAnswer
 from joulepath.app.schemas.examples.own_arm import ARM
+from joulepath.optimizer.evaluate.errors import NotCertified
+from joulepath.optimizer.exceptions import DeadlineExceeded
 from tests.app.requests import HOME, NEAR, PATIENT, move
 from tests.app.routes.test_problems import refused
 
@@ -59,7 +62,7 @@ def test_a_whole_answer_knows_its_arm_too(client: TestClient, loaded: dict[str, 
     content = replayed(client, answer=loaded)
     agrees(content["motions"][0])
     nobodys = loaded | {"arm": None}
-    assert refused(client.post("/replay", json={"answer": nobodys}), problems.Validation)["errors"][0]["loc"] == [
+    assert refused(client.post("/replay", json={"answer": nobodys}), InvalidRequest)["errors"][0]["loc"] == [
         "body", "arm"
     ]  # fmt: skip
     given = replayed(client, answer=nobodys, arm={name: LOADED[name] for name in ("payload", "gravity")})
@@ -68,8 +71,8 @@ def test_a_whole_answer_knows_its_arm_too(client: TestClient, loaded: dict[str, 
 
 def test_nothing_is_simulated_on_another_arm(client: TestClient, loaded: dict[str, Any]) -> None:
     for arm in ({}, {"payload": LOADED["payload"]}, loaded["arm"] | {"link_mass_scale": 1.01}):
-        refused(client.post("/replay", json={"answer": loaded, "arm": arm}), problems.NotCertified)
-    refusal = refused(client.post("/replay", json={"answer": loaded, "arm": {"robot": "ur10e"}}), problems.Validation)
+        refused(client.post("/replay", json={"answer": loaded, "arm": arm}), NotCertified)
+    refusal = refused(client.post("/replay", json={"answer": loaded, "arm": {"robot": "ur10e"}}), InvalidRequest)
     assert refusal["errors"][0]["loc"] == ["body", "arm", "robot"]
 
 
@@ -132,7 +135,7 @@ def test_points_of_a_front_and_changed_arms(client: TestClient) -> None:
 def test_given_motions(client: TestClient) -> None:
     request = {"configurations": [HOME, NEAR, HOME], "time_per_segment": 1.0, "payload": LOADED["payload"]}
     without = client.post("/evaluate", json=request).json()
-    refused(client.post("/replay", json={"answer": without}), problems.Validation)
+    refused(client.post("/replay", json={"answer": without}), InvalidRequest)
     request |= {"sample_period": 0.01}
     agrees(replayed(client, answer=client.post("/evaluate", json=request).json())["motions"][0])
     study = client.post("/studies", json={"name": "replay", "threshold": 10.0}).json()["id"]
@@ -174,7 +177,7 @@ def test_own_robots(client: TestClient) -> None:
     ],
 )
 def test_faults_are_located(client: TestClient, loaded: dict[str, Any], change: dict[str, Any], loc: list[str]) -> None:
-    refusal = refused(client.post("/replay", json={"answer": loaded} | change), problems.Validation)
+    refusal = refused(client.post("/replay", json={"answer": loaded} | change), InvalidRequest)
     assert refusal["errors"][0]["loc"] == ["body", *loc]
 
 
@@ -182,24 +185,24 @@ def test_edited_answers_are_refused(client: TestClient, loaded: dict[str, Any]) 
     spline = loaded["trajectory"]["spline"]
     for name, value in (("knots", [0.0] * 6), ("control_points", [[0.0]] * 20), ("degree", 3)):
         edited = loaded | {"trajectory": loaded["trajectory"] | {"spline": spline | {name: value}}}
-        refused(client.post("/replay", json={"answer": edited}), problems.Validation)
+        refused(client.post("/replay", json={"answer": edited}), InvalidRequest)
     moved = [[q + 0.01 for q in point] for point in spline["control_points"]]
     edited = loaded | {"trajectory": loaded["trajectory"] | {"spline": spline | {"control_points": moved}}}
-    refused(client.post("/replay", json={"answer": edited}), problems.NotCertified)
+    refused(client.post("/replay", json={"answer": edited}), NotCertified)
     edited = {name: value for name, value in loaded.items() if name != "energy"}
-    refusal = refused(client.post("/replay", json={"answer": edited}), problems.Validation)
+    refusal = refused(client.post("/replay", json={"answer": edited}), InvalidRequest)
     assert refusal["errors"][0]["loc"] == ["body", "answer", "energy"]
 
 
 def test_unknown_ids(client: TestClient) -> None:
     for name in ("x", "/answers/5c0a0e0f-8d1f-4f1c-9a43-2f4a3ad0d1b7", "\0"):
-        refused(client.post("/replay", json={"answer": name}), problems.UnknownAnswer)
+        refused(client.post("/replay", json={"answer": name}), UnknownAnswer)
     leg = {"kind": "move", "start": {"stop": "start"}, "goal": {"stop": "a"}, "duration": 1.0, "answer": "/answers/x"}
     cycle_of_lost_moves = {"robot": "ur5e", "legs": [leg]}
-    refused(client.post("/replay", json={"answer": cycle_of_lost_moves}), problems.UnknownAnswer)
+    refused(client.post("/replay", json={"answer": cycle_of_lost_moves}), UnknownAnswer)
 
 
 def test_a_motion_that_takes_long_is_ended(client: TestClient) -> None:
     request = {"configurations": [HOME, NEAR], "time_per_segment": 90.0, "sample_period": 1.0}
     body = {"answer": client.post("/evaluate", json=request).json(), "deadline": 0.05}
-    refused(client.post("/replay", json=body), problems.DeadlineExceeded)
+    refused(client.post("/replay", json=body), DeadlineExceeded)

@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import csv
 import io
-import signal
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.stored import KeyReused, UnknownAnswer, UnknownStudy
 from joulepath.app.schemas.studies import IterationDetail, Study, StudyList, StudySummary
-from tests.app.databases import postgres, why_no_postgres
-from tests.app.live import Server, serving
+from joulepath.optimizer.exceptions import (
+    DeadlineExceeded,
+    DeclaredError,
+    InvalidTable,
+    UnknownRobot,
+    UnreachableTargets,
+)
+from joulepath.optimizer.search.errors import DurationTooShort
+from tests.app.problems import checked
 from tests.app.requests import HOME, NEAR, move
 
 ABSENT = "5c0a0e0f-8d1f-4f1c-9a43-2f4a3ad0d1b7"
@@ -109,7 +115,7 @@ def test_the_studys_objective_is_the_iterations(client: TestClient) -> None:
     assert step["request"]["optimize"]["objective"] == "mechanical"
     assert step["energy"] == step["mechanical"] < step["electrical"]
     answer = client.post(f"{path}/iterations", json={"optimize": move(duration=2.0, objective="electrical")})
-    assert problems.Validation.model_validate_json(answer.content).errors[0].loc == ["body", "optimize", "objective"]
+    assert checked(InvalidRequest, answer.content).errors[0].loc == ["body", "optimize", "objective"]
 
 
 def test_the_history_as_a_table(client: TestClient, three: Any) -> None:
@@ -133,15 +139,13 @@ TIMES = {"t": [0.0, 1.0, 1.0, 2.0, 3.0], "q": [HOME, NEAR, NEAR, HOME, NEAR]}
 @pytest.mark.parametrize(
     ("body", "kind"),
     [
-        ({"optimize": move(goal={"any_of": [FAR, FAR]})}, problems.UnreachableTargets),
-        ({"evaluate": {"trajectory": TIMES}}, problems.InvalidTable),
+        ({"optimize": move(goal={"any_of": [FAR, FAR]})}, UnreachableTargets),
+        ({"evaluate": {"trajectory": TIMES}}, InvalidTable),
     ],
 )
-def test_what_either_endpoint_refuses_is_documented(
-    client: TestClient, body: Any, kind: type[problems.ProblemDetails]
-) -> None:
+def test_what_either_endpoint_refuses_is_documented(client: TestClient, body: Any, kind: type[DeclaredError]) -> None:
     answer = client.post(f"{begin(client)}/iterations", json=body)
-    kind.model_validate_json(answer.content)
+    checked(kind, answer.content)
     responses = client.get("/openapi.json").json()["paths"]["/studies/{id}/iterations"]["post"]["responses"]
     schema = responses[str(answer.status_code)]["content"]["application/problem+json"]["schema"]
     assert answer.json()["type"] in schema["discriminator"]["mapping"]
@@ -150,9 +154,9 @@ def test_what_either_endpoint_refuses_is_documented(
 def test_a_failed_request_leaves_no_trace(client: TestClient) -> None:
     path = begin(client)
     answer = client.post(f"{path}/iterations", json={"optimize": move(duration=0.05)})
-    problems.DurationTooShort.model_validate_json(answer.content)
+    checked(DurationTooShort, answer.content)
     answer = client.post(f"{path}/iterations", json={"optimize": move(deadline=1e-3)})
-    problems.DeadlineExceeded.model_validate_json(answer.content)
+    checked(DeadlineExceeded, answer.content)
     assert shown(client, path)["iterations"] == 0
     assert added(client, path, FREE)["number"] == 1
 
@@ -162,9 +166,9 @@ def test_deleted_with_all_that_belongs_to_it(recorded: TestClient) -> None:
     step = added(recorded, path, FREE)
     assert recorded.delete(path).status_code == 204
     for gone in (recorded.get(path), recorded.delete(path), recorded.get(f"{path}/iterations/1")):
-        problems.UnknownStudy.model_validate_json(gone.content)
-    problems.UnknownStudy.model_validate_json(recorded.post(f"{path}/iterations", json=FREE).content)
-    problems.UnknownAnswer.model_validate_json(recorded.get(f"/answers/{step['answer']}").content)
+        checked(UnknownStudy, gone.content)
+    checked(UnknownStudy, recorded.post(f"{path}/iterations", json=FREE).content)
+    checked(UnknownAnswer, recorded.get(f"/answers/{step['answer']}").content)
 
 
 def test_pages_hold_every_study_once(recorded: TestClient) -> None:
@@ -194,12 +198,12 @@ def test_a_repeated_request_makes_nothing_new(recorded: TestClient) -> None:
     assert "idempotency-replayed" not in first.headers
     assert second.headers["idempotency-replayed"] == "true"
     reused = recorded.post("/studies", json=body | {"threshold": 51.0}, headers=key)
-    problems.KeyReused.model_validate_json(reused.content)
+    checked(KeyReused, reused.content)
 
     path = first.headers["location"]
     steps = [added(recorded, path, FREE, headers=key) for _ in range(2)]
     assert steps[0] == steps[1]
-    problems.KeyReused.model_validate_json(recorded.post(f"{path}/iterations", json=LINE, headers=key).content)
+    checked(KeyReused, recorded.post(f"{path}/iterations", json=LINE, headers=key).content)
     assert added(recorded, begin(recorded), LINE, headers=key)["number"] == 1, "a key belongs to one study"
     assert shown(recorded, path)["iterations"] == 1
 
@@ -237,14 +241,14 @@ def test_a_malformed_study_is_refused(recorded: TestClient, body: dict[str, Any]
     sent = body if not body else {"name": "A study", "threshold": 50.0, **body}
     answer = recorded.post("/studies", json=sent)
     assert answer.status_code == 422
-    errors = problems.Validation.model_validate_json(answer.content).errors
+    errors = checked(InvalidRequest, answer.content).errors
     assert loc in [error.loc for error in errors]
     assert SECRET not in answer.text
 
 
 def test_an_unknown_robot_is_refused(recorded: TestClient) -> None:
     answer = recorded.post("/studies", json={"name": "A study", "threshold": 50.0, "robot": "r2d2"})
-    problems.UnknownRobot.model_validate_json(answer.content)
+    checked(UnknownRobot, answer.content)
 
 
 @pytest.mark.parametrize(
@@ -261,14 +265,14 @@ def test_an_unknown_robot_is_refused(recorded: TestClient) -> None:
 )
 def test_a_malformed_iteration_is_refused(recorded: TestClient, body: Any) -> None:
     answer = recorded.post(f"{begin(recorded)}/iterations", json=body)
-    assert problems.Validation.model_validate_json(answer.content).errors
+    assert checked(InvalidRequest, answer.content).errors
     assert SECRET not in answer.text
 
 
 @pytest.mark.parametrize("key", ["", "x" * 129, "two words"])
 def test_a_malformed_key_is_refused(recorded: TestClient, key: str) -> None:
     answer = recorded.post("/studies", json={"name": "A", "threshold": 1.0}, headers={"Idempotency-Key": key})
-    (error,) = problems.Validation.model_validate_json(answer.content).errors
+    (error,) = checked(InvalidRequest, answer.content).errors
     assert error.loc == ["header", "Idempotency-Key"]
 
 
@@ -277,7 +281,7 @@ def test_a_malformed_key_is_refused(recorded: TestClient, key: str) -> None:
 )
 def test_a_malformed_query_is_refused(recorded: TestClient, query: str) -> None:
     answer = recorded.get(f"/studies?{query}")
-    assert problems.Validation.model_validate_json(answer.content).errors
+    assert checked(InvalidRequest, answer.content).errors
     assert SECRET not in answer.text
 
 
@@ -290,60 +294,10 @@ def test_unknown_study(recorded: TestClient, id: str) -> None:
     ]
     for answer in [*answers, recorded.post(f"/studies/{id}/iterations", json=FREE)]:
         assert answer.status_code == 404
-        problems.UnknownStudy.model_validate_json(answer.content)
+        checked(UnknownStudy, answer.content)
 
 
-@pytest.mark.parametrize(("number", "kind"), [("2", "UnknownStudy"), ("0", "Validation"), ("9" * 30, "Validation")])
-def test_unknown_iteration(recorded: TestClient, number: str, kind: str) -> None:
+@pytest.mark.parametrize(("number", "kind"), [("2", UnknownStudy), ("0", InvalidRequest), ("9" * 30, InvalidRequest)])
+def test_unknown_iteration(recorded: TestClient, number: str, kind: type[DeclaredError]) -> None:
     path = begin(recorded)
-    answer = recorded.get(f"{path}/iterations/{number}")
-    getattr(problems, kind).model_validate_json(answer.content)
-
-
-def databases() -> list[Any]:
-    missing = why_no_postgres()
-    skipped = pytest.mark.skipif(missing is not None, reason=str(missing))
-    return ["sqlite", pytest.param("postgres", marks=[skipped, pytest.mark.long])]
-
-
-class Over:
-    """A live server, called as a test client is."""
-
-    def __init__(self, server: Server) -> None:
-        self.get = server.get
-        self._server = server
-
-    def post(self, path: str, json: Any, **options: Any) -> Any:
-        return self._server.post(path, json, **options)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("kind", databases())
-def test_what_was_acknowledged_outlives_a_kill(kind: str, tmp_path: Path) -> None:
-    if kind == "sqlite":
-        check_kill(f"sqlite:///{tmp_path}/joulepath.db")
-    else:
-        with postgres() as database:
-            check_kill(database.url)
-
-
-def check_kill(url: str) -> None:
-    """Kills one of two servers on one database right after its answers, and asks the others."""
-    with serving(workers=1, database_url=url) as other:
-        with serving(workers=1, database_url=url) as killed:
-            path = begin(Over(killed))
-            step = added(Over(killed), path, LINE)
-            killed.process.send_signal(signal.SIGKILL)
-            killed.process.wait()
-        with serving(workers=1, database_url=url) as restarted:
-            for server in (other, restarted):
-                assert [entry["answer"] for entry in shown(Over(server), path)["history"]] == [step["answer"]]
-                kept = server.get(f"/answers/{step['answer']}").json()["answer"]
-                assert kept["energy"]["electrical"]["total"] == step["energy"]
-            # both servers, at once: numbers are counted without gaps and none is given twice
-            with ThreadPoolExecutor(6) as pool:
-                servers = [other, restarted] * 3
-                numbers = list(pool.map(lambda server: added(Over(server), path, LINE)["number"], servers))
-            assert sorted(numbers) == list(range(2, 8))
-            for server in (other, restarted):
-                assert [entry["number"] for entry in shown(Over(server), path)["history"]] == list(range(1, 8))
+    checked(kind, recorded.get(f"{path}/iterations/{number}").content)

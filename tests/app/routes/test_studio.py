@@ -11,7 +11,8 @@ from xml.etree import ElementTree
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.transport import NotFound
+from joulepath.optimizer.exceptions import UnknownRobot
 from tests.app.live import ROOT
 from tests.app.routes.test_problems import refused
 
@@ -46,7 +47,7 @@ def test_a_file_is_sent_once(client: TestClient) -> None:
 
 @pytest.mark.parametrize("path", ["nothing.js", "", "vendor", "../main.js", "%2e%2e/__init__.py", "x" * 5000])
 def test_nothing_else_is_served(client: TestClient, path: str) -> None:
-    refused(client.get(f"/studio/{path}"), problems.NotFound)
+    refused(client.get(f"/studio/{path}"), NotFound)
 
 
 def test_the_first_load_is_small(client: TestClient) -> None:
@@ -99,4 +100,4 @@ def test_the_urdf_of_a_robot(client: TestClient) -> None:
     robot = ElementTree.fromstring(answer.text)
     links = [link.get("name") for link in robot.findall("link")]
     assert links[0] == "base" and links[-1] == "flange" and len(robot.findall("joint[@type='revolute']")) == 6
-    refused(client.get("/robots/none/urdf"), problems.UnknownRobot)
+    refused(client.get("/robots/none/urdf"), UnknownRobot)

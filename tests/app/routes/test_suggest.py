@@ -9,13 +9,16 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.convert.pose import to_matrix
-from joulepath.app.schemas import errors as problems
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.queue import ShuttingDown
+from joulepath.app.exceptions.stored import EmptyStudy, UnknownStudy
 from joulepath.app.schemas.common import QuaternionPose
 from joulepath.app.schemas.suggestions import Suggestions
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.tcp import rotated_poses
 from joulepath.optimizer.problem.arm import Arm
+from tests.app.problems import checked
 from tests.app.recorded import recorded_service
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_studies import ABSENT, SECRET, added, begin
@@ -210,21 +213,21 @@ def test_a_shutdown_is_told_as_one(client: TestClient) -> None:
         stopping.portal.call(stopping.app.state.engine.drain)  # type: ignore[attr-defined]
         answer = stopping.get(f"{path}/suggest")
     assert answer.status_code == 503
-    problems.ShuttingDown.model_validate_json(answer.content)
+    checked(ShuttingDown, answer.content)
 
 
 def test_an_empty_study_has_no_next_step(client: TestClient) -> None:
     answer = client.get(f"{begin(client)}/suggest")
     assert answer.status_code == 409
-    problems.EmptyStudy.model_validate_json(answer.content)
+    checked(EmptyStudy, answer.content)
 
 
 @pytest.mark.parametrize("query", ["base=worst", "deadline=0", "deadline=nan", "deadline=599", f"a%20{SECRET}=1"])
 def test_a_malformed_query_is_refused(client: TestClient, query: str) -> None:
     answer = client.get(f"/studies/{ABSENT}/suggest?{query}")
-    assert problems.Validation.model_validate_json(answer.content).errors
+    assert checked(InvalidRequest, answer.content).errors
     assert SECRET not in answer.text
 
 
 def test_unknown_study(client: TestClient) -> None:
-    problems.UnknownStudy.model_validate_json(client.get(f"/studies/{ABSENT}/suggest").content)
+    checked(UnknownStudy, client.get(f"/studies/{ABSENT}/suggest").content)

@@ -9,7 +9,8 @@ from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.optimize.task import OptimizeAnswer
-from joulepath.app.schemas.errors import UnreachableTargets
+from joulepath.optimizer.exceptions import UnreachableTargets
+from tests.app.problems import checked
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_validation import POSE, refused
 from tests.selection import long_but
@@ -35,7 +36,7 @@ def test_names_every_target_out_of_reach(client: TestClient) -> None:
     beyond = {"q": [*HOME[:5], 7.0]}
     answer = client.post("/optimize", json=move(start={"any_of": [FAR, beyond]}))
     assert answer.status_code == 422
-    UnreachableTargets.model_validate_json(answer.content)
+    checked(UnreachableTargets, answer.content)
     content = answer.json()
     assert content["target"] == "start"
     assert [entry["target"] for entry in content["unreachable"]] == [0, 1]

@@ -8,8 +8,10 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.transport import UnsupportedMediaType
 from joulepath.app.schemas import common
-from joulepath.app.schemas.errors import UnsupportedMediaType, Validation
+from tests.app.problems import checked
 from tests.app.requests import HOME, move
 
 SECRET = "caller-secret-7f3a"
@@ -23,7 +25,7 @@ def refused(client: TestClient, body: bytes | str | dict[str, Any], path: str = 
     answer = client.post(path, content=content, headers={"content-type": "application/json"})
     assert answer.status_code == 422, answer.text
     assert answer.headers["content-type"] == "application/problem+json"
-    problem = Validation.model_validate_json(answer.content)
+    problem = checked(InvalidRequest, answer.content)
     assert problem.errors
     return [error.model_dump() for error in problem.errors]
 
@@ -137,7 +139,7 @@ def test_what_is_declared_as_something_else_is_told_so(client: TestClient, conte
     if (path, content_type) != ("/evaluate", "text/csv"):
         answer = client.post(path, content=json.dumps(move()), headers={"content-type": content_type})
         assert answer.status_code == 415
-        UnsupportedMediaType.model_validate_json(answer.content)
+        checked(UnsupportedMediaType, answer.content)
 
 
 def test_names_only_the_first_of_many_errors(client: TestClient) -> None:

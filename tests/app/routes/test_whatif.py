@@ -11,7 +11,7 @@ from starlette.testclient import TestClient
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.evaluate.task import EvaluateAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
-from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.whatif import WhatifResponse
 from joulepath.app.tasks import answer_collector
 from joulepath.app.tasks.answer_collector import AnswerCollector
@@ -222,7 +222,7 @@ def change(**arm: Any) -> dict[str, Any]:
 def test_refuses_what_cannot_be_asked(client: TestClient, fields: dict[str, Any], loc: list[Any]) -> None:
     answer = client.post("/whatif", json=body(**fields))
     assert answer.status_code == 422, answer.text
-    assert answer.json()["type"] == "/problems/validation"
+    assert answer.json()["type"] == "/problems/invalid-request"
     assert answer.json()["errors"][0]["loc"][: len(loc) + 1] == ["body", *loc]
     assert "none of these" not in answer.text
 

@@ -17,7 +17,7 @@ from sqlalchemy import text
 
 from joulepath.app.access.client import OPERATOR
 from joulepath.app.engine.result import StoredAnswer
-from joulepath.app.exceptions import StoreFault, StoreUnavailable
+from joulepath.app.exceptions.stored import StoreFault, StoreUnavailable
 from joulepath.app.store import answers, studies
 from joulepath.app.store.database import create_database_engine
 from joulepath.app.store.store import Store

@@ -14,7 +14,8 @@ from joulepath.app.access.client import OPERATOR
 from joulepath.app.answers.envelope import AnswerFigures
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.result import StoredAnswer
-from joulepath.app.exceptions import JobNotCancellable, KeyReused, TooManyWaiting, UnknownAnswer, UnknownJob
+from joulepath.app.exceptions.queue import TooManyWaiting
+from joulepath.app.exceptions.stored import JobNotCancellable, KeyReused, UnknownAnswer, UnknownJob
 from joulepath.app.store import answers, job_events, jobs, leases
 from joulepath.app.store.jobs import NewJob, NewRequest
 from joulepath.app.store.leases import Lease, Outcome
@@ -176,7 +177,7 @@ def test_the_first_failure_may_end_a_job(bench: Bench) -> None:
     async def run() -> None:
         job_id = await bench.create(4, keep_going=False)
         first, second = await bench.lease("a", 2)
-        await bench.settle("a", Outcome(first, "failed", problem={"type": "/problems/internal"}))
+        await bench.settle("a", Outcome(first, "failed", problem={"type": "/problems/internal-error"}))
         assert await bench.states(job_id) == ["failed", "running", "cancelled", "cancelled"]
         await bench.settle("a", done(second))
         assert await bench.state(job_id) == "cancelled"

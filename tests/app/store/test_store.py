@@ -24,9 +24,8 @@ from sqlalchemy import func, select, text, update
 from starlette.testclient import TestClient
 
 from joulepath.app.engine.result import StoredAnswer, TaskResult
-from joulepath.app.exceptions import StoreUnavailable, UnknownAnswer
+from joulepath.app.exceptions.stored import StoreUnavailable, UnknownAnswer
 from joulepath.app.schemas import answers as schemas
-from joulepath.app.schemas import errors as problems
 from joulepath.app.settings import Settings
 from joulepath.app.store import answers, database
 from joulepath.app.store.database import OtherVersion, create_database_engine, migrate
@@ -35,6 +34,7 @@ from joulepath.app.store.store_answers import store_answers
 from joulepath.app.store.tables import Answer, Table, new_id, now
 from tests.app.databases import Postgres, why_no_postgres
 from tests.app.live import ROOT, WARM_UP, Server, serving
+from tests.app.problems import checked
 from tests.app.requests import move
 
 MISSING = why_no_postgres()
@@ -70,7 +70,7 @@ def until_refused(server: Server, cause: str | None) -> None:
             if answer.status_code == 200 and cause is None:
                 return
             if answer.json()["type"] == "/problems/store-unavailable":
-                problems.StoreUnavailable.model_validate_json(answer.content)
+                checked(StoreUnavailable, answer.content)
                 if answer.json()["cause"] == cause:
                     return
         time.sleep(0.05)
@@ -247,7 +247,7 @@ def test_answers_over_http(client: TestClient) -> None:
 def test_unknown_answer(client: TestClient, id: str) -> None:
     answer = client.get(f"/answers/{id}")
     assert answer.status_code == 404
-    problems.UnknownAnswer.model_validate_json(answer.content)
+    checked(UnknownAnswer, answer.content)
 
 
 @pytest.mark.parametrize(
@@ -265,7 +265,7 @@ def test_without_its_database_the_service_goes_on(url: str) -> None:
         assert server.post("/optimize", move()).status_code == 200
         answer = server.get("/answers/none")
         assert answer.status_code == 503
-        problems.StoreUnavailable.model_validate_json(answer.content)
+        checked(StoreUnavailable, answer.content)
         assert int(answer.headers["retry-after"]) > 0
         assert server.terminate() == 0
         errors = [entry for entry in server.logged() if entry["level"] == "error"]

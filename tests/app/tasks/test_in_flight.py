@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 import pytest
 
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.exceptions import Busy
+from joulepath.app.exceptions.queue import Busy
 from joulepath.app.store.cache import Asked
 from joulepath.app.tasks.in_flight import InFlight
 from joulepath.optimizer.exceptions import OutsideLimits

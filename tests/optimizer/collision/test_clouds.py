@@ -18,11 +18,12 @@ from joulepath.optimizer.collision.coal_distance import SKIN, coal_shape
 from joulepath.optimizer.collision.cores import Core
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.collision.state_validity import StateValidityChecker
-from joulepath.optimizer.exceptions import InvalidProblem, StartInCollision
+from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.clouds import MOST_POINTS, Points, TriangleMesh, Voxels
 from joulepath.optimizer.problem.clouds import Cloud as Shape
 from joulepath.optimizer.problem.scene import Attachment, Box, Mesh, Obstacle, Scene, Sphere
+from joulepath.optimizer.search.errors import StartInCollision
 from tests.optimizer.cells import LOADS, arm_in_cell, at, wander
 from tests.optimizer.moves import GOAL, START, problem_with
 from tests.selection import long_but

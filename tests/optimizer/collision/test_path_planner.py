@@ -23,7 +23,7 @@ from joulepath.optimizer.collision.path_planner import (
 )
 from joulepath.optimizer.collision.state_validity import StateValidityChecker
 from joulepath.optimizer.deadline import NEVER, Deadline
-from joulepath.optimizer.exceptions import NoCollisionFreeTrajectory, NoTrajectory
+from joulepath.optimizer.exceptions import NoTrajectory
 from joulepath.optimizer.kinematics.forward import joint_placements
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.path_constraints import PathConstraints, path_constraint_list
@@ -35,6 +35,7 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import Box, HalfSpace, Obstacle, Scene, Shape, capsule_between
 from joulepath.optimizer.problem.tool_cone import ToolCone
+from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory
 from joulepath.optimizer.trajectories.spline import sample
 from tests.optimizer.cells import LOADS, arm_in_cell, cell
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still

@@ -12,7 +12,6 @@ import pytest
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.divided_paths import PLACES, _cheapest, _costs, with_divided_paths
 from joulepath.optimizer.cycle.strands import Strand, strands_of
-from joulepath.optimizer.exceptions import PathInfeasible
 from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
 from joulepath.optimizer.kinematics.tool_course import ToolCourse
 from joulepath.optimizer.plan_cycle import plan_cycle
@@ -24,6 +23,7 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stop_path import StopPath
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.search.errors import PathInfeasible
 from tests.optimizer.cycle.cycles import PART
 from tests.optimizer.cycle.test_optimize_cycle import assert_true
 from tests.optimizer.cycle.test_paths import FREE, a_cycle, down

@@ -122,20 +122,31 @@ def test_a_deadline_gives_a_cycle_or_says_so(readings: int) -> None:
         ({"together": [("stop 0", "stop 1"), ("stop 1", "stop 2")]}, "together", "one list"),
         ({"together": [("stop 1",)]}, "together.0", "two"),
         ({"before": [("stop 1", "stop 1")]}, "before.0", "two"),
-        ({"before": [("stop 0", "stop 1"), ("stop 1", "stop 2"), ("stop 2", "stop 0")]}, "before", "stop 2"),
-        ({"before": [("stop 1", "stop 0")], "together": [("stop 0", "stop 1")]}, "before.0", "together"),
+    ],
+    ids=str,
+)
+def test_a_malformed_order_names_its_field(order: dict[str, Any], field: str, word: str) -> None:
+    with pytest.raises(InvalidProblem) as refusal:
+        inspection(0, 3, order=FreeOrder(**order))
+    assert refusal.value.field == field and word in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("order", "names", "word"),
+    [
+        ({"before": [("stop 1", "stop 0")], "together": [("stop 0", "stop 1")]}, ["stop 0", "stop 1"], "together"),
         (
             {"before": [("stop 0", "stop 2"), ("stop 2", "stop 1")], "together": [("stop 0", "stop 1")]},
-            "before",
-            "stop 2",
+            ["stop 0", "stop 1", "stop 2"],
+            "'stop 2'",
         ),
     ],
     ids=str,
 )
-def test_a_contradictory_order_names_its_field(order: dict[str, Any], field: str, word: str) -> None:
-    with pytest.raises(InvalidProblem) as refusal:
+def test_a_contradictory_order_names_its_stops(order: dict[str, Any], names: list[str], word: str) -> None:
+    with pytest.raises(ContradictoryOrder) as refusal:
         inspection(0, 3, order=FreeOrder(**order))
-    assert refusal.value.field == field and word in str(refusal.value)
+    assert sorted(refusal.value.names) == names and word in str(refusal.value)
 
 
 def test_stops_that_come_before_each_other_are_all_named() -> None:

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.cycle.errors import NoSequence
 from joulepath.optimizer.cycle.lazy_search import LazySearch
 from joulepath.optimizer.cycle.legs import Leg
 from joulepath.optimizer.deadline import NEVER
-from joulepath.optimizer.exceptions import DeadlineExceeded, NoSequence
+from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.trajectories.spline import Spline
 
 RANGE = 3.0

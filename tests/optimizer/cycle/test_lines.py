@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from joulepath.optimizer.cycle.ways import layers_of
-from joulepath.optimizer.exceptions import InvalidProblem, PathInfeasible, StopInCollision
+from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.arm import Arm
@@ -20,6 +20,7 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
 from joulepath.optimizer.problem.stops import Stop
+from joulepath.optimizer.search.errors import PathInfeasible, StopInCollision
 from tests.optimizer.cycle.cycles import HOME, pick_and_place
 from tests.optimizer.cycle.test_optimize_cycle import assert_true
 from tests.optimizer.moves import AMPLE, ROBOT, tcp_pose

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
+from joulepath.optimizer.cycle.errors import CycleTooShort
 from joulepath.optimizer.cycle.ways import layers_of
-from joulepath.optimizer.exceptions import CycleTooShort, InvalidProblem
+from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.free_order import FreeOrder

@@ -12,16 +12,10 @@ import pytest
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
+from joulepath.optimizer.cycle.errors import NoSequence
 from joulepath.optimizer.cycle.ways import layers_of
 from joulepath.optimizer.energy.dwell import holding_power
-from joulepath.optimizer.exceptions import (
-    DeadlineExceeded,
-    InvalidProblem,
-    NoSequence,
-    OutsideLimits,
-    StopInCollision,
-    UnreachablePose,
-)
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, OutsideLimits, UnreachablePose
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.plan_cycle import plan_cycle
@@ -35,6 +29,7 @@ from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.ends import EndConfiguration
+from joulepath.optimizer.search.errors import StopInCollision
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.cycle.cycles import HOME, PART, pick_and_place, poses
 from tests.optimizer.moves import AMPLE, ROBOT, torques
@@ -274,7 +269,7 @@ def test_a_wrong_cycle_names_its_field(field: str, given: dict[str, Any]) -> Non
 def test_joint_positions_out_of_range_name_the_stop_and_the_joint() -> None:
     with pytest.raises(OutsideLimits) as refusal:
         replace(pick_and_place(1, 2), stops=[Stop(name="a", target=HOME + 7.0)])
-    assert refusal.value.field == "stops.0.target.q" and refusal.value.joint == ROBOT.joint_names[0]
+    assert refusal.value.target == "stops.0.target" and refusal.value.joint == ROBOT.joint_names[0]
 
 
 def test_moves_into_a_stop_keep_its_limits() -> None:

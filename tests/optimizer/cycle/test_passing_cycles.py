@@ -13,8 +13,9 @@ import pytest
 from joulepath.optimizer.cycle.against_stopping import as_passed, start_from
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
+from joulepath.optimizer.cycle.errors import CycleTooShort
 from joulepath.optimizer.cycle.passing_leg import PassingLeg
-from joulepath.optimizer.exceptions import CycleTooShort, DeadlineExceeded, InvalidProblem
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.arm import Arm, Payload

@@ -12,7 +12,7 @@ import pytest
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.priced_search import priced_motion
 from joulepath.optimizer.cycle.ways import layers_of
-from joulepath.optimizer.exceptions import InvalidProblem, PathInfeasible
+from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.arm import Arm, Payload
@@ -26,6 +26,7 @@ from joulepath.optimizer.problem.stop_path import StopPath
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.search.errors import PathInfeasible
 from tests.optimizer.cycle.cycles import HOME, PART, pick_and_place
 from tests.optimizer.cycle.test_lines import INTO
 from tests.optimizer.cycle.test_optimize_cycle import assert_true

@@ -12,12 +12,13 @@ import pytest
 
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
+from joulepath.optimizer.cycle.errors import CycleTooShort
 from joulepath.optimizer.cycle.time_sharing import TimeSharing
 from joulepath.optimizer.cycle.time_sharing import duration_of as duration_of_all
 from joulepath.optimizer.cycle.timed_cycle import TimedSearch
 from joulepath.optimizer.cycle.ways import layers_of
 from joulepath.optimizer.energy.dwell import holding_power
-from joulepath.optimizer.exceptions import CycleTooShort, DeadlineExceeded, InvalidProblem, JoulepathError, NoTrajectory
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, JoulepathError, NoTrajectory
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.branches import BranchFilter

@@ -12,13 +12,14 @@ import pytest
 
 from joulepath.optimizer.energy.dwell import dwell_energy, holding_power, linear_dwells
 from joulepath.optimizer.energy.kernel_cache import compile_kernel
-from joulepath.optimizer.exceptions import DurationTooShort, InvalidProblem
+from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.result.solution import Solution
+from joulepath.optimizer.search.errors import DurationTooShort
 from tests.optimizer.moves import ROBOT, fixed, problem
 from tests.selection import long_but
 

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, OutsideLimits
 from joulepath.optimizer.excitation import excite as module
 from joulepath.optimizer.excitation.errors import ExcitationInfeasible
 from joulepath.optimizer.excitation.excitation_problem import Criterion, ExcitationProblem
@@ -164,7 +164,6 @@ def test_an_obstacle_of_the_planes_name_stands_for_it() -> None:
         ("parameters", {"parts": ("power",)}),
         ("criterion", {"criterion": "e"}),
         ("centre", {"centre": np.zeros(5)}),
-        ("centre.q", {"centre": np.full(6, 10.0)}),
         ("noise", {"noise": -1.0}),
         ("tool_cone", {"arm": Arm(robot=ARM.robot, tool_cone=ToolCone(np.eye(3)[2], -np.eye(3)[2], 0.2))}),
     ],
@@ -173,3 +172,9 @@ def test_wrong_problems(field: str, given: dict[str, object]) -> None:
     with pytest.raises(InvalidProblem) as caught:
         ExcitationProblem(**{"arm": ARM, **given})  # type: ignore[arg-type]
     assert caught.value.field == field
+
+
+def test_a_centre_out_of_range_is_refused() -> None:
+    with pytest.raises(OutsideLimits) as caught:
+        ExcitationProblem(arm=ARM, centre=np.full(6, 10.0))
+    assert caught.value.target == "centre"

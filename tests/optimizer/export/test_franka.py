@@ -8,7 +8,7 @@ from io import StringIO
 import numpy as np
 import pytest
 
-from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.franka import ROUNDING, FrankaOptions, to_franka
 from tests.optimizer.export.programs import cycle_with_payload
 from tests.optimizer.export.read_back.random_motions import one_move

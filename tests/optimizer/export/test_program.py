@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.evaluate.errors import NotCertified
 from joulepath.optimizer.evaluate.sample_check import check_samples
-from joulepath.optimizer.exceptions import InvalidProblem, NotCertified
+from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.export.certified import certified
 from joulepath.optimizer.export.program import Move, Program, Rest, program_of_cycle
 from joulepath.optimizer.plan_cycle import plan_cycle

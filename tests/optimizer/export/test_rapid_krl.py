@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.krl import KrlOptions, to_krl
 from joulepath.optimizer.export.program import Move, Program, Rest
 from joulepath.optimizer.export.rapid import RapidOptions, to_rapid

@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import FormatUnsuitable
 from joulepath.optimizer.export import quintic_points as points_module
+from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.program import Move, Program
 from joulepath.optimizer.export.quintic_points import POSITION_TOLERANCE, VELOCITY_TOLERANCE
 from joulepath.optimizer.export.ros_messages import MoveitOptions, Ros2Options, to_moveit, to_ros2

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from joulepath.app.api.evaluate.motion_csv import MotionCsv
-from joulepath.optimizer.exceptions import FormatUnsuitable
 from joulepath.optimizer.export.csv_table import to_csv
+from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.json_document import to_json
 from joulepath.optimizer.export.npz_arrays import to_npz
 from joulepath.optimizer.export.rows import TableOptions

@@ -9,7 +9,7 @@ import pytest
 from scipy.interpolate import make_lsq_spline
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import FormatUnsuitable
+from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.program import Move, Program
 from joulepath.optimizer.export.urscript import SET_POINT_ERROR, UrscriptOptions, to_urscript
 from joulepath.optimizer.trajectories.spline import retimed

@@ -11,7 +11,6 @@ from scipy.spatial import KDTree
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.energy.kernel_cache import compile_kernel
-from joulepath.optimizer.exceptions import NoCollisionFreeTrajectory
 from joulepath.optimizer.methods import METHODS, planned_paths, solver_for
 from joulepath.optimizer.methods.duration_intervals import duration_intervals
 from joulepath.optimizer.methods.method import SolveStatus
@@ -22,6 +21,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import MethodName, Problem
 from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
 from joulepath.optimizer.problem.tool_cone import ToolCone
+from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory
 from joulepath.optimizer.trajectories import bspline, quintic
 from joulepath.optimizer.trajectories.spline import least_time_scale, retimed, spline_of
 from tests.optimizer.moves import ROBOT, problem_with

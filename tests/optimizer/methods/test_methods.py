@@ -13,7 +13,6 @@ import pytest
 
 from joulepath.optimizer.deadline import NEVER
 from joulepath.optimizer.energy.kernel_cache import compile_kernel
-from joulepath.optimizer.exceptions import DurationTooShort
 from joulepath.optimizer.methods import METHODS, polynomial_ga
 from joulepath.optimizer.methods.method import SolveResult, with_excess
 from joulepath.optimizer.methods.polynomial_ga import PolynomialGA
@@ -24,6 +23,7 @@ from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.candidates import bound, pairs
 from joulepath.optimizer.search.ends import ends
+from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.trajectories.ruckig_motion import time_optimal_spline
 from tests.optimizer.clocks import LAST_READINGS, CountingClock
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, fixed, limits, problem, random_moves, tcp_pose

@@ -12,7 +12,7 @@ import pytest
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import NEVER, Deadline
 from joulepath.optimizer.energy.kernel_cache import compile_kernel
-from joulepath.optimizer.exceptions import TorqueInfeasible, UnreachablePose
+from joulepath.optimizer.exceptions import UnreachablePose
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.methods import solver_for
 from joulepath.optimizer.methods.method import SolveResult, SolveStatus
@@ -25,6 +25,7 @@ from joulepath.optimizer.search import candidates as search
 from joulepath.optimizer.search.branch_and_bound import explore
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.ends import ends
+from joulepath.optimizer.search.errors import TorqueInfeasible
 from joulepath.optimizer.surroundings import Surroundings
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem, tcp_pose, torques
 from tests.selection import long_but

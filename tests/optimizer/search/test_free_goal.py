@@ -11,7 +11,7 @@ import pytest
 from scipy.stats import qmc
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import InvalidProblem, NoReachableTarget, UnreachablePose
+from joulepath.optimizer.exceptions import InvalidProblem, UnreachablePose, UnreachableTargets
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.orientation_tolerance import excess_angle, nearest_orientation, sample_orientations
 from joulepath.optimizer.methods.duration_intervals import duration_intervals
@@ -248,7 +248,7 @@ def test_out_of_reach_in_every_orientation() -> None:
         optimize(problem(goal=far))
     assert refusal.value.distance is not None and 0.5 < refusal.value.distance < 1.5
     assert "each of the 96 orientations" in str(refusal.value)
-    with pytest.raises(NoReachableTarget):
+    with pytest.raises(UnreachableTargets):
         optimize(problem(goal=AnyOf((far, far))))
 
 

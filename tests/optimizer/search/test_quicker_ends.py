@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.exceptions import DurationTooShort
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.quicker_ends import with_quicker_ends
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sampled_ends import fastest_samples

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import InvalidProblem, NoReachableTarget, OutsideLimits
+from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits, UnreachableTargets
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.pose import Pose
@@ -70,7 +70,7 @@ def test_what_is_out_of_reach_is_named_and_left_out() -> None:
 
 
 def test_nothing_within_reach_is_an_error_that_names_each() -> None:
-    with pytest.raises(NoReachableTarget) as refusal:
+    with pytest.raises(UnreachableTargets) as refusal:
         optimize(problem(goal=AnyOf((FAR, BEYOND))))
     assert refusal.value.target == "goal"
     assert [each.target for each in refusal.value.unreachable] == [0, 1]

@@ -13,7 +13,7 @@ from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from joulepath.app.routes.large_bodies import LargeBodyRoute
 from joulepath.app.routes.parameters import deadline_of
 from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
-from joulepath.app.schemas import errors as problems
+from joulepath.optimizer.exceptions import OutsideLimits
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
@@ -22,7 +22,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     "/ik/path",
     summary="Configurations along a path of the TCP",
     response_model=model_of(IKPathAnswer),
-    responses=problem_responses(*WORKER_PROBLEMS, problems.OutsideLimits),
+    responses=problem_responses(*WORKER_PROBLEMS, OutsideLimits),
 )
 async def follow(
     request: Request,

@@ -1,0 +1,123 @@
+"""Problem details (RFC 9457): documents and schemas, made from what the classes of the errors declare."""
+
+from __future__ import annotations
+
+from dataclasses import is_dataclass
+from functools import cache
+from itertools import islice
+from typing import Any, Literal
+
+import numpy as np
+from fastapi.exceptions import RequestValidationError
+from pydantic import BaseModel, Field, ValidationError, create_model
+
+from joulepath.app.answers.declared import model_of, shown_fields
+from joulepath.app.convert.fields import location
+from joulepath.app.exceptions import access, base, queue, stored, transport
+from joulepath.app.exceptions.base import FieldError, InternalError, InvalidRequest
+from joulepath.app.http.validation_messages import told
+from joulepath.app.schemas.problem_details import ProblemDetails
+from joulepath.optimizer import exceptions as library
+from joulepath.optimizer.cycle import errors as sequence
+from joulepath.optimizer.evaluate import errors as given_motions
+from joulepath.optimizer.exceptions import DeclaredError, InvalidProblem
+from joulepath.optimizer.excitation import errors as excitation
+from joulepath.optimizer.export import errors as exports
+from joulepath.optimizer.identify import errors as identification
+from joulepath.optimizer.identify.logs import log_errors as logs
+from joulepath.optimizer.search import errors as search
+
+PREFIX = "/problems/"
+MOST_ERRORS = 20
+"""Errors that an `invalid-request` problem lists at most: a body can have thousands, and the first ones suffice."""
+
+_MODULES = (
+    *(base, library, search, sequence, given_motions, exports, logs, identification, excitation),
+    *(stored, queue, access, transport),
+)
+"""Where errors are declared, in the order of the reference."""
+
+
+@cache
+def types_of_error() -> tuple[type[DeclaredError], ...]:
+    """Every type of error that the service answers with."""
+    classes = (each for module in _MODULES for each in vars(module).values() if isinstance(each, type))
+    declared = (each for each in classes if issubclass(each, DeclaredError) and "title" in vars(each))
+    # a module has the classes that it imports, too
+    return tuple(dict.fromkeys(declared))
+
+
+def reported(error: Exception) -> DeclaredError:
+    """The error that the client is told of."""
+    if isinstance(error, InvalidProblem):
+        return InvalidRequest([FieldError(loc=location(error, "body"), msg=str(error))], str(error))
+    # the message of an unforeseen exception is for the log, not for the client
+    return error if isinstance(error, DeclaredError) else InternalError()
+
+
+def problem_of(error: Exception, instance: str) -> dict[str, Any]:
+    """The document: the request `instance` failed with `error`."""
+    error = reported(error)
+    fixed = {"type": path_of(type(error)), "title": error.title, "status": error.status}
+    own = {name: _plain(getattr(error, name)) for name in _names(error.type_of_error())}
+    return fixed | {"detail": str(error), "instance": instance} | own
+
+
+def path_of(kind: type[DeclaredError]) -> str:
+    """The `type` of a document: the path of the page about it."""
+    return PREFIX + kind.slug()
+
+
+def invalid_request(error: ValidationError | RequestValidationError, *where: str) -> InvalidRequest:
+    """The InvalidRequest for errors of pydantic or FastAPI; their locations start with `where`.
+
+    What each says is in `validation_messages`.
+    """
+    entries = (entry for each in error.errors()[:MOST_ERRORS] for entry in told(each, where))
+    return InvalidRequest(list(islice(entries, MOST_ERRORS)))
+
+
+def model_of_problem(kind: type[DeclaredError]) -> type[ProblemDetails]:
+    """The pydantic model of the documents of a type of error."""
+    fixed = {"type": path_of(kind), "title": kind.title, "status": kind.status}
+    fields: dict[str, Any] = {
+        name: (Literal[value], Field(default=value, description=ProblemDetails.model_fields[name].description))
+        for name, value in fixed.items()
+    }
+    fields |= {name: (field.annotation, field) for name, field in _model(kind).model_fields.items()}
+    return create_model(kind.__name__, __base__=ProblemDetails, __doc__=explanation(kind), **fields)
+
+
+def own_fields(kind: type[DeclaredError]) -> dict[str, str]:
+    """The fields that the documents of a type have beside those of every type, with their meaning."""
+    fields = model_of_problem(kind).model_fields
+    return {name: fields[name].description or "" for name in _names(kind)}
+
+
+def explanation(kind: type[DeclaredError]) -> str:
+    """When an error of this type occurs, and what to do about it."""
+    return f"{occasion(kind)} {kind.remedy}"
+
+
+def occasion(kind: type[DeclaredError]) -> str:
+    """When an error of this type occurs."""
+    return " ".join((kind.__doc__ or "").split())
+
+
+def _names(kind: type) -> tuple[str, ...]:
+    return shown_fields(kind)
+
+
+def _model(kind: type) -> type[BaseModel]:
+    return model_of(kind)
+
+
+def _plain(value: Any) -> Any:
+    """The data of an error as JSON."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, dict):
+        return {name: _plain(each) for name, each in value.items()}
+    if is_dataclass(value) or hasattr(value, "_fields"):
+        return {name: _plain(getattr(value, name)) for name in _names(type(value))}
+    return [_plain(each) for each in value] if isinstance(value, list | tuple) else value
