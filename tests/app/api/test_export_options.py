@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from joulepath.app.api.export.request import ExportRequest, option_field, to_options
-from joulepath.app.exceptions import InvalidRequest
+from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.given_answer import AnswerRequest
 from joulepath.optimizer.export.export import FORMATS
 from joulepath.optimizer.export.formats import FORMAT_NAMES, FormatName
