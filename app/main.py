@@ -13,12 +13,15 @@ from starlette.middleware.cors import CORSMiddleware
 from joulepath import __version__
 from joulepath.app.access.key_ring import KeyRing
 from joulepath.app.access.start import key_ring
+from joulepath.app.api.compare import route as compare
 from joulepath.app.api.evaluate import route as evaluate
 from joulepath.app.api.export import route as export
 from joulepath.app.api.ik import route as ik
 from joulepath.app.api.ik.path import route as ik_path
 from joulepath.app.api.optimize import route as optimize
+from joulepath.app.api.pareto import route as pareto
 from joulepath.app.api.replay import route as replay
+from joulepath.app.api.whatif import route as whatif
 from joulepath.app.cluster.link import Cluster
 from joulepath.app.engine.pool import Engine
 from joulepath.app.engine.warm_up import warm
@@ -34,7 +37,6 @@ from joulepath.app.jobs.jobs import Jobs
 from joulepath.app.routes import (
     answers,
     cluster,
-    compare,
     cycle,
     docs,
     excitation,
@@ -45,13 +47,11 @@ from joulepath.app.routes import (
     jobs,
     logs,
     metrics,
-    pareto,
     problems,
     robots,
     studies,
     studio,
     suggest,
-    whatif,
 )
 from joulepath.app.settings import Settings
 from joulepath.app.store.store import Store

@@ -22,14 +22,12 @@ import orjson
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
 from benchmarks.tasks import as_pose, flange
+from joulepath.app.api.compare.task import CompareRequest, CompareTask
 from joulepath.app.api.optimize.task import OptimizeTask
-from joulepath.app.schemas.compare import CompareRequest
+from joulepath.app.api.pareto.task import ParetoRequest, ParetoTask
 from joulepath.app.schemas.cycle import CycleRequest
-from joulepath.app.schemas.pareto import ParetoRequest
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.app.tasks.compare import CompareTask
 from joulepath.app.tasks.cycle import CycleTask
-from joulepath.app.tasks.pareto import ParetoTask
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.exceptions import JoulepathError

@@ -25,12 +25,11 @@ from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
 from benchmarks.tasks import as_pose, collision_free, flange
 from joulepath.app.api.optimize.task import OptimizeTask
+from joulepath.app.api.pareto.task import ParetoRequest, ParetoTask
 from joulepath.app.engine.result import json_document
 from joulepath.app.engine.task import Task
 from joulepath.app.http.problems import problem_of
-from joulepath.app.schemas.pareto import ParetoRequest
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.app.tasks.pareto import ParetoTask
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from joulepath.optimizer.optimize import warm_up

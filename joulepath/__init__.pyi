@@ -48,7 +48,7 @@ from .optimizer.identify.results import Advice, Parameter, Validation
 from .optimizer.inverse_kinematics import IKSolution, IKSolutions, inverse_kinematics
 from .optimizer.optimize import optimize
 from .optimizer.optimize_many import Optimized, optimize_many
-from .optimizer.pareto import Dropped, Front, pareto
+from .optimizer.pareto import pareto
 from .optimizer.plan_cycle import plan_cycle
 from .optimizer.problem.arm import Arm, Inverter, Payload
 from .optimizer.problem.branches import BranchFilter
@@ -102,6 +102,7 @@ from .optimizer.result.energy import (
     SavingInterval,
     StorageUse,
 )
+from .optimizer.result.front import Dropped, Front, FrontSolver
 from .optimizer.result.solution import (
     Baseline,
     Configuration,
@@ -170,6 +171,7 @@ __all__ = [
     "FrankaOptions",
     "FreeOrder",
     "Front",
+    "FrontSolver",
     "GoalInCollision",
     "HalfSpace",
     "IKSolution",

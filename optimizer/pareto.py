@@ -21,7 +21,6 @@ import math
 import time
 from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
-from typing import Literal
 
 import numpy as np
 
@@ -30,6 +29,7 @@ from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, NoT
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, forward, nobody
+from joulepath.optimizer.result.front import Dropped, Front, FrontSolver
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.fastest import fastest, fastest_of
@@ -48,32 +48,6 @@ SAME_DURATION, SAME_JUMP, BEFORE_JUMP = 2e-4, 2e-3, (1e-4, 1e-3)
 LEAST_TIME = 1e-3
 # relative difference of two energies that are the same optimum: solves from other guesses and knots scatter by as much
 CONVERGED = 1e-3
-
-
-@dataclass(frozen=True)
-class Dropped:
-    """A duration [s] that gave no point of the front, the energy [J] of its motion in the objective, and the reason."""
-
-    duration: float
-    energy: float | None
-    reason: str
-
-
-@dataclass(frozen=True)
-class Front:
-    """Motions of which none is both slower and of no less energy than another, fastest first.
-
-    `shortest` [s] is the least feasible duration over all candidates. `status` is `optimal` when every duration chosen
-    was solved and every motion is optimal, `feasible` if the deadline passed before. `wall_time` [s] and `nlp_solves`
-    are for the whole front.
-    """
-
-    status: Literal["optimal", "feasible"]
-    shortest: float
-    points: list[Solution]
-    dropped: list[Dropped]
-    wall_time: float
-    nlp_solves: int
 
 
 @dataclass(frozen=True)
@@ -332,8 +306,10 @@ class _Search:
             shortest=shortest,
             points=points,
             dropped=[each for each in dropped if math.isfinite(each.duration)],
-            wall_time=self.clock() - self.began,
-            nlp_solves=self.solves + self.fastest_run.incumbent.solves,
+            solver=FrontSolver(
+                wall_time=self.clock() - self.began,
+                nlp_solves=self.solves + self.fastest_run.incumbent.solves,
+            ),
         )
 
 

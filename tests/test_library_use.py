@@ -42,7 +42,7 @@ TYPES = {
     "Certificate", "Clearance", "ClosestPair", "Compared", "Comparison", "ConeOrientedPose", "Configuration",
     "Contact", "Coupling", "Cycle", "CycleBaseline", "CycleMove", "CycleSolution", "Cylinder",
     "Dropped", "Dwell", "ElectricalEnergy", "Energy", "EnergyInterval", "Evaluation",
-    "ExportedFile", "FrankaOptions", "FreeOrder", "Front", "HalfSpace", "IKSolution",
+    "ExportedFile", "FrankaOptions", "FreeOrder", "Front", "FrontSolver", "HalfSpace", "IKSolution",
     "IKSolutions", "Identification", "IdentificationOptions", "Improved", "IntervalEnergy",
     "Inverter", "JointEnergy", "KrlOptions", "LeastClearance", "LimitReport", "Limits",
     "LimitsInForce", "Line", "Log", "LogMove", "LogOptions", "LogReading", "LogReport",

@@ -7,16 +7,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Tag
 
+from joulepath.app.api.compare.task import CompareRequest
+from joulepath.app.api.pareto.task import ParetoRequest
+from joulepath.app.api.whatif.task import WhatifRequest
 from joulepath.app.schemas.common import Request, Response, by_field, described, part
-from joulepath.app.schemas.compare import CompareRequest
 from joulepath.app.schemas.cycle import CycleRequest
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.examples.values import ANSWER_PATH, CREATED, EVALUATE, JOB_ID, OPTIMIZE
-from joulepath.app.schemas.pareto import ParetoRequest
 from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.schemas.studies import Name
-from joulepath.app.schemas.whatif import WhatifRequest
 
 MOST_REQUESTS = 10_000
 """Most requests of one job."""

@@ -9,25 +9,22 @@ from typing import Any
 
 import orjson
 
+from joulepath.app.api.compare.task import CompareRequest, CompareTask
 from joulepath.app.api.evaluate.task import EvaluateAnswer, evaluated
 from joulepath.app.api.optimize.task import OptimizeTask
+from joulepath.app.api.pareto.task import ParetoRequest, ParetoTask
+from joulepath.app.api.whatif.task import WhatifRequest, WhatifTask
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.schemas.compare import CompareRequest
 from joulepath.app.schemas.cycle import CycleRequest
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.identifications import IdentifyRequest
-from joulepath.app.schemas.pareto import ParetoRequest
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.app.schemas.whatif import WhatifRequest
 from joulepath.app.store.leases import FoundFigures
 from joulepath.app.tasks.answer_figures import figures_of
-from joulepath.app.tasks.compare import CompareTask
 from joulepath.app.tasks.cycle import CycleTask
 from joulepath.app.tasks.figures import replacing
 from joulepath.app.tasks.identify import IdentifyTask, Stored
-from joulepath.app.tasks.pareto import ParetoTask
-from joulepath.app.tasks.whatif import WhatifTask
 from joulepath.optimizer.deadline import Deadline
 
 IDENTIFY, CYCLE = "identify", "cycle"

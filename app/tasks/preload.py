@@ -9,15 +9,12 @@ from pkgutil import walk_packages
 from joulepath.app.engine.imports import importing
 
 TASKS = (
-    "compare",
     "cycle",
     "job_body",
     "job_request",
     "own_robot",
-    "pareto",
     "read_body",
     "study_step",
-    "whatif",
 )
 
 with importing():

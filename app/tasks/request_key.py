@@ -9,9 +9,9 @@ import orjson
 from pydantic import BaseModel
 
 from joulepath import __version__
+from joulepath.app.api.whatif.task import WhatifRequest
 from joulepath.app.schemas.arm import ArmRequest
 from joulepath.app.schemas.cycle import CycleRequest
-from joulepath.app.schemas.whatif import WhatifRequest
 from joulepath.app.store.cache import Meaning
 
 _FORM = 2

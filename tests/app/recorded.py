@@ -21,20 +21,18 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.answers.envelope import AnswerFigures
+from joulepath.app.api.compare.task import CompareRequest, CompareTask
 from joulepath.app.api.optimize.task import OptimizeTask
+from joulepath.app.api.pareto.task import ParetoRequest, ParetoTask
 from joulepath.app.engine import forkserver, pool
 from joulepath.app.engine.result import StoredAnswer, TaskResult
 from joulepath.app.engine.task import Task, outcome
 from joulepath.app.engine.work import Ended, Take, Work
 from joulepath.app.main import create_app
-from joulepath.app.schemas.compare import CompareRequest
 from joulepath.app.schemas.cycle import CycleRequest
-from joulepath.app.schemas.pareto import ParetoRequest
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.settings import Settings
-from joulepath.app.tasks.compare import CompareTask
 from joulepath.app.tasks.cycle import CycleTask
-from joulepath.app.tasks.pareto import ParetoTask
 from joulepath.optimizer.deadline import Stopped
 from joulepath.optimizer.progress import Tell, nobody
 from tests.app.live import COMPUTED, LOCAL, WARM_UP

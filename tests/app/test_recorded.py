@@ -10,16 +10,16 @@ from pydantic import BaseModel
 from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
+from joulepath.app.api.compare.task import CompareAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
-from joulepath.app.schemas.compare import CompareResponse
+from joulepath.app.api.pareto.task import ParetoAnswer
 from joulepath.app.schemas.cycle import CycleResponse
-from joulepath.app.schemas.pareto import ParetoResponse
 from tests.app.recorded import FOLDER, TASKS, record
 
 SCHEMAS: dict[str, type[BaseModel]] = {
     "optimize": model_of(OptimizeAnswer),
-    "compare": CompareResponse,
-    "pareto": ParetoResponse,
+    "compare": model_of(CompareAnswer),
+    "pareto": model_of(ParetoAnswer),
     "cycle": CycleResponse,
 }
 

@@ -13,13 +13,14 @@ from scipy.spatial.transform import Rotation
 
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, JoulepathError
 from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.pareto import CONVERGED, Front, pareto
+from joulepath.optimizer.pareto import CONVERGED, pareto
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.result.front import Front
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.run import Run
@@ -287,7 +288,7 @@ def test_a_deadline_gives_what_was_found(readings: int) -> None:
         return
     assert front.points and all(point.certificate.valid for point in front.points)
     assert len(front.points) + len(front.dropped) < 50 and front.status == "feasible"
-    assert front.wall_time < readings + LAST_READINGS
+    assert front.solver.wall_time < readings + LAST_READINGS
 
 
 def test_a_front_without_its_end_of_least_energy_is_not_optimal(monkeypatch: pytest.MonkeyPatch) -> None:

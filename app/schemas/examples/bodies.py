@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from joulepath.app.schemas.examples.compare import COMPARE_EXAMPLES
 from joulepath.app.schemas.examples.excitation import EXCITATION_EXAMPLES
 from joulepath.app.schemas.examples.figures import FIGURES_EXAMPLES
 from joulepath.app.schemas.examples.files import Example, body_examples, shown
@@ -10,16 +9,11 @@ from joulepath.app.schemas.examples.identifications import IDENTIFY_EXAMPLES
 from joulepath.app.schemas.examples.jobs import NEW_JOB_EXAMPLES
 from joulepath.app.schemas.examples.logs import LOG_EXAMPLES
 from joulepath.app.schemas.examples.own_arm import NEW_ROBOT_EXAMPLES, PUT_EXAMPLES
-from joulepath.app.schemas.examples.pareto import PARETO_EXAMPLES
 from joulepath.app.schemas.examples.studies import ITERATION_EXAMPLES, STUDY_EXAMPLES
-from joulepath.app.schemas.examples.whatif import WHATIF_EXAMPLES
 
 JSON, CSV = "application/json", "text/csv"
 BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     **{path: body_examples(path) for path in shown()},
-    "/compare": {JSON: COMPARE_EXAMPLES},
-    "/pareto": {JSON: PARETO_EXAMPLES},
-    "/whatif": {JSON: WHATIF_EXAMPLES},
     "/excitation": {JSON: EXCITATION_EXAMPLES},
     "/identifications": {JSON: IDENTIFY_EXAMPLES},
     "/logs": {CSV: LOG_EXAMPLES},

@@ -12,12 +12,12 @@ import orjson
 import pytest
 
 from joulepath.app.answers.declared import model_of
+from joulepath.app.api.compare.task import CompareAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
+from joulepath.app.api.pareto.task import ParetoAnswer
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.queue import TooManyRequests, WorkerLost
-from joulepath.app.schemas.compare import CompareResponse
 from joulepath.app.schemas.cycle import CycleResponse
-from joulepath.app.schemas.pareto import ParetoResponse
 from joulepath.optimizer.exceptions import DeclaredError, UnreachablePose
 from joulepath.optimizer.search.errors import DurationTooShort
 from tests.app.live import CLIENT, GRACE, Server, serving, until
@@ -80,10 +80,10 @@ def test_the_answer_is_that_of_a_request_without_progress(one: Server) -> None:
 def test_other_paths_tell_too(one: Server) -> None:
     start, goal = {"q": HOME}, {"q": NEAR}
     front = told(one, "/pareto", move(**SHORT, points=2))
-    ParetoResponse.model_validate_json(orjson.dumps(front[-1][1]))
+    model_of(ParetoAnswer).model_validate_json(orjson.dumps(front[-1][1]))
     assert front[0] == ("candidates", {"total": 2})
     compared = told(one, "/compare", move(methods=["time_scaling", "uniform_scaling"]))
-    CompareResponse.model_validate_json(orjson.dumps(compared[-1][1]))
+    model_of(CompareAnswer).model_validate_json(orjson.dumps(compared[-1][1]))
     assert [content["index"] for name, content in compared if name == "candidate"] == [0, 1]
     cycle = told(one, "/cycle", {"start": start, "stops": [{"target": goal}], "windings": False, **SHORT})
     CycleResponse.model_validate_json(orjson.dumps(cycle[-1][1]))

@@ -7,7 +7,8 @@ from typing import Any, get_args
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath.app.schemas.compare import CompareResponse
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.compare.task import CompareAnswer
 from joulepath.optimizer.problem.problem import MethodName
 from tests.app.requests import PATIENT
 from tests.selection import long_but
@@ -28,7 +29,7 @@ PATIENCE = 100.0
 def compared(client: TestClient, **given: Any) -> dict[str, Any]:
     answer = client.post("/compare", json=MOVE | {"deadline": PATIENCE} | given)
     assert answer.status_code == 200, answer.text
-    CompareResponse.model_validate_json(answer.content)
+    model_of(CompareAnswer).model_validate_json(answer.content)
     table: dict[str, Any] = answer.json()
     return table
 

@@ -12,10 +12,11 @@ from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.optimize.task import OptimizeAnswer
-from joulepath.app.schemas.examples.pareto import PARETO_EXAMPLES
-from joulepath.app.schemas.pareto import ParetoResponse
+from joulepath.app.api.pareto.task import ParetoAnswer
+from joulepath.app.schemas.examples.files import body_examples
 from tests.app.requests import move
 
+EXAMPLES = body_examples("/pareto")["application/json"]
 # enough for every point on a busy machine
 TIME = 100.0
 
@@ -26,13 +27,13 @@ SLOW = "branch_switch"
 
 @pytest.fixture(
     scope="module",
-    params=[pytest.param(name, marks=pytest.mark.long) if name == SLOW else name for name in PARETO_EXAMPLES],
+    params=[pytest.param(name, marks=pytest.mark.long) if name == SLOW else name for name in EXAMPLES],
 )
 def asked_and_answered(request: pytest.FixtureRequest, client: TestClient) -> tuple[dict[str, Any], dict[str, Any]]:
-    asked: dict[str, Any] = (PARETO_EXAMPLES[request.param]["value"] or {}) | {"deadline": TIME}
+    asked: dict[str, Any] = EXAMPLES[request.param]["value"] | {"deadline": TIME}
     answer = client.post("/pareto", json=asked)
     assert answer.status_code == 200, answer.text
-    ParetoResponse.model_validate_json(answer.content)
+    model_of(ParetoAnswer).model_validate_json(answer.content)
     return asked, answer.json()
 
 
@@ -65,7 +66,7 @@ def test_every_point_refers_to_its_answer(
 
 
 def test_as_csv(client: TestClient) -> None:
-    request = PARETO_EXAMPLES["lift"]["value"] or {}
+    request = EXAMPLES["lift"]["value"]
     answer = client.post("/pareto", json=request | {"points": 3, "deadline": TIME}, headers={"Accept": "text/csv"})
     assert answer.headers["content-type"].startswith("text/csv")
     rows = list(csv.DictReader(StringIO(answer.text)))

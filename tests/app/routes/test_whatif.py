@@ -11,8 +11,8 @@ from starlette.testclient import TestClient
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.evaluate.task import EvaluateAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
+from joulepath.app.api.whatif.answer import WhatifAnswer
 from joulepath.app.exceptions.base import InvalidRequest
-from joulepath.app.schemas.whatif import WhatifResponse
 from joulepath.app.tasks import answer_collector
 from joulepath.app.tasks.answer_collector import AnswerCollector
 from tests.app.requests import HOME, NEAR, move
@@ -38,7 +38,7 @@ def ask(client: TestClient, base: dict[str, Any], **changes: dict[str, Any]) -> 
     rows = [{"name": name, "arm": arm} for name, arm in changes.items()]
     answer = client.post("/whatif", json={**base, "changes": rows, "deadline": TIME})
     assert answer.status_code == 200, answer.text
-    WhatifResponse.model_validate_json(answer.content)
+    model_of(WhatifAnswer).model_validate_json(answer.content)
     content: dict[str, Any] = answer.json()
     assert [row["name"] for row in content["changes"]] == list(changes)
     return content | {"changes": {row["name"]: row for row in content["changes"]}}

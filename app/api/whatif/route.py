@@ -4,18 +4,24 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.whatif.answer import WhatifAnswer
+from joulepath.app.api.whatif.task import WhatifRequest, WhatifTask
 from joulepath.app.exceptions.stored import KeyReused, StoreUnavailable, UnknownLog
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from joulepath.app.routes.dependencies import (
+    ServiceArmEngine,
+    ServiceClient,
+    ServiceSettings,
+    ServiceStore,
+)
 from joulepath.app.routes.large_bodies import LargeBodyRoute
 from joulepath.app.routes.later import ACCEPTED, ServiceLater
 from joulepath.app.routes.parameters import deadline_of
 from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
-from joulepath.app.schemas.whatif import WhatifRequest, WhatifResponse
 from joulepath.app.store.store_answers import store_answers
-from joulepath.app.tasks.whatif import WhatifTask
 from joulepath.optimizer.exceptions import InvalidTable
 from joulepath.optimizer.search.errors import PathInfeasible
 
@@ -25,7 +31,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 @router.post(
     "/whatif",
     summary="The energy of a motion on a changed arm",
-    response_model=WhatifResponse,
+    response_model=model_of(WhatifAnswer),
     responses={
         **ACCEPTED,
         **problem_responses(
@@ -47,12 +53,14 @@ async def whatif(
     client: ServiceClient,
     later: ServiceLater,
 ) -> Response:
-    """Compares one motion on the arm as it is with the same task on changed arms: lighter links, another payload, other
-    drives or limits. Each change has two results, as differences from the base: the base's motion on the changed arm,
-    and the best motion of the changed arm. A given motion (`evaluate`) is evaluated only."""
+    """Compares one motion on the arm as it is with the same task on changed arms: lighter links,
+    another payload, other drives or limits. Each change has two results, as differences from the
+    base: the base's motion on the changed arm, and the best motion of the changed arm. A given
+    motion (`evaluate`) is evaluated only."""
     if later.wanted:
         return await later.respond("whatif", body)
     task = WhatifTask(body, request.state.id)
-    result = await unless_disconnected(request, engine.run(task, deadline_of(body, settings.max_deadline)))
+    deadline = deadline_of(body, settings.max_deadline)
+    result = await unless_disconnected(request, engine.run(task, deadline))
     kind = "evaluate" if body.optimize is None else "optimize"
     return result_response(await store_answers(store, settings, kind, result, client.owner))

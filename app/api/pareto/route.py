@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.pareto.task import ParetoAnswer, ParetoRequest, ParetoTask
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.stored import KeyReused, StoreUnavailable
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from joulepath.app.routes.dependencies import (
+    ServiceArmEngine,
+    ServiceClient,
+    ServiceSettings,
+    ServiceStore,
+)
 from joulepath.app.routes.large_bodies import LargeBodyRoute
 from joulepath.app.routes.later import ACCEPTED, ServiceLater
 from joulepath.app.routes.parameters import WantedFormat, deadline_of
 from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
 from joulepath.app.routes.reply import BY_EVENTS, ServiceReply
-from joulepath.app.schemas.pareto import ParetoRequest, ParetoResponse
 from joulepath.app.store.store_answers import store_answers
-from joulepath.app.tasks.pareto import ParetoTask
 from joulepath.optimizer.progress import Tell
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
@@ -24,7 +29,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 @router.post(
     "/pareto",
     summary="Energy over duration",
-    response_model=ParetoResponse,
+    response_model=model_of(ParetoAnswer),
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}}, **BY_EVENTS}},
         **ACCEPTED,
@@ -42,9 +47,10 @@ async def pareto(
     later: ServiceLater,
     reply: ServiceReply,
 ) -> Response:
-    """Finds the Pareto front of duration and energy over all arm configurations, from the fastest motion to the motion
-    of least energy. Each point refers to its complete answer. `Accept: text/csv` returns the points as CSV,
-    `Accept: text/event-stream` events while the search runs, and then the answer."""
+    """Finds the Pareto front of duration and energy over all arm configurations, from the fastest
+    motion to the motion of least energy. Each point refers to its complete answer.
+    `Accept: text/csv` returns the points as CSV, `Accept: text/event-stream` events while the
+    search runs, and then the answer."""
     if later.wanted:
         return await later.respond("pareto", body)
     task = ParetoTask(body, request.state.id, wanted)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.compare.task import CompareAnswer, CompareRequest, CompareTask
 from joulepath.app.exceptions.stored import KeyReused
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings
@@ -12,8 +14,6 @@ from joulepath.app.routes.later import ACCEPTED, ServiceLater
 from joulepath.app.routes.parameters import deadline_of
 from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
 from joulepath.app.routes.reply import BY_EVENTS, ServiceReply
-from joulepath.app.schemas.compare import CompareRequest, CompareResponse
-from joulepath.app.tasks.compare import CompareTask
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
@@ -21,8 +21,12 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 @router.post(
     "/compare",
     summary="The same motion by several methods",
-    response_model=CompareResponse,
-    responses={200: {"content": BY_EVENTS}, **ACCEPTED, **problem_responses(*MOTION_PROBLEMS, KeyReused)},
+    response_model=model_of(CompareAnswer),
+    responses={
+        200: {"content": BY_EVENTS},
+        **ACCEPTED,
+        **problem_responses(*MOTION_PROBLEMS, KeyReused),
+    },
 )
 async def compare(
     request: Request,
@@ -32,11 +36,13 @@ async def compare(
     later: ServiceLater,
     reply: ServiceReply,
 ) -> Response:
-    """Solves one request with several methods, one after another. The answer is a table of their energies, durations
-    and solve times; each motion is certified. A method that finds no motion has its problem in its row. If no method
-    finds a motion, the answer is the problem of the first method in the request. `Accept: text/event-stream` returns
-    events while the methods run, and then the answer."""
+    """Solves one request with several methods, one after another. The answer is a table of their
+    energies, durations and solve times; each motion is certified. A method that finds no motion has
+    its problem in its row. If no method finds a motion, the answer is the problem of the first
+    method in the request. `Accept: text/event-stream` returns events while the methods run, and
+    then the answer."""
     if later.wanted:
         return await later.respond("compare", body)
     task = CompareTask(body, request.state.id)
-    return await reply.of(lambda tell: engine.run(task, deadline_of(body, settings.max_deadline), tell))
+    deadline = deadline_of(body, settings.max_deadline)
+    return await reply.of(lambda tell: engine.run(task, deadline, tell))

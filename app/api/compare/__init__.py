@@ -1,0 +1,1 @@
+"""`POST /compare`: the same motion by several methods."""

@@ -1,0 +1,1 @@
+"""`POST /pareto`: energy over duration."""

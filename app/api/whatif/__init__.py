@@ -1,0 +1,1 @@
+"""`POST /whatif`: the energy of a motion on a changed arm."""
