@@ -16,10 +16,15 @@ from joulepath.app.access.start import key_ring
 from joulepath.app.api.answers import route as answers
 from joulepath.app.api.compare import route as compare
 from joulepath.app.api.cycle import route as cycle
+from joulepath.app.api.evaluate import route as evaluate
 from joulepath.app.api.excitation import route as excitation
+from joulepath.app.api.export import route as export
+from joulepath.app.api.ik import route as ik
+from joulepath.app.api.ik.path import route as ik_path
 from joulepath.app.api.jobs import route as jobs
 from joulepath.app.api.optimize import route as optimize
 from joulepath.app.api.pareto import route as pareto
+from joulepath.app.api.replay import route as replay
 from joulepath.app.api.studies import route as studies
 from joulepath.app.api.studies.iterations import route as iterations
 from joulepath.app.api.studies.suggest import route as suggest
@@ -39,17 +44,12 @@ from joulepath.app.jobs.jobs import Jobs
 from joulepath.app.routes import (
     cluster,
     docs,
-    evaluate,
-    export,
     figures,
     health,
     identifications,
-    ik,
-    ik_path,
     logs,
     metrics,
     problems,
-    replay,
     robots,
     studio,
 )

@@ -82,7 +82,15 @@ from .optimizer.progress import CandidatesFound, CandidateTried, Improved
 from .optimizer.replay.outcome import Outcome
 from .optimizer.replay.planned import PlannedBaseline, PlannedMotion, PlannedTorques
 from .optimizer.replay.play import Contact
-from .optimizer.replay.replay import Replay, ReplayedChange, SavingRange, replay
+from .optimizer.replay.replay import (
+    AsPlanned,
+    Replay,
+    ReplayedChange,
+    ReplayedRun,
+    SavingRange,
+    SimulatedSaving,
+    replay,
+)
 from .optimizer.result.candidates import CandidateReport, CandidateStatus, UnreachableTarget
 from .optimizer.result.certificate import Certificate, Clearance
 from .optimizer.result.energy import (
@@ -121,6 +129,7 @@ __all__ = [
     "Advice",
     "AnyOf",
     "Arm",
+    "AsPlanned",
     "Attachment",
     "Baseline",
     "Box",
@@ -224,6 +233,7 @@ __all__ = [
     "Recording",
     "Replay",
     "ReplayedChange",
+    "ReplayedRun",
     "Rest",
     "Robot",
     "Ros2Options",
@@ -231,6 +241,7 @@ __all__ = [
     "SavingInterval",
     "SavingRange",
     "Scene",
+    "SimulatedSaving",
     "SingularPose",
     "Solution",
     "SolverReport",

@@ -4,48 +4,52 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import overload
+from dataclasses import dataclass, field
+from typing import Annotated, overload
 
 import numpy as np
 
-from joulepath.models.robot import Array, Robot
+from joulepath.models.robot import Robot
 from joulepath.optimizer.collision.model import ClosestPair, collision_model
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
+from joulepath.optimizer.declared import PerJoint, Radians, Ratio, Unit
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.kinematics.ik_solutions import LimitedSolution
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.branches import BranchLabel
 from joulepath.optimizer.problem.pose import Pose
 
 
 @dataclass(frozen=True, eq=False)
 class IKSolution:
-    """One arm configuration that reaches a pose within the position limits.
+    """One arm configuration that reaches the pose."""
 
-    `q` (nq,) [rad] are its joint positions and `label` its branch, which full turns do not change.
-    `limit_distance` [rad] is the least distance of a joint from an end of its range.
-    `smallest_singular_value` is that of the flange's geometric Jacobian (m and rad mixed): near
-    zero, the configuration is nearly singular. `singular` names the parts of the label that are
-    singular. `free` names the joints that can move together while the TCP stays; it is empty for an
-    isolated configuration. `nearest` are the two bodies with the least clearance, margins
-    subtracted; None if no bodies are compared.
-    """
-
-    q: Array
-    label: BranchLabel
-    limit_distance: float
-    smallest_singular_value: float
+    label: str
+    """Branch: shoulder/elbow/wrist, or its number for an arm whose branches have no names. Full turns
+    of a joint do not change it."""
+    q: Annotated[PerJoint, Unit("rad")]
+    """Joint positions."""
+    limit_distance: Radians
+    """Smallest distance of a joint from an end of its range."""
+    smallest_singular_value: Ratio
+    """Smallest singular value of the Jacobian in metres and radians; near zero, the configuration is
+    nearly singular."""
     singular: tuple[str, ...]
+    """Parts of the branch that are singular here: the configuration is on both branches of such a
+    part."""
     free: tuple[str, ...]
+    """Joints that can move together while the TCP keeps its pose; empty if the configuration is
+    isolated. Then infinitely many configurations reach the pose, and `solutions` has some of them,
+    evenly spread."""
+    collides: bool = field(init=False)
+    """Whether `nearest.distance` is negative."""
     nearest: ClosestPair | None
+    """The two bodies with the smallest clearance. Null if the arm has no shapes to compare."""
 
-    @property
-    def collides(self) -> bool:
-        """Whether two bodies overlap, or are closer than a margin allows."""
-        return self.nearest is not None and self.nearest.distance < 0
+    def __post_init__(self) -> None:
+        collides = self.nearest is not None and self.nearest.distance < 0
+        object.__setattr__(self, "collides", collides)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,8 +130,8 @@ def _found(arm: Arm, pose: Pose, windings: bool) -> IKSolutions:
 def _solution(arm: Arm, found: LimitedSolution, nearest: ClosestPair | None) -> IKSolution:
     free = found.self_motion.free if found.self_motion else ()
     return IKSolution(
+        label=str(found.label),
         q=found.q,
-        label=found.label,
         limit_distance=found.limit_distance,
         smallest_singular_value=found.smallest_singular_value,
         singular=found.singular,

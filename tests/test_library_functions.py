@@ -147,7 +147,7 @@ def test_inverse_kinematics() -> None:
     assert min(float(np.abs(each.q - goal.q).max()) for each in found) < 1e-6
     branches = joulepath.inverse_kinematics(arm.robot, pose, windings=False)
     assert found.complete and branches.complete
-    assert len(branches) == len({str(each.label) for each in branches}) == 8 < len(found)
+    assert len(branches) == len({each.label for each in branches}) == 8 < len(found)
     assert not any(each.free for each in branches)
     T = np.eye(4)
     T[:3, 3] = 0.4, -0.2, 0.3
@@ -190,7 +190,7 @@ def test_inverse_kinematics_says_what_is_out_of_reach() -> None:
 def test_replay() -> None:
     found = joulepath.replay(solution(), ("feed_forward",), 1e-3, {"friction": 0.3}, problem=problem())
     assert found.torque_error is not None and found.torque_error < 1e-9
-    run = found.runs["feed_forward"]
+    run = found.under("feed_forward")
     assert electrical(run.energy) == pytest.approx(electrical(solution().energy), rel=5e-3)
     assert not run.collides
     assert {each.name for each in found.savings} == {each.name for each in solution().baselines}
@@ -202,7 +202,7 @@ def test_replay_of_a_cycle_plays_every_move() -> None:
     found = joulepath.replay(cycle_solution(), ("feed_forward",), 1e-3)
     assert len(found) == len(cycle_solution().moves)
     for replayed, move in zip(found, cycle_solution().moves, strict=True):
-        energy = electrical(replayed.runs["feed_forward"].energy)
+        energy = electrical(replayed.under("feed_forward").energy)
         assert energy == pytest.approx(electrical(move.solution.energy), rel=5e-3)
 
 

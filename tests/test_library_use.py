@@ -37,7 +37,7 @@ ERRORS = {
     "UnreachablePose",
 }
 TYPES = {
-    "Advice", "AnyOf", "Arm", "Attachment", "Baseline", "Box", "BranchFilter", "Bus",
+    "Advice", "AnyOf", "Arm", "AsPlanned", "Attachment", "Baseline", "Box", "BranchFilter", "Bus",
     "CandidateReport", "CandidateStatus", "CandidateTried", "CandidatesFound", "Capsule",
     "Certificate", "Clearance", "ClosestPair", "Compared", "Comparison", "ConeOrientedPose", "Configuration",
     "Contact", "Coupling", "Cycle", "CycleBaseline", "CycleMove", "CycleSolution", "Cylinder",
@@ -49,8 +49,8 @@ TYPES = {
     "MechanicalEnergy", "Mesh", "Move", "MoveitOptions", "Obstacle", "Optimized", "Outcome",
     "Parameter", "Payload", "PlannedBaseline", "PlannedMotion", "PlannedTorques", "Points",
     "Pose", "PosesAround", "Problem", "Program", "RapidOptions", "RecordedRows", "Recording",
-    "Replay", "ReplayedChange", "Rest", "Robot", "Ros2Options", "Samples", "SavingInterval",
-    "SavingRange", "Scene", "Solution", "SolverReport", "Sphere", "Spline", "Stop", "StopPath",
+    "Replay", "ReplayedChange", "ReplayedRun", "Rest", "Robot", "Ros2Options", "Samples", "SavingInterval",
+    "SavingRange", "Scene", "SimulatedSaving", "Solution", "SolverReport", "Sphere", "Spline", "Stop", "StopPath",
     "StorageUse", "TableOptions", "ToolCone", "ToolPath", "Trajectory", "TriangleMesh",
     "UnreachableTarget", "UrscriptOptions", "Validation", "Voxels", "Waypoints", "WhatIf",
 }

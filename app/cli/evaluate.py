@@ -70,7 +70,7 @@ def evaluate(
 
 
 def _answer(file: str, kind: Kind, fields: dict[str, Any], wanted: Kind, deadline: float) -> bytes:
-    from joulepath.app.tasks.evaluate import EvaluateTask
+    from joulepath.app.api.evaluate.task import EvaluateTask
 
     # as the query of POST /evaluate has them: each is JSON
     query = {name: orjson.dumps(value).decode() for name, value in fields.items()}

@@ -11,11 +11,10 @@ import orjson
 from joulepath.app.cli import terminal
 from joulepath.app.cli.answer import FILE, OUTPUT, answered, content_of, new_id, validated, write
 from joulepath.app.cli.kept_answers import WithStore
+from joulepath.optimizer.export.formats import FORMAT_NAMES, FormatName
 
 # wall time [s] that an export may take; it takes milliseconds
 DEADLINE = 120.0
-NAMES = ("urscript", "ros2", "moveit", "franka", "rapid", "krl", "csv", "json", "npz")
-"""The formats, known before the schemas are imported."""
 
 
 @click.command(
@@ -25,33 +24,32 @@ Examples:
   joulepath export urscript answer.json --speed-scale 0.1 --output slowly.script
   joulepath export ros2 answer.json --set message=trajectory > trajectory.yaml"""
 )
-@click.argument("format", type=click.Choice(NAMES))
+@click.argument("format", type=click.Choice(FORMAT_NAMES))
 @FILE
 @OUTPUT
 @click.option("--speed-scale", type=float, default=1.0, help="Fraction of the speed, certified again. Default: 1.")
 @click.option("--set", "options", multiple=True, metavar="NAME=VALUE", help="An option of the format, JSON or a word.")
-def export(format: str, file: str, output: Path | None, speed_scale: float, options: tuple[str, ...]) -> None:
+def export(format: FormatName, file: str, output: Path | None, speed_scale: float, options: tuple[str, ...]) -> None:
     """Writes the motion of an answer as a file for a robot controller.
 
     FILE is the JSON answer of `optimize`, of `evaluate` with a sample period, or of `POST /cycle`, whose moves must be
     in the database; or - for standard input. If standard error is a terminal, a summary follows: how far the file
     deviates, and what it leaves out.
     """
-    from joulepath.app.schemas.export import OPTIONS_OF, ExportFormat, ExportRequest
-    from joulepath.app.tasks.export import ExportResult, ExportTask
+    from joulepath.app.api.export.request import ExportRequest, option_field
+    from joulepath.app.api.export.task import ExportResult, ExportTask
 
-    chosen, request_id = ExportFormat(format), new_id()
-    given = _given(options)
-    if given and chosen not in OPTIONS_OF:
+    request_id, given, own = new_id(), _given(options), option_field(format)
+    if given and own is None:
         raise click.UsageError(f"The format {format} has no options.")
-    beside = {OPTIONS_OF[chosen]: given} if given else {}
+    beside = {own: given} if given else {}
     body = b'{"answer":%b,"speed_scale":%b%b}' % (
         content_of(file).strip() or b"null",
         orjson.dumps(speed_scale),
         b"".join(b",%b:%b" % (orjson.dumps(name), orjson.dumps(value)) for name, value in beside.items()),
     )
     request = validated(ExportRequest, body, request_id)
-    task = WithStore(ExportTask(request, chosen, False, request_id), request_id)
+    task = WithStore(ExportTask(request, format, False, request_id), request_id)
     with terminal.progress("Certifying the motion"):
         document = answered(task, DEADLINE, request_id)
     write(document, output)

@@ -49,8 +49,7 @@ def replay(
     in the database; or - for standard input. If standard error is a terminal, a summary follows: deviations, energies,
     contacts, savings.
     """
-    from joulepath.app.schemas.replay import ReplayRequest
-    from joulepath.app.tasks.replay import ReplayTask
+    from joulepath.app.api.replay.task import ReplayRequest, ReplayTask
 
     body = {"answer": _json(content_of(file), "FILE"), "perturb": dict(perturb) or None, **options}
     if arm is not None:

@@ -61,16 +61,16 @@ def replay_warnings(planned: PlannedMotion, found: Replay) -> list[str]:
         f"{name} has many parts and is not simulated: contacts with it are not found. The certificate counts it."
         for name in unsimulated(arm)
     ]
-    for control, run in found.runs.items():
-        said += _of_run(f"Under {control}", planned, found, run)
+    for run in found.runs:
+        said += _of_run(f"Under {run.control}", planned, found, run)
     for change in found.changes:
-        said += _of_run(f"With {change.quantity} times {change.factor:.4g}", planned, found, change.outcome)
+        said += _of_run(f"With {change.quantity} times {change.factor:.4g}", planned, found, change)
     return said
 
 
 def _of_run(what: str, planned: PlannedMotion, found: Replay, run: Outcome) -> list[str]:
     said = []
-    for joint, time, ratio in zip(planned.arm.robot.joint_names, run.saturated, found.planned_ratio, strict=True):
+    for joint, time, ratio in zip(planned.arm.robot.joint_names, run.saturated, found.planned.limit_ratio, strict=True):
         if time > 0:
             advice = ": plan with a tighter limits.torque." if ratio > LITTLE_LEFT else "."
             said.append(

@@ -1,4 +1,4 @@
-"""What `POST /evaluate` takes and answers."""
+"""What `POST /evaluate` takes."""
 
 from __future__ import annotations
 
@@ -7,21 +7,16 @@ from typing import Annotated, Literal, Self
 from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from joulepath.app.answers.declared import Shown
 from joulepath.app.schemas.arm import ArmRequest, one_or_each
-from joulepath.app.schemas.common import JointPositions, MotionAnswer, Request, Response, described, part
+from joulepath.app.schemas.common import JointPositions, Request, described
 from joulepath.app.schemas.examples.values import LOG_ID
 from joulepath.app.schemas.examples.values import PAPER_HOME as _HOME
 from joulepath.app.schemas.examples.values import PAPER_POSE as _THERE
 from joulepath.app.schemas.lengths import ID_LENGTH
 from joulepath.app.schemas.log_file import LogFile
 from joulepath.app.schemas.request import Seconds
-from joulepath.app.schemas.wording import BODIES, WARNINGS
-from joulepath.optimizer.evaluate.limit_report import LimitName
 from joulepath.optimizer.evaluate.sampler import MOST_SAMPLES
 from joulepath.optimizer.problem.problem import LONGEST_DURATION
-from joulepath.optimizer.result.energy import Energy
-from joulepath.optimizer.result.solution import Samples
 
 MAX_ROWS = 100_000
 """Largest number of rows of a motion sent as JSON; a CSV file may have more."""
@@ -150,98 +145,3 @@ class EvaluateRequest(EvaluateSettings):
 
 class EvaluateCsvSettings(EvaluateSettings, LogFile):
     """The query parameters of a CSV body."""
-
-
-class MeasuredEnergy(Response):
-    """Electrical energy by what was measured during this part of a log."""
-
-    electrical: float | None = described(
-        "Integral of the logged power of the arm's bus. Null if the log has none.", "J", 61.2
-    )
-    by_efforts: float | None = described(
-        "Integral of the power that the motors take by their logged currents or torques, with the losses of the "
-        "robot's drives and its idle power. Null if the log has none.",
-        "J",
-        59.8,
-    )
-
-
-class IntervalEnergy(Response):
-    """Energy of one segment of the motion, or of the whole motion."""
-
-    start: float = described("Time at which it starts, from the start of the motion.", "s", 0.0)
-    end: float = described("Time at which it ends, from the start of the motion.", "s", 1.5)
-    energy: Annotated[Energy, Shown] = part("Energy and power.")
-    mean_mechanical_power: float = described("Mean of Σ_j |tau_j v_j|: mechanical energy / duration.", "W", 14.3)
-    kinetic_start: float = described("Kinetic energy just after `start`, rotors included.", "J", 6.9)
-    kinetic_end: float = described("Kinetic energy just before `end`, rotors included.", "J", 6.2)
-    balance_error: float = described(
-        "|sum of the electrical parts - total| / total. It is large if the logged `v` and `a` do not fit `q`.",
-        "1",
-        1e-9,
-    )
-    measured: MeasuredEnergy | None = part("What was measured meanwhile; null without a log of power or efforts.")
-
-
-class LimitCheck(Response):
-    """One limit, at the instant of the motion with the largest value / limit."""
-
-    limit: LimitName = described(
-        "The limit. `tool_cone`, `tcp_speed` and `elbow_speed` only if the request limits them.", None, "velocity"
-    )
-    held: bool = described("Whether the motion is within this limit.", None, True)
-    worst_ratio: float | None = described(
-        "|value| / limit; for positions: distance from the middle of the range / half of the range. Null if the value"
-        " is infinite.",
-        "1",
-        0.42,
-    )
-    joint: str | None = described(
-        "Name of the joint; null for `tool_cone`, `tcp_speed` and `elbow_speed`.", None, "wrist_2_joint"
-    )
-    t: float = described("Time of this instant, from the start of the motion.", "s", 0.75)
-    value: float | None = described(
-        "Value at this instant, in the unit of the limit: rad, rad/s, rad/s², rad/s³, N·m or m/s. Null if it is "
-        "infinite: the acceleration at a velocity step, the jerk at an acceleration step.",
-        "SI",
-        1.31,
-    )
-    bound: float = described("Value of the limit, in the same unit.", "SI", 3.1416)
-
-
-class SampledClearance(Response):
-    """Smallest distance between two bodies at sample points. It proves nothing between two samples."""
-
-    distance: float = described(
-        "Distance minus the obstacle's `margin`; if negative, the two bodies are too close or overlap.", "m", 0.031
-    )
-    pair: list[str] = described(BODIES, None, ["table", "tool"])
-    time: float = described("Time of this sample, from the start of the motion.", "s", 0.62)
-    spacing: float = described("Largest time between two samples.", "s", 0.01)
-
-
-class EvaluateResponse(MotionAnswer):
-    """The energy of a given motion, and the limits that it violates."""
-
-    duration: float = described("Duration of the motion.", "s", 3.0)
-    total: IntervalEnergy = part("The whole motion.")
-    segments: list[IntervalEnergy] = part(
-        "Segments between configurations. A trajectory is one segment, and a log has one for each move and each rest. "
-        "Empty if there are more than 10,000."
-    )
-    segment_count: int = described("Number of segments.", "1", 2)
-    speed_jumps: int = described(
-        "Number of velocity steps inside the motion. A step contributes no energy, because its power is not defined.",
-        "1",
-        1,
-    )
-    within_limits: bool = described(
-        "Whether the motion is within every limit; collisions are in `collides`.", None, False
-    )
-    limits: list[LimitCheck] = part("One entry per limit.")
-    collides: bool | None = described(
-        "Whether a clearance is negative at a sample; null if `collisions` is false.", None, False
-    )
-    nearest: SampledClearance | None = part("Smallest clearance at sample points; null if `collisions` is false.")
-    warnings: list[str] = described(WARNINGS + " Of a log, also what `POST /logs` says of it.", None, [])
-    samples: Annotated[Samples, Shown] | None = part("Samples of the motion; null without `sample_period`.")

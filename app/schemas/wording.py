@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-BODIES = "Names of the two bodies: links, `tool`, `payload` or obstacles."
 WARNINGS = (
     "Remarks on the motion, in words; empty if there are none. If two bodies come closer than 2 mm, one names them, "
     "their distance without margins, and the time. Others say that arm configurations may have been missed, that a "

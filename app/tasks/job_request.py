@@ -12,10 +12,10 @@ import orjson
 from joulepath.app.api.compare.task import CompareRequest, CompareTask
 from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.cycle.task import CycleTask
+from joulepath.app.api.evaluate.task import EvaluateAnswer, evaluated
 from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.api.pareto.task import ParetoRequest, ParetoTask
 from joulepath.app.api.whatif.task import WhatifRequest, WhatifTask
-from joulepath.app.convert.evaluation import to_evaluate_response
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.evaluate import EvaluateRequest
@@ -23,7 +23,6 @@ from joulepath.app.schemas.identifications import IdentifyRequest
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.store.leases import FoundFigures
 from joulepath.app.tasks.answer_figures import figures_of
-from joulepath.app.tasks.evaluate import evaluated
 from joulepath.app.tasks.figures import replacing
 from joulepath.app.tasks.identify import IdentifyTask, Stored
 from joulepath.optimizer.deadline import Deadline
@@ -102,7 +101,7 @@ def _identified(answer: dict[str, Any]) -> FoundFigures:
 
 def _evaluate(body: bytes, request_id: str, deadline: float) -> TaskResult:
     request = EvaluateRequest.model_validate_json(body)
-    return TaskResult.of_json(to_evaluate_response(request_id, evaluated(request, Deadline.after(deadline))))
+    return TaskResult.of_json(EvaluateAnswer.of(request_id, evaluated(request, Deadline.after(deadline))))
 
 
 _RUN: dict[str, Callable[[bytes, str, float], TaskResult]] = {

@@ -9,17 +9,10 @@ from pkgutil import walk_packages
 from joulepath.app.engine.imports import importing
 
 TASKS = (
-    "compare",
-    "evaluate",
-    "export",
-    "ik",
-    "ik_path",
     "job_body",
     "job_request",
     "own_robot",
-    "pareto",
     "read_body",
-    "whatif",
 )
 
 with importing():

@@ -15,6 +15,7 @@ import numpy as np
 from joulepath.models.robot import MOST_ROBOTS, Array, Mask, Robot
 from joulepath.optimizer.collision.bodies import Body, Indices, bodies_of
 from joulepath.optimizer.collision.pair_distance import PairGeometry, WitnessPoints
+from joulepath.optimizer.declared import Metres
 from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
 from joulepath.optimizer.problem.arm import Arm
 
@@ -24,10 +25,13 @@ STRIDE = 6
 
 @dataclass(frozen=True)
 class ClosestPair:
-    """Names of the two bodies with the least signed distance [m], margins subtracted: negative if they overlap."""
+    """Two bodies and the distance between them."""
 
     pair: tuple[str, str]
-    distance: float
+    """Names of the two bodies: links, `tool`, `payload` or obstacles."""
+    distance: Metres
+    """Distance between the two bodies minus the obstacle's `margin`; if negative, the two bodies are
+    too close or overlap."""
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import reduce
 from typing import TypeVar
 
+from joulepath.optimizer.declared import Joules, Ratio, Seconds, Watts
 from joulepath.optimizer.energy.losses import relative_error
 from joulepath.optimizer.result.energy import Energy, StorageUse
 
@@ -15,31 +16,35 @@ Sum = TypeVar("Sum")
 
 @dataclass(frozen=True)
 class IntervalEnergy:
-    """Energy of a segment, or of the whole motion, from `start` to `end` [s] after the start of the motion.
+    """Energy of one segment of the motion, or of the whole motion."""
 
-    `kinetic_start`, `kinetic_end` [J]: kinetic energy, rotors included, just after `start` and just before `end`.
-    """
-
-    start: float
-    end: float
+    start: Seconds
+    """Time at which it starts, from the start of the motion."""
+    end: Seconds
+    """Time at which it ends, from the start of the motion."""
     energy: Energy
-    kinetic_start: float
-    kinetic_end: float
+    """Energy and power."""
+    mean_mechanical_power: Watts = field(init=False)
+    """Mean of Σ_j |tau_j v_j|: mechanical energy / duration."""
+    kinetic_start: Joules
+    """Kinetic energy just after `start`, rotors included."""
+    kinetic_end: Joules
+    """Kinetic energy just before `end`, rotors included."""
+    balance_error: Ratio = field(init=False)
+    """|sum of the electrical parts - total| / total. It is large if the logged `v` and `a` do not fit
+    `q`."""
+
+    def __post_init__(self) -> None:
+        electrical = self.energy.electrical
+        mean_power = self.energy.mechanical.total / self.duration
+        object.__setattr__(self, "mean_mechanical_power", mean_power)
+        error = relative_error(electrical.parts_sum, electrical.total)
+        object.__setattr__(self, "balance_error", error)
 
     @property
     def duration(self) -> float:
         """Duration [s]."""
         return self.end - self.start
-
-    @property
-    def mean_mechanical_power(self) -> float:
-        """Mean of Σ_j |tau_j v_j| [W]: Eq. 3 of the paper divided by the duration."""
-        return self.energy.mechanical.total / self.duration
-
-    @property
-    def balance_error(self) -> float:
-        """|sum of the electrical parts - total| / total: quadrature error, and how badly logged v and a fit q."""
-        return relative_error(self.energy.electrical.parts_sum, self.energy.electrical.total)
 
 
 def joined(parts: Sequence[IntervalEnergy]) -> IntervalEnergy:

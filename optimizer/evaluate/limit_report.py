@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
 
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.declared import NullIfInfinite, Ratio, Seconds, Unit
 from joulepath.optimizer.energy.limited_torque import limited_torque
 from joulepath.optimizer.evaluate.piecewise_motion import Indices, PiecewiseMotion
 from joulepath.optimizer.kinematics.path_constraints import path_constraints_of
@@ -22,24 +23,27 @@ SPEED_STEP, ACCELERATION_STEP = 1e-6, 1e-4
 
 @dataclass(frozen=True)
 class LimitReport:
-    """The instant with the largest `ratio` = |value| / limit: of `joint` at time `t` [s], with `value` and `bound`.
+    """One limit, at the instant of the motion with the largest value / limit."""
 
-    Position: the ratio is the distance from the middle of the range over half of it. Path constraints: `joint` is None,
-    and the value is an angle [rad] or a speed [m/s]. At a velocity step acceleration and jerk, at an acceleration step
-    the jerk have infinite `value` and `ratio`.
-    """
-
+    worst_ratio: Annotated[Ratio, NullIfInfinite]
+    """|value| / limit; for positions: distance from the middle of the range / half of the range. Null
+    if the value is infinite."""
     limit: LimitName
-    ratio: float
+    """The limit. `tool_cone`, `tcp_speed` and `elbow_speed` only if the request limits them."""
+    held: bool = field(init=False)
+    """Whether the motion is within this limit."""
     joint: str | None
-    t: float
-    value: float
-    bound: float
+    """Name of the joint; null for `tool_cone`, `tcp_speed` and `elbow_speed`."""
+    t: Seconds
+    """Time of this instant, from the start of the motion."""
+    value: Annotated[float, Unit("SI"), NullIfInfinite]
+    """Value at this instant, in the unit of the limit: rad, rad/s, rad/s², rad/s³, N·m or m/s. Null if
+    it is infinite: the acceleration at a velocity step, the jerk at an acceleration step."""
+    bound: Annotated[float, Unit("SI")]
+    """Value of the limit, in the same unit."""
 
-    @property
-    def held(self) -> bool:
-        """Whether the motion satisfies the limit."""
-        return self.ratio <= 1 + RATIO_TOLERANCE
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "held", self.worst_ratio <= 1 + RATIO_TOLERANCE)
 
 
 class LimitMonitor:
@@ -110,6 +114,6 @@ class LimitMonitor:
 
     def _note(self, name: LimitName, ratio: float, joint: int | None, t: float, value: float, bound: float) -> None:
         known = self._worst.get(name)
-        if known is None or ratio > known.ratio:
+        if known is None or ratio > known.worst_ratio:
             joint_name = None if joint is None else self._joints[joint]
-            self._worst[name] = LimitReport(name, ratio, joint_name, t, value, bound)
+            self._worst[name] = LimitReport(ratio, name, joint_name, t, value, bound)

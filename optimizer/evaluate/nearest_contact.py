@@ -12,6 +12,7 @@ from joulepath.optimizer.collision.close_pass import CLOSE, model_without_margin
 from joulepath.optimizer.collision.model import ClosestPair, CollisionModel, collision_model
 from joulepath.optimizer.collision.stand_ins import StandIns
 from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.declared import Metres, Seconds
 from joulepath.optimizer.evaluate.piecewise_motion import PiecewiseMotion
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.result.certificate import Clearance
@@ -26,15 +27,16 @@ CHECKS = 100_000
 
 @dataclass(frozen=True)
 class LeastClearance:
-    """The least sampled distance [m] between the bodies of `pair`, at `time` [s].
+    """Smallest distance between two bodies at sample points. It proves nothing between two samples."""
 
-    Samples are at most `spacing` [s] apart: between two of them the distance may be smaller.
-    """
-
-    distance: float
+    distance: Metres
+    """Distance minus the obstacle's `margin`; if negative, the two bodies are too close or overlap."""
     pair: tuple[str, str]
-    time: float
-    spacing: float
+    """Names of the two bodies: links, `tool`, `payload` or obstacles."""
+    time: Seconds
+    """Time of this sample, from the start of the motion."""
+    spacing: Seconds
+    """Largest time between two samples."""
 
 
 class ClearanceMonitor:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, overload
+from typing import Any, overload
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from joulepath.optimizer.export.certified import certified
 from joulepath.optimizer.export.csv_table import to_csv
 from joulepath.optimizer.export.facts import NOT_RUN, WrittenFile
+from joulepath.optimizer.export.formats import FormatName
 from joulepath.optimizer.export.franka import FrankaOptions, to_franka
 from joulepath.optimizer.export.json_document import to_json
 from joulepath.optimizer.export.krl import KrlOptions, to_krl
@@ -28,28 +29,48 @@ from joulepath.optimizer.export.urscript import UrscriptOptions, to_urscript
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.solution import Solution
 
-FormatName = Literal["urscript", "ros2", "moveit", "franka", "rapid", "krl", "csv", "json", "npz"]
 ExportOptions = UrscriptOptions | Ros2Options | MoveitOptions | FrankaOptions | RapidOptions | KrlOptions | TableOptions
 
 
 @dataclass(frozen=True)
 class Format:
-    """What writes a format, and the class of its options; None for a format that has none."""
+    """A format: its meaning, what writes it, and the class of its options; None if it has none."""
 
+    meaning: str
     write: Callable[[Program, Any], WrittenFile]
     options: type[ExportOptions] | None
 
 
 FORMATS: dict[FormatName, Format] = {
-    "urscript": Format(to_urscript, UrscriptOptions),
-    "ros2": Format(to_ros2, Ros2Options),
-    "moveit": Format(to_moveit, MoveitOptions),
-    "franka": Format(to_franka, FrankaOptions),
-    "rapid": Format(to_rapid, RapidOptions),
-    "krl": Format(to_krl, KrlOptions),
-    "csv": Format(to_csv, TableOptions),
-    "json": Format(lambda program, _: to_json(program), None),
-    "npz": Format(to_npz, TableOptions),
+    "urscript": Format(
+        "A program for Universal Robots controllers that follows the spline with servoj.",
+        to_urscript,
+        UrscriptOptions,
+    ),
+    "ros2": Format(
+        "A FollowJointTrajectory goal or a JointTrajectory for ros2_control, as YAML or for rosbridge.",
+        to_ros2,
+        Ros2Options,
+    ),
+    "moveit": Format("A RobotTrajectory for MoveIt, as YAML or JSON.", to_moveit, MoveitOptions),
+    "franka": Format(
+        "A table at 1 kHz for robots of Franka, or a motion generator for libfranka.",
+        to_franka,
+        FrankaOptions,
+    ),
+    "rapid": Format(
+        "A module for ABB controllers, which hold the times only roughly; the file says how far.",
+        to_rapid,
+        RapidOptions,
+    ),
+    "krl": Format(
+        "A program for KUKA controllers, which hold the times only roughly; the file says how far.",
+        to_krl,
+        KrlOptions,
+    ),
+    "csv": Format("A table of samples: t, q, v, a. `POST /evaluate` reads it.", to_csv, TableOptions),
+    "json": Format("The splines themselves, with payloads and rests.", lambda program, _: to_json(program), None),
+    "npz": Format("Arrays for NumPy: samples and splines.", to_npz, TableOptions),
 }
 """The formats by name."""
 

@@ -10,14 +10,15 @@ A configuration is part of the motion only if it reaches its point, is not nearl
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
 
 import numpy as np
 import pinocchio as pin
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import NEVER, Deadline
+from joulepath.optimizer.declared import Metres, PerJoint, Radians, Ratio, Unit
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from joulepath.optimizer.kinematics.angles import nearest_turn
 from joulepath.optimizer.kinematics.tcp import T_last_tcp
@@ -37,29 +38,28 @@ Reason = Literal["unreachable", "near_singular", "outside_limits", "deadline"]
 
 @dataclass(frozen=True)
 class PathPoint:
-    """Result for one point: the nearest q (nq,) [rad] found, its errors [m, rad] and smallest singular value.
+    """Result for one point of a path."""
 
-    A point for which no time was left has the configuration from which its search would have begun.
-
-    The singular value is of the TCP's Jacobian: its three translational rows [m] for a position, all six [m, rad] for
-    a pose. `rotation_error` is None for a position.
-    """
-
-    q: Array
-    position_error: float
-    rotation_error: float | None
-    smallest_singular_value: float
+    q: Annotated[PerJoint, Unit("rad")]
+    """Joint positions of the configuration found with the smallest error."""
+    position_error: Metres
+    """Distance of the TCP from the point."""
+    rotation_error: Radians | None
+    """Angle of the TCP to the orientation of the pose; null for positions."""
+    smallest_singular_value: Ratio
+    """Smallest singular value of the TCP's Jacobian in metres and radians: of its translational rows
+    for a position, of all rows for a pose."""
+    reached: bool = field(init=False)
+    """Whether the errors are within `tolerance`."""
+    written: bool = field(init=False)
+    """Whether the configuration is part of `trajectory`."""
     reason: Reason | None
+    """Why it is not part of `trajectory`; null if it is. `deadline`: no time was left to search for
+    it, and `q` is where the search would have begun."""
 
-    @property
-    def reached(self) -> bool:
-        """Whether the TCP reaches the point."""
-        return self.reason not in ("unreachable", "deadline")
-
-    @property
-    def written(self) -> bool:
-        """Whether the configuration is part of the motion."""
-        return self.reason is None
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "reached", self.reason not in ("unreachable", "deadline"))
+        object.__setattr__(self, "written", self.reason is None)
 
 
 def follow(

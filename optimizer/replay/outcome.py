@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
+from typing import Annotated, Any, Self
 
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.declared import Internal, Joules, Metres, PerJoint, Ratio, Unit
 from joulepath.optimizer.energy.limited_torque import limited_torque
 from joulepath.optimizer.energy.losses import breakdown, friction_torque
 from joulepath.optimizer.energy.plant import Plant
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.replay.planned import PlannedMotion
 from joulepath.optimizer.replay.play import Contact, Played
 from joulepath.optimizer.replay.reference import Reference
 from joulepath.optimizer.result.energy import Energy
@@ -24,50 +27,83 @@ ROUNDS = 12
 POSES = 8192
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """A motion under a controller.
+    """The motion as the simulated arm went it. Lists have one number per joint, from base to flange."""
 
-    Per joint (nq,): the greatest deviation `joint_error` [rad], the greatest torque of the motor `peak_torque` [N·m],
-    the greatest `limit_ratio` of a torque to its limit, on the side that the limit is for, and how long the motor's
-    torque was cut to it, `saturated` [s]. `tcp_error` and `end_error` [m] are the greatest deviation of the TCP and
-    that at the end. `energy` is that of the motion as it went, without waiting afterwards.
-    """
-
-    joint_error: Array
-    tcp_error: float
-    end_error: float
-    peak_torque: Array
-    limit_ratio: Array
-    saturated: Array
-    energy: Energy
+    electrical: Joules = field(init=False)
+    """Energy drawn from the supply, without waiting at the goal."""
+    mechanical: Joules = field(init=False)
+    """Mechanical work."""
+    electrical_error: Ratio
+    """`electrical` / that of the answer - 1."""
+    mechanical_error: Ratio
+    """`mechanical` / that of the answer - 1."""
     contact: Contact | None
+    """The deepest contact; null if there was none."""
+    joint_error: Annotated[PerJoint, Unit("rad")]
+    """Largest deviation from the motion, per joint."""
+    tcp_error: Metres
+    """Largest distance of the TCP from the motion."""
+    end_error: Metres
+    """Distance of the TCP from its goal when the motion ends."""
+    peak_torque: Annotated[PerJoint, Unit("N·m")]
+    """Largest torque of the motor at the joint, friction included, per joint."""
+    limit_ratio: Annotated[PerJoint, Unit("1")]
+    """Largest torque / limit, on the side of the robot's `limits.torque_side`, per joint."""
+    saturated: Annotated[PerJoint, Unit("s")]
+    """For how long the motor gave its largest torque and the controller asked for more, per joint."""
+    collides: bool = field(init=False)
+    """Whether a contact is deeper than 0.25 mm, or than `tcp_error` if that is less: a planned
+    distance may be smaller than any controller's error."""
+    energy: Annotated[Energy, Internal]
+    """Energy of the motion as it went, without waiting afterwards."""
 
-    @property
-    def collides(self) -> bool:
-        """Whether a contact is deeper than TOUCH, or than the TCP was off its motion if that is less."""
-        return self.contact is not None and self.contact.depth > min(self.tcp_error, TOUCH)
+    def __post_init__(self) -> None:
+        contact, energy = self.contact, self.energy
+        collides = contact is not None and contact.depth > min(self.tcp_error, TOUCH)
+        object.__setattr__(self, "electrical", energy.electrical.total)
+        object.__setattr__(self, "mechanical", energy.mechanical.total)
+        object.__setattr__(self, "collides", collides)
+
+    @classmethod
+    def extended(cls, outcome: Outcome, **own: Any) -> Self:
+        """An outcome with the fields of a subclass."""
+        known = {each.name: getattr(outcome, each.name) for each in fields(Outcome) if each.init}
+        return cls(**known, **own)
 
 
-def outcome(arm: Arm, motion: Reference, played: Played) -> Outcome:
-    """What a motion amounts to that the simulated `arm` played."""
-    tau = _without_friction(arm, played)
-    plant, q, v = Plant(arm), played.q, played.v
-    # the trapezoidal rule
-    weights = np.full(len(q), played.step)
-    weights[[0, -1]] /= 2
-    off = _distances(arm, q, motion.q)
-    limited = limited_torque(arm, tau, v, played.a)
+def outcome(arm: Arm, motion: Reference, played: Played, planned: PlannedMotion) -> Outcome:
+    """What a planned motion amounts to that the simulated `arm` played."""
+    off = _distances(arm, played.q, motion.q)
+    limited = limited_torque(arm, _without_friction(arm, played), played.v, played.a)
+    energy = played_energy(arm, played)
     return Outcome(
-        joint_error=np.abs(q - motion.q).max(axis=0),
+        electrical_error=_relative(energy.electrical.total, planned.electrical),
+        mechanical_error=_relative(energy.mechanical.total, planned.mechanical),
+        contact=played.contact,
+        joint_error=np.abs(played.q - motion.q).max(axis=0),
         tcp_error=float(off.max()),
         end_error=float(off[-1]),
         peak_torque=np.abs(played.tau_motor).max(axis=0),
         limit_ratio=np.abs(limited).max(axis=0) / arm.active_limits.tau_max,
         saturated=played.saturated.sum(axis=0) * played.step,
-        energy=breakdown(weights, v, played.a, tau, plant.potential(q[-1]) - plant.potential(q[0]), arm),
-        contact=played.contact,
+        energy=energy,
     )
+
+
+def played_energy(arm: Arm, played: Played) -> Energy:
+    """The energy of a motion that the simulated `arm` played, by the trapezoidal rule."""
+    plant, q = Plant(arm), played.q
+    weights = np.full(len(q), played.step)
+    weights[[0, -1]] /= 2
+    gain = plant.potential(q[-1]) - plant.potential(q[0])
+    tau = _without_friction(arm, played)
+    return breakdown(weights, played.v, played.a, tau, gain, arm)
+
+
+def _relative(value: float, reference: float) -> float:
+    return (value - reference) / abs(reference) if reference else 0.0
 
 
 def _without_friction(arm: Arm, played: Played) -> Array:

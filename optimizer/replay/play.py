@@ -8,6 +8,7 @@ import numpy as np
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.declared import Metres, Seconds
 from joulepath.optimizer.replay.controller import Command
 from joulepath.optimizer.replay.reference import Reference
 from joulepath.optimizer.replay.simulated_arm import SimulatedArm
@@ -19,11 +20,14 @@ STEPS_PER_CHECK = 512
 
 @dataclass(frozen=True)
 class Contact:
-    """The deepest contact: names of the two bodies, depth [m], and time [s]."""
+    """The deepest contact of two bodies."""
 
     pair: tuple[str, str]
-    depth: float
-    time: float
+    """Names of the two bodies: links, `tool`, `payload` or obstacles."""
+    depth: Metres
+    """How deep they go into each other."""
+    time: Seconds
+    """Time, from the start of the motion."""
 
 
 @dataclass(frozen=True)

@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal, overload
+from dataclasses import dataclass, field
+from typing import Annotated, Literal, overload
 
 import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
+from joulepath.optimizer.declared import Internal, Joules, NotEmpty, PerJoint, Ratio, Seconds, Unit
 from joulepath.optimizer.energy.plant import Plant
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.replay.controller import ControlName, command, gains
 from joulepath.optimizer.replay.from_solution import planned_motion
-from joulepath.optimizer.replay.outcome import Outcome, outcome
+from joulepath.optimizer.replay.outcome import Outcome, outcome, played_energy
 from joulepath.optimizer.replay.planned import PlannedMotion
-from joulepath.optimizer.replay.play import play
+from joulepath.optimizer.replay.play import Played, play
 from joulepath.optimizer.replay.reference import Reference, reference
 from joulepath.optimizer.replay.simulated_arm import SimulatedArm, with_changes
 from joulepath.optimizer.result.solution import BaselineName, Solution
@@ -29,50 +30,98 @@ from joulepath.optimizer.search.baselines import saving
 Quantity = Literal["payload", "friction"]
 
 
-@dataclass(frozen=True)
-class ReplayedChange:
-    """The motion on an arm of which one `quantity` is multiplied by `factor`; the controller does not know.
+@dataclass(frozen=True, kw_only=True)
+class ReplayedRun(Outcome):
+    """The motion under one controller."""
 
-    `savings` [1] are those of the simulated motion against every simulated baseline on the same arm.
-    """
-
-    quantity: Quantity
-    factor: float
-    outcome: Outcome
-    savings: dict[BaselineName, float]
+    control: ControlName
+    """The controller."""
 
 
 @dataclass(frozen=True)
-class SavingRange:
-    """The saving [1] against a baseline: as `planned`, as `simulated`, and the least and the most over all changes."""
+class SimulatedSaving:
+    """What the motion saves against a baseline."""
 
     name: BaselineName
-    planned: float
-    simulated: float
-    least: float
-    most: float
+    """Name of the baseline."""
+    saving: Ratio
+    """1 - energy of the motion / energy of the baseline, both simulated."""
 
-    @property
-    def persists(self) -> bool | None:
-        """Whether something is saved in every case; None if nothing is saved as planned."""
-        return self.least > 0 if self.planned > 0 else None
+
+@dataclass(frozen=True, kw_only=True)
+class ReplayedChange(Outcome):
+    """The motion on a changed arm, under the first controller, which does not know of the change."""
+
+    quantity: Quantity
+    """What is changed."""
+    factor: Ratio
+    """By how much it is multiplied."""
+    savings: list[SimulatedSaving]
+    """Savings on this arm, against every baseline on this arm."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SavingRange:
+    """What the answer saves against a baseline, as planned and as simulated."""
+
+    name: BaselineName
+    """Name of the baseline."""
+    planned: Ratio
+    """Saving in the answer."""
+    simulated: Ratio
+    """Saving on the unchanged arm."""
+    least: Ratio
+    """Smallest saving over the unchanged and all changed arms."""
+    most: Ratio
+    """Largest saving over these."""
+    persists: bool | None = field(init=False)
+    """Whether `least` is above zero; null if nothing is saved as planned."""
+    range: Ratio = field(init=False)
+    """`most` - `least`, in percentage points."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "persists", self.least > 0 if self.planned > 0 else None)
+        object.__setattr__(self, "range", 100 * (self.most - self.least))
 
 
 @dataclass(frozen=True)
+class AsPlanned:
+    """Energy of the motion in the answer, without waiting at the goal, and the use of its torque limits."""
+
+    electrical: Joules
+    """Energy drawn from the supply."""
+    mechanical: Joules
+    """Mechanical work."""
+    limit_ratio: Annotated[PerJoint, Unit("1")]
+    """Largest torque / limit as planned, per joint."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Replay:
-    """What MuJoCo makes of a motion, per controller, in steps of `step` [s].
+    """A motion, planned and simulated."""
 
-    `planned_ratio` (nq,) is the greatest torque of each joint over its limit, as planned. `torque_error` is the
-    greatest difference of MuJoCo's torques from the answer's, over the limit; None for an answer without samples.
-    `changes` and `savings` are empty if nothing is changed.
-    """
-
-    step: float
-    planned_ratio: Array
-    torque_error: float | None
-    runs: dict[ControlName, Outcome]
+    step: Annotated[Seconds, Internal]
+    """Step of the simulation."""
+    duration: Seconds
+    """Duration of the motion."""
+    planned: AsPlanned
+    """What the answer says."""
+    torque_error: Ratio | None
+    """Largest difference of MuJoCo's torques from those of the answer's samples / limit; null without
+    samples."""
+    runs: Annotated[list[ReplayedRun], NotEmpty]
+    """The motion under each controller."""
     changes: list[ReplayedChange]
+    """The motion on changed arms; empty without `perturb`."""
     savings: list[SavingRange]
+    """What is saved against each baseline; empty without `perturb`."""
+
+    def under(self, control: ControlName) -> ReplayedRun:
+        """The run under a controller. Raises LookupError for one that was not asked for."""
+        for run in self.runs:
+            if run.control == control:
+                return run
+        raise LookupError(control)
 
 
 @overload
@@ -170,14 +219,21 @@ class _Replayer:
 
     def replay(self, controls: Sequence[ControlName], perturb: Mapping[Quantity, float]) -> Replay:
         """The replay under these controllers."""
-        torque_error = self._torque_error()
-        runs = {control: self._outcome(self._motion, control) for control in dict.fromkeys(controls)}
+        torque_error, planned = self._torque_error(), self._planned
+        runs = [ReplayedRun.extended(self._outcome(control), control=control) for control in dict.fromkeys(controls)]
         first = controls[0]
-        simulated = self._savings(runs[first], first) if perturb else {}
+        simulated = self._savings(runs[0], first) if perturb else {}
         changes = [self._changed(quantity, factor, first) for quantity, factor in self._factors(perturb)]
-        self._simulated.carry(self._planned.arm)
-        savings = self._ranges(simulated, changes)
-        return Replay(self._motion.step, self._planned_ratio(), torque_error, runs, changes, savings)
+        self._simulated.carry(planned.arm)
+        return Replay(
+            step=self._motion.step,
+            duration=planned.duration,
+            planned=AsPlanned(planned.electrical, planned.mechanical, self._planned_ratio()),
+            torque_error=torque_error,
+            runs=runs,
+            changes=changes,
+            savings=self._ranges(simulated, changes),
+        )
 
     def _planned_ratio(self) -> Array:
         arm, motion = self._planned.arm, self._motion
@@ -193,26 +249,35 @@ class _Replayer:
 
     def _changed(self, quantity: Quantity, factor: float, control: ControlName) -> ReplayedChange:
         self._simulated.carry(with_changes(self._planned.arm, **{quantity: factor}))
-        found = self._outcome(self._motion, control)
-        return ReplayedChange(quantity, factor, found, self._savings(found, control))
+        found = self._outcome(control)
+        savings = self._savings(found, control)
+        return ReplayedChange.extended(
+            found,
+            quantity=quantity,
+            factor=factor,
+            savings=[SimulatedSaving(name, saved) for name, saved in savings.items()],
+        )
 
-    def _outcome(self, motion: Reference, control: ControlName) -> Outcome:
+    def _outcome(self, control: ControlName) -> Outcome:
+        played = self._played(self._motion, control)
+        return outcome(self._simulated.arm, self._motion, played, self._planned)
+
+    def _played(self, motion: Reference, control: ControlName) -> Played:
         checkpoint()
-        asked = command(self._plant, motion, control, self._loop)
-        played = play(self._simulated, motion, asked)
+        played = play(self._simulated, motion, command(self._plant, motion, control, self._loop))
         checkpoint()
-        return outcome(self._simulated.arm, motion, played)
+        return played
 
     def _savings(self, ours: Outcome, control: ControlName) -> dict[BaselineName, float]:
         """The saving of a simulated motion against every baseline, simulated on the same arm."""
         planned, found = self._planned, {}
         own = ours.energy.of(planned.objective) + planned.waiting
         for each in planned.baselines:
-            # a motion that no planner checked may run into something, after which its energy means nothing
+            # a motion that no planner checked may run into something: its energy then means nothing
             with self._simulated.without("contact"):
-                theirs = self._outcome(reference(each.course, each.duration, self._step), control)
-            energy = theirs.energy.of(planned.objective) + each.waiting
-            found[each.name] = saving(own, energy)
+                played = self._played(reference(each.course, each.duration, self._step), control)
+            theirs = played_energy(self._simulated.arm, played)
+            found[each.name] = saving(own, theirs.of(planned.objective) + each.waiting)
         return found
 
     def _torque_error(self) -> float | None:
@@ -223,13 +288,20 @@ class _Replayer:
         return float((np.abs(found - given.tau) / self._planned.arm.active_limits.tau_max).max())
 
     def _ranges(self, simulated: Mapping[BaselineName, float], changes: Sequence[ReplayedChange]) -> list[SavingRange]:
-        return [
-            SavingRange(
-                each.name,
-                each.saving,
-                simulated[each.name],
-                min([simulated[each.name], *(change.savings[each.name] for change in changes)]),
-                max([simulated[each.name], *(change.savings[each.name] for change in changes)]),
+        found = list[SavingRange]()
+        for each in self._planned.baselines if simulated else ():
+            own = simulated[each.name]
+            savings = [
+                own,
+                *(saved.saving for change in changes for saved in change.savings if saved.name == each.name),
+            ]
+            found.append(
+                SavingRange(
+                    name=each.name,
+                    planned=each.saving,
+                    simulated=own,
+                    least=min(savings),
+                    most=max(savings),
+                )
             )
-            for each in (self._planned.baselines if simulated else ())
-        ]
+        return found

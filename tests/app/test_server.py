@@ -18,9 +18,9 @@ import pytest
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.optimize.task import OptimizeAnswer
+from joulepath.app.api.replay.task import ReplayAnswer
 from joulepath.app.exceptions.queue import Busy, ShuttingDown
 from joulepath.app.exceptions.transport import BodyTooLarge, MalformedHttp
-from joulepath.app.schemas.replay import ReplayResponse
 from tests.app.live import CLIENT, EXIT, ROOT, WARM_UP, Server, alive, processor_time, serving, until
 from tests.app.problems import checked
 from tests.app.requests import EXAMPLES, long_search, move
@@ -81,7 +81,8 @@ def test_an_answer_is_played_in_mujoco(server: Server) -> None:
     """By its path alone: the payload is in the answer."""
     found = server.post("/optimize", move(payload={"mass": 2.0, "com": [0.0, 0.0, 0.06]})).json()
     answer = server.post("/replay", {"answer": found["answer"], "perturb": {"payload": 0.1}, "step": 1e-3})
-    (motion,) = ReplayResponse.model_validate_json(answer.content).motions
+    content: Any = model_of(ReplayAnswer).model_validate_json(answer.content)
+    (motion,) = content.motions
     assert motion.planned.electrical == found["energy"]["electrical"]["total"]
     assert max(motion.runs[0].joint_error) < 3e-4 < max(motion.changes[0].joint_error)
     assert not motion.runs[0].collides

@@ -10,6 +10,7 @@ from typing import Annotated, Self, TypeVar
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from joulepath.app.api.evaluate.task import EvaluateAnswer, Evaluated
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.api.whatif.answer import (
     ChangeResult,
@@ -20,7 +21,7 @@ from joulepath.app.api.whatif.answer import (
 )
 from joulepath.app.convert.arm import to_arm
 from joulepath.app.convert.arm_fields import arm_fields
-from joulepath.app.convert.evaluation import Evaluated, to_evaluate_response, to_motion
+from joulepath.app.convert.given_motion import to_motion
 from joulepath.app.convert.recorded import as_logged
 from joulepath.app.convert.request import to_problem
 from joulepath.app.convert.until import time_left, until
@@ -295,7 +296,7 @@ class _Evaluated(_Work):
 
     def _kept(self, asked: EvaluateRequest, found: Evaluation) -> str:
         """The path of the complete answer to a request."""
-        return self.collector.add(to_evaluate_response(self.request_id, Evaluated(asked, found)))
+        return self.collector.add(EvaluateAnswer.of(self.request_id, Evaluated(asked, found)))
 
 
 def _located(work: Callable[[], T], where: str, change: Change | None = None) -> T:

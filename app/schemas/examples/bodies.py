@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from joulepath.app.schemas.examples.export import EXPORT_EXAMPLES
 from joulepath.app.schemas.examples.figures import FIGURES_EXAMPLES
 from joulepath.app.schemas.examples.files import Example, body_examples, shown
 from joulepath.app.schemas.examples.identifications import IDENTIFY_EXAMPLES
-from joulepath.app.schemas.examples.ik import IK_EXAMPLES, IK_PATH_EXAMPLES
 from joulepath.app.schemas.examples.logs import LOG_EXAMPLES
 from joulepath.app.schemas.examples.own_arm import NEW_ROBOT_EXAMPLES, PUT_EXAMPLES
-from joulepath.app.schemas.examples.replay import REPLAY_EXAMPLES
 from joulepath.app.schemas.examples.studies import ITERATION_EXAMPLES
 
 JSON, CSV = "application/json", "text/csv"
 BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     **{path: body_examples(path) for path in shown()},
-    "/export/{format}": {JSON: EXPORT_EXAMPLES},
-    "/replay": {JSON: REPLAY_EXAMPLES},
-    "/ik": {JSON: IK_EXAMPLES},
-    "/ik/path": {JSON: IK_PATH_EXAMPLES},
     "/identifications": {JSON: IDENTIFY_EXAMPLES},
     "/logs": {CSV: LOG_EXAMPLES},
     "/robots": {JSON: NEW_ROBOT_EXAMPLES},

@@ -2,18 +2,21 @@
 
 `examples/openapi/<path>.json` lists the requests that the OpenAPI document shows, by the names of
 their files in `examples/<path>`, each with its summary and description. It has an answer, too, unless
-the models of the answer have examples of their own.
+the models of the answer have examples of their own. Parameters are left out of a path: where it has
+one, the files may be in folders, which give the examples their names.
 """
 
 from __future__ import annotations
 
 import json
+import re
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 Example = dict[str, Any]
 """Summary, description and value, as in an OpenAPI document."""
+_PARAMETER = re.compile(r"/\{[^}]*\}")
 _MEDIA_TYPES = {".json": "application/json", ".csv": "text/csv"}
 
 
@@ -40,8 +43,8 @@ def body_examples(path: str) -> dict[str, dict[str, Example]]:
     """Examples of the body of a path: by media type, then by name."""
     found: dict[str, dict[str, Example]] = {}
     for name, words in shown()[path]["requests"].items():
-        file = folder() / path[1:] / name
+        file = folder() / _PARAMETER.sub("", path)[1:] / name
         text = file.read_text(encoding="utf-8")
         value = json.loads(text) if file.suffix == ".json" else text
-        found.setdefault(_MEDIA_TYPES[file.suffix], {})[file.stem] = {**words, "value": value}
+        found.setdefault(_MEDIA_TYPES[file.suffix], {})[Path(Path(name).parts[0]).stem] = {**words, "value": value}
     return found

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.declared import Joules
 from joulepath.optimizer.energy.losses import breakdown
 from joulepath.optimizer.energy.plant import Plant
 from joulepath.optimizer.evaluate.recording import BLOCK
@@ -17,22 +18,21 @@ from joulepath.optimizer.problem.arm import Arm
 
 
 @dataclass(frozen=True)
-class Measured:
-    """Electrical energies of a part of a log [J], None where the log has no such channel.
+class MeasuredEnergy:
+    """Electrical energy by what was measured during this part of a log."""
 
-    `electrical` is the integral of the logged power. `by_efforts` is that of the power which the motors' logged
-    currents or torques take by the figures of the arm's drives, with its idle power.
-    """
+    electrical: Joules | None
+    """Integral of the logged power of the arm's bus. Null if the log has none."""
+    by_efforts: Joules | None
+    """Integral of the power that the motors take by their logged currents or torques, with the losses
+    of the robot's drives and its idle power. Null if the log has none."""
 
-    electrical: float | None
-    by_efforts: float | None
-
-    def joined(self, other: Measured) -> Measured:
+    def joined(self, other: MeasuredEnergy) -> MeasuredEnergy:
         """The energies of two parts together."""
-        return Measured(_sum(self.electrical, other.electrical), _sum(self.by_efforts, other.by_efforts))
+        return MeasuredEnergy(_sum(self.electrical, other.electrical), _sum(self.by_efforts, other.by_efforts))
 
 
-def measured(log: Log, arm: Arm) -> list[Measured]:
+def measured(log: Log, arm: Arm) -> list[MeasuredEnergy]:
     """What was measured in each segment of `log.recording()` of `arm`; empty if nothing was."""
     drives = arm.drives
     torque = None
@@ -40,7 +40,7 @@ def measured(log: Log, arm: Arm) -> list[Measured]:
         torque = log.effort * (drives.torque_constant if log.effort_meaning == "current" else 1.0)
     if torque is None and log.power is None:
         return []
-    plant, found = Plant(arm), list[Measured]()
+    plant, found = Plant(arm), list[MeasuredEnergy]()
     for first, last in pairwise(log.segment_rows):
         parts = [_part(log, plant, torque, slice(low, high + 1)) for low, high in _pieces(first, last)]
         whole = parts[0]
@@ -50,19 +50,19 @@ def measured(log: Log, arm: Arm) -> list[Measured]:
     return found
 
 
-def _part(log: Log, plant: Plant, torque: Array | None, rows: slice) -> Measured:
+def _part(log: Log, plant: Plant, torque: Array | None, rows: slice) -> MeasuredEnergy:
     time = log.time[rows]
     weights = np.zeros(len(time))
     weights[:-1] += np.diff(time) / 2
     weights[1:] += np.diff(time) / 2
     drawn = None if log.power is None else float(weights @ log.power[rows])
     if torque is None:
-        return Measured(drawn, None)
+        return MeasuredEnergy(drawn, None)
     q, v, a = (channel[rows].astype(float) for channel in (log.q, log.v, log.a))
     tau = plant.torques(q, v, a)
     # what is left of the measured torque when the motion is made is lost
     energy = breakdown(weights, v, a, tau, 0.0, plant.arm, lost=torque[rows] - tau)
-    return Measured(drawn, energy.electrical.total)
+    return MeasuredEnergy(drawn, energy.electrical.total)
 
 
 def _pieces(first: int, last: int) -> Iterator[tuple[int, int]]:

@@ -10,8 +10,8 @@ import pytest
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.cycle.task import CycleAnswer
+from joulepath.app.api.evaluate.task import EvaluateAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
-from joulepath.app.schemas.evaluate import EvaluateResponse
 from joulepath.app.schemas.examples.files import body_examples
 from joulepath.app.settings import Settings
 from tests.app.cli.console import CSV, CSV_OPTIONS, Here, request, run
@@ -95,7 +95,7 @@ def test_evaluate_answers_as_the_service_does() -> None:
     example = next(iter(body_examples("/evaluate")["application/json"].values()))["value"]
     finished = run("evaluate", "-", stdin=json.dumps(example))
     assert (finished.returncode, finished.stderr) == (0, b"")
-    EvaluateResponse.model_validate_json(finished.stdout)
+    model_of(EvaluateAnswer).model_validate_json(finished.stdout)
 
 
 def test_evaluate_takes_a_csv_with_options_and_settings(here: Here, tmp_path: Path) -> None:
@@ -105,7 +105,7 @@ def test_evaluate_takes_a_csv_with_options_and_settings(here: Here, tmp_path: Pa
     energies = []
     for more in ((), ("--settings", str(settings))):
         assert here.run(*given, *more) == (0, b"", b"")
-        answer = EvaluateResponse.model_validate_json(output.read_bytes())
+        answer = model_of(EvaluateAnswer).model_validate_json(output.read_bytes())
         # the option, not the file, says 1.5 s for each of two segments
         assert answer.duration == pytest.approx(3.0)
         energies.append(answer.total.energy.electrical.total)

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from joulepath.app.cli.export import NAMES
-from joulepath.app.schemas.export import ExportFormat
 from tests.app.cli.console import ROOT as PROJECT
 from tests.app.cli.console import Here
 
@@ -20,10 +18,6 @@ def answer(tmp_path: Path) -> str:
     file = tmp_path / "answer.json"
     file.write_text(json.dumps(ANSWER))
     return str(file)
-
-
-def test_the_command_knows_every_format() -> None:
-    assert set(NAMES) == set(ExportFormat)
 
 
 def test_a_motion_is_written_with_the_options_of_its_format(here: Here, answer: str, tmp_path: Path) -> None:

@@ -13,9 +13,8 @@ from fastapi.testclient import TestClient
 
 from joulepath.app.api.cycle.problem import to_cycle
 from joulepath.app.api.cycle.request import CycleRequest
-from joulepath.app.convert.ik import to_ik_arm
+from joulepath.app.api.ik.task import IKRequest, to_ik_arm
 from joulepath.app.convert.request import to_problem
-from joulepath.app.schemas.ik import IKRequest
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.models.own_arm.description import Description
 from joulepath.models.registry import load_robot, robot_names

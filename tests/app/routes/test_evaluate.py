@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.evaluate.task import EvaluateAnswer
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.transport import BodyTooLarge
 from joulepath.app.http.problems import path_of
-from joulepath.app.schemas.evaluate import EvaluateResponse
 from joulepath.app.schemas.examples.files import body_examples
 from joulepath.optimizer.exceptions import DeclaredError, InvalidTable, UnknownRobot
 from tests.app.problems import checked
@@ -60,7 +61,7 @@ def refused(answer: Any, kind: type[DeclaredError]) -> dict[str, Any]:
 def test_answers_the_documented_requests(name: str, client: TestClient) -> None:
     answer = client.post("/evaluate", json=REQUESTS[name])
     assert answer.status_code == 200, answer.text
-    EvaluateResponse.model_validate_json(answer.content)
+    model_of(EvaluateAnswer).model_validate_json(answer.content)
     content = answer.json()
     assert content["segment_count"] == len(content["segments"])
     assert content["total"]["balance_error"] < 1e-6

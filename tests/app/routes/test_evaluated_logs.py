@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.evaluate.task import EvaluateAnswer
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import UnknownLog
-from joulepath.app.schemas.evaluate import EvaluateResponse
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidTable
@@ -74,7 +75,7 @@ def table(names: list[str], rows: Array, separator: str) -> bytes:
 def evaluated(client: TestClient, body: bytes, **query: str) -> dict[str, Any]:
     answer = client.post("/evaluate", content=body, headers=CSV, params=query)
     assert answer.status_code == 200, answer.text
-    EvaluateResponse.model_validate_json(answer.content)
+    model_of(EvaluateAnswer).model_validate_json(answer.content)
     content: dict[str, Any] = answer.json()
     return content
 
@@ -145,7 +146,7 @@ def test_units_of_a_log(client: TestClient, recording: Recording) -> None:
 def test_a_stored_log_brings_its_arm(client: TestClient, recording: Recording, stored: str) -> None:
     answer = client.post("/evaluate", json={"log": stored})
     assert answer.status_code == 200, answer.text
-    EvaluateResponse.model_validate_json(answer.content)
+    model_of(EvaluateAnswer).model_validate_json(answer.content)
     by_file = evaluated(client, rtde(recording))
     assert answer.json()["total"] == by_file["total"] and answer.json()["arm"] == by_file["arm"]
     other = client.post("/evaluate", json={"log": stored, "payload": None}).json()

@@ -9,9 +9,10 @@ import pinocchio as pin
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.ik.path.task import IKPathAnswer
 from joulepath.app.exceptions.base import InvalidRequest
-from joulepath.app.schemas.examples.ik import IK_PATH_EXAMPLES
-from joulepath.app.schemas.ik_path import IKPathResponse
+from joulepath.app.schemas.examples.files import body_examples
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import OutsideLimits
 from tests.app.problems import checked
@@ -21,7 +22,9 @@ GUESS = [2.7, -1.4, 1.8, -2.0, -1.57, 0.0]
 DOWN = [0.0, 1.0, 0.0, 0.0]
 # of an answer's forward kinematics, computed apart from the search [m]
 ACCURACY = 1e-9
-REQUESTS: dict[str, Any] = {name: example["value"] for name, example in IK_PATH_EXAMPLES.items()}
+REQUESTS: dict[str, Any] = {
+    name: example["value"] for name, example in body_examples("/ik/path")["application/json"].items()
+}
 
 
 def circle(count: int, radius: float = 0.1) -> list[list[float]]:
@@ -47,7 +50,7 @@ def test_answers_the_documented_requests(name: str, client: TestClient) -> None:
     answer = client.post("/ik/path", json=REQUESTS[name])
     assert answer.status_code == 200, answer.text
     content = answer.json()
-    IKPathResponse.model_validate_json(answer.content)
+    model_of(IKPathAnswer).model_validate_json(answer.content)
     assert all(point["written"] for point in content["points"]), content["points"]
 
 

@@ -9,14 +9,13 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.api.ik.task import IKRequest, IKTask
 from joulepath.app.exceptions.base import InternalError
 from joulepath.app.exceptions.queue import NotReady
 from joulepath.app.exceptions.transport import BodyTooLarge, MethodNotAllowed, NotFound
 from joulepath.app.http.problems import own_fields, path_of, problem_of, types_of_error
 from joulepath.app.main import create_app
-from joulepath.app.schemas.ik import IKRequest
 from joulepath.app.settings import Settings
-from joulepath.app.tasks.ik import IKTask
 from joulepath.models.registry import robot_names
 from joulepath.optimizer.exceptions import (
     DeadlineExceeded,
@@ -200,7 +199,7 @@ def test_not_ready(tmp_path: Any) -> None:
 
 
 def test_a_pose_for_an_arm_without_inverse_kinematics(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("joulepath.app.tasks.ik.robot_named", lambda _: serial_chain(3))
+    monkeypatch.setattr("joulepath.app.api.ik.task.robot_named", lambda _: serial_chain(3))
     (error,) = problem_of_ik({"position": [0.4, -0.2, 0.3], "quaternion": DOWN})["errors"]
     assert error["loc"] == ["body", "pose"] and "give joint positions" in error["msg"]
 
@@ -209,7 +208,7 @@ def test_internal(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object) -> None:
         raise RuntimeError("caller-secret")
 
-    monkeypatch.setattr("joulepath.app.routes.ik.deadline_of", fail)
+    monkeypatch.setattr("joulepath.app.api.ik.route.deadline_of", fail)
     pose = {"position": [0.4, -0.2, 0.3], "quaternion": DOWN}
     answer = client.post("/ik", json={"pose": pose})
     refused(answer, InternalError)

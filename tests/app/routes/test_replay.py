@@ -7,10 +7,11 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.replay.task import ReplayAnswer
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import UnknownAnswer
 from joulepath.app.schemas.examples.own_arm import ARM
-from joulepath.app.schemas.replay import ReplayResponse
 from joulepath.optimizer.evaluate.errors import NotCertified
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from tests.app.requests import HOME, NEAR, PATIENT, move
@@ -26,7 +27,7 @@ def replayed(client: TestClient, **body: Any) -> dict[str, Any]:
     """The answer of POST /replay."""
     answer = client.post("/replay", json=COARSE | body)
     assert answer.status_code == 200, answer.text
-    ReplayResponse.model_validate_json(answer.content)
+    model_of(ReplayAnswer).model_validate_json(answer.content)
     content: dict[str, Any] = answer.json()
     return content
 

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import re
 import uuid
+from typing import Any
 
 import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.ik.task import IKAnswer
 from joulepath.app.convert.pose import to_matrix
 from joulepath.app.schemas.common import QuaternionPose
-from joulepath.app.schemas.ik import IKResponse
 from joulepath.app.schemas.robots import RobotDetail, RobotList
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from tests.app.requests import PATIENT
 
+IK: Any = model_of(IKAnswer)
 POSE = {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}
 
 
@@ -44,7 +47,7 @@ def test_a_robot_without_a_default_motion_says_so(client: TestClient) -> None:
 
 def test_ik_of_a_spherical_wrist(client: TestClient) -> None:
     pose = {"position": [0.6, -0.2, 0.5], "rpy": [3.0, 0.1, 0.4]}
-    answer = IKResponse.model_validate_json(client.post("/ik", json={"robot": "kr10_r1100", "pose": pose}).content)
+    answer = IK.model_validate_json(client.post("/ik", json={"robot": "kr10_r1100", "pose": pose}).content)
     assert answer.complete and {solution.label for solution in answer.solutions} >= {
         "right/up/flip",
         "right/up/no_flip",
@@ -81,7 +84,7 @@ def test_a_robot_without_a_default_motion_shows_none(client: TestClient) -> None
 def test_ik_gives_members_of_every_curve_of_a_redundant_arm(client: TestClient) -> None:
     pose = {"position": [0.45, 0.1, 0.4], "quaternion": [1.0, 0.0, 0.0, 0.0]}
     answer = client.post("/ik", json={"robot": "panda", "pose": pose})
-    solutions = IKResponse.model_validate_json(answer.content).solutions
+    solutions = IK.model_validate_json(answer.content).solutions
     assert len(solutions) > 8
     assert all(each.free == [f"joint{k}" for k in range(1, 8)] and len(each.q) == 7 for each in solutions)
 
@@ -89,7 +92,7 @@ def test_ik_gives_members_of_every_curve_of_a_redundant_arm(client: TestClient) 
 def test_ik_gives_every_solution(client: TestClient) -> None:
     answer = client.post("/ik", json={"pose": POSE, "tcp": {"position": [0, 0, 0.1], "rotvec": [0, 0, 0]}})
     assert answer.headers["content-type"] == "application/json"
-    solutions = IKResponse.model_validate_json(answer.content).solutions
+    solutions = IK.model_validate_json(answer.content).solutions
     robot = load_robot("ur5e")
     T = to_matrix(QuaternionPose(**POSE))
     T_tcp = np.eye(4)

@@ -9,10 +9,10 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
+from joulepath.app.api.evaluate.task import EvaluateAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.api.whatif.answer import WhatifAnswer
 from joulepath.app.exceptions.base import InvalidRequest
-from joulepath.app.schemas.evaluate import EvaluateResponse
 from joulepath.app.tasks import answer_collector
 from joulepath.app.tasks.answer_collector import AnswerCollector
 from tests.app.requests import HOME, NEAR, move
@@ -48,7 +48,7 @@ def kept(client: TestClient, path: str, kind: str) -> dict[str, Any]:
     answer = client.get(path).json()
     assert answer["kind"] == kind
     content: dict[str, Any] = answer["answer"]
-    (model_of(OptimizeAnswer) if kind == "optimize" else EvaluateResponse).model_validate(content)
+    (model_of(OptimizeAnswer) if kind == "optimize" else model_of(EvaluateAnswer)).model_validate(content)
     return content
 
 

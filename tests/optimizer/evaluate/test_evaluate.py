@@ -110,7 +110,7 @@ def test_is_the_baselines_own_quintic() -> None:
     known = quintic(START, GOAL, 1.6)
     tau = Plant(ARM).torques(known.q, known.v, known.a)
     assert total(result) == pytest.approx(float(known.weights @ simple_power(ARM, known.v, tau)), rel=1e-4)
-    peaks = {report.limit: report.ratio for report in result.limits}
+    peaks = {report.limit: report.worst_ratio for report in result.limits}
     assert peaks["velocity"] == pytest.approx((known.peak_v / ROBOT.limits.v_max).max(), rel=1e-5)
     assert peaks["acceleration"] == pytest.approx((known.peak_a / ROBOT.limits.a_max).max(), rel=1e-5)
     assert peaks["jerk"] == pytest.approx((known.peak_jerk / ROBOT.limits.j_max).max(), rel=1e-5)
@@ -135,7 +135,7 @@ def test_a_trapezoid_violates_jerk_only() -> None:
     relaxed = Arm(robot=ROBOT, payload=PAYLOAD, gravity=TILTED, limits=limits(v_max=0.3))
     broken = {report.limit: report for report in evaluate(relaxed, motion("trapezoid")).limits if not report.held}
     assert broken["velocity"].bound == 0.3
-    assert abs(broken["velocity"].value) == pytest.approx(0.3 * broken["velocity"].ratio)
+    assert abs(broken["velocity"].value) == pytest.approx(0.3 * broken["velocity"].worst_ratio)
 
 
 def test_a_log_of_a_motion_needs_the_energy_of_the_motion() -> None:

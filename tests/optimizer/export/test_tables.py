@@ -8,7 +8,7 @@ from io import BytesIO
 import numpy as np
 import pytest
 
-from joulepath.app.convert.motion_csv import MotionCsv
+from joulepath.app.api.evaluate.motion_csv import MotionCsv
 from joulepath.optimizer.export.csv_table import to_csv
 from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.json_document import to_json

@@ -65,7 +65,7 @@ def answer() -> PlannedMotion:
 
 def holds_promise(found: Replay, plan: PlannedMotion) -> None:
     """Feed-forward with PD follows the plan, at its energy."""
-    run = found.runs["feed_forward"]
+    run = found.under("feed_forward")
     assert run.joint_error.max() <= JOINT
     assert run.tcp_error <= TCP
     assert run.energy.electrical.total == pytest.approx(plan.electrical, rel=ELECTRICAL)
@@ -82,7 +82,7 @@ def test_the_plan_is_what_happens(name: str) -> None:
     plan = quintic(arm, middle, middle + np.resize([0.5, -0.4, 0.3], arm.robot.nq), 1.5)
     found = replay(plan, ("feed_forward",))
     holds_promise(found, plan)
-    assert (found.runs["feed_forward"].saturated == 0).all()
+    assert (found.under("feed_forward").saturated == 0).all()
 
 
 def test_an_optimised_motion_is_what_happens() -> None:
@@ -90,9 +90,9 @@ def test_an_optimised_motion_is_what_happens() -> None:
     found = replay(plan)
     holds_promise(found, plan)
     worst = solution().certificate.worst_ratio["torque"]
-    assert found.runs["feed_forward"].limit_ratio.max() == pytest.approx(worst, rel=1e-2)
+    assert found.under("feed_forward").limit_ratio.max() == pytest.approx(worst, rel=1e-2)
     # the loop alone sags under gravity and lags behind friction
-    assert found.runs["pd"].joint_error.max() > 10 * JOINT
+    assert found.under("pd").joint_error.max() > 10 * JOINT
     assert found.changes == found.savings == []
 
 
@@ -107,14 +107,14 @@ def test_joints_at_the_knee_of_friction_follow() -> None:
 def test_an_arm_at_rest_stays_there() -> None:
     """Nothing chatters and nothing creeps where friction is steepest."""
     plan = quintic(ARM, START, START, 0.5)
-    run = replay(plan, ("feed_forward",)).runs["feed_forward"]
+    run = replay(plan, ("feed_forward",)).under("feed_forward")
     assert run.joint_error.max() < 1e-9
     assert run.energy.electrical.total == pytest.approx(plan.electrical, rel=1e-6)
 
 
 def test_a_coarser_step_is_as_good_to_a_tenth_of_a_milliradian() -> None:
     plan = answer()
-    runs = [replay(plan, ("feed_forward",), step).runs["feed_forward"] for step in (2e-3, 1e-3, 5e-4)]
+    runs = [replay(plan, ("feed_forward",), step).under("feed_forward") for step in (2e-3, 1e-3, 5e-4)]
     errors = [run.joint_error.max() for run in runs]
     assert errors[0] > errors[1] > errors[2]
     assert errors[0] < 2 * JOINT
@@ -129,7 +129,7 @@ def in_the_way(margin: float = 0.0, above: float = 0.0) -> Arm:
 
 def test_an_obstacle_in_the_way_is_touched() -> None:
     arm = in_the_way()
-    run = replay(quintic(arm), ("feed_forward",), FAST).runs["feed_forward"]
+    run = replay(quintic(arm), ("feed_forward",), FAST).under("feed_forward")
     assert run.contact is not None and run.collides
     assert run.contact.pair[0] == "box" or run.contact.pair[1] == "box"
     assert 0 < run.contact.time < 1.2
@@ -138,7 +138,7 @@ def test_an_obstacle_in_the_way_is_touched() -> None:
     # our own distances say so, too
     q = quintic(arm).course(np.array([0.6]))[0]
     assert collision_model(arm).least_distance(q, np.inf) < 0
-    free = replay(quintic(replace(arm, collisions=False)), ("feed_forward",), FAST).runs["feed_forward"]
+    free = replay(quintic(replace(arm, collisions=False)), ("feed_forward",), FAST).under("feed_forward")
     assert free.contact is None and free.tcp_error <= TCP
 
 
@@ -148,7 +148,7 @@ def test_a_margin_is_no_body() -> None:
     assert (
         collision_model(arm).least_distance(q, np.inf) < 0 < collision_model(in_the_way(0.0, 0.5)).least_distance(q, 1)
     )
-    assert replay(quintic(arm), ("feed_forward",), FAST).runs["feed_forward"].contact is None
+    assert replay(quintic(arm), ("feed_forward",), FAST).under("feed_forward").contact is None
 
 
 def test_the_savings_persist_as_planned() -> None:
@@ -164,8 +164,8 @@ def test_the_savings_persist_as_planned() -> None:
         assert each.least <= each.simulated <= each.most
         assert each.persists == (each.least > 0 if each.planned > 0 else None)
     assert {each.name for each in found.savings} == {each.name for each in plan.baselines}
-    lighter, heavier, smooth, rough = (each.outcome for each in found.changes)
-    own = found.runs["feed_forward"].energy.electrical
+    lighter, heavier, smooth, rough = found.changes
+    own = found.under("feed_forward").energy.electrical
     assert lighter.energy.electrical.total < own.total < heavier.energy.electrical.total
     assert smooth.energy.electrical.friction < 0.8 * own.friction < rough.energy.electrical.friction
     # the controller does not know
@@ -181,11 +181,11 @@ def test_a_joint_at_its_limit_saturates() -> None:
     """A motion planned at nearly all the torque of a joint: a heavier payload asks for more than there is."""
     plan = quintic(ARM)
     tight = (
-        plan.arm.active_limits.tau_max * replay(plan, ("feed_forward",), FAST).runs["feed_forward"].limit_ratio / 0.99
+        plan.arm.active_limits.tau_max * replay(plan, ("feed_forward",), FAST).under("feed_forward").limit_ratio / 0.99
     )
     arm = replace(ARM, limits=replace(ARM.active_limits, tau_max=np.minimum(tight, ARM.active_limits.tau_max)))
     found = replay(quintic(arm), ("feed_forward",), FAST, {"payload": 0.1})
-    as_planned, (lighter, heavier) = found.runs["feed_forward"], (each.outcome for each in found.changes)
+    as_planned, (lighter, heavier) = found.under("feed_forward"), found.changes
     assert as_planned.limit_ratio.max() == pytest.approx(0.99, abs=5e-3)
     assert (as_planned.saturated == 0).all() and (lighter.saturated == 0).all()
     assert heavier.saturated.max() > 0
@@ -207,7 +207,7 @@ def test_a_velocity_step_is_not_followed() -> None:
     line = Spline(1, np.array([0.0, 0.0, 1.0, 1.0]), np.array([START, GOAL]))
     found = replay(PlannedMotion(ARM, course_of(line), 1.0, 1.0, 1.0), ("pd",), FAST)
     assert found.torque_error is None
-    assert found.runs["pd"].joint_error.max() > 10 * JOINT
+    assert found.under("pd").joint_error.max() > 10 * JOINT
 
 
 def test_friction_that_grows_with_the_load() -> None:
@@ -219,8 +219,8 @@ def test_friction_that_grows_with_the_load() -> None:
     found = replay(plan, ("feed_forward",))
     holds_promise(found, plan)
     assert plan.electrical > plain.electrical * (1 + 10 * ELECTRICAL)
-    rough = replay(plan, ("feed_forward",), FAST, {"friction": 0.3}).changes[1].outcome
-    assert rough.energy.electrical.friction > 1.2 * found.runs["feed_forward"].energy.electrical.friction
+    rough = replay(plan, ("feed_forward",), FAST, {"friction": 0.3}).changes[1]
+    assert rough.energy.electrical.friction > 1.2 * found.under("feed_forward").energy.electrical.friction
 
 
 def test_a_motion_of_too_many_steps_is_refused() -> None:

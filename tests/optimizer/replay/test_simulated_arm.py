@@ -218,7 +218,7 @@ def test_obstacles_of_many_parts_are_named() -> None:
 def test_only_a_replay_imports_mujoco() -> None:
     """It takes 20 MB of memory in each process, which no other request has to pay."""
     code = (
-        "import sys, joulepath.app.main, joulepath.app.server, joulepath.app.tasks.replay\n"
+        "import sys, joulepath.app.main, joulepath.app.server, joulepath.app.api.replay.task\n"
         "import joulepath.optimizer.replay.replay\n"
         "from tests.optimizer.moves import problem; from joulepath import optimize\n"
         "optimize(problem()); print('mujoco' in sys.modules)\n"

@@ -10,6 +10,7 @@ import orjson
 from fastapi import APIRouter, Path, Request, Response
 
 from joulepath.app.access.rules import check_owner
+from joulepath.app.api.evaluate.task import EvaluateTask
 from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.api.studies.iterations.task import StudyStep, StudyStepTask, large_step, study_step
 from joulepath.app.engine.result import StoredAnswer, TaskResult
@@ -37,7 +38,6 @@ from joulepath.app.studies.answers import detail
 from joulepath.app.tasks.answer_cache import AnswerCache
 from joulepath.app.tasks.answer_figures import figures_of
 from joulepath.app.tasks.arm_engine import ArmEngine
-from joulepath.app.tasks.evaluate import EvaluateTask
 from joulepath.app.tasks.read_body import HeldBody
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.search.errors import PathInfeasible

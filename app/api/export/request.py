@@ -2,44 +2,18 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.common import Request, described
 from joulepath.app.schemas.given_answer import AnswerRequest
-
-
-class ExportFormat(StrEnum):
-    """Formats of `POST /export/{format}`."""
-
-    URSCRIPT = "urscript"
-    ROS2 = "ros2"
-    MOVEIT = "moveit"
-    FRANKA = "franka"
-    RAPID = "rapid"
-    KRL = "krl"
-    CSV = "csv"
-    JSON = "json"
-    NPZ = "npz"
-
-
-FORMATS: dict[ExportFormat, str] = {
-    ExportFormat.URSCRIPT: "A program for Universal Robots controllers that follows the spline with servoj.",
-    ExportFormat.ROS2: "A FollowJointTrajectory goal or a JointTrajectory for ros2_control, as YAML or for rosbridge.",
-    ExportFormat.MOVEIT: "A RobotTrajectory for MoveIt, as YAML or JSON.",
-    ExportFormat.FRANKA: "A table at 1 kHz for robots of Franka, or a motion generator for libfranka.",
-    ExportFormat.RAPID: "A module for ABB controllers, which hold the times only roughly; the file says how far.",
-    ExportFormat.KRL: "A program for KUKA controllers, which hold the times only roughly; the file says how far.",
-    ExportFormat.CSV: "A table of samples: t, q, v, a. `POST /evaluate` reads it.",
-    ExportFormat.JSON: "The splines themselves, with payloads and rests.",
-    ExportFormat.NPZ: "Arrays for NumPy: samples and splines.",
-}
-"""What each format is: the OpenAPI document has it as `x-enum-descriptions`."""
+from joulepath.optimizer.export.export import FORMATS, ExportOptions
+from joulepath.optimizer.export.formats import FormatName
+from joulepath.optimizer.export.ros_messages import Encoding
 
 Period = Annotated[float, Field(ge=1e-4, le=1.0)]
-Encoding = Literal["yaml", "json"]
 ENCODING = "`yaml` or `json`. Null: `json` if the header `Accept` asks for it, else `yaml`."
 
 
@@ -161,19 +135,6 @@ class KrlOptions(PointsOptions):
     )
 
 
-OPTIONS_OF: dict[ExportFormat, str] = {
-    ExportFormat.URSCRIPT: "urscript",
-    ExportFormat.ROS2: "ros2",
-    ExportFormat.MOVEIT: "moveit",
-    ExportFormat.FRANKA: "franka",
-    ExportFormat.RAPID: "rapid",
-    ExportFormat.KRL: "krl",
-    ExportFormat.CSV: "table",
-    ExportFormat.NPZ: "table",
-}
-"""Field with the options of each format that has any."""
-
-
 class ExportRequest(AnswerRequest):
     """An answer, and how to export it. Options of other formats than the one in the path are refused."""
 
@@ -192,3 +153,30 @@ class ExportRequest(AnswerRequest):
     franka: FrankaOptions | None = described("Options of `franka`.", None, {"form": "cpp"}, default=None)
     rapid: RapidOptions | None = described("Options of `rapid`.", None, {"tolerance": 0.002}, default=None)
     krl: KrlOptions | None = described("Options of `krl`.", None, {"tolerance": 0.002}, default=None)
+
+
+def option_field(format: FormatName) -> str | None:
+    """Field of the request with the options of a format, named after their class; None if it has none."""
+    kind = FORMATS[format].options
+    return None if kind is None else kind.__name__.removesuffix("Options").lower()
+
+
+def to_options(request: ExportRequest, format: FormatName, preferred: Encoding) -> ExportOptions | None:
+    """The options of the library for a format.
+
+    Messages have the `preferred` encoding unless the request names one. Raises
+    InvalidRequest for options of another format.
+    """
+    own = option_field(format)
+    for name in sorted({other for each in FORMATS if (other := option_field(each)) is not None} - {own}):
+        if getattr(request, name) is not None:
+            msg = f"{name} is not for the format {format}: leave it out"
+            raise InvalidRequest([{"loc": ["body", name], "msg": msg}])
+    kind = FORMATS[format].options
+    if kind is None or own is None:
+        return None
+    given: dict[str, Any] = dict(getattr(request, own) or {})
+    if "encoding" in kind.__dataclass_fields__:
+        given["encoding"] = given.get("encoding") or preferred
+    values: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
+    return kind(**values)

@@ -7,6 +7,8 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Request, Response
 
+from joulepath.app.api.export.request import ExportRequest
+from joulepath.app.api.export.task import ExportResult, ExportTask
 from joulepath.app.exceptions.stored import UnknownAnswer, UnknownFigures
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
@@ -15,18 +17,18 @@ from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings,
 from joulepath.app.routes.kept_answers import with_kept_answers
 from joulepath.app.routes.large_bodies import LargeBodyRoute
 from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
-from joulepath.app.schemas.export import FORMATS, ExportFormat, ExportRequest
-from joulepath.app.tasks.export import ExportResult, ExportTask
 from joulepath.optimizer.evaluate.errors import NotCertified
 from joulepath.optimizer.export.errors import FormatUnsuitable
+from joulepath.optimizer.export.export import FORMATS
+from joulepath.optimizer.export.formats import FormatName
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
 _NOT_IN_A_NAME = re.compile(r"[^A-Za-z0-9._-]")
 _FORMAT = Path(
-    description="The format. " + " ".join(f"`{name}`: {text}" for name, text in FORMATS.items()),
+    description="The format. " + " ".join(f"`{name}`: {each.meaning}" for name, each in FORMATS.items()),
     examples=["urscript"],
-    json_schema_extra={"x-enum-descriptions": {str(name): text for name, text in FORMATS.items()}},
+    json_schema_extra={"x-enum-descriptions": {name: each.meaning for name, each in FORMATS.items()}},
 )
 _MEDIA_TYPES = ("text/plain", "application/yaml", "application/json", "text/csv", "application/octet-stream")
 _HEADERS = {
@@ -63,7 +65,7 @@ _FILE: dict[int | str, dict[str, Any]] = {
 )
 async def export(
     request: Request,
-    format: Annotated[ExportFormat, _FORMAT],
+    format: Annotated[FormatName, _FORMAT],
     body: ExportRequest,
     settings: ServiceSettings,
     engine: ServiceArmEngine,

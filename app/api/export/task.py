@@ -6,15 +6,15 @@ from dataclasses import dataclass, field
 
 from pydantic import ValidationError
 
-from joulepath.app.convert.exported_file import to_options
+from joulepath.app.api.export.request import ExportRequest, to_options
 from joulepath.app.convert.given_answer import paths_of_moves, to_program
 from joulepath.app.convert.until import until
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.http.problems import invalid_request
-from joulepath.app.schemas.export import ExportFormat, ExportRequest
 from joulepath.app.tasks.kept_answers import WithKeptAnswers
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.export.export import export
+from joulepath.optimizer.export.formats import FormatName
 from joulepath.optimizer.export.program import Program
 
 
@@ -36,7 +36,7 @@ class ExportTask(WithKeptAnswers):
     """
 
     asked: ExportRequest
-    format: ExportFormat
+    format: FormatName
     as_json: bool
     request_id: str
 
@@ -50,7 +50,7 @@ class ExportTask(WithKeptAnswers):
         except ValidationError as error:
             raise invalid_request(error, "body", "answer") from None
         speed_scale = self.asked.speed_scale
-        file = export(program, self.format.value, options, speed_scale=speed_scale, deadline=end.left)
+        file = export(program, self.format, options, speed_scale=speed_scale, deadline=end.left)
         return ExportResult(
             file.content,
             file.media_type,

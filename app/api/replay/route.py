@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.replay.task import ReplayAnswer, ReplayRequest, ReplayTask
 from joulepath.app.exceptions.stored import UnknownAnswer, UnknownFigures
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
@@ -13,8 +15,6 @@ from joulepath.app.routes.kept_answers import with_kept_answers
 from joulepath.app.routes.large_bodies import LargeBodyRoute
 from joulepath.app.routes.parameters import deadline_of
 from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
-from joulepath.app.schemas.replay import ReplayRequest, ReplayResponse
-from joulepath.app.tasks.replay import ReplayTask
 from joulepath.optimizer.evaluate.errors import NotCertified
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
@@ -23,7 +23,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 @router.post(
     "/replay",
     summary="A motion in an independent simulator",
-    response_model=ReplayResponse,
+    response_model=model_of(ReplayAnswer),
     responses=problem_responses(
         *WORKER_PROBLEMS,
         UnknownAnswer,

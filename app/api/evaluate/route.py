@@ -6,6 +6,8 @@ from typing import IO, Any, Literal
 
 from fastapi import APIRouter, Request, Response
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.evaluate.task import EvaluateAnswer, EvaluateTask
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import KeyReused, UnknownFigures, UnknownLog
 from joulepath.app.exceptions.transport import UnsupportedMediaType
@@ -19,9 +21,7 @@ from joulepath.app.routes.parameters import WantedFormat, is_fresh
 from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
 from joulepath.app.routes.query_settings import query_parameters
 from joulepath.app.routes.uploads import upload
-from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateResponse
-from joulepath.app.schemas.examples.evaluate import CSV_TABLE
-from joulepath.app.tasks.evaluate import EvaluateTask
+from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
 from joulepath.app.tasks.job_body import JobBodyTask
 from joulepath.optimizer.exceptions import InvalidTable
 from joulepath.optimizer.identify.logs.log_errors import LogTooLarge
@@ -31,6 +31,11 @@ router = APIRouter(tags=["motion"])
 _Kind = Literal["json", "csv"]
 _KINDS: dict[str, _Kind] = {"application/json": "json", "text/csv": "csv"}
 _BEGINNING = 4096
+_TABLE = (
+    "segment,start,end,electrical.total,…,balance_error\n1,0.0,1.5,53.1,…,9e-16\n"
+    "2,1.5,3.0,99.8,…,7e-16\ntotal,0.0,3.0,152.9,…,9e-16\n"
+)
+"""The start of an answer as CSV."""
 _REF = "#/components/schemas/{model}"
 
 
@@ -58,9 +63,9 @@ def _kind_of(file: IO[bytes]) -> _Kind:
 @router.post(
     "/evaluate",
     summary="The energy of a given motion",
-    response_model=EvaluateResponse,
+    response_model=model_of(EvaluateAnswer),
     responses={
-        200: {"content": {"text/csv": {"schema": {"type": "string"}, "example": CSV_TABLE}}},
+        200: {"content": {"text/csv": {"schema": {"type": "string"}, "example": _TABLE}}},
         **ACCEPTED,
         **problem_responses(
             *WORKER_PROBLEMS,

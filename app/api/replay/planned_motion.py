@@ -1,4 +1,4 @@
-"""POST /replay: from answers to planned motions, and from replays to the answer."""
+"""From answers to planned motions."""
 
 from __future__ import annotations
 
@@ -8,16 +8,12 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from joulepath.app.convert.fields import fields
 from joulepath.app.convert.given_answer import Number, Part
-from joulepath.app.schemas.replay import DeepestContact, Perturb, SimulatedMotion
 from joulepath.optimizer.export.program import Move
 from joulepath.optimizer.replay.baseline_courses import ReportedBaseline, planned_baselines
-from joulepath.optimizer.replay.outcome import Outcome
 from joulepath.optimizer.replay.planned import PlannedMotion, PlannedTorques
 from joulepath.optimizer.replay.reference import course_of
-from joulepath.optimizer.replay.replay import Quantity, Replay
-from joulepath.optimizer.result.energy import Energy, Objective
+from joulepath.optimizer.result.energy import Objective
 from joulepath.optimizer.result.solution import BaselineName
 
 
@@ -98,51 +94,3 @@ def _planned(move: Move, samples: dict[str, Any], energy: _Energy) -> PlannedMot
         mechanical=energy.mechanical.total,
         torques=PlannedTorques(*(np.array(samples[name], dtype=float) for name in ("q", "v", "a", "tau"))),
     )
-
-
-def to_perturbation(perturb: Perturb | None) -> dict[Quantity, float]:
-    """The fraction by which each quantity is changed."""
-    given: dict[Quantity, float | None] = (
-        {} if perturb is None else {"payload": perturb.payload, "friction": perturb.friction}
-    )
-    return {quantity: fraction for quantity, fraction in given.items() if fraction is not None}
-
-
-def to_replayed_motion(planned: PlannedMotion, found: Replay, leg: int | None) -> dict[str, Any]:
-    """The entry of one motion."""
-    return {
-        "leg": leg,
-        "duration": planned.duration,
-        "planned": {**fields(planned, "electrical", "mechanical"), "limit_ratio": found.planned_ratio},
-        "torque_error": found.torque_error,
-        "runs": [{**_outcome(planned, run), "control": control} for control, run in found.runs.items()],
-        "changes": [
-            {
-                **_outcome(planned, each.outcome),
-                **fields(each, "quantity", "factor"),
-                "savings": [{"name": name, "saving": saving} for name, saving in each.savings.items()],
-            }
-            for each in found.changes
-        ],
-        "savings": [
-            {
-                **fields(each, "name", "planned", "simulated", "least", "most", "persists"),
-                "range": 100 * (each.most - each.least),
-            }
-            for each in found.savings
-        ],
-    }
-
-
-def _outcome(planned: PlannedMotion, found: Outcome) -> dict[str, Any]:
-    """The fields of a SimulatedMotion."""
-    energy: Energy = found.energy
-    totals = {"electrical": energy.electrical.total, "mechanical": energy.mechanical.total}
-    errors = {f"{name}_error": _relative(total, getattr(planned, name)) for name, total in totals.items()}
-    contact = found.contact
-    own = {**totals, **errors, "contact": None if contact is None else fields(contact, *DeepestContact.model_fields)}
-    return own | fields(found, *(name for name in SimulatedMotion.model_fields if name not in own))
-
-
-def _relative(value: float, reference: float) -> float:
-    return (value - reference) / abs(reference) if reference else 0.0

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.ik.path.task import IKPathAnswer, IKPathRequest, IKPathTask
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
@@ -11,8 +13,6 @@ from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from joulepath.app.routes.large_bodies import LargeBodyRoute
 from joulepath.app.routes.parameters import deadline_of
 from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
-from joulepath.app.schemas.ik_path import IKPathRequest, IKPathResponse
-from joulepath.app.tasks.ik_path import IKPathTask
 from joulepath.optimizer.exceptions import OutsideLimits
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
@@ -21,7 +21,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 @router.post(
     "/ik/path",
     summary="Configurations along a path of the TCP",
-    response_model=IKPathResponse,
+    response_model=model_of(IKPathAnswer),
     responses=problem_responses(*WORKER_PROBLEMS, OutsideLimits),
 )
 async def follow(

@@ -1,0 +1,1 @@
+"""`POST /evaluate`: the energy of a given motion."""

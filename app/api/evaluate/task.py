@@ -1,0 +1,278 @@
+"""What `POST /evaluate` answers, and its work in a worker: reads the motion from the received body."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from functools import reduce
+from io import StringIO
+from pathlib import Path
+from typing import Any, Literal, Self, TypeVar
+
+import numpy as np
+from pydantic import ValidationError
+
+from joulepath.app.answers.declared import as_json
+from joulepath.app.answers.envelope import AnswerFigures, MotionAnswer
+from joulepath.app.api.evaluate.motion_csv import MotionCsv
+from joulepath.app.convert.arm import to_arm
+from joulepath.app.convert.arm_fields import arm_fields
+from joulepath.app.convert.fields import location
+from joulepath.app.convert.given_motion import own_times, to_motion, to_waypoints
+from joulepath.app.convert.json_text import parsed_json
+from joulepath.app.convert.query import query_values
+from joulepath.app.convert.recorded import as_logged, read_csv, reading_of, told_by
+from joulepath.app.convert.until import until
+from joulepath.app.convert.warnings import sampled_warnings
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.http.problems import invalid_request
+from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
+from joulepath.optimizer.csv_table import FIRST_ROW
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.declared import Count, Seconds
+from joulepath.optimizer.evaluate.evaluate import Evaluation, evaluate
+from joulepath.optimizer.evaluate.interval_energy import IntervalEnergy
+from joulepath.optimizer.evaluate.limit_report import LimitReport
+from joulepath.optimizer.evaluate.nearest_contact import LeastClearance
+from joulepath.optimizer.evaluate.recording import Recording, Waypoints
+from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
+from joulepath.optimizer.identify.logs.reading import LogReading
+from joulepath.optimizer.identify.logs.recorded import MeasuredEnergy, measured
+from joulepath.optimizer.result.solution import Samples
+
+M = TypeVar("M", EvaluateRequest, EvaluateCsvSettings)
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluatedInterval(IntervalEnergy):
+    """Energy of one segment of the motion, or of the whole motion."""
+
+    measured: MeasuredEnergy | None
+    """What was measured meanwhile; null without a log of power or efforts."""
+
+    @classmethod
+    def of(cls, interval: IntervalEnergy, known: MeasuredEnergy | None) -> Self:
+        """The energy of an interval, and what is known of it from measurements."""
+        own = {each.name: getattr(interval, each.name) for each in fields(interval) if each.init}
+        return cls(**own, measured=known)
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """The evaluation of a motion of the arm that was `asked` about.
+
+    Of a log, what was `measured` in each segment, and the remarks on it.
+    """
+
+    asked: EvaluateSettings
+    result: Evaluation
+    measured: Sequence[MeasuredEnergy] = ()
+    remarks: Sequence[str] = ()
+
+    @property
+    def total(self) -> EvaluatedInterval:
+        """The whole motion."""
+        known = reduce(MeasuredEnergy.joined, self.measured) if self.measured else None
+        return EvaluatedInterval.of(self.result.total, known)
+
+    @property
+    def segments(self) -> list[EvaluatedInterval]:
+        """The segments that are listed."""
+        return [
+            EvaluatedInterval.of(each, self.measured[k] if self.measured else None)
+            for k, each in enumerate(self.result.segments)
+        ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluateAnswer(MotionAnswer):
+    """The energy of a given motion, and the limits that it violates."""
+
+    duration: Seconds
+    """Duration of the motion."""
+    total: EvaluatedInterval
+    """The whole motion."""
+    segments: list[EvaluatedInterval]
+    """Segments between configurations. A trajectory is one segment, and a log has one for each move
+    and each rest. Empty if there are more than 10,000."""
+    segment_count: Count
+    """Number of segments."""
+    speed_jumps: Count
+    """Number of velocity steps inside the motion. A step contributes no energy, because its power is
+    not defined."""
+    within_limits: bool
+    """Whether the motion is within every limit; collisions are in `collides`."""
+    limits: list[LimitReport]
+    """One entry per limit."""
+    collides: bool | None
+    """Whether a clearance is negative at a sample; null if `collisions` is false."""
+    nearest: LeastClearance | None
+    """Smallest clearance at sample points; null if `collisions` is false."""
+    warnings: list[str]
+    """Remarks on the motion, in words; empty if there are none. If two bodies come closer than 2 mm,
+    one names them, their distance without margins, and the time. Others say that arm configurations
+    may have been missed, that a baseline is left out, or what a tool or payload without a shape would
+    touch. Of a log, also what `POST /logs` says of it."""
+    samples: Samples | None
+    """Samples of the motion; null without `sample_period`."""
+
+    @classmethod
+    def of(cls, request_id: str, found: Evaluated) -> Self:
+        """The answer for the motion of the arm asked about."""
+        asked, result = found.asked, found.result
+        return cls(
+            request=request_id,
+            robot=asked.robot,
+            arm=arm_fields(asked),
+            duration=result.total.duration,
+            total=found.total,
+            segments=found.segments,
+            segment_count=result.segment_count,
+            speed_jumps=result.speed_jumps,
+            within_limits=all(report.held for report in result.limits),
+            limits=result.limits,
+            collides=None if result.nearest is None else result.nearest.distance < 0,
+            nearest=result.nearest,
+            warnings=[*found.remarks, *sampled_warnings(result)],
+            samples=result.samples,
+        )
+
+    @property
+    def figures(self) -> AnswerFigures:
+        """What lists show of this answer."""
+        return AnswerFigures(self.robot, self.total.energy.electrical.total, self.duration)
+
+
+@dataclass(frozen=True)
+class EvaluateTask:
+    """A received body in `file`, of the media type `kind`, and the query's parameters; the answer's is `wanted`.
+
+    `longest`: most that the body may ask for as its deadline, and what it gets if it asks for none [s].
+    """
+
+    file: str
+    kind: Literal["json", "csv"]
+    query: dict[str, str]
+    wanted: Literal["json", "csv"]
+    request_id: str
+    longest: float
+
+    def run(self, deadline: float) -> TaskResult:
+        """The answer of `POST /evaluate`, within about `deadline` seconds. Raises InvalidRequest."""
+        # when the request began to wait for a worker
+        began = Deadline.after(deadline - self.longest)
+        found = self._evaluate_csv(began) if self.kind == "csv" else self._evaluate_json(began)
+        if self.wanted == "csv":
+            return TaskResult.of_csv(_csv_table(found))
+        return TaskResult.of_json(EvaluateAnswer.of(self.request_id, found))
+
+    def _evaluate_csv(self, began: Deadline) -> Evaluated:
+        settings = _csv_settings(self.query)
+        end = self._end(settings, began, "query")
+        try:
+            with Path(self.file).open("rb") as file:
+                with until(end):
+                    arm = to_arm(settings)
+                    try:
+                        table = MotionCsv.of(file, arm.robot.nq, settings.units)
+                    except InvalidTable as error:
+                        return self._evaluate_log(settings, end, error)
+                    motion = _csv_motion(settings, table)
+                return Evaluated(settings, evaluate(arm, motion, settings.sample_period, end.left))
+        except InvalidProblem as error:
+            raise InvalidRequest([{"loc": location(error, "query"), "msg": str(error)}]) from None
+
+    def _evaluate_log(self, settings: EvaluateCsvSettings, end: Deadline, error: InvalidTable) -> Evaluated:
+        """The evaluation of a file whose header is that of a log, and not that of a motion, as `error` says."""
+        reading = read_csv(Path(self.file), settings, error)
+        if settings.model_fields_set & {"time_per_segment", "interpolation"}:
+            raise own_times()
+        return _evaluated_log(told_by(reading.log, settings), reading, end)
+
+    def _evaluate_json(self, began: Deadline) -> Evaluated:
+        body = Path(self.file).read_bytes()
+        content = parsed_json(body)
+        request = _validated(lambda: EvaluateRequest.model_validate(content), "body")
+        return evaluated(request, self._end(request, began, "body"))
+
+    def _end(self, asked: EvaluateSettings, began: Deadline, where: str) -> Deadline:
+        """Raises InvalidRequest, with the part `where` of the request, if it asks for more than it may."""
+        if asked.deadline is not None and asked.deadline > self.longest:
+            msg = f"deadline must be at most {self.longest:g} s: the operator of the service has set this."
+            raise InvalidRequest([{"loc": [where, "deadline"], "msg": msg}])
+        return began.earlier_by(-(asked.deadline or self.longest))
+
+
+def evaluated(request: EvaluateRequest, end: Deadline) -> Evaluated:
+    """The evaluation of the motion in a request, until about `end`. Raises UnknownLog."""
+    if request.log is not None:
+        with until(end):
+            reading = reading_of(request.log)
+        return _evaluated_log(as_logged(request), reading, end)
+    with until(end):
+        arm, motion = to_arm(request), to_motion(request)
+    return Evaluated(request, evaluate(arm, motion, request.sample_period, end.left))
+
+
+def _evaluated_log(asked: EvaluateSettings, reading: LogReading, end: Deadline) -> Evaluated:
+    """The evaluation of the motion of a log, until about `end`, and what was measured."""
+    with until(end):
+        arm = to_arm(asked)
+    result = evaluate(arm, reading.log.recording(), asked.sample_period, end.left)
+    return Evaluated(asked, result, measured(reading.log, arm), reading.report.warnings)
+
+
+def _csv_settings(query: dict[str, str]) -> EvaluateCsvSettings:
+    """Settings from query parameters: each is JSON, or a bare word. Raises InvalidRequest."""
+    return _validated(lambda: EvaluateCsvSettings.model_validate(query_values(query)), "query")
+
+
+def _validated(validate: Callable[[], M], where: str) -> M:
+    """What `validate` returns. Raises InvalidRequest with the part `where` of the request."""
+    try:
+        return validate()
+    except ValidationError as error:
+        raise invalid_request(error, where) from None
+
+
+def _csv_motion(settings: EvaluateCsvSettings, table: MotionCsv) -> Waypoints | Recording:
+    """The motion in a CSV file. Raises InvalidProblem."""
+    if not table.has_time:
+        return to_waypoints(settings, table.configurations(), FIRST_ROW)
+    if settings.model_fields_set & {"time_per_segment", "interpolation"}:
+        raise own_times()
+    return Recording(table.log(), FIRST_ROW)
+
+
+def _csv_table(found: Evaluated) -> str:
+    """The answer as CSV: one line per segment, and a last line `total`.
+
+    Columns have the names of the JSON fields.
+    """
+    text, writer = StringIO(), None
+    rows = [(str(k), each) for k, each in enumerate(found.segments, 1)]
+    for name, interval in [*rows, ("total", found.total)]:
+        row = {"segment": name, **dict(_flat("", interval))}
+        # only the whole motion has one
+        row = {key: value for key, value in row.items() if not key.startswith("electrical.interval")}
+        if writer is None:
+            writer = csv.DictWriter(text, row.keys(), lineterminator="\n")
+            writer.writeheader()
+        writer.writerow(row)
+    return text.getvalue()
+
+
+def _flat(name: str, value: Any) -> list[tuple[str, Any]]:
+    """Names and values of a nested answer: `electrical.total`, `per_joint.friction.1`, …"""
+    if is_dataclass(value):
+        value = as_json(value)
+    if isinstance(value, dict):
+        # almost all fields are in `energy`: it would only make the names longer
+        parts = [(key if not name or name == "energy" else f"{name}.{key}", part) for key, part in value.items()]
+    elif isinstance(value, np.ndarray):
+        parts = [(f"{name}.{j}", part) for j, part in enumerate(value.tolist(), 1)]
+    else:
+        return [(name, value)]
+    return [column for key, part in parts for column in _flat(key, part)]

@@ -1,0 +1,1 @@
+"""`POST /export/{format}`: a motion as a program or file for a controller."""

@@ -1,0 +1,1 @@
+"""`POST /ik`: every arm configuration that reaches a pose."""

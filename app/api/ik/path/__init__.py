@@ -1,0 +1,1 @@
+"""`POST /ik/path`: configurations along a path of the TCP."""

@@ -1,0 +1,97 @@
+"""What `POST /ik` takes and answers, and its work in a worker, because its meshes may take seconds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from joulepath.app.answers.envelope import Answer
+from joulepath.app.convert.arm import robot_named
+from joulepath.app.convert.pose import to_base_pose, to_matrix
+from joulepath.app.convert.scene import to_attachment, to_scene, to_tool
+from joulepath.app.convert.until import until
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.schemas.common import BasePose, described
+from joulepath.app.schemas.examples.values import BOX
+from joulepath.app.schemas.scene import CarriedBody, CellRequest
+from joulepath.models.robot import Robot
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.inverse_kinematics import IKSolution, inverse_kinematics
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.problem import LONGEST_DURATION
+
+
+class IKRequest(CellRequest):
+    """A pose of the TCP."""
+
+    pose: BasePose = described(
+        "Pose of the TCP in the robot's base frame, or in its `frame`.",
+        None,
+        {"position": [0.4, -0.2, 0.3], "quaternion": [0, 1, 0, 0]},
+    )
+    windings: bool = described(
+        "Whether to return all full-turn alternatives q + 2πk within the joint range. If false: "
+        "one solution per branch, the one nearest to zero.",
+        None,
+        True,
+        default=True,
+    )
+    payload: CarriedBody | None = described(
+        "Payload at the flange, for collision checking. Null: no payload.",
+        None,
+        {"shape": BOX},
+        default=None,
+    )
+    deadline: float = described(
+        "Wall time from the arrival of the request, including the wait for a worker.",
+        "s",
+        10.0,
+        default=10.0,
+        ge=1e-3,
+        le=LONGEST_DURATION,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class IKAnswer(Answer):
+    """All arm configurations within the joint range that reach the pose."""
+
+    solutions: tuple[IKSolution, ...]
+    """One entry per configuration."""
+    complete: bool
+    """Whether every branch is among them. False for an arm whose inverse kinematics is not proven to
+    find all: some may be missing."""
+
+
+@dataclass(frozen=True)
+class IKTask:
+    """A validated request and its id."""
+
+    request: IKRequest
+    request_id: str
+
+    def run(self, deadline: float) -> TaskResult:
+        """The answer of `POST /ik`, within about `deadline` seconds. Raises DeadlineExceeded."""
+        request, end = self.request, Deadline.after(deadline)
+        with until(end):
+            robot = robot_named(request.robot)
+            arm, pose = to_ik_arm(request, robot), to_base_pose(request.pose, robot)
+        found = inverse_kinematics(arm, pose, request.windings, end.left)
+        answer = IKAnswer(
+            request=self.request_id,
+            robot=request.robot,
+            solutions=found.solutions,
+            complete=found.complete,
+        )
+        return TaskResult.of_json(answer)
+
+
+def to_ik_arm(request: IKRequest, robot: Robot) -> Arm:
+    """The arm with its TCP, and its shapes for collision checking. Raises InvalidProblem."""
+    carried = request.payload
+    return Arm(
+        robot=robot,
+        T_flange_tcp=to_matrix(request.tcp),
+        tool=to_tool(request.tool),
+        payload=Payload(shape=None if carried is None else to_attachment(carried.shape, carried.touches)),
+        scene=to_scene(request.scene, robot),
+    )

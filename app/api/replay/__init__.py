@@ -1,0 +1,1 @@
+"""`POST /replay`: a motion in an independent simulator."""

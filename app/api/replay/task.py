@@ -1,0 +1,176 @@
+"""What `POST /replay` takes and answers, and its work in a worker."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, ValidationError
+
+from joulepath.app.answers.envelope import Answer
+from joulepath.app.api.replay.planned_motion import to_planned_motion
+from joulepath.app.convert.given_answer import paths_of_moves, to_program
+from joulepath.app.convert.until import until
+from joulepath.app.convert.warnings import replay_warnings
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.http.problems import invalid_request
+from joulepath.app.schemas.common import Request, described
+from joulepath.app.schemas.given_answer import AnswerRequest
+from joulepath.app.settings import LONGEST_DEADLINE
+from joulepath.app.tasks.kept_answers import WithKeptAnswers
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.declared import NotEmpty, Seconds
+from joulepath.optimizer.replay.controller import ControlName
+from joulepath.optimizer.replay.planned import PlannedMotion
+from joulepath.optimizer.replay.replay import Quantity, Replay, replay
+from joulepath.optimizer.replay.simulator import mujoco
+
+PERTURBED_NOTHING = "The arm carries no payload: to change it has no effect."
+NO_BASELINES = (
+    "The motions of the baselines do not follow from this answer, so that their savings are not replayed. They do for "
+    "goals that are joint positions or whole poses, without a path."
+)
+CONTROLS: dict[Literal["feed_forward", "pd", "both"], tuple[ControlName, ...]] = {
+    "feed_forward": ("feed_forward",),
+    "pd": ("pd",),
+    "both": ("feed_forward", "pd"),
+}
+Fraction = Annotated[float, Field(gt=0, le=0.9)]
+
+
+class Perturb(Request):
+    """Quantities of the arm that the controller does not know exactly. Each is changed by itself."""
+
+    payload: Fraction | None = described(
+        "Fraction by which mass and inertia of the payload are less, and more. Null: not changed.",
+        "1",
+        0.1,
+        default=None,
+    )
+    friction: Fraction | None = described(
+        "Fraction by which the friction of all joints is less, and more. Null: not changed.", "1", 0.3, default=None
+    )
+
+
+class ReplayRequest(AnswerRequest):
+    """An answer whose motion is played in MuJoCo."""
+
+    control: Literal["feed_forward", "pd", "both"] = described(
+        "Controller of the joints. `feed_forward`: torques known in advance, friction included, and a PD loop. `pd`: "
+        "the loop alone, as simple controllers have it.",
+        None,
+        "feed_forward",
+        default="both",
+    )
+    step: float = described(
+        "Step of the simulation and of its controller.", "s", 2.5e-4, default=2.5e-4, ge=1e-5, le=1e-2
+    )
+    perturb: Perturb | None = described(
+        "Changes of the arm that the controller does not know: how the motion and its savings stand them. Null: none.",
+        None,
+        {"payload": 0.1, "friction": 0.3},
+        default=None,
+    )
+    deadline: float = described(
+        "Wall time from the arrival of the request, including the wait for a worker.",
+        "s",
+        60.0,
+        default=60.0,
+        ge=1e-3,
+        le=LONGEST_DEADLINE,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _OfLeg:
+    leg: int | None
+    """Index in `legs` of a cycle, from 0; null for an answer of one motion."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReplayedMotion(Replay, _OfLeg):
+    """A motion of the answer, planned and simulated."""
+
+    @classmethod
+    def of(cls, leg: int | None, found: Replay) -> Self:
+        """The replay of a motion, and of a cycle the index of its leg."""
+        return cls(leg=leg, **{each.name: getattr(found, each.name) for each in fields(Replay)})
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReplayAnswer(Answer):
+    """Motions of an answer as MuJoCo plays them, beside what the answer says of them."""
+
+    simulator: str
+    """The simulator and its version."""
+    motions: Annotated[list[ReplayedMotion], NotEmpty]
+    """The motions, in their order."""
+    wall_time: Seconds
+    """Wall time."""
+    warnings: list[str]
+    """Remarks, in words: joints that give all their torque, contacts, obstacles that are not
+    simulated, and baselines that cannot be replayed. Empty if there are none."""
+
+
+@dataclass(frozen=True)
+class ReplayTask(WithKeptAnswers):
+    """A validated request and its id."""
+
+    asked: ReplayRequest
+    request_id: str
+
+    def run(self, deadline: float) -> TaskResult:
+        """The answer of `POST /replay`, within about `deadline` seconds.
+
+        Raises PartsNeeded with the answers that must be kept at hand first, and what its parts raise.
+        """
+        simulator, end = f"MuJoCo {mujoco().__version__}", Deadline.after(deadline)
+        began = end.clock()
+        try:
+            with until(end):
+                planned = self._planned()
+        except ValidationError as error:
+            raise invalid_request(error, "body", "answer") from None
+        warnings = list[str]()
+        motions = [self._replayed(leg, motion, end, warnings) for leg, motion in planned]
+        answer = ReplayAnswer(
+            request=self.request_id,
+            robot=planned[0][1].arm.robot.name,
+            simulator=simulator,
+            motions=motions,
+            wall_time=end.clock() - began,
+            warnings=warnings,
+        )
+        return TaskResult.of_json(answer)
+
+    def _planned(self) -> list[tuple[int | None, PlannedMotion]]:
+        """The motions of the answer, and of a cycle the index of each in `legs`."""
+        given = self.asked.answer
+        answer = self.answers([given])[0] if isinstance(given, str) else given
+        paths = paths_of_moves(answer)
+        single = self.answers(paths) if paths else [answer]
+        moves = to_program(answer, self.asked.arm, self.answers).moves
+        legs: list[int | None] = [None]
+        if paths:
+            legs = [k for k, leg in enumerate(answer["legs"]) if leg["answer"] is not None]
+        return [(leg, to_planned_motion(*each)) for leg, *each in zip(legs, moves, single, strict=True)]
+
+    def _replayed(self, leg: int | None, planned: PlannedMotion, end: Deadline, warnings: list[str]) -> ReplayedMotion:
+        """The entry of one motion; adds its warnings."""
+        perturb, said = _perturbation(self.asked.perturb), list[str]()
+        if "payload" in perturb and planned.arm.payload.mass == 0:
+            said.append(PERTURBED_NOTHING)
+        if perturb and planned.compared and not planned.baselines:
+            said.append(NO_BASELINES)
+        found = replay(planned, CONTROLS[self.asked.control], self.asked.step, perturb, end.left, end.clock)
+        where = "" if leg is None else f"Leg {leg}: "
+        warnings += [f"{where}{words}" for words in (*said, *replay_warnings(planned, found))]
+        return ReplayedMotion.of(leg, found)
+
+
+def _perturbation(perturb: Perturb | None) -> dict[Quantity, float]:
+    """The fraction by which each quantity is changed."""
+    given: dict[Quantity, float | None] = (
+        {} if perturb is None else {"payload": perturb.payload, "friction": perturb.friction}
+    )
+    return {quantity: fraction for quantity, fraction in given.items() if fraction is not None}

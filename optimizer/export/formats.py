@@ -1,0 +1,8 @@
+"""The names of the formats, which load nothing."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+FormatName = Literal["urscript", "ros2", "moveit", "franka", "rapid", "krl", "csv", "json", "npz"]
+FORMAT_NAMES: tuple[FormatName, ...] = get_args(FormatName)
