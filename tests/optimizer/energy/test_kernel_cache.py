@@ -69,7 +69,7 @@ def test_the_digest_covers_every_source_that_runs_while_the_c_is_written() -> No
     finally:
         sys.setprofile(None)
     sources = {Path(str(module.__file__)).resolve() for module in SOURCES}
-    rooms = [ours / part for part in ("optimizer", "models")]
+    rooms = [(ours / part).resolve() for part in ("optimizer", "models")]
     assert {path.resolve() for path in ran if any(path.resolve().is_relative_to(room) for room in rooms)} == sources
 
 
