@@ -180,7 +180,9 @@ def _ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
 
 def test_equal_ends_take_the_least_duration() -> None:
     error = refused(problem(goal=START), LEAST_DURATION / 2)
-    assert named(error) == error.bound == LEAST_DURATION and error.proven
+    # the time of a motion that stands still is divided and multiplied again
+    assert named(error) == pytest.approx(LEAST_DURATION, rel=1e-12)
+    assert error.bound == LEAST_DURATION and error.proven
 
 
 @pytest.mark.long
