@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import gzip
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import zstandard
@@ -29,6 +30,9 @@ class Compression:
     """In the order in which equal weights are decided."""
     zstd_level: int = 3
     gzip_level: int = 5
+    file_zstd_level: int = 12
+    """For files, which have an entity tag: they are compressed once and sent often."""
+    file_gzip_level: int = 9
     least: int = 1024
     """Smaller bodies fit into one packet anyway [byte]."""
     instant: int = 1 << 15
@@ -71,17 +75,26 @@ class Compression:
         body: bytes = first.get("body", b"")
         if coding == "identity" or first.get("more_body", False) or len(body) < self.least:
             return first
-        if len(body) < self.instant:
-            body = self._compressed(body, coding)
+        if "etag" in headers:
+            level = self.file_zstd_level if coding == "zstd" else self.file_gzip_level
+            body = await asyncio.to_thread(_compressed_file, body, coding, level)
         else:
-            body = await asyncio.to_thread(self._compressed, body, coding)
+            level = self.zstd_level if coding == "zstd" else self.gzip_level
+            if len(body) < self.instant:
+                body = _compressed(body, coding, level)
+            else:
+                body = await asyncio.to_thread(_compressed, body, coding, level)
         headers["Content-Encoding"] = coding
         headers["Content-Length"] = str(len(body))
         if headers.get("etag", "").startswith('"'):  # the same answer, but not the same bytes
             headers["ETag"] = f"W/{headers['etag']}"
         return {**first, "body": body}
 
-    def _compressed(self, body: bytes, coding: Coding) -> bytes:
-        if coding == "zstd":  # a compressor may not be shared by threads
-            return zstandard.ZstdCompressor(level=self.zstd_level).compress(body)
-        return gzip.compress(body, self.gzip_level, mtime=0)
+
+def _compressed(body: bytes, coding: Coding, level: int) -> bytes:
+    if coding == "zstd":  # a compressor may not be shared by threads
+        return zstandard.ZstdCompressor(level=level).compress(body)
+    return gzip.compress(body, level, mtime=0)
+
+
+_compressed_file = lru_cache(maxsize=64)(_compressed)
