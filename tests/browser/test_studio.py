@@ -225,18 +225,6 @@ def test_branches_side_by_side(page: Page) -> None:
         expect(labels.filter(has_text=f"{energy:.3g} J")).to_have_count(1)
 
 
-def test_a_point_of_the_front_takes_the_place_of_the_answer(page: Page) -> None:
-    lift = json.loads((ROOT / "examples" / "pareto" / "lift.json").read_text())
-    ask(page, {name: value for name, value in lift.items() if name not in ("points", "duration")})
-    page.locator("#compute-front").click()
-    points = page.locator("#front .point")
-    expect(points.first).to_be_visible()
-    assert points.count() > 1
-    fastest = points.first.get_attribute("aria-label")
-    points.first.click()
-    expect(page.locator("#joules")).to_have_text(str(fastest).split(", ")[1])
-
-
 def test_without_webgl_the_figures_are_there(browser: Browser, service: Server) -> None:
     options = ["--no-sandbox", "--disable-gpu", "--disable-software-rasterizer"]
     plain = browser.browser_type.launch(executable_path=BROWSER, args=options)
@@ -342,3 +330,16 @@ def test_an_obstacle_under_the_pointer_tells_its_name_and_margin(page: Page) -> 
     page.mouse.move(5, 5)
     expect(page.locator(".label.hover")).to_have_count(0)
     assert page.evaluate(shells) == 0
+
+
+def test_a_point_of_the_front_takes_the_place_of_the_answer(page: Page) -> None:
+    """The last test of the shared page: it shows another request."""
+    lift = json.loads((ROOT / "examples" / "pareto" / "lift.json").read_text())
+    ask(page, {name: value for name, value in lift.items() if name not in ("points", "duration")})
+    page.locator("#compute-front").click()
+    points = page.locator("#front .point")
+    expect(points.first).to_be_visible()
+    assert points.count() > 1
+    fastest = points.first.get_attribute("aria-label")
+    points.first.click()
+    expect(page.locator("#joules")).to_have_text(str(fastest).split(", ")[1])
