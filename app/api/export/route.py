@@ -9,14 +9,14 @@ from fastapi import APIRouter, Path, Request, Response
 
 from joulepath.app.api.export.request import ExportRequest
 from joulepath.app.api.export.task import ExportResult, ExportTask
+from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
+from joulepath.app.api.shared.kept_answers import with_kept_answers
+from joulepath.app.api.shared.large_bodies import LargeBodyRoute
+from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
 from joulepath.app.exceptions.stored import UnknownAnswer, UnknownFigures
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.http.weights import JSON, is_wanted
-from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
-from joulepath.app.routes.kept_answers import with_kept_answers
-from joulepath.app.routes.large_bodies import LargeBodyRoute
-from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
 from joulepath.optimizer.evaluate.errors import NotCertified
 from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.export import FORMATS

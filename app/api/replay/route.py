@@ -6,15 +6,15 @@ from fastapi import APIRouter, Request, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.replay.task import ReplayAnswer, ReplayRequest, ReplayTask
+from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
+from joulepath.app.api.shared.kept_answers import with_kept_answers
+from joulepath.app.api.shared.large_bodies import LargeBodyRoute
+from joulepath.app.api.shared.parameters import deadline_of
+from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
 from joulepath.app.exceptions.stored import UnknownAnswer, UnknownFigures
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
-from joulepath.app.routes.kept_answers import with_kept_answers
-from joulepath.app.routes.large_bodies import LargeBodyRoute
-from joulepath.app.routes.parameters import deadline_of
-from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
 from joulepath.optimizer.evaluate.errors import NotCertified
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)

@@ -9,6 +9,9 @@ from fastapi import APIRouter, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
+from joulepath.app.api.shared.dependencies import ServiceClient, ServiceStore
+from joulepath.app.api.shared.large_bodies import LargeBodyRoute
+from joulepath.app.api.shared.parameters import CREATED_HEADERS, Key, StudyId, WantedFormat, set_location
 from joulepath.app.convert.identified import identified_as, with_figures
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import InvalidRequest
@@ -16,9 +19,6 @@ from joulepath.app.exceptions.queue import ShuttingDown, WorkerLost
 from joulepath.app.exceptions.stored import KeyReused, StoreUnavailable, UnknownFigures, UnknownStudy
 from joulepath.app.exceptions.transport import BodyTooLarge, RequestTimeout
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import ServiceClient, ServiceStore
-from joulepath.app.routes.large_bodies import LargeBodyRoute
-from joulepath.app.routes.parameters import CREATED_HEADERS, Key, StudyId, WantedFormat, set_location
 from joulepath.app.schemas.examples.studies import STUDY_CSV
 from joulepath.app.schemas.studies import Study, StudyList, StudyPage, StudyRequest, StudySummary
 from joulepath.app.store import studies

@@ -11,15 +11,15 @@ from fastapi import APIRouter, Path, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
+from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from joulepath.app.api.shared.large_bodies import LargeBodyRoute
+from joulepath.app.api.shared.parameters import LOCATION_HEADER
+from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.stored import FiguresInUse, StoreUnavailable, TooManyFigures, UnknownFigures
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.http.weights import is_wanted
-from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
-from joulepath.app.routes.large_bodies import LargeBodyRoute
-from joulepath.app.routes.parameters import LOCATION_HEADER
-from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
 from joulepath.app.schemas.examples.figures import FIGURES, UNKNOWN_ID
 from joulepath.app.schemas.figures import FiguresDetail, FiguresDocument, FiguresList, FiguresSummary
 from joulepath.app.store import figures

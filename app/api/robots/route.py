@@ -12,16 +12,16 @@ from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
 from joulepath.app.access.client import Client
+from joulepath.app.api.shared.dependencies import ServiceClient, ServiceClientEngine, ServiceSettings, ServiceStore
+from joulepath.app.api.shared.large_bodies import LargeBodyRoute
+from joulepath.app.api.shared.parameters import LOCATION_HEADER
+from joulepath.app.api.shared.problem_lists import ADDING_PROBLEMS
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.queue import ShuttingDown, WorkerLost
 from joulepath.app.exceptions.stored import NoMeshes, RobotExists, StoreUnavailable
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.entity_tag import is_known
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import ServiceClient, ServiceClientEngine, ServiceSettings, ServiceStore
-from joulepath.app.routes.large_bodies import LargeBodyRoute
-from joulepath.app.routes.parameters import LOCATION_HEADER
-from joulepath.app.routes.problem_lists import ADDING_PROBLEMS
 from joulepath.app.schemas.own_arm import NewRobot, OwnArm, OwnName
 from joulepath.app.schemas.robots import Friction, FrictionLaw, RobotDetail, RobotList, RobotSummary
 from joulepath.app.store import robots
