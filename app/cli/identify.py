@@ -107,8 +107,8 @@ def identify(
     LOGS are CSV files of RTDE, of ROS `JointState` or of the service's own form, plain or packed with gzip. The answer
     is the `result` of `GET /identifications/{id}`; its `document` can be sent to `PUT /figures`.
     """
-    from joulepath.app.schemas.identifications import IdentifyRequest
-    from joulepath.app.schemas.logs import LogSettings
+    from joulepath.app.api.identifications.request import IdentifyRequest
+    from joulepath.app.api.logs.request import LogSettings
 
     request_id = new_id()
     carried = None if payload is None else {"mass": payload, "com": list(com)}
@@ -126,7 +126,7 @@ def identify(
 
 
 def _answered(asked: Any, read: Any, request_id: str) -> bytes:
-    from joulepath.app.tasks.identify import IdentifyTask
+    from joulepath.app.api.identifications.task import IdentifyTask
 
     return answered(IdentifyTask(asked, read, request_id), asked.deadline, request_id)
 

@@ -1,13 +1,11 @@
-"""Logs of arms: from the settings of a request to the options of the library, and from a reading to its answer."""
+"""Logs of arms: the options with which they are read, and readings of those that are stored."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Any
 
+from joulepath.app.api.logs.request import LogSettings
 from joulepath.app.convert.arm import robot_named, to_payload
-from joulepath.app.schemas.logs import LogSettings
-from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.reading import LogOptions, LogReading, read_log
 
 
@@ -27,28 +25,8 @@ def to_log_options(settings: LogSettings, most_bytes: int) -> LogOptions:
     )
 
 
-def report_fields(reading: LogReading) -> dict[str, Any]:
-    """What an answer says of a log beside its name and owner."""
-    log, report = reading.log, reading.report
-    return {
-        "rows": report.rows,
-        "duration": log.duration,
-        "dropped": report.dropped,
-        "rate": log.rate,
-        "jitter": list(report.jitter),
-        "payload": log.payload.mass,
-        "channels": [asdict(channel) for channel in report.channels],
-        "effort": None if report.effort is None else asdict(report.effort),
-        "moves": [
-            {"start": move.start / log.rate, "end": move.end / log.rate, "at_rest": move.at_rest} for move in log.moves
-        ],
-        "warnings": list(report.warnings),
-    }
-
-
-def stored_log(settings: dict[str, Any], body: bytes) -> Log:
+def stored_reading(settings: dict[str, Any], body: bytes) -> LogReading:
     """A log from the database, by its settings and its packed file. Raises UnknownRobot if its robot is gone."""
     given = LogSettings.model_validate(settings)
     # its size was checked when it was added
-    options = to_log_options(given, LogOptions.most_bytes)
-    return read_log(body, robot_named(given.robot), options).log
+    return read_log(body, robot_named(given.robot), to_log_options(given, LogOptions.most_bytes))

@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from joulepath.app.convert.arm import robot_named, to_payload
-from joulepath.app.convert.logs import to_log_options
+from joulepath.app.convert.logs import stored_reading
 from joulepath.app.exceptions.stored import UnknownLog
 from joulepath.app.schemas.arm import Payload
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
-from joulepath.app.schemas.logs import LogSettings
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
@@ -36,9 +35,7 @@ class GivenLog:
     @cached_property
     def reading(self) -> LogReading:
         """The log. Raises UnknownRobot if its robot is gone."""
-        settings = LogSettings.model_validate(self.settings)
-        # its size was checked when it was added
-        return read_log(self.body, robot_named(settings.robot), to_log_options(settings, LogOptions.most_bytes))
+        return stored_reading(self.settings, self.body)
 
 
 _LOG: ContextVar[GivenLog | None] = ContextVar("stored log", default=None)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol, TypeGuard
 
+from joulepath.app.api.identifications.request import IdentifyRequest
 from joulepath.app.cluster.link import Cluster
 from joulepath.app.convert.packed import unpacked
 from joulepath.app.engine.pool import Engine
@@ -15,7 +16,6 @@ from joulepath.app.engine.task import Task
 from joulepath.app.engine.work import Ended, Take, Work, result_of
 from joulepath.app.exceptions.queue import Preempted
 from joulepath.app.exceptions.stored import UnknownFigures, UnknownLog
-from joulepath.app.schemas.identifications import IdentifyRequest
 from joulepath.app.store import logs
 from joulepath.app.store.store import Store
 from joulepath.app.tasks.arm_engine import ArmEngine

@@ -13,18 +13,18 @@ from joulepath.app.api.compare.task import CompareRequest, CompareTask
 from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.cycle.task import CycleTask
 from joulepath.app.api.evaluate.task import EvaluateAnswer, evaluated
+from joulepath.app.api.identifications.request import IdentifyRequest
+from joulepath.app.api.identifications.task import IdentifyTask, Stored
 from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.api.pareto.task import ParetoRequest, ParetoTask
 from joulepath.app.api.whatif.task import WhatifRequest, WhatifTask
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.evaluate import EvaluateRequest
-from joulepath.app.schemas.identifications import IdentifyRequest
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.store.leases import FoundFigures
 from joulepath.app.tasks.answer_figures import figures_of
 from joulepath.app.tasks.figures import replacing
-from joulepath.app.tasks.identify import IdentifyTask, Stored
 from joulepath.optimizer.deadline import Deadline
 
 IDENTIFY, CYCLE = "identify", "cycle"

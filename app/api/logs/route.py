@@ -10,6 +10,9 @@ import orjson
 from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
+from joulepath.app.api.logs.models import LogDetail, LogList, LogPage, LogSummary
+from joulepath.app.api.logs.request import LogSettings
+from joulepath.app.api.logs.task import ReadLogTask
 from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
 from joulepath.app.api.shared.parameters import LOCATION_HEADER, set_location
 from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
@@ -23,10 +26,8 @@ from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.json_route import UNDECLARED, media_type
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.examples.values import LOG_ID
-from joulepath.app.schemas.logs import LogDetail, LogList, LogPage, LogSettings, LogSummary
 from joulepath.app.store import logs
 from joulepath.app.store.tables import StoredLog, new_id, now
-from joulepath.app.tasks.read_log import ReadLogTask
 from joulepath.optimizer.exceptions import InvalidTable
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
 
