@@ -13,6 +13,7 @@ from joulepath.app.api.compare.task import CompareRequest, CompareTask
 from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.cycle.task import CycleTask
 from joulepath.app.api.evaluate.task import EvaluateAnswer, evaluated
+from joulepath.app.api.figures.task import replacing
 from joulepath.app.api.identifications.request import IdentifyRequest
 from joulepath.app.api.identifications.task import IdentifyTask, Stored
 from joulepath.app.api.optimize.task import OptimizeTask
@@ -24,7 +25,6 @@ from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.store.leases import FoundFigures
 from joulepath.app.tasks.answer_figures import figures_of
-from joulepath.app.tasks.figures import replacing
 from joulepath.optimizer.deadline import Deadline
 
 IDENTIFY, CYCLE = "identify", "cycle"

@@ -22,14 +22,14 @@ from joulepath.app.api.identifications.task import IdentifyTask
 from joulepath.app.api.ik.task import IKRequest, IKTask
 from joulepath.app.api.logs.request import LogSettings
 from joulepath.app.api.logs.task import ReadLogTask
+from joulepath.app.api.robots.request import OwnArm
+from joulepath.app.api.robots.task import OwnRobotTask
 from joulepath.app.convert.mesh_file import mesh_from_file
 from joulepath.app.convert.request import to_problem
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.transport import BodyTooLarge
 from joulepath.app.schemas.examples.own_arm import ARM, URDF
-from joulepath.app.schemas.own_arm import OwnArm
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.app.tasks.own_robot import OwnRobotTask
 from joulepath.models.own_arm.description import InvalidArm
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.registry import load_robot

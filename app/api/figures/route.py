@@ -11,6 +11,9 @@ from fastapi import APIRouter, Path, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
+from joulepath.app.api.figures.models import FiguresDetail, FiguresList, FiguresSummary
+from joulepath.app.api.figures.request import FiguresDocument
+from joulepath.app.api.figures.task import FiguresTask
 from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.parameters import LOCATION_HEADER
@@ -21,12 +24,10 @@ from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.http.weights import is_wanted
 from joulepath.app.schemas.examples.figures import FIGURES, UNKNOWN_ID
-from joulepath.app.schemas.figures import FiguresDetail, FiguresDocument, FiguresList, FiguresSummary
 from joulepath.app.store import figures
 from joulepath.app.store.store import Store
 from joulepath.app.store.tables import Figures
 from joulepath.app.tasks.arm_engine import robot_in
-from joulepath.app.tasks.figures import FiguresTask
 from joulepath.models.uncertainty.document import merged
 from joulepath.optimizer.exceptions import UnknownRobot
 

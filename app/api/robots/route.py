@@ -12,6 +12,10 @@ from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
 from joulepath.app.access.client import Client
+from joulepath.app.api.robots.models import Friction, FrictionLaw, RobotDetail, RobotList, RobotSummary
+from joulepath.app.api.robots.pictures import MEDIA_TYPE, PictureTask, digest, kept
+from joulepath.app.api.robots.request import NewRobot, OwnArm, OwnName
+from joulepath.app.api.robots.task import OwnRobotTask
 from joulepath.app.api.shared.dependencies import ServiceClient, ServiceClientEngine, ServiceSettings, ServiceStore
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.parameters import LOCATION_HEADER
@@ -22,12 +26,8 @@ from joulepath.app.exceptions.stored import NoMeshes, RobotExists, StoreUnavaila
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.entity_tag import is_known
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.schemas.own_arm import NewRobot, OwnArm, OwnName
-from joulepath.app.schemas.robots import Friction, FrictionLaw, RobotDetail, RobotList, RobotSummary
 from joulepath.app.store import robots
 from joulepath.app.store.tables import OwnRobot, now
-from joulepath.app.tasks.own_robot import OwnRobotTask
-from joulepath.app.tasks.pictures import MEDIA_TYPE, PictureTask, digest, kept
 from joulepath.models.form import link_bodies
 from joulepath.models.pictures import picture_sources
 from joulepath.models.registry import load_robot, robot_names
