@@ -16,7 +16,6 @@ import orjson
 from joulepath.app.cli.exit_codes import of_error
 
 if TYPE_CHECKING:
-    from joulepath.app.engine.result import TaskResult
     from joulepath.app.engine.task import Task
     from joulepath.app.schemas.common import Request
 
@@ -67,34 +66,14 @@ def validated(model: type[M], body: bytes, request_id: str) -> M:
 
 def answered(task: Task, deadline: float, request_id: str) -> bytes:
     """The answer of a task for which `deadline` [s] is left. Raises Refused."""
+    from joulepath.app.cli.store import run_with_store
     from joulepath.optimizer.exceptions import DeclaredError
 
     try:
-        result = _run(task, deadline)
+        result = run_with_store(task, deadline)
         return (result if result.kept_as is None else result.not_kept()).document
     except DeclaredError as error:
         raise refused(error, request_id) from None
-
-
-def _run(task: Task, deadline: float) -> TaskResult:
-    """The result of a task, with the log, the robot and the figures that it takes from the database."""
-    from joulepath.app.cli.store import with_figures, with_log, with_own_robot
-    from joulepath.app.exceptions.stored import UnknownFigures, UnknownLog
-    from joulepath.optimizer.exceptions import UnknownRobot
-
-    try:
-        return task.run(deadline)
-    except UnknownLog as error:
-        return _run(with_log(task, error.id), deadline)
-    except UnknownFigures as error:
-        task = with_figures(task, error.id)
-    except UnknownRobot as error:
-        task = with_own_robot(task, error.name)
-    try:
-        return task.run(deadline)
-    except UnknownFigures as error:
-        # of a robot that a user added
-        return with_figures(task, error.id).run(deadline)
 
 
 def refused(error: Exception, request_id: str | None = None) -> Refused:

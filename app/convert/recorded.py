@@ -1,4 +1,4 @@
-"""Logs that are evaluated: they come along with the task, from the database, or are the body of a request."""
+"""Logs and how they are read: the database has them, or a request whose body they are."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
+from joulepath.app.api.logs.request import LogSettings
 from joulepath.app.convert.arm import robot_named, to_payload
-from joulepath.app.convert.logs import stored_reading
 from joulepath.app.exceptions.stored import UnknownLog
 from joulepath.app.schemas.arm import Payload
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
@@ -22,6 +22,22 @@ from joulepath.optimizer.identify.logs.reading import LogOptions, LogReading, ch
 from joulepath.optimizer.problem import arm as library
 
 S = TypeVar("S", bound=EvaluateSettings)
+
+
+def to_log_options(settings: LogSettings, most_bytes: int) -> LogOptions:
+    """The options of the library for a file of at most `most_bytes` after unpacking. Raises InvalidProblem."""
+    columns = settings.columns
+    return LogOptions(
+        payload=None if settings.payload is None else to_payload(settings.payload),
+        gravity=settings.gravity,
+        columns=None if columns is None else columns.model_dump(exclude_none=True),
+        units=settings.units,
+        current_units=settings.current_units,
+        effort=settings.effort,
+        name=settings.name,
+        tags=tuple(settings.tags),
+        most_bytes=most_bytes,
+    )
 
 
 @dataclass(frozen=True)
@@ -35,7 +51,9 @@ class GivenLog:
     @cached_property
     def reading(self) -> LogReading:
         """The log. Raises UnknownRobot if its robot is gone."""
-        return stored_reading(self.settings, self.body)
+        settings = LogSettings.model_validate(self.settings)
+        # its size was checked when it was added
+        return read_log(self.body, robot_named(settings.robot), to_log_options(settings, LogOptions.most_bytes))
 
 
 _LOG: ContextVar[GivenLog | None] = ContextVar("stored log", default=None)

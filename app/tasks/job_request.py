@@ -15,11 +15,12 @@ from joulepath.app.api.cycle.task import CycleTask
 from joulepath.app.api.evaluate.task import EvaluateAnswer, evaluated
 from joulepath.app.api.figures.task import replacing
 from joulepath.app.api.identifications.request import IdentifyRequest
-from joulepath.app.api.identifications.task import IdentifyTask, Stored
+from joulepath.app.api.identifications.task import IdentifyTask
 from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.api.pareto.task import ParetoRequest, ParetoTask
 from joulepath.app.api.whatif.task import WhatifRequest, WhatifTask
 from joulepath.app.convert.packed import packed, unpacked
+from joulepath.app.convert.recorded import GivenLog
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.request import OptimizeRequest
@@ -52,7 +53,7 @@ class JobRequestTask:
     kind: str
     body: bytes
     request_id: str
-    logs: tuple[Stored, ...] = ()
+    logs: tuple[GivenLog, ...] = ()
     """Those that an identification names."""
     motions: Mapping[str, bytes] = field(default_factory=dict)
     """Those of the cell of a cycle."""

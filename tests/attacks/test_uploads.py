@@ -25,6 +25,7 @@ from joulepath.app.api.logs.task import ReadLogTask
 from joulepath.app.api.robots.request import OwnArm
 from joulepath.app.api.robots.task import OwnRobotTask
 from joulepath.app.convert.mesh_file import mesh_from_file
+from joulepath.app.convert.recorded import GivenLog
 from joulepath.app.convert.request import to_problem
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.transport import BodyTooLarge
@@ -234,7 +235,7 @@ def late_tasks(log: bytes, folder: Path) -> Iterator[tuple[str, Any]]:
     yield "a motion", EvaluateTask(str(motion), "csv", {"time_per_segment": "1"}, "json", "id", LATE)
     request = IdentifyRequest.model_validate({"logs": ["1" * 8 + "-" + "-".join(["1" * 4] * 3) + "-" + "1" * 12]})
     settings = LogSettings(robot="ur5e").model_dump(mode="json")
-    yield "an identification", IdentifyTask(request, ((settings, gzip.compress(log)),), "id")
+    yield "an identification", IdentifyTask(request, (GivenLog("log", settings, gzip.compress(log)),), "id")
     pose = {"position": [0.4, 0.1, 0.3], "rpy": [0, 0, 0]}
     yield "a scene of /ik", IKTask(IKRequest.model_validate({"pose": pose, "scene": scene}), "id")
     move = {"start": {"q": [0.0] * 6}, "goal": {"q": [1.0] * 6}, "scene": scene}

@@ -14,7 +14,7 @@ from joulepath.app.answers.envelope import AnswerFigures
 from joulepath.app.api.identifications.request import Fraction, IdentifyRequest
 from joulepath.app.convert.arm import robot_named
 from joulepath.app.convert.fields import location
-from joulepath.app.convert.logs import stored_reading
+from joulepath.app.convert.recorded import GivenLog
 from joulepath.app.convert.until import until
 from joulepath.app.engine.result import StoredAnswer, TaskResult, json_document
 from joulepath.app.exceptions.base import InvalidRequest
@@ -26,9 +26,6 @@ from joulepath.optimizer.identify.identify import Identification, identify
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.results import Curves, Validation
 
-Stored = tuple[dict[str, Any], bytes]
-"""Settings and packed file of a log."""
-
 _DECIMALS = 4
 """Of the times, torques and powers of a picture."""
 
@@ -38,7 +35,7 @@ class IdentifyTask:
     """A validated request, and the logs that it names: those of the fit, then those of the validation."""
 
     request: IdentifyRequest
-    logs: tuple[Stored, ...]
+    logs: tuple[GivenLog, ...]
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
@@ -51,7 +48,7 @@ class IdentifyTask:
             return self._identified()
 
     def _identified(self) -> TaskResult:
-        logs = [stored_reading(settings, body).log for settings, body in self.logs]
+        logs = [each.reading.log for each in self.logs]
         count, robot = len(self.request.logs), robot_named(logs[0].robot)
         try:
             found = identify(robot, logs[:count], _to_options(self.request))

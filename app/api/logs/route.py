@@ -93,7 +93,7 @@ async def add(
     )
     detail = _detail(log)
     await store.write(partial(logs.add, log=log, most=settings.logs_max_bytes))
-    set_location(request, response, f"/logs/{detail.id}", again=False)
+    set_location(request, response, f"/logs/{detail.id}")
     return detail
 
 

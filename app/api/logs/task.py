@@ -9,7 +9,7 @@ from typing import Any
 from joulepath.app.api.logs.request import LogSettings
 from joulepath.app.convert.arm import robot_named
 from joulepath.app.convert.fields import location
-from joulepath.app.convert.logs import to_log_options
+from joulepath.app.convert.recorded import to_log_options
 from joulepath.app.convert.until import until
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.base import InvalidRequest

@@ -18,7 +18,7 @@ from joulepath.app.api.robots.request import NewRobot, OwnArm, OwnName
 from joulepath.app.api.robots.task import OwnRobotTask
 from joulepath.app.api.shared.dependencies import ServiceClient, ServiceClientEngine, ServiceSettings, ServiceStore
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
-from joulepath.app.api.shared.parameters import LOCATION_HEADER
+from joulepath.app.api.shared.parameters import LOCATION_HEADER, set_location
 from joulepath.app.api.shared.problem_lists import ADDING_PROBLEMS
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.queue import ShuttingDown, WorkerLost
@@ -81,7 +81,7 @@ async def add(
         await store.write(partial(robots.add, robot=robot, most=settings.max_robots))
     except IntegrityError:  # another process has just added a robot of this name
         raise RobotExists from None
-    response.headers["Location"] = f"{request.scope.get('root_path', '')}/robots/{body.name}"
+    set_location(request, response, f"/robots/{body.name}")
     return _of_user(robot)
 
 
@@ -176,14 +176,10 @@ async def put(
     stay."""
     robots.check_own(name)
     robot = await _computed(request, name, body, engine, settings.max_deadline, client)
-    write = partial(robots.put, robot=robot, most=settings.max_robots, client=client)
-    try:
-        is_new = await store.write(write)
-    except IntegrityError:  # another process has just added it
-        is_new = await store.write(write)
+    is_new = await store.create(partial(robots.put, robot=robot, most=settings.max_robots, client=client))
     if is_new:
         response.status_code = 201
-        response.headers["Location"] = f"{request.scope.get('root_path', '')}/robots/{name}"
+        set_location(request, response, f"/robots/{name}")
     return _of_user(robot)
 
 

@@ -7,7 +7,6 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
-from sqlalchemy.exc import IntegrityError
 
 from joulepath.app.api.shared.dependencies import ServiceClient, ServiceStore
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
@@ -64,10 +63,7 @@ async def create(
         with identified_as(await identified(store, body.figures)):
             with_figures(robot, body.figures)
     study = studies.new_study(body.name, body.robot, body.objective, body.threshold, key, client.owner, body.figures)
-    try:
-        made, again = await store.write(partial(studies.create, study=study))
-    except IntegrityError:  # another process has just created the study of this key
-        made, again = await store.write(partial(studies.create, study=study))
+    made, again = await store.create(partial(studies.create, study=study))
     set_location(request, response, f"/studies/{made.id}", again)
     return StudySummary(**summary(await store.read(partial(studies.state, study_id=made.id))))
 

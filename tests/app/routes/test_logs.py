@@ -11,7 +11,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.api.logs.models import LogDetail, LogList
-from joulepath.app.convert.logs import stored_reading
+from joulepath.app.convert.recorded import GivenLog
 from joulepath.app.exceptions.access import NotOwner, Role, RoleTooLow, Unauthenticated
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import TooManyLogs, UnknownLog
@@ -63,7 +63,7 @@ def test_a_log_is_added_listed_shown_and_deleted(client: TestClient, recording: 
 
 
 def test_what_is_stored_is_read_again_as_it_was(recording: Recording) -> None:
-    log = stored_reading({"robot": "ur5e", "tags": [], "effort": "auto"}, gzip.compress(csv_of(recording))).log
+    log = GivenLog("log", {"robot": "ur5e", "tags": [], "effort": "auto"}, gzip.compress(csv_of(recording))).reading.log
     assert np.abs(log.q - recording.q).max() < 1e-7 and log.effort_meaning == "current"
 
 
