@@ -16,6 +16,7 @@ import orjson
 from joulepath.app.cli.exit_codes import of_error
 
 if TYPE_CHECKING:
+    from joulepath.app.engine.result import TaskResult
     from joulepath.app.engine.task import Task
     from joulepath.app.schemas.common import Request
 
@@ -66,12 +67,17 @@ def validated(model: type[M], body: bytes, request_id: str) -> M:
 
 def answered(task: Task, deadline: float, request_id: str) -> bytes:
     """The answer of a task for which `deadline` [s] is left. Raises Refused."""
+    result = result_of(task, deadline, request_id)
+    return (result if result.kept_as is None else result.not_kept()).document
+
+
+def result_of(task: Task, deadline: float, request_id: str) -> TaskResult:
+    """The result of a task for which `deadline` [s] is left. Raises Refused."""
     from joulepath.app.cli.store import run_with_store
     from joulepath.optimizer.exceptions import DeclaredError
 
     try:
-        result = run_with_store(task, deadline)
-        return (result if result.kept_as is None else result.not_kept()).document
+        return run_with_store(task, deadline)
     except DeclaredError as error:
         raise refused(error, request_id) from None
 

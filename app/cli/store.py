@@ -16,11 +16,11 @@ T = TypeVar("T")
 
 
 def run_with_store(task: Task, deadline: float) -> TaskResult:
-    """The result of a task, with the log, the robot and the figures that it takes from the database.
+    """The result of a task, with the log, the robot, the figures and the answers that it takes from the database.
 
     Raises what the task raises; StoreUnavailable if the database is needed.
     """
-    from joulepath.app.exceptions.stored import UnknownFigures, UnknownLog
+    from joulepath.app.exceptions.stored import PartsNeeded, UnknownFigures, UnknownLog
     from joulepath.app.tasks.arm_engine import Equipped, Needs
     from joulepath.optimizer.exceptions import UnknownRobot
 
@@ -28,7 +28,7 @@ def run_with_store(task: Task, deadline: float) -> TaskResult:
     while True:
         try:
             return equipped.run(deadline)
-        except (UnknownRobot, UnknownFigures, UnknownLog) as error:
+        except (UnknownRobot, UnknownFigures, UnknownLog, PartsNeeded) as error:
             needs = needs.after(error)
         equipped = Equipped(task, in_store(needs.given))
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,6 +11,7 @@ from typing import Any, TypeVar
 
 from joulepath.app.api.logs.request import LogSettings
 from joulepath.app.convert.arm import robot_named, to_payload
+from joulepath.app.convert.at_hand import at_hand
 from joulepath.app.exceptions.stored import UnknownLog
 from joulepath.app.schemas.arm import Payload
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
@@ -59,14 +59,9 @@ class GivenLog:
 _LOG: ContextVar[GivenLog | None] = ContextVar("stored log", default=None)
 
 
-@contextmanager
-def log_given(log: GivenLog) -> Iterator[None]:
+def log_given(log: GivenLog) -> AbstractContextManager[None]:
     """Within the context, and its thread, requests may name this log."""
-    before = _LOG.set(log)
-    try:
-        yield
-    finally:
-        _LOG.reset(before)
+    return at_hand(_LOG, log)
 
 
 def reading_of(id: str) -> LogReading:

@@ -13,9 +13,10 @@ from joulepath.app.convert.own_robots import own_robot_named, own_robot_of
 from joulepath.app.convert.recorded import GivenLog, log_given
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.task import Task
-from joulepath.app.exceptions.stored import UnknownFigures, UnknownLog
-from joulepath.app.store import figures, logs, robots
+from joulepath.app.exceptions.stored import PartsNeeded, UnknownFigures, UnknownLog
+from joulepath.app.store import answers, figures, logs, robots
 from joulepath.app.store.store import Store
+from joulepath.app.tasks.kept_answers import answers_given
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import UnknownRobot
@@ -54,26 +55,30 @@ class Equipped:
 
 @dataclass(frozen=True)
 class Needs:
-    """What a task may need of the database: the robot of this name, and figures and a log by their ids."""
+    """What a task may need of the database: the robot of this name, figures and a log by their ids, and answers by
+    their ids or paths."""
 
     robot: str | None = None
     figures: str | None = None
     log: str | None = None
+    answers: tuple[str, ...] = ()
 
-    def after(self, error: UnknownRobot | UnknownFigures | UnknownLog) -> Needs:
+    def after(self, error: UnknownRobot | UnknownFigures | UnknownLog | PartsNeeded) -> Needs:
         """These needs, and what a worker did not know. Raises the error if that is among these already."""
         if isinstance(error, UnknownRobot):
             more = replace(self, robot=error.name)
         elif isinstance(error, UnknownFigures):
             more = replace(self, figures=error.id)
-        else:
+        elif isinstance(error, UnknownLog):
             more = replace(self, log=error.id)
+        else:
+            more = replace(self, answers=tuple(dict.fromkeys((*self.answers, *error.names))))
         if more == self:
             raise error
         return more
 
     async def given(self, store: Store) -> tuple[Given, ...]:
-        """What is needed. Raises UnknownRobot, UnknownFigures, UnknownLog or StoreUnavailable."""
+        """What is needed. Raises UnknownRobot, UnknownFigures, UnknownLog, UnknownAnswer or StoreUnavailable."""
         found: list[Given] = []
         if self.log is not None:
             found.append(partial(log_given, await given_log(store, self.log)))
@@ -81,6 +86,9 @@ class Needs:
             found.append(partial(identified_as, await identified(store, self.figures)))
         if self.robot is not None and self.robot not in robot_names():
             found.append(partial(own_robot_named, self.robot, await own_figures(store, self.robot)))
+        if self.answers:
+            kept = {name: await _kept(store, name) for name in self.answers}
+            found.append(partial(answers_given, kept))
         return tuple(found)
 
 
@@ -95,8 +103,8 @@ class ArmEngine:
     async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
         """The task's result; `tell` gets what it finds.
 
-        Raises UnknownRobot, UnknownFigures, UnknownLog, and what the engine raises; StoreUnavailable only for figures,
-        a log, and a robot that does not come with the service.
+        Raises UnknownRobot, UnknownFigures, UnknownLog, UnknownAnswer, and what the engine raises; StoreUnavailable
+        only for figures, a log, kept answers, and a robot that does not come with the service.
         """
         request = getattr(task, "request", None)
         needs = Needs(getattr(request, "robot", None), getattr(request, "figures", None))
@@ -104,8 +112,8 @@ class ArmEngine:
             given = await needs.given(self.store)
             try:
                 return await self.engine.run(Equipped(task, given) if given else task, deadline, tell)
-            # only the worker reads the body of an upload, and the names in it
-            except (UnknownRobot, UnknownFigures, UnknownLog) as error:
+            # only the worker reads the body of an upload, or a kept answer, and the names in it
+            except (UnknownRobot, UnknownFigures, UnknownLog, PartsNeeded) as error:
                 needs = needs.after(error)
 
 
@@ -142,6 +150,11 @@ async def given_log(store: Store, id: str) -> GivenLog:
     """The stored log of this id. Raises UnknownLog or StoreUnavailable."""
     row = await store.read(partial(logs.get, log_id=id))
     return GivenLog(id, row.settings, row.body)
+
+
+async def _kept(store: Store, name: str) -> bytes:
+    _, body = await store.read(partial(answers.get, answer_id=name.rpartition("/")[2]))
+    return body
 
 
 async def own_figures(store: Store, name: str) -> dict[str, Any]:

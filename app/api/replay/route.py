@@ -6,8 +6,7 @@ from fastapi import APIRouter, Request, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.replay.task import ReplayAnswer, ReplayRequest, ReplayTask
-from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
-from joulepath.app.api.shared.kept_answers import with_kept_answers
+from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.parameters import deadline_of
 from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
@@ -32,11 +31,11 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     ),
 )
 async def replay(
-    request: Request, body: ReplayRequest, settings: ServiceSettings, engine: ServiceArmEngine, store: ServiceStore
+    request: Request, body: ReplayRequest, settings: ServiceSettings, engine: ServiceArmEngine
 ) -> Response:
     """Plays the motion of an answer in MuJoCo, with a controller, and puts what happens beside what the answer says:
     deviation, torques, contacts and energy. With `perturb`, also on arms that are not quite the one planned with, and
     with what is left of the savings there."""
     task = ReplayTask(body, request.state.id)
-    work = with_kept_answers(task, engine, store, deadline_of(body, settings.max_deadline))
+    work = engine.run(task, deadline_of(body, settings.max_deadline))
     return result_response(await unless_disconnected(request, work))
