@@ -13,18 +13,23 @@ from starlette.middleware.cors import CORSMiddleware
 from joulepath import __version__
 from joulepath.app.access.key_ring import KeyRing
 from joulepath.app.access.start import key_ring
+from joulepath.app.api import cluster, docs, health, metrics, problems, studio
 from joulepath.app.api.answers import route as answers
 from joulepath.app.api.compare import route as compare
 from joulepath.app.api.cycle import route as cycle
 from joulepath.app.api.evaluate import route as evaluate
 from joulepath.app.api.excitation import route as excitation
 from joulepath.app.api.export import route as export
+from joulepath.app.api.figures import route as figures
+from joulepath.app.api.identifications import route as identifications
 from joulepath.app.api.ik import route as ik
 from joulepath.app.api.ik.path import route as ik_path
 from joulepath.app.api.jobs import route as jobs
+from joulepath.app.api.logs import route as logs
 from joulepath.app.api.optimize import route as optimize
 from joulepath.app.api.pareto import route as pareto
 from joulepath.app.api.replay import route as replay
+from joulepath.app.api.robots import route as robots
 from joulepath.app.api.studies import route as studies
 from joulepath.app.api.studies.iterations import route as iterations
 from joulepath.app.api.studies.suggest import route as suggest
@@ -41,18 +46,6 @@ from joulepath.app.http.transfers import Transfers
 from joulepath.app.jobs.dispatcher import Dispatcher
 from joulepath.app.jobs.executor import ClusterExecutor, Executor, LocalExecutor
 from joulepath.app.jobs.jobs import Jobs
-from joulepath.app.routes import (
-    cluster,
-    docs,
-    figures,
-    health,
-    identifications,
-    logs,
-    metrics,
-    problems,
-    robots,
-    studio,
-)
 from joulepath.app.settings import Settings
 from joulepath.app.store.store import Store
 from joulepath.app.tasks.in_flight import InFlight

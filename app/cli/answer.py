@@ -67,34 +67,19 @@ def validated(model: type[M], body: bytes, request_id: str) -> M:
 
 def answered(task: Task, deadline: float, request_id: str) -> bytes:
     """The answer of a task for which `deadline` [s] is left. Raises Refused."""
+    result = result_of(task, deadline, request_id)
+    return (result if result.kept_as is None else result.not_kept()).document
+
+
+def result_of(task: Task, deadline: float, request_id: str) -> TaskResult:
+    """The result of a task for which `deadline` [s] is left. Raises Refused."""
+    from joulepath.app.cli.store import run_with_store
     from joulepath.optimizer.exceptions import DeclaredError
 
     try:
-        result = _run(task, deadline)
-        return (result if result.kept_as is None else result.not_kept()).document
+        return run_with_store(task, deadline)
     except DeclaredError as error:
         raise refused(error, request_id) from None
-
-
-def _run(task: Task, deadline: float) -> TaskResult:
-    """The result of a task, with the log, the robot and the figures that it takes from the database."""
-    from joulepath.app.cli.store import with_figures, with_log, with_own_robot
-    from joulepath.app.exceptions.stored import UnknownFigures, UnknownLog
-    from joulepath.optimizer.exceptions import UnknownRobot
-
-    try:
-        return task.run(deadline)
-    except UnknownLog as error:
-        return _run(with_log(task, error.id), deadline)
-    except UnknownFigures as error:
-        task = with_figures(task, error.id)
-    except UnknownRobot as error:
-        task = with_own_robot(task, error.name)
-    try:
-        return task.run(deadline)
-    except UnknownFigures as error:
-        # of a robot that a user added
-        return with_figures(task, error.id).run(deadline)
 
 
 def refused(error: Exception, request_id: str | None = None) -> Refused:

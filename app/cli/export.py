@@ -9,8 +9,7 @@ import click
 import orjson
 
 from joulepath.app.cli import terminal
-from joulepath.app.cli.answer import FILE, OUTPUT, answered, content_of, new_id, validated, write
-from joulepath.app.cli.kept_answers import WithStore
+from joulepath.app.cli.answer import FILE, OUTPUT, content_of, new_id, result_of, validated, write
 from joulepath.optimizer.export.formats import FORMAT_NAMES, FormatName
 
 # wall time [s] that an export may take; it takes milliseconds
@@ -49,12 +48,11 @@ def export(format: FormatName, file: str, output: Path | None, speed_scale: floa
         b"".join(b",%b:%b" % (orjson.dumps(name), orjson.dumps(value)) for name, value in beside.items()),
     )
     request = validated(ExportRequest, body, request_id)
-    task = WithStore(ExportTask(request, format, False, request_id), request_id)
     with terminal.progress("Certifying the motion"):
-        document = answered(task, DEADLINE, request_id)
-    write(document, output)
-    assert isinstance(task.result, ExportResult)
-    notes = task.result.notes
+        result = result_of(ExportTask(request, format, False, request_id), DEADLINE, request_id)
+    write(result.document, output)
+    assert isinstance(result, ExportResult)
+    notes = result.notes
     terminal.summary(lambda: {f"note {k}": note for k, note in enumerate(notes, 1)})
 
 

@@ -6,12 +6,15 @@ import gzip
 import shutil
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from joulepath.app.cli import terminal
 from joulepath.app.cli.answer import OUTPUT, answered, new_id, parsed, validated, write
+
+if TYPE_CHECKING:
+    from joulepath.app.convert.recorded import GivenLog
 
 _GZIP = b"\x1f\x8b"
 _PIECE = 1 << 20
@@ -107,8 +110,8 @@ def identify(
     LOGS are CSV files of RTDE, of ROS `JointState` or of the service's own form, plain or packed with gzip. The answer
     is the `result` of `GET /identifications/{id}`; its `document` can be sent to `PUT /figures`.
     """
-    from joulepath.app.schemas.identifications import IdentifyRequest
-    from joulepath.app.schemas.logs import LogSettings
+    from joulepath.app.api.identifications.request import IdentifyRequest
+    from joulepath.app.api.logs.request import LogSettings
 
     request_id = new_id()
     carried = None if payload is None else {"mass": payload, "com": list(com)}
@@ -126,15 +129,17 @@ def identify(
 
 
 def _answered(asked: Any, read: Any, request_id: str) -> bytes:
-    from joulepath.app.tasks.identify import IdentifyTask
+    from joulepath.app.api.identifications.task import IdentifyTask
 
     return answered(IdentifyTask(asked, read, request_id), asked.deadline, request_id)
 
 
-def _read(model: Any, fields: dict[str, Any], file: Path, request_id: str) -> tuple[dict[str, Any], bytes]:
+def _read(model: Any, fields: dict[str, Any], file: Path, request_id: str) -> GivenLog:
     """Checked settings of a log, as they are stored, and its packed file."""
+    from joulepath.app.convert.recorded import GivenLog
+
     named = _json(fields | {"name": file.stem[:80]})
-    return validated(model, named, request_id).model_dump(mode="json"), _packed(file)
+    return GivenLog(_FILE_ID, validated(model, named, request_id).model_dump(mode="json"), _packed(file))
 
 
 def _json(content: dict[str, Any]) -> bytes:

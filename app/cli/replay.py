@@ -10,7 +10,6 @@ import orjson
 
 from joulepath.app.cli import terminal
 from joulepath.app.cli.answer import FILE, OUTPUT, answered, content_of, new_id, parsed, validated, write
-from joulepath.app.cli.kept_answers import WithStore
 
 
 @click.command(
@@ -57,7 +56,7 @@ def replay(
     request_id, deadline = new_id(), options["deadline"]
     request = validated(ReplayRequest, orjson.dumps(body), request_id)
     with terminal.progress(f"Replaying for at most {deadline:g} s"):
-        found = answered(WithStore(ReplayTask(request, request_id), request_id), deadline, request_id)
+        found = answered(ReplayTask(request, request_id), deadline, request_id)
     write(found, output)
     terminal.summary(lambda: summary_of(parsed(found)))
 

@@ -50,8 +50,8 @@ def add(file: Path, name: str | None, replace: bool) -> None:
     FILE is a YAML file that names a URDF and says what a URDF does not hold: see docs/own_robot.md.
     """
     from joulepath.app.access.client import OPERATOR
+    from joulepath.app.api.robots.request import NAME_PATTERN
     from joulepath.app.exceptions.base import ServiceError
-    from joulepath.app.schemas.own_arm import NAME_PATTERN
     from joulepath.app.settings import Settings
     from joulepath.app.store import robots as stored
     from joulepath.app.store.tables import OwnRobot, now

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
+    from joulepath.app.engine.result import TaskResult
     from joulepath.app.engine.task import Task
     from joulepath.app.store.store import Store
     from joulepath.models.robot import Robot
@@ -14,25 +15,22 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 
-def with_own_robot(task: Task, name: str) -> Task:
-    """The task, with the robot that a user added. Raises UnknownRobot or StoreUnavailable."""
-    from joulepath.app.tasks.arm_engine import WithOwnRobot, own_figures
+def run_with_store(task: Task, deadline: float) -> TaskResult:
+    """The result of a task, with the log, the robot, the figures and the answers that it takes from the database.
 
-    return WithOwnRobot(task, name, in_store(lambda store: own_figures(store, name)))
+    Raises what the task raises; StoreUnavailable if the database is needed.
+    """
+    from joulepath.app.exceptions.stored import PartsNeeded, UnknownFigures, UnknownLog
+    from joulepath.app.tasks.arm_engine import Equipped, Needs
+    from joulepath.optimizer.exceptions import UnknownRobot
 
-
-def with_figures(task: Task, id: str) -> Task:
-    """The task, with identified figures. Raises UnknownFigures or StoreUnavailable."""
-    from joulepath.app.tasks.arm_engine import WithFigures, identified
-
-    return WithFigures(task, in_store(lambda store: identified(store, id)))
-
-
-def with_log(task: Task, id: str) -> Task:
-    """The task, with a stored log. Raises UnknownLog or StoreUnavailable."""
-    from joulepath.app.tasks.arm_engine import WithLog, given_log
-
-    return WithLog(task, in_store(lambda store: given_log(store, id)))
+    needs, equipped = Needs(), task
+    while True:
+        try:
+            return equipped.run(deadline)
+        except (UnknownRobot, UnknownFigures, UnknownLog, PartsNeeded) as error:
+            needs = needs.after(error)
+        equipped = Equipped(task, in_store(needs.given))
 
 
 def robot_named(name: str) -> Robot:

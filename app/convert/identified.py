@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any
 
+from joulepath.app.convert.at_hand import at_hand
 from joulepath.app.exceptions.stored import UnknownFigures
 from joulepath.models.own_arm.robots import own_robot
 from joulepath.models.robot import Robot
@@ -27,14 +27,9 @@ class Identified:
 _FIGURES: ContextVar[Identified | None] = ContextVar("identified figures", default=None)
 
 
-@contextmanager
-def identified_as(figures: Identified) -> Iterator[None]:
+def identified_as(figures: Identified) -> AbstractContextManager[None]:
     """Within the context, and its thread, requests may name these figures."""
-    before = _FIGURES.set(figures)
-    try:
-        yield
-    finally:
-        _FIGURES.reset(before)
+    return at_hand(_FIGURES, figures)
 
 
 def with_figures(robot: Robot, id: str) -> Robot:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from typing import Any
 
+from joulepath.app.convert.at_hand import at_hand
 from joulepath.models.own_arm.robots import own_robot
 from joulepath.models.robot import Robot
 from joulepath.models.shape_sizes import WrongSize
@@ -15,14 +15,9 @@ from joulepath.optimizer.exceptions import InvalidProblem
 _ROBOT: ContextVar[tuple[str, dict[str, Any]] | None] = ContextVar("own robot", default=None)
 
 
-@contextmanager
-def own_robot_named(name: str, figures: dict[str, Any]) -> Iterator[None]:
+def own_robot_named(name: str, figures: dict[str, Any]) -> AbstractContextManager[None]:
     """Within the context, and its thread, requests may name this robot."""
-    before = _ROBOT.set((name, figures))
-    try:
-        yield
-    finally:
-        _ROBOT.reset(before)
+    return at_hand(_ROBOT, (name, figures))
 
 
 def own_figures_of(name: str) -> dict[str, Any] | None:

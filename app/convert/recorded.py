@@ -1,21 +1,20 @@
-"""Logs that are evaluated: they come along with the task, from the database, or are the body of a request."""
+"""Logs and how they are read: the database has them, or a request whose body they are."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
+from joulepath.app.api.logs.request import LogSettings
 from joulepath.app.convert.arm import robot_named, to_payload
-from joulepath.app.convert.logs import to_log_options
+from joulepath.app.convert.at_hand import at_hand
 from joulepath.app.exceptions.stored import UnknownLog
 from joulepath.app.schemas.arm import Payload
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
-from joulepath.app.schemas.logs import LogSettings
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
@@ -23,6 +22,22 @@ from joulepath.optimizer.identify.logs.reading import LogOptions, LogReading, ch
 from joulepath.optimizer.problem import arm as library
 
 S = TypeVar("S", bound=EvaluateSettings)
+
+
+def to_log_options(settings: LogSettings, most_bytes: int) -> LogOptions:
+    """The options of the library for a file of at most `most_bytes` after unpacking. Raises InvalidProblem."""
+    columns = settings.columns
+    return LogOptions(
+        payload=None if settings.payload is None else to_payload(settings.payload),
+        gravity=settings.gravity,
+        columns=None if columns is None else columns.model_dump(exclude_none=True),
+        units=settings.units,
+        current_units=settings.current_units,
+        effort=settings.effort,
+        name=settings.name,
+        tags=tuple(settings.tags),
+        most_bytes=most_bytes,
+    )
 
 
 @dataclass(frozen=True)
@@ -44,14 +59,9 @@ class GivenLog:
 _LOG: ContextVar[GivenLog | None] = ContextVar("stored log", default=None)
 
 
-@contextmanager
-def log_given(log: GivenLog) -> Iterator[None]:
+def log_given(log: GivenLog) -> AbstractContextManager[None]:
     """Within the context, and its thread, requests may name this log."""
-    before = _LOG.set(log)
-    try:
-        yield
-    finally:
-        _LOG.reset(before)
+    return at_hand(_LOG, log)
 
 
 def reading_of(id: str) -> LogReading:

@@ -11,6 +11,7 @@ from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
 from joulepath.app.access.rules import needed_role
+from joulepath.app.api.logs.request import LogSettings
 from joulepath.app.exceptions.access import CrossSite, RoleTooLow, Unauthenticated, WrongHost
 from joulepath.app.exceptions.base import InternalError
 from joulepath.app.exceptions.queue import Busy, TooManyRequests
@@ -25,7 +26,6 @@ from joulepath.app.schemas.examples.files import shown
 from joulepath.app.schemas.examples.problems import example_of
 from joulepath.app.schemas.examples.values import REQUEST_ID
 from joulepath.app.schemas.jobs import NewJob
-from joulepath.app.schemas.logs import LogSettings
 from joulepath.app.settings import Settings
 from joulepath.optimizer.exceptions import DeclaredError
 

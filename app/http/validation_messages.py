@@ -12,11 +12,11 @@ from typing import Any, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
+from joulepath.app.api.robots.request import NAME_PATTERN
 from joulepath.app.convert.json_text import EMPTY, PLAIN_NAME
 from joulepath.app.exceptions.base import FieldError
 from joulepath.app.schemas.common import KEY_HEADER, NO_CONTROLS, UNKNOWN_FIELD, nearest
 from joulepath.app.schemas.common import Request as RequestModel
-from joulepath.app.schemas.own_arm import NAME_PATTERN
 from joulepath.app.schemas.queries import PAGE_PATTERN
 from joulepath.app.schemas.scene import BASE64
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol, TypeGuard
 
+from joulepath.app.api.identifications.request import IdentifyRequest
 from joulepath.app.cluster.link import Cluster
 from joulepath.app.convert.packed import unpacked
 from joulepath.app.engine.pool import Engine
@@ -15,10 +16,8 @@ from joulepath.app.engine.task import Task
 from joulepath.app.engine.work import Ended, Take, Work, result_of
 from joulepath.app.exceptions.queue import Preempted
 from joulepath.app.exceptions.stored import UnknownFigures, UnknownLog
-from joulepath.app.schemas.identifications import IdentifyRequest
-from joulepath.app.store import logs
 from joulepath.app.store.store import Store
-from joulepath.app.tasks.arm_engine import ArmEngine
+from joulepath.app.tasks.arm_engine import ArmEngine, given_log
 from joulepath.app.tasks.job_request import IDENTIFY, JobRequestTask
 from joulepath.optimizer.exceptions import DeclaredError, UnknownRobot
 from joulepath.optimizer.progress import Tell, nobody
@@ -106,8 +105,7 @@ async def _with_logs(task: Task, store: Store) -> Task:
     if not _needs_logs(task):
         return task
     asked = IdentifyRequest.model_validate_json(unpacked(task.body))
-    found = [await store.read(partial(logs.get, log_id=each)) for each in asked.all_logs]
-    return replace(task, logs=tuple((log.settings, log.body) for log in found))
+    return replace(task, logs=tuple([await given_log(store, each) for each in asked.all_logs]))
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,6 @@ import asyncio
 from dataclasses import dataclass
 from functools import partial
 
-from sqlalchemy.exc import IntegrityError
-
 from joulepath.app.access.client import Client
 from joulepath.app.jobs.dispatcher import Dispatcher
 from joulepath.app.settings import Settings
@@ -29,11 +27,9 @@ class Jobs:
 
     async def create(self, new: NewJob, key: str | None, owner: str | None) -> tuple[str, bool]:
         """See `joulepath.app.store.jobs.create`. Raises KeyReused, TooManyWaiting or StoreUnavailable."""
-        write = partial(jobs.create, new=new, key=key, most_waiting=self.settings.max_waiting, owner=owner)
-        try:
-            made = await self.store.write(write)
-        except IntegrityError:  # another request has just created the job of this key
-            made = await self.store.write(write)
+        made = await self.store.create(
+            partial(jobs.create, new=new, key=key, most_waiting=self.settings.max_waiting, owner=owner)
+        )
         self.dispatcher.wake()
         return made
 

@@ -101,6 +101,14 @@ class Store:
         do = self._free if frees else self._write
         return await asyncio.get_running_loop().run_in_executor(self._threads, do, work)
 
+    async def create(self, work: Callable[[Session], T]) -> T:
+        """See `write`. The work is done once more if another request or process has just created the same: it sees it
+        then."""
+        try:
+            return await self.write(work)
+        except IntegrityError:
+            return await self.write(work)
+
     def __str__(self) -> str:
         return self._engine.url.render_as_string(hide_password=True)
 

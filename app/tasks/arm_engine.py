@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Protocol
 
@@ -12,9 +13,10 @@ from joulepath.app.convert.own_robots import own_robot_named, own_robot_of
 from joulepath.app.convert.recorded import GivenLog, log_given
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.task import Task
-from joulepath.app.exceptions.stored import UnknownFigures, UnknownLog
-from joulepath.app.store import figures, logs, robots
+from joulepath.app.exceptions.stored import PartsNeeded, UnknownFigures, UnknownLog
+from joulepath.app.store import answers, figures, logs, robots
 from joulepath.app.store.store import Store
+from joulepath.app.tasks.kept_answers import answers_given
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import UnknownRobot
@@ -29,13 +31,16 @@ class Runner(Protocol):
         ...
 
 
+Given = Callable[[], AbstractContextManager[None]]
+"""Makes a context in which requests may name something of the database."""
+
+
 @dataclass(frozen=True)
-class WithOwnRobot:
-    """A task, and the name and figures of the own robot that it is about."""
+class Equipped:
+    """A task, and what it needs of the database."""
 
     task: Task
-    name: str
-    figures: dict[str, Any]
+    given: tuple[Given, ...]
 
     @property
     def request_id(self) -> str:
@@ -44,44 +49,47 @@ class WithOwnRobot:
 
     def run(self, deadline: float) -> TaskResult:
         """The task's result."""
-        with own_robot_named(self.name, self.figures):
+        with _within(self.given):
             return self.task.run(deadline)
 
 
 @dataclass(frozen=True)
-class WithFigures:
-    """A task, and the identified figures that it names."""
+class Needs:
+    """What a task may need of the database: the robot of this name, figures and a log by their ids, and answers by
+    their ids or paths."""
 
-    task: Task
-    figures: Identified
+    robot: str | None = None
+    figures: str | None = None
+    log: str | None = None
+    answers: tuple[str, ...] = ()
 
-    @property
-    def request_id(self) -> str:
-        """Id of the request."""
-        return self.task.request_id
+    def after(self, error: UnknownRobot | UnknownFigures | UnknownLog | PartsNeeded) -> Needs:
+        """These needs, and what a worker did not know. Raises the error if that is among these already."""
+        if isinstance(error, UnknownRobot):
+            more = replace(self, robot=error.name)
+        elif isinstance(error, UnknownFigures):
+            more = replace(self, figures=error.id)
+        elif isinstance(error, UnknownLog):
+            more = replace(self, log=error.id)
+        else:
+            more = replace(self, answers=tuple(dict.fromkeys((*self.answers, *error.names))))
+        if more == self:
+            raise error
+        return more
 
-    def run(self, deadline: float) -> TaskResult:
-        """The task's result."""
-        with identified_as(self.figures):
-            return self.task.run(deadline)
-
-
-@dataclass(frozen=True)
-class WithLog:
-    """A task, and the stored log that it names."""
-
-    task: Task
-    log: GivenLog
-
-    @property
-    def request_id(self) -> str:
-        """Id of the request."""
-        return self.task.request_id
-
-    def run(self, deadline: float) -> TaskResult:
-        """The task's result."""
-        with log_given(self.log):
-            return self.task.run(deadline)
+    async def given(self, store: Store) -> tuple[Given, ...]:
+        """What is needed. Raises UnknownRobot, UnknownFigures, UnknownLog, UnknownAnswer or StoreUnavailable."""
+        found: list[Given] = []
+        if self.log is not None:
+            found.append(partial(log_given, await given_log(store, self.log)))
+        if self.figures is not None:
+            found.append(partial(identified_as, await identified(store, self.figures)))
+        if self.robot is not None and self.robot not in robot_names():
+            found.append(partial(own_robot_named, self.robot, await own_figures(store, self.robot)))
+        if self.answers:
+            kept = {name: await _kept(store, name) for name in self.answers}
+            found.append(partial(answers_given, kept))
+        return tuple(found)
 
 
 @dataclass(frozen=True)
@@ -95,42 +103,18 @@ class ArmEngine:
     async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
         """The task's result; `tell` gets what it finds.
 
-        Raises UnknownRobot, UnknownFigures, UnknownLog, and what the engine raises; StoreUnavailable only for figures,
-        a log, and a robot that does not come with the service.
+        Raises UnknownRobot, UnknownFigures, UnknownLog, UnknownAnswer, and what the engine raises; StoreUnavailable
+        only for figures, a log, kept answers, and a robot that does not come with the service.
         """
-        log: str | None = None
         request = getattr(task, "request", None)
-        name, used = getattr(request, "robot", None), getattr(request, "figures", None)
+        needs = Needs(getattr(request, "robot", None), getattr(request, "figures", None))
         while True:
-            equipped = await self._equipped(task, name, used, log)
+            given = await needs.given(self.store)
             try:
-                return await self.engine.run(equipped, deadline, tell)
-            # only the worker reads the body of an upload, and the names in it
-            except UnknownRobot as error:
-                if error.name == name:
-                    raise
-                name = error.name
-            except UnknownFigures as error:
-                if error.id == used:
-                    raise
-                used = error.id
-            except UnknownLog as error:
-                if error.id == log:
-                    raise
-                log = error.id
-
-    async def _equipped(self, task: Task, name: str | None, used: str | None, log: str | None) -> Task:
-        """The task with what it needs of the database.
-
-        Raises UnknownRobot, UnknownFigures, UnknownLog or StoreUnavailable.
-        """
-        if log is not None:
-            task = WithLog(task, await given_log(self.store, log))
-        if used is not None:
-            task = WithFigures(task, await identified(self.store, used))
-        if name is not None and name not in robot_names():
-            task = WithOwnRobot(task, name, await own_figures(self.store, name))
-        return task
+                return await self.engine.run(Equipped(task, given) if given else task, deadline, tell)
+            # only the worker reads the body of an upload, or a kept answer, and the names in it
+            except (UnknownRobot, UnknownFigures, UnknownLog, PartsNeeded) as error:
+                needs = needs.after(error)
 
 
 async def robot_in(store: Store, name: str) -> Robot:
@@ -146,11 +130,13 @@ async def known_here(store: Store, name: str, used: str | None) -> AbstractConte
 
     Raises UnknownRobot, UnknownFigures or StoreUnavailable.
     """
+    return _within(await Needs(name, used).given(store))
+
+
+def _within(given: tuple[Given, ...]) -> AbstractContextManager[Any]:
     context = ExitStack()
-    if name not in robot_names():
-        context.enter_context(own_robot_named(name, await own_figures(store, name)))
-    if used is not None:
-        context.enter_context(identified_as(await identified(store, used)))
+    for each in given:
+        context.enter_context(each())
     return context
 
 
@@ -164,6 +150,11 @@ async def given_log(store: Store, id: str) -> GivenLog:
     """The stored log of this id. Raises UnknownLog or StoreUnavailable."""
     row = await store.read(partial(logs.get, log_id=id))
     return GivenLog(id, row.settings, row.body)
+
+
+async def _kept(store: Store, name: str) -> bytes:
+    _, body = await store.read(partial(answers.get, answer_id=name.rpartition("/")[2]))
+    return body
 
 
 async def own_figures(store: Store, name: str) -> dict[str, Any]:

@@ -13,18 +13,19 @@ from joulepath.app.api.compare.task import CompareRequest, CompareTask
 from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.cycle.task import CycleTask
 from joulepath.app.api.evaluate.task import EvaluateAnswer, evaluated
+from joulepath.app.api.figures.task import replacing
+from joulepath.app.api.identifications.request import IdentifyRequest
+from joulepath.app.api.identifications.task import IdentifyTask
 from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.api.pareto.task import ParetoRequest, ParetoTask
 from joulepath.app.api.whatif.task import WhatifRequest, WhatifTask
 from joulepath.app.convert.packed import packed, unpacked
+from joulepath.app.convert.recorded import GivenLog
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.evaluate import EvaluateRequest
-from joulepath.app.schemas.identifications import IdentifyRequest
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.store.leases import FoundFigures
 from joulepath.app.tasks.answer_figures import figures_of
-from joulepath.app.tasks.figures import replacing
-from joulepath.app.tasks.identify import IdentifyTask, Stored
 from joulepath.optimizer.deadline import Deadline
 
 IDENTIFY, CYCLE = "identify", "cycle"
@@ -52,7 +53,7 @@ class JobRequestTask:
     kind: str
     body: bytes
     request_id: str
-    logs: tuple[Stored, ...] = ()
+    logs: tuple[GivenLog, ...] = ()
     """Those that an identification names."""
     motions: Mapping[str, bytes] = field(default_factory=dict)
     """Those of the cell of a cycle."""

@@ -2,36 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
+from contextvars import ContextVar
+from typing import Any
 
 import orjson
 
-from joulepath.app.engine.result import TaskResult
+from joulepath.app.convert.at_hand import at_hand
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import PartsNeeded
 
+_KEPT: ContextVar[Mapping[str, bytes] | None] = ContextVar("kept answers", default=None)
 
-@dataclass(frozen=True, kw_only=True)
-class WithKeptAnswers:
-    """Base of such a task. `kept` holds kept answers (JSON) by their ids or paths."""
 
-    kept: dict[str, bytes] = field(default_factory=dict)
+def answers_given(kept: Mapping[str, bytes]) -> AbstractContextManager[None]:
+    """Within the context, and its thread, requests may name these answers (JSON), by their ids or paths."""
+    return at_hand(_KEPT, kept)
 
-    def run(self, deadline: float) -> TaskResult:
-        """The task's result, within about `deadline` seconds. Raises PartsNeeded."""
-        raise NotImplementedError
 
-    def with_kept(self, found: dict[str, bytes]) -> Self:
-        """The same task with more kept answers at hand."""
-        return replace(self, kept=self.kept | found)
-
-    def answers(self, names: list[str]) -> list[Any]:
-        """The kept answers of these names. Raises PartsNeeded with those that are not at hand, and InvalidRequest."""
-        missing = [name for name in names if name not in self.kept]
-        if missing:
-            raise PartsNeeded(missing)
-        return [_document(self.kept[name]) for name in names]
+def kept_answers(names: list[str]) -> list[Any]:
+    """The kept answers of these names. Raises PartsNeeded with those that are not at hand, and InvalidRequest."""
+    kept = _KEPT.get() or {}
+    missing = [name for name in names if name not in kept]
+    if missing:
+        raise PartsNeeded(missing)
+    return [_document(kept[name]) for name in names]
 
 
 def _document(body: bytes) -> Any:

@@ -8,12 +8,7 @@ from pkgutil import walk_packages
 
 from joulepath.app.engine.imports import importing
 
-TASKS = (
-    "job_body",
-    "job_request",
-    "own_robot",
-    "read_body",
-)
+TASKS = ("job_body", "job_request", "read_body")
 
 with importing():
     endpoints = import_module("joulepath.app.api")

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import pytest
 
+from joulepath.app.api.cluster import ClusterState
 from joulepath.app.exceptions.queue import ClusterUnavailable
-from joulepath.app.schemas.cluster import ClusterState
 from tests.app.job_clients import ended, evaluation, over, sent, shown
 from tests.app.live import EXIT, GRACE, ROOT, Server, alive, processor_time, serving, until
 from tests.app.problems import checked

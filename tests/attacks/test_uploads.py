@@ -17,19 +17,20 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.api.evaluate.task import EvaluateTask
+from joulepath.app.api.identifications.request import IdentifyRequest
+from joulepath.app.api.identifications.task import IdentifyTask
 from joulepath.app.api.ik.task import IKRequest, IKTask
+from joulepath.app.api.logs.request import LogSettings
+from joulepath.app.api.logs.task import ReadLogTask
+from joulepath.app.api.robots.request import OwnArm
+from joulepath.app.api.robots.task import OwnRobotTask
 from joulepath.app.convert.mesh_file import mesh_from_file
+from joulepath.app.convert.recorded import GivenLog
 from joulepath.app.convert.request import to_problem
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.transport import BodyTooLarge
 from joulepath.app.schemas.examples.own_arm import ARM, URDF
-from joulepath.app.schemas.identifications import IdentifyRequest
-from joulepath.app.schemas.logs import LogSettings
-from joulepath.app.schemas.own_arm import OwnArm
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.app.tasks.identify import IdentifyTask
-from joulepath.app.tasks.own_robot import OwnRobotTask
-from joulepath.app.tasks.read_log import ReadLogTask
 from joulepath.models.own_arm.description import InvalidArm
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.registry import load_robot
@@ -234,7 +235,7 @@ def late_tasks(log: bytes, folder: Path) -> Iterator[tuple[str, Any]]:
     yield "a motion", EvaluateTask(str(motion), "csv", {"time_per_segment": "1"}, "json", "id", LATE)
     request = IdentifyRequest.model_validate({"logs": ["1" * 8 + "-" + "-".join(["1" * 4] * 3) + "-" + "1" * 12]})
     settings = LogSettings(robot="ur5e").model_dump(mode="json")
-    yield "an identification", IdentifyTask(request, ((settings, gzip.compress(log)),), "id")
+    yield "an identification", IdentifyTask(request, (GivenLog("log", settings, gzip.compress(log)),), "id")
     pose = {"position": [0.4, 0.1, 0.3], "rpy": [0, 0, 0]}
     yield "a scene of /ik", IKTask(IKRequest.model_validate({"pose": pose, "scene": scene}), "id")
     move = {"start": {"q": [0.0] * 6}, "goal": {"q": [1.0] * 6}, "scene": scene}

@@ -9,13 +9,13 @@ import orjson
 from fastapi import APIRouter, Path, Query, Response
 
 from joulepath.app.api.answers.models import AnswerList, AnswerPage, AnswerSummary, StoredAnswer
+from joulepath.app.api.shared.dependencies import ServiceClient, ServiceStore
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import AnswerInUse, StoreUnavailable, UnknownAnswer
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import ServiceClient, ServiceStore
 from joulepath.app.schemas.examples.values import ANSWER_ID
 from joulepath.app.store import answers
 

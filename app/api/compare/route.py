@@ -6,14 +6,14 @@ from fastapi import APIRouter, Request, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.compare.task import CompareAnswer, CompareRequest, CompareTask
+from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings
+from joulepath.app.api.shared.large_bodies import LargeBodyRoute
+from joulepath.app.api.shared.later import ACCEPTED, ServiceLater
+from joulepath.app.api.shared.parameters import deadline_of
+from joulepath.app.api.shared.problem_lists import MOTION_PROBLEMS
+from joulepath.app.api.shared.reply import BY_EVENTS, ServiceReply
 from joulepath.app.exceptions.stored import KeyReused
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings
-from joulepath.app.routes.large_bodies import LargeBodyRoute
-from joulepath.app.routes.later import ACCEPTED, ServiceLater
-from joulepath.app.routes.parameters import deadline_of
-from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
-from joulepath.app.routes.reply import BY_EVENTS, ServiceReply
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 

@@ -8,6 +8,12 @@ from fastapi import APIRouter, Request, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.evaluate.task import EvaluateAnswer, EvaluateTask
+from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings
+from joulepath.app.api.shared.later import ACCEPTED, ServiceLater, deadlines
+from joulepath.app.api.shared.parameters import WantedFormat, is_fresh
+from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
+from joulepath.app.api.shared.query_settings import query_parameters
+from joulepath.app.api.shared.uploads import upload
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import KeyReused, UnknownFigures, UnknownLog
 from joulepath.app.exceptions.transport import UnsupportedMediaType
@@ -15,12 +21,6 @@ from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.json_route import UNDECLARED, media_type
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings
-from joulepath.app.routes.later import ACCEPTED, ServiceLater, deadlines
-from joulepath.app.routes.parameters import WantedFormat, is_fresh
-from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
-from joulepath.app.routes.query_settings import query_parameters
-from joulepath.app.routes.uploads import upload
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
 from joulepath.app.tasks.job_body import JobBodyTask
 from joulepath.optimizer.exceptions import InvalidTable

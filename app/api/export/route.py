@@ -9,14 +9,13 @@ from fastapi import APIRouter, Path, Request, Response
 
 from joulepath.app.api.export.request import ExportRequest
 from joulepath.app.api.export.task import ExportResult, ExportTask
+from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings
+from joulepath.app.api.shared.large_bodies import LargeBodyRoute
+from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
 from joulepath.app.exceptions.stored import UnknownAnswer, UnknownFigures
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.http.weights import JSON, is_wanted
-from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
-from joulepath.app.routes.kept_answers import with_kept_answers
-from joulepath.app.routes.large_bodies import LargeBodyRoute
-from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
 from joulepath.optimizer.evaluate.errors import NotCertified
 from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.export import FORMATS
@@ -69,13 +68,12 @@ async def export(
     body: ExportRequest,
     settings: ServiceSettings,
     engine: ServiceArmEngine,
-    store: ServiceStore,
 ) -> Response:
     """Writes the motion of an answer as a file for a robot controller. The certificate of the motion is computed again,
     for the speed asked for: what fails it is not exported. No format was run on hardware."""
     as_json = is_wanted(request, JSON)
     task = ExportTask(body, format, as_json, request.state.id)
-    work = with_kept_answers(task, engine, store, settings.max_deadline)
+    work = engine.run(task, settings.max_deadline)
     result = await unless_disconnected(request, work)
     assert isinstance(result, ExportResult)
     return _response(result)

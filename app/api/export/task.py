@@ -11,7 +11,7 @@ from joulepath.app.convert.given_answer import paths_of_moves, to_program
 from joulepath.app.convert.until import until
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.http.problems import invalid_request
-from joulepath.app.tasks.kept_answers import WithKeptAnswers
+from joulepath.app.tasks.kept_answers import kept_answers
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.export.export import export
 from joulepath.optimizer.export.formats import FormatName
@@ -29,7 +29,7 @@ class ExportResult(TaskResult):
 
 
 @dataclass(frozen=True)
-class ExportTask(WithKeptAnswers):
+class ExportTask:
     """A validated request, its format, and its id.
 
     `as_json`: the client accepts JSON.
@@ -62,6 +62,6 @@ class ExportTask(WithKeptAnswers):
 
     def _program(self) -> Program:
         given = self.asked.answer
-        answer = self.answers([given])[0] if isinstance(given, str) else given
-        self.answers(paths_of_moves(answer))
-        return to_program(answer, self.asked.arm, self.answers)
+        answer = kept_answers([given])[0] if isinstance(given, str) else given
+        kept_answers(paths_of_moves(answer))
+        return to_program(answer, self.asked.arm, kept_answers)

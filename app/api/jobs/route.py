@@ -8,6 +8,16 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
+from joulepath.app.api.shared.dependencies import (
+    ServiceClient,
+    ServiceClientEngine,
+    ServiceJobs,
+    ServiceSettings,
+    ServiceStore,
+)
+from joulepath.app.api.shared.later import deadlines
+from joulepath.app.api.shared.parameters import CREATED_HEADERS, Key, WantedFormat, is_fresh, set_location
+from joulepath.app.api.shared.uploads import upload
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.queue import Busy, ShuttingDown, WorkerLost
@@ -20,16 +30,6 @@ from joulepath.app.http.openapi import problem_responses
 from joulepath.app.http.weights import JSON
 from joulepath.app.jobs.answers import as_csv, as_lines, detail, summary
 from joulepath.app.jobs.events import events_after
-from joulepath.app.routes.dependencies import (
-    ServiceClient,
-    ServiceClientEngine,
-    ServiceJobs,
-    ServiceSettings,
-    ServiceStore,
-)
-from joulepath.app.routes.later import deadlines
-from joulepath.app.routes.parameters import CREATED_HEADERS, Key, WantedFormat, is_fresh, set_location
-from joulepath.app.routes.uploads import upload
 from joulepath.app.schemas.examples.jobs import RESULTS_CSV, RESULTS_LINES
 from joulepath.app.schemas.examples.values import JOB_ID
 from joulepath.app.schemas.jobs import Job, JobDetail, JobList, JobPage, NewJob, RequestPage

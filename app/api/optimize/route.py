@@ -6,21 +6,21 @@ from fastapi import APIRouter, Request, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.optimize.task import OptimizeAnswer, OptimizeTask
-from joulepath.app.engine.result import TaskResult
-from joulepath.app.exceptions.stored import KeyReused
-from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import (
+from joulepath.app.api.shared.dependencies import (
     ServiceArmEngine,
     ServiceCache,
     ServiceClient,
     ServiceSettings,
     ServiceStore,
 )
-from joulepath.app.routes.large_bodies import LargeBodyRoute
-from joulepath.app.routes.later import ACCEPTED, ServiceLater
-from joulepath.app.routes.parameters import CACHED_HEADERS, deadline_of
-from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
-from joulepath.app.routes.reply import BY_EVENTS, ServiceReply
+from joulepath.app.api.shared.large_bodies import LargeBodyRoute
+from joulepath.app.api.shared.later import ACCEPTED, ServiceLater
+from joulepath.app.api.shared.parameters import CACHED_HEADERS, deadline_of
+from joulepath.app.api.shared.problem_lists import MOTION_PROBLEMS
+from joulepath.app.api.shared.reply import BY_EVENTS, ServiceReply
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions.stored import KeyReused
+from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.store.store_answers import keep_answer
 from joulepath.optimizer.progress import Tell, nobody

@@ -17,7 +17,7 @@ from joulepath.app.http.problems import invalid_request
 from joulepath.app.schemas.common import Request, described
 from joulepath.app.schemas.given_answer import AnswerRequest
 from joulepath.app.settings import LONGEST_DEADLINE
-from joulepath.app.tasks.kept_answers import WithKeptAnswers
+from joulepath.app.tasks.kept_answers import kept_answers
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.declared import NotEmpty, Seconds
 from joulepath.optimizer.replay.controller import ControlName
@@ -113,7 +113,7 @@ class ReplayAnswer(Answer):
 
 
 @dataclass(frozen=True)
-class ReplayTask(WithKeptAnswers):
+class ReplayTask:
     """A validated request and its id."""
 
     asked: ReplayRequest
@@ -146,10 +146,10 @@ class ReplayTask(WithKeptAnswers):
     def _planned(self) -> list[tuple[int | None, PlannedMotion]]:
         """The motions of the answer, and of a cycle the index of each in `legs`."""
         given = self.asked.answer
-        answer = self.answers([given])[0] if isinstance(given, str) else given
+        answer = kept_answers([given])[0] if isinstance(given, str) else given
         paths = paths_of_moves(answer)
-        single = self.answers(paths) if paths else [answer]
-        moves = to_program(answer, self.asked.arm, self.answers).moves
+        single = kept_answers(paths) if paths else [answer]
+        moves = to_program(answer, self.asked.arm, kept_answers).moves
         legs: list[int | None] = [None]
         if paths:
             legs = [k for k, leg in enumerate(answer["legs"]) if leg["answer"] is not None]

@@ -7,8 +7,10 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
-from sqlalchemy.exc import IntegrityError
 
+from joulepath.app.api.shared.dependencies import ServiceClient, ServiceStore
+from joulepath.app.api.shared.large_bodies import LargeBodyRoute
+from joulepath.app.api.shared.parameters import CREATED_HEADERS, Key, StudyId, WantedFormat, set_location
 from joulepath.app.convert.identified import identified_as, with_figures
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import InvalidRequest
@@ -16,9 +18,6 @@ from joulepath.app.exceptions.queue import ShuttingDown, WorkerLost
 from joulepath.app.exceptions.stored import KeyReused, StoreUnavailable, UnknownFigures, UnknownStudy
 from joulepath.app.exceptions.transport import BodyTooLarge, RequestTimeout
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import ServiceClient, ServiceStore
-from joulepath.app.routes.large_bodies import LargeBodyRoute
-from joulepath.app.routes.parameters import CREATED_HEADERS, Key, StudyId, WantedFormat, set_location
 from joulepath.app.schemas.examples.studies import STUDY_CSV
 from joulepath.app.schemas.studies import Study, StudyList, StudyPage, StudyRequest, StudySummary
 from joulepath.app.store import studies
@@ -64,10 +63,7 @@ async def create(
         with identified_as(await identified(store, body.figures)):
             with_figures(robot, body.figures)
     study = studies.new_study(body.name, body.robot, body.objective, body.threshold, key, client.owner, body.figures)
-    try:
-        made, again = await store.write(partial(studies.create, study=study))
-    except IntegrityError:  # another process has just created the study of this key
-        made, again = await store.write(partial(studies.create, study=study))
+    made, again = await store.create(partial(studies.create, study=study))
     set_location(request, response, f"/studies/{made.id}", again)
     return StudySummary(**summary(await store.read(partial(studies.state, study_id=made.id))))
 

@@ -5,22 +5,22 @@ from __future__ import annotations
 from fastapi import APIRouter, Request, Response
 
 from joulepath.app.answers.declared import model_of
+from joulepath.app.api.shared.dependencies import (
+    ServiceArmEngine,
+    ServiceClient,
+    ServiceSettings,
+    ServiceStore,
+)
+from joulepath.app.api.shared.large_bodies import LargeBodyRoute
+from joulepath.app.api.shared.later import ACCEPTED, ServiceLater
+from joulepath.app.api.shared.parameters import deadline_of
+from joulepath.app.api.shared.problem_lists import MOTION_PROBLEMS
 from joulepath.app.api.whatif.answer import WhatifAnswer
 from joulepath.app.api.whatif.task import WhatifRequest, WhatifTask
 from joulepath.app.exceptions.stored import KeyReused, StoreUnavailable, UnknownLog
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import (
-    ServiceArmEngine,
-    ServiceClient,
-    ServiceSettings,
-    ServiceStore,
-)
-from joulepath.app.routes.large_bodies import LargeBodyRoute
-from joulepath.app.routes.later import ACCEPTED, ServiceLater
-from joulepath.app.routes.parameters import deadline_of
-from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
 from joulepath.app.store.store_answers import store_answers
 from joulepath.optimizer.exceptions import InvalidTable
 from joulepath.optimizer.search.errors import PathInfeasible

@@ -10,8 +10,9 @@ import click
 import numpy as np
 import pytest
 
+from joulepath.app.api.identifications.models import IdentificationResult
+from joulepath.app.api.identifications.request import Method, Target, Term
 from joulepath.app.cli.identify import identify, summary_of
-from joulepath.app.schemas.identifications import IdentificationResult, Method, Target, Term
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.identify.errors import MethodNotApplicable, NoPowerChannel, NothingHeldOut
 from joulepath.optimizer.problem.arm import Payload

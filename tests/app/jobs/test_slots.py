@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from joulepath.app.convert.packed import packed
+from joulepath.app.convert.recorded import GivenLog
 from joulepath.app.engine.work import Ended, Take, Work, taking
 from joulepath.app.exceptions.base import InternalError
 from joulepath.app.exceptions.queue import ClusterUnavailable
@@ -132,7 +133,7 @@ def test_an_identification_gets_its_logs_wherever_it_is_computed(tmp_path: Path,
         ended: list[Ended] = []
         others = [Work(JobRequestTask(kind, body, "job.0"), 1.0, ended.append) for kind in (IDENTIFY, "optimize")]
         await executor.run(taking(*others))
-        assert [task.logs for task in runner.tasks] == [(), (({"robot": "ur5e"}, b"log"),)]
+        assert [task.logs for task in runner.tasks] == [(), (GivenLog(log.id, {"robot": "ur5e"}, b"log"),)]
         assert [type(each) for each in ended] == [InternalError, InternalError]
 
     with_store(tmp_path, test)

@@ -13,8 +13,8 @@ from joulepath.app.answers.declared import model_of
 from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.cycle.task import CycleAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
+from joulepath.app.api.shared.parameters import deadline_of
 from joulepath.app.convert.warnings import NO_DEFAULT_MOTION
-from joulepath.app.routes.parameters import deadline_of
 from tests.app.requests import HOME, PATIENT
 
 # relative: sums of the same numbers in another order

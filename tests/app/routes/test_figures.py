@@ -12,10 +12,10 @@ import pytest
 import yaml
 from starlette.testclient import TestClient
 
+from joulepath.app.api.figures.models import FiguresDetail, FiguresList
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import FiguresInUse, TooManyFigures, UnknownFigures
 from joulepath.app.schemas.examples.figures import FIGURES
-from joulepath.app.schemas.figures import FiguresDetail, FiguresList
 from joulepath.models.registry import load_robot
 from joulepath.models.uncertainty.document import InvalidFigures
 from joulepath.optimizer.optimize import optimize

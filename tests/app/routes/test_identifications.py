@@ -10,9 +10,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.api.excitation.task import ExcitationRequest
-from joulepath.app.exceptions.base import InvalidRequest
-from joulepath.app.exceptions.stored import UnknownIdentification, UnknownLog
-from joulepath.app.schemas.identifications import (
+from joulepath.app.api.identifications.models import (
     Identification,
     IdentificationList,
     IdentificationResult,
@@ -20,6 +18,8 @@ from joulepath.app.schemas.identifications import (
     ResidualCurves,
     ResidualMove,
 )
+from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.exceptions.stored import UnknownIdentification, UnknownLog
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.energy.link_regressor import base_wrench_regressor, body_parameters
 from joulepath.optimizer.exceptions import DeclaredError

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath.app.routes.large_bodies import LARGE
+from joulepath.app.api.shared.large_bodies import LARGE
 from joulepath.app.schemas.examples.bodies import BODY_EXAMPLES
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.tasks.read_body import HeldBody, ReadBodyTask, held

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath.app.convert.logs import stored_log
+from joulepath.app.api.logs.models import LogDetail, LogList
+from joulepath.app.convert.recorded import GivenLog
 from joulepath.app.exceptions.access import NotOwner, Role, RoleTooLow, Unauthenticated
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import TooManyLogs, UnknownLog
 from joulepath.app.exceptions.transport import BodyTooLarge, UnsupportedMediaType
 from joulepath.app.schemas.examples.logs import LOG_EXAMPLES
 from joulepath.app.schemas.examples.own_arm import ARM
-from joulepath.app.schemas.logs import LogDetail, LogList
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import InvalidTable, UnknownRobot
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
@@ -63,7 +63,7 @@ def test_a_log_is_added_listed_shown_and_deleted(client: TestClient, recording: 
 
 
 def test_what_is_stored_is_read_again_as_it_was(recording: Recording) -> None:
-    log = stored_log({"robot": "ur5e", "tags": [], "effort": "auto"}, gzip.compress(csv_of(recording)))
+    log = GivenLog("log", {"robot": "ur5e", "tags": [], "effort": "auto"}, gzip.compress(csv_of(recording))).reading.log
     assert np.abs(log.q - recording.q).max() < 1e-7 and log.effort_meaning == "current"
 
 

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.api.robots.models import RobotDetail, RobotList
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import RobotExists, TooManyRobots
 from joulepath.app.schemas.examples.own_arm import ARM
-from joulepath.app.schemas.robots import RobotDetail, RobotList
 from joulepath.optimizer.exceptions import UnknownRobot
 from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
 from tests.app.recorded import recorded_service

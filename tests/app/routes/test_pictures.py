@@ -12,15 +12,15 @@ import pytest
 import trimesh
 from starlette.testclient import TestClient
 
+from joulepath.app.api.robots.pictures import PictureTask, kept
 from joulepath.app.exceptions.stored import NoMeshes
-from joulepath.app.tasks.pictures import PictureTask, kept
 from joulepath.optimizer.exceptions import UnknownRobot
 from tests.app.live import ANSWER, ROOT
 from tests.app.routes.test_problems import refused
 
 MAKE = """
 import hashlib
-from joulepath.app.tasks.pictures import PictureTask, _path
+from joulepath.app.api.robots.pictures import PictureTask, _path
 content = PictureTask("ur5e", "test").run(60).document
 print(_path("ur5e").stat().st_ino, hashlib.sha256(content).hexdigest())
 """

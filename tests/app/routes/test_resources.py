@@ -12,9 +12,9 @@ from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.ik.task import IKAnswer
+from joulepath.app.api.robots.models import RobotDetail, RobotList
 from joulepath.app.convert.pose import to_matrix
 from joulepath.app.schemas.common import QuaternionPose
-from joulepath.app.schemas.robots import RobotDetail, RobotList
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from tests.app.requests import PATIENT

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from joulepath.app.convert.own_arm import to_description
+from joulepath.app.api.robots.request import OwnArm
+from joulepath.app.api.robots.task import to_description
 from joulepath.app.schemas.examples.figures import FIGURES
 from joulepath.app.schemas.examples.own_arm import ARM
-from joulepath.app.schemas.own_arm import OwnArm
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.own_arm.robots import own_robot
 from joulepath.models.registry import load_robot

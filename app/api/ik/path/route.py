@@ -6,13 +6,13 @@ from fastapi import APIRouter, Request, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.ik.path.task import IKPathAnswer, IKPathRequest, IKPathTask
+from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings
+from joulepath.app.api.shared.large_bodies import LargeBodyRoute
+from joulepath.app.api.shared.parameters import deadline_of
+from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings
-from joulepath.app.routes.large_bodies import LargeBodyRoute
-from joulepath.app.routes.parameters import deadline_of
-from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
 from joulepath.optimizer.exceptions import OutsideLimits
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)

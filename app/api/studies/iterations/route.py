@@ -12,6 +12,17 @@ from fastapi import APIRouter, Path, Request, Response
 from joulepath.app.access.rules import check_owner
 from joulepath.app.api.evaluate.task import EvaluateTask
 from joulepath.app.api.optimize.task import OptimizeTask
+from joulepath.app.api.shared.dependencies import (
+    ServiceArmEngine,
+    ServiceCache,
+    ServiceClient,
+    ServiceSettings,
+    ServiceStore,
+)
+from joulepath.app.api.shared.large_bodies import LargeBodyRoute
+from joulepath.app.api.shared.parameters import CREATED_HEADERS, Key, StudyId, deadline_of, set_location
+from joulepath.app.api.shared.problem_lists import MOTION_PROBLEMS
+from joulepath.app.api.shared.uploads import upload
 from joulepath.app.api.studies.iterations.task import StudyStep, StudyStepTask, large_step, study_step
 from joulepath.app.engine.result import StoredAnswer, TaskResult
 from joulepath.app.exceptions.access import NotOwner
@@ -19,17 +30,6 @@ from joulepath.app.exceptions.base import FieldError, InvalidRequest
 from joulepath.app.exceptions.stored import KeyReused, StoreUnavailable, UnknownLog, UnknownStudy
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import (
-    ServiceArmEngine,
-    ServiceCache,
-    ServiceClient,
-    ServiceSettings,
-    ServiceStore,
-)
-from joulepath.app.routes.large_bodies import LargeBodyRoute
-from joulepath.app.routes.parameters import CREATED_HEADERS, Key, StudyId, deadline_of, set_location
-from joulepath.app.routes.problem_lists import MOTION_PROBLEMS
-from joulepath.app.routes.uploads import upload
 from joulepath.app.schemas.studies import IterationBody, IterationDetail
 from joulepath.app.store import studies
 from joulepath.app.store.cache import Answered, Asked

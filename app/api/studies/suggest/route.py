@@ -11,6 +11,8 @@ import orjson
 from fastapi import APIRouter, Query, Request, Response
 
 from joulepath.app.api.optimize.task import OptimizeTask
+from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
+from joulepath.app.api.shared.parameters import StudyId, allowed_deadline
 from joulepath.app.api.studies.suggest.models import Suggestions, SuggestQuery
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.base import InternalError, InvalidRequest
@@ -20,8 +22,6 @@ from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.http.problems import reported
-from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
-from joulepath.app.routes.parameters import StudyId, allowed_deadline
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.store import answers, studies
 from joulepath.app.store.store import Store

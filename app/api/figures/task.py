@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from joulepath.app.api.figures.request import FiguresDocument
 from joulepath.app.convert.arm import robot_named
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.schemas.figures import FiguresDocument
 from joulepath.models.own_arm.robots import own_robot
 from joulepath.models.uncertainty.document import InvalidFigures, merged, replaced_in
 from joulepath.optimizer.exceptions import InvalidProblem

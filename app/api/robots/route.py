@@ -12,22 +12,22 @@ from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
 from joulepath.app.access.client import Client
+from joulepath.app.api.robots.models import Friction, FrictionLaw, RobotDetail, RobotList, RobotSummary
+from joulepath.app.api.robots.pictures import MEDIA_TYPE, PictureTask, digest, kept
+from joulepath.app.api.robots.request import NewRobot, OwnArm, OwnName
+from joulepath.app.api.robots.task import OwnRobotTask
+from joulepath.app.api.shared.dependencies import ServiceClient, ServiceClientEngine, ServiceSettings, ServiceStore
+from joulepath.app.api.shared.large_bodies import LargeBodyRoute
+from joulepath.app.api.shared.parameters import LOCATION_HEADER, set_location
+from joulepath.app.api.shared.problem_lists import ADDING_PROBLEMS
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.queue import ShuttingDown, WorkerLost
 from joulepath.app.exceptions.stored import NoMeshes, RobotExists, StoreUnavailable
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.entity_tag import is_known
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import ServiceClient, ServiceClientEngine, ServiceSettings, ServiceStore
-from joulepath.app.routes.large_bodies import LargeBodyRoute
-from joulepath.app.routes.parameters import LOCATION_HEADER
-from joulepath.app.routes.problem_lists import ADDING_PROBLEMS
-from joulepath.app.schemas.own_arm import NewRobot, OwnArm, OwnName
-from joulepath.app.schemas.robots import Friction, FrictionLaw, RobotDetail, RobotList, RobotSummary
 from joulepath.app.store import robots
 from joulepath.app.store.tables import OwnRobot, now
-from joulepath.app.tasks.own_robot import OwnRobotTask
-from joulepath.app.tasks.pictures import MEDIA_TYPE, PictureTask, digest, kept
 from joulepath.models.form import link_bodies
 from joulepath.models.pictures import picture_sources
 from joulepath.models.registry import load_robot, robot_names
@@ -81,7 +81,7 @@ async def add(
         await store.write(partial(robots.add, robot=robot, most=settings.max_robots))
     except IntegrityError:  # another process has just added a robot of this name
         raise RobotExists from None
-    response.headers["Location"] = f"{request.scope.get('root_path', '')}/robots/{body.name}"
+    set_location(request, response, f"/robots/{body.name}")
     return _of_user(robot)
 
 
@@ -176,14 +176,10 @@ async def put(
     stay."""
     robots.check_own(name)
     robot = await _computed(request, name, body, engine, settings.max_deadline, client)
-    write = partial(robots.put, robot=robot, most=settings.max_robots, client=client)
-    try:
-        is_new = await store.write(write)
-    except IntegrityError:  # another process has just added it
-        is_new = await store.write(write)
+    is_new = await store.create(partial(robots.put, robot=robot, most=settings.max_robots, client=client))
     if is_new:
         response.status_code = 201
-        response.headers["Location"] = f"{request.scope.get('root_path', '')}/robots/{name}"
+        set_location(request, response, f"/robots/{name}")
     return _of_user(robot)
 
 

@@ -1,35 +1,76 @@
-"""Identifications: from a request to the options of the library, and from what was found to its answer."""
+"""POST /identifications in a worker: fits the figures of an arm to stored logs."""
 
 from __future__ import annotations
 
+import uuid
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 
-from joulepath.app.schemas.identifications import Fraction, IdentifyRequest
+from joulepath.app.answers.envelope import AnswerFigures
+from joulepath.app.api.identifications.request import Fraction, IdentifyRequest
+from joulepath.app.convert.arm import robot_named
+from joulepath.app.convert.fields import location
+from joulepath.app.convert.recorded import GivenLog
+from joulepath.app.convert.until import until
+from joulepath.app.engine.result import StoredAnswer, TaskResult, json_document
+from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.fits.payload_fit import Carried
-from joulepath.optimizer.identify.identify import Identification
+from joulepath.optimizer.identify.identify import Identification, identify
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.results import Curves, Validation
 
-DECIMALS = 4
+_DECIMALS = 4
 """Of the times, torques and powers of a picture."""
 
 
-def to_options(request: IdentifyRequest) -> IdentificationOptions:
+@dataclass(frozen=True)
+class IdentifyTask:
+    """A validated request, and the logs that it names: those of the fit, then those of the validation."""
+
+    request: IdentifyRequest
+    logs: tuple[GivenLog, ...]
+    request_id: str
+
+    def run(self, deadline: float) -> TaskResult:
+        """What was found, within about `deadline` seconds; the curves of its residuals are stored beside it.
+
+        Raises UnknownRobot, EffortNotUsable, MethodNotApplicable, NotExcited, NothingHeldOut,
+        NoPowerChannel, PayloadUnknown, InvalidRequest or DeadlineExceeded.
+        """
+        with until(Deadline.after(deadline)):
+            return self._identified()
+
+    def _identified(self) -> TaskResult:
+        logs = [each.reading.log for each in self.logs]
+        count, robot = len(self.request.logs), robot_named(logs[0].robot)
+        try:
+            found = identify(robot, logs[:count], _to_options(self.request))
+            others = found.validate(logs[count:]) if logs[count:] else found.validation
+        except InvalidProblem as error:
+            raise InvalidRequest([{"loc": location(error, "body"), "msg": str(error)}]) from None
+        assert others is not None
+        moves = _residual_fields(found, others, self.request.all_logs)
+        curves = StoredAnswer(str(uuid.uuid4()), json_document({"moves": moves}), AnswerFigures(robot.name))
+        return TaskResult.of_json(_identification_fields(found, others), (curves,))
+
+
+def _to_options(request: IdentifyRequest) -> IdentificationOptions:
     """The options of the library. Raises InvalidProblem."""
-    held_out = {"moves": 1.0} if isinstance(request.validate_, str) else {}
-    fraction = request.validate_.fraction if isinstance(request.validate_, Fraction) else 0.0
+    by = request.validate_
+    held_out = 1.0 if by == "moves" else by.fraction if isinstance(by, Fraction) else 0.0
     return IdentificationOptions(
         fit=tuple(request.fit),
         refit=request.inertials == "refit",
         method=request.method,
         period=request.period,
-        held_out=held_out.get("moves", fraction),
+        held_out=held_out,
         terms=tuple(request.friction.terms),
         knee=request.friction.knee,
         estimator=request.estimator,
@@ -38,7 +79,7 @@ def to_options(request: IdentifyRequest) -> IdentificationOptions:
     )
 
 
-def identification_fields(found: Identification, validation: Validation) -> dict[str, Any]:
+def _identification_fields(found: Identification, validation: Validation) -> dict[str, Any]:
     """What an answer says of an identification."""
     return {
         "robot": found.robot.name,
@@ -46,7 +87,7 @@ def identification_fields(found: Identification, validation: Validation) -> dict
         "parameters": [asdict(each) for each in found.parameters],
         "structure": asdict(found.structure),
         "physical": None if found.physical is None else asdict(found.physical),
-        "validation": _without_curves(asdict(validation)),
+        "validation": {name: value for name, value in asdict(validation).items() if name != "curves"},
         "residuals": asdict(found.residuals),
         "temperatures": asdict(found.temperatures),
         "noise": None if found.noise is None else asdict(found.noise),
@@ -56,7 +97,7 @@ def identification_fields(found: Identification, validation: Validation) -> dict
     }
 
 
-def residual_fields(found: Identification, validation: Validation, logs: Sequence[str]) -> list[dict[str, Any]]:
+def _residual_fields(found: Identification, validation: Validation, logs: Sequence[str]) -> list[dict[str, Any]]:
     """The moves of logs with these ids: those of the fit, and from the next number on those that validate it alone."""
     own = len(found.logs)
     others = own if len(logs) > own else 0
@@ -88,11 +129,7 @@ def _series(measured: Array, modelled: Array) -> dict[str, Any] | None:
 
 def _rounded(values: Array) -> Array:
     # of what sensors tell, nothing is lost; the document is half as long
-    return np.ascontiguousarray(values.round(DECIMALS))
-
-
-def _without_curves(validation: dict[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in validation.items() if name != "curves"}
+    return np.ascontiguousarray(values.round(_DECIMALS))
 
 
 def _payload_fields(carried: Carried) -> dict[str, Any]:

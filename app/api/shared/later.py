@@ -9,12 +9,12 @@ from typing import Annotated, Any
 import orjson
 from fastapi import Depends, Header, Request, Response
 
+from joulepath.app.api.shared.dependencies import ServiceClient, ServiceClientEngine, ServiceJobs, ServiceSettings
+from joulepath.app.api.shared.parameters import CREATED_HEADERS, Key, is_fresh, set_location
 from joulepath.app.convert.packed import unpacked
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import PROBLEM_MEDIA_TYPE
 from joulepath.app.jobs.answers import summary
-from joulepath.app.routes.dependencies import ServiceClient, ServiceClientEngine, ServiceJobs, ServiceSettings
-from joulepath.app.routes.parameters import CREATED_HEADERS, Key, is_fresh, set_location
 from joulepath.app.schemas.common import Request as RequestModel
 from joulepath.app.schemas.jobs import Job
 from joulepath.app.store import jobs as stored_jobs

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
+from joulepath.app.api.logs.request import LogSettings
 from joulepath.app.convert.arm import robot_named
 from joulepath.app.convert.fields import location
-from joulepath.app.convert.logs import report_fields, to_log_options
+from joulepath.app.convert.recorded import to_log_options
 from joulepath.app.convert.until import until
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.base import InvalidRequest
-from joulepath.app.schemas.logs import LogSettings
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identify.logs.reading import read_log
+from joulepath.optimizer.identify.logs.reading import LogReading, read_log
 
 
 @dataclass(frozen=True)
@@ -37,4 +38,23 @@ class ReadLogTask:
                 reading = read_log(Path(self.file), robot, to_log_options(self.request, self.most_bytes))
         except InvalidProblem as error:
             raise InvalidRequest([{"loc": location(error, "query"), "msg": str(error)}]) from None
-        return TaskResult.of_json(report_fields(reading))
+        return TaskResult.of_json(_report_fields(reading))
+
+
+def _report_fields(reading: LogReading) -> dict[str, Any]:
+    """What an answer says of a log beside its name and owner."""
+    log, report = reading.log, reading.report
+    return {
+        "rows": report.rows,
+        "duration": log.duration,
+        "dropped": report.dropped,
+        "rate": log.rate,
+        "jitter": list(report.jitter),
+        "payload": log.payload.mass,
+        "channels": [asdict(channel) for channel in report.channels],
+        "effort": None if report.effort is None else asdict(report.effort),
+        "moves": [
+            {"start": move.start / log.rate, "end": move.end / log.rate, "at_rest": move.at_rest} for move in log.moves
+        ],
+        "warnings": list(report.warnings),
+    }

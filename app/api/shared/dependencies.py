@@ -7,12 +7,12 @@ from typing import Annotated
 from fastapi import Depends, Request
 
 from joulepath.app.access.client import Client
+from joulepath.app.api.shared.parameters import is_fresh
 from joulepath.app.cluster.link import Cluster
 from joulepath.app.engine.pool import ClientEngine, Engine
 from joulepath.app.http.client import client_of
 from joulepath.app.http.metrics import Metrics
 from joulepath.app.jobs.jobs import Jobs
-from joulepath.app.routes.parameters import is_fresh
 from joulepath.app.settings import Settings
 from joulepath.app.store.store import Store
 from joulepath.app.tasks.answer_cache import AnswerCache

@@ -85,7 +85,7 @@ def is_fresh(request: Request) -> bool:
     return "no-cache" in request.headers.get("cache-control", "").lower()
 
 
-def set_location(request: Request, response: Response, path: str, again: bool) -> None:
+def set_location(request: Request, response: Response, path: str, again: bool = False) -> None:
     """Sets the headers of a response about a created resource; `again`: an earlier request with this key created it."""
     response.headers["Location"] = f"{request.scope.get('root_path', '')}{path}"
     if again:

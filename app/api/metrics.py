@@ -6,9 +6,9 @@ import asyncio
 
 from fastapi import APIRouter, Request, Response
 
+from joulepath.app.api.shared.dependencies import ServiceEngine, ServiceMetrics, ServiceStore
 from joulepath.app.exceptions.stored import StoreUnavailable
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import ServiceEngine, ServiceMetrics, ServiceStore
 from joulepath.app.store.store import Store
 
 router = APIRouter(tags=["health"])

@@ -10,6 +10,14 @@ import orjson
 from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
+from joulepath.app.api.logs.models import LogDetail, LogList, LogPage, LogSummary
+from joulepath.app.api.logs.request import LogSettings
+from joulepath.app.api.logs.task import ReadLogTask
+from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from joulepath.app.api.shared.parameters import LOCATION_HEADER, set_location
+from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
+from joulepath.app.api.shared.query_settings import query_parameters, settings_of
+from joulepath.app.api.shared.uploads import upload
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import StoreUnavailable, TooManyLogs, UnknownLog
@@ -17,16 +25,9 @@ from joulepath.app.exceptions.transport import UnsupportedMediaType
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.json_route import UNDECLARED, media_type
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
-from joulepath.app.routes.parameters import LOCATION_HEADER, set_location
-from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
-from joulepath.app.routes.query_settings import query_parameters, settings_of
-from joulepath.app.routes.uploads import upload
 from joulepath.app.schemas.examples.values import LOG_ID
-from joulepath.app.schemas.logs import LogDetail, LogList, LogPage, LogSettings, LogSummary
 from joulepath.app.store import logs
 from joulepath.app.store.tables import StoredLog, new_id, now
-from joulepath.app.tasks.read_log import ReadLogTask
 from joulepath.optimizer.exceptions import InvalidTable
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
 
@@ -92,7 +93,7 @@ async def add(
     )
     detail = _detail(log)
     await store.write(partial(logs.add, log=log, most=settings.logs_max_bytes))
-    set_location(request, response, f"/logs/{detail.id}", again=False)
+    set_location(request, response, f"/logs/{detail.id}")
     return detail
 
 

@@ -9,24 +9,24 @@ import orjson
 import yaml
 from fastapi import APIRouter, Path, Request, Response
 from fastapi.concurrency import run_in_threadpool
-from sqlalchemy.exc import IntegrityError
 
+from joulepath.app.api.figures.models import FiguresDetail, FiguresList, FiguresSummary
+from joulepath.app.api.figures.request import FiguresDocument
+from joulepath.app.api.figures.task import FiguresTask
+from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from joulepath.app.api.shared.large_bodies import LargeBodyRoute
+from joulepath.app.api.shared.parameters import LOCATION_HEADER, set_location
+from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.stored import FiguresInUse, StoreUnavailable, TooManyFigures, UnknownFigures
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.http.weights import is_wanted
-from joulepath.app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
-from joulepath.app.routes.large_bodies import LargeBodyRoute
-from joulepath.app.routes.parameters import LOCATION_HEADER
-from joulepath.app.routes.problem_lists import WORKER_PROBLEMS
 from joulepath.app.schemas.examples.figures import FIGURES, UNKNOWN_ID
-from joulepath.app.schemas.figures import FiguresDetail, FiguresDocument, FiguresList, FiguresSummary
 from joulepath.app.store import figures
 from joulepath.app.store.store import Store
 from joulepath.app.store.tables import Figures
 from joulepath.app.tasks.arm_engine import robot_in
-from joulepath.app.tasks.figures import FiguresTask
 from joulepath.models.uncertainty.document import merged
 from joulepath.optimizer.exceptions import UnknownRobot
 
@@ -59,14 +59,10 @@ async def put(
     task = FiguresTask(body, request.state.id)
     result = await unless_disconnected(request, engine.run(task, settings.max_deadline))
     new = figures.new_figures(body.robot, orjson.loads(result.document), client.owner)
-    write = partial(figures.put, figures=new, most=settings.max_figures)
-    try:
-        row, is_new = await store.write(write)
-    except IntegrityError:  # another process has just stored them
-        row, is_new = await store.write(write)
+    row, is_new = await store.create(partial(figures.put, figures=new, most=settings.max_figures))
     if is_new:
         response.status_code = 201
-    response.headers["Location"] = f"{request.scope.get('root_path', '')}/figures/{row.id}"
+    set_location(request, response, f"/figures/{row.id}")
     return await _detail(store, row)
 
 

@@ -9,6 +9,17 @@ import orjson
 from fastapi import APIRouter, Path, Query, Request, Response
 from sqlalchemy.orm import Session
 
+from joulepath.app.api.identifications.models import (
+    Identification,
+    IdentificationList,
+    IdentificationPage,
+    ListedIdentification,
+    ResidualCurves,
+)
+from joulepath.app.api.identifications.request import IdentifyRequest
+from joulepath.app.api.shared.dependencies import ServiceClient, ServiceJobs, ServiceStore
+from joulepath.app.api.shared.later import deadlines
+from joulepath.app.api.shared.parameters import CREATED_HEADERS, Key, set_location
 from joulepath.app.convert.packed import unpacked
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.base import InvalidRequest
@@ -16,18 +27,7 @@ from joulepath.app.exceptions.queue import Busy
 from joulepath.app.exceptions.stored import KeyReused, StoreUnavailable, UnknownIdentification, UnknownJob, UnknownLog
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import ServiceClient, ServiceJobs, ServiceStore
-from joulepath.app.routes.later import deadlines
-from joulepath.app.routes.parameters import CREATED_HEADERS, Key, set_location
 from joulepath.app.schemas.examples.values import IDENTIFICATION_ID
-from joulepath.app.schemas.identifications import (
-    Identification,
-    IdentificationList,
-    IdentificationPage,
-    IdentifyRequest,
-    ListedIdentification,
-    ResidualCurves,
-)
 from joulepath.app.store import answers
 from joulepath.app.store import jobs as stored_jobs
 from joulepath.app.store import logs as stored_logs

@@ -11,10 +11,10 @@ from fastapi import Depends, Request, Response
 from fastapi.routing import APIRoute
 from pydantic import BaseModel
 
+from joulepath.app.api.shared.dependencies import ServiceClientEngine, ServiceSettings
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.json_route import JsonRoute, media_type, strictly
 from joulepath.app.http.weights import JSON
-from joulepath.app.routes.dependencies import ServiceClientEngine, ServiceSettings
 from joulepath.app.tasks.read_body import HeldBody, ReadBodyTask, held
 
 LARGE = 1 << 16

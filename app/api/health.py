@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from fastapi import APIRouter
 
+from joulepath.app.api.shared.dependencies import ServiceEngine, ServiceStore
 from joulepath.app.exceptions.queue import NotReady
 from joulepath.app.exceptions.stored import StoreUnavailable
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.routes.dependencies import ServiceEngine, ServiceStore
-from joulepath.app.schemas.health import Alive, Ready
+from joulepath.app.schemas.common import Response, described
 
 router = APIRouter(tags=["health"])
+
+
+class Alive(Response):
+    """The process is alive."""
+
+    status: Literal["alive"] = described("Always `alive`.", None, "alive")
+
+
+class Ready(Response):
+    """All workers are warm: started, with the kernel loaded. The database can be read and written."""
+
+    status: Literal["ready"] = described("Always `ready`.", None, "ready")
+    workers: int = described("Number of warm workers.", "1", 2)
 
 
 @router.get("/healthz", summary="Is the process alive?", response_model=Alive, responses=problem_responses())

@@ -1,116 +1,16 @@
-"""What POST /identifications and GET /identifications/{id} take and answer."""
+"""What the routes under `/identifications` answer."""
 
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import Field
-
-from joulepath.app.schemas.common import Request, Response, described, part
+from joulepath.app.schemas.common import Response, described, part
 from joulepath.app.schemas.examples.figures import FIGURES_ID
 from joulepath.app.schemas.examples.values import CREATED, IDENTIFICATION_ID, LOG_ID
 from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
 
-MOST_LOGS = 32
-Target = Literal["friction", "rotor", "torque_constant", "power", "payload"]
-Term = Literal["coulomb", "viscous", "load", "offset", "curved"]
-Method = Literal[
-    "automatic",
-    "motor_current",
-    "electrical_power",
-    "base_parameters",
-    "essential_parameters",
-    "periodic",
-    "base_wrench",
-    "threshold_velocity",
-    "temperature",
-]
 State = Literal["queued", "running", "done", "failed", "cancelled"]
-LogIds = Annotated[list[str], Field(min_length=1, max_length=MOST_LOGS)]
-DEADLINE = 60.0
-
-
-class Fraction(Request):
-    """The part of the moves that is held out."""
-
-    fraction: float = described(
-        "Fraction of the moving time; whole motions are held out.", "1", 0.3, default=0.3, ge=0.05, le=0.8
-    )
-
-
-class FrictionTerms(Request):
-    """The friction law that is fitted."""
-
-    terms: Annotated[list[Term], Field(min_length=1, max_length=5)] = described(
-        "Terms of the law. `curved` is the concave rise of strain-wave gears, at the speed that fits best.",
-        None,
-        ["coulomb", "viscous", "load", "offset"],
-        default=["coulomb", "viscous", "load", "offset"],
-    )
-    knee: float | None = described(
-        "Speed over which Coulomb friction reverses. Null: the robot's own.",
-        "rad/s",
-        0.001,
-        default=None,
-        ge=1e-6,
-        le=1,
-    )
-
-
-class IdentifyRequest(Request):
-    """Logs of one robot, and what is to be found from them."""
-
-    logs: LogIds = described("Ids of logs, all of one robot.", None, [LOG_ID])
-    validate_: LogIds | Fraction | Literal["moves"] = described(
-        "What the figures are validated on, which no fit sees: other logs, a fraction of the moves, or `moves`: each "
-        "motion in its turn. Moves along the same motion stay together.",
-        None,
-        {"fraction": 0.3},
-        default=Fraction(),
-        alias="validate",
-    )
-    fit: Annotated[list[Target], Field(min_length=1, max_length=5)] = described(
-        "What is found. Power is added by itself where the logs have it; asking for it refuses logs without. "
-        "`payload`: mass and centre of mass of what the last of `logs` carried and the others did not; friction and "
-        "rotors are found with it.",
-        None,
-        ["friction", "rotor"],
-        default=["friction", "rotor"],
-    )
-    method: Method = described(
-        "How it is found. `automatic`: friction and rotors with the robot's own links where the logs "
-        "have currents or torques, and power where they have it. The others are methods of the "
-        "literature, each for its own kind of log: one that does not fit is `method-not-applicable`.",
-        None,
-        "automatic",
-        default="automatic",
-    )
-    period: float | None = described(
-        "Period of the motion; only for the method `periodic`.", "s", 10.0, default=None, ge=0.1, le=1e4
-    )
-    inertials: Literal["keep", "refit"] = described(
-        "`keep`: the robot's own. `refit`: they are found, too, as those of real bodies near the robot's own.",
-        None,
-        "keep",
-        default="keep",
-    )
-    friction: FrictionTerms = Field(description="Terms of the friction law.", default=FrictionTerms())
-    estimator: Literal["wls", "irls", "ols"] = described(
-        "Weighted, reweighted (outliers count less) or ordinary least squares.", None, "wls", default="wls"
-    )
-    velocity_threshold: float = described(
-        "Slower samples of a joint do not count for its friction.", "rad/s", 0.02, default=0.02, ge=0.0, le=10.0
-    )
-    prior_weight: float = described(
-        "Weight of the robot's own inertials where they are refitted.", "1", 1.0, default=1.0, ge=1e-6, le=1e6
-    )
-    deadline: float = described("Longest time of the fit.", "s", DEADLINE, default=DEADLINE, gt=0, le=3600)
-
-    @property
-    def all_logs(self) -> list[str]:
-        """Ids of the logs of the fit, then of those of the validation."""
-        return [*self.logs, *(self.validate_ if isinstance(self.validate_, list) else [])]
 
 
 class IdentifiedParameter(Response):

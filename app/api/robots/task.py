@@ -1,17 +1,50 @@
-"""From the arm in a request to the description of a user's own arm."""
+"""POST /robots and PUT /robots/{name} in a worker, because no URDF is to end the service: figures of a user's arm."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
+from joulepath.app.api.robots.request import OwnArm
 from joulepath.app.convert.base64_data import decoded
-from joulepath.app.schemas import own_arm as asked
-from joulepath.models.own_arm.description import Collision, Description, Drives, Electronics, Motion, PerJoint
+from joulepath.app.convert.until import until
+from joulepath.app.engine.result import TaskResult
+from joulepath.models.own_arm.description import (
+    Collision,
+    Description,
+    Drives,
+    Electronics,
+    InvalidArm,
+    Motion,
+    PerJoint,
+)
+from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.own_arm.mesh_files import in_zip
-from joulepath.optimizer.deadline import checkpoint
+from joulepath.models.own_arm.robots import own_robot
+from joulepath.optimizer.deadline import Deadline, checkpoint
+from joulepath.optimizer.exceptions import InvalidProblem
 
 
-def to_description(arm: asked.OwnArm) -> Description:
+@dataclass(frozen=True)
+class OwnRobotTask:
+    """A validated arm, its name, and the request's id."""
+
+    name: str
+    arm: OwnArm
+    request_id: str
+
+    def run(self, deadline: float) -> TaskResult:
+        """`figures` and `warnings`, within about `deadline` seconds. Raises InvalidProblem or DeadlineExceeded."""
+        try:
+            with until(Deadline.after(deadline)):
+                figures, warnings = own_figures(self.name, to_description(self.arm), checkpoint)
+        except InvalidArm as error:
+            raise InvalidProblem(error.field, str(error)) from None
+        own_robot(self.name, figures)
+        return TaskResult.of_json({"figures": figures, "warnings": warnings})
+
+
+def to_description(arm: OwnArm) -> Description:
     """The description of the library. Raises InvalidArm or InvalidProblem for meshes that are no zip,
     and DeadlinePassed once a watched deadline has passed."""
     motion, collision = arm.default_motion, arm.collision

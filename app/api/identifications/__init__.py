@@ -1,0 +1,1 @@
+"""`/identifications`: figures of one arm, found from its logs."""

@@ -1,0 +1,1 @@
+"""`/logs`: recorded motions of an arm."""

@@ -1,0 +1,1 @@
+"""`/robots`: the arms of the service, and those that users add."""

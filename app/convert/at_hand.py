@@ -1,0 +1,20 @@
+"""What a request needs of the database comes along with its task, in variables of the context in which it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import TypeVar
+
+T = TypeVar("T")
+
+
+@contextmanager
+def at_hand(variable: ContextVar[T], value: T) -> Iterator[None]:
+    """Within the context, and its thread, the variable has this value."""
+    before = variable.set(value)
+    try:
+        yield
+    finally:
+        variable.reset(before)
