@@ -39,7 +39,7 @@ class ParetoRequest(OptimizeRequest):
     )
     duration: DurationRange | None = described(
         "Bounds on the durations of the front. Null: from the shortest feasible duration to the "
-        "duration of least energy. The objective `mechanical` needs a `max` or a `cycle`.",
+        "duration of least energy. The objective `mechanical` needs a `max` or a `dwell`.",
         "s",
         {"max": 3.0},
         default=None,
