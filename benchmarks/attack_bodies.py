@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 from typing import Any
+
+import numpy as np
 
 HOME = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
 NEAR = [0.3, -1.4, 1.4, -1.5, -1.57, 0.2]
@@ -30,3 +33,33 @@ def long_search(deadline: float) -> dict[str, Any]:
 def numbers(size: int) -> bytes:
     """A body of about `size` bytes: a list of short lists."""
     return b'{"start": [' + b"[1,2]," * (size // 6 - 4) + b"[]]}"
+
+
+def _stl(triangles: Any) -> bytes:
+    """A binary STL file of triangles (n, 3, 3) [m]."""
+    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    records = np.zeros(len(triangles), record)
+    records["corners"] = triangles
+    return bytes(80) + len(triangles).to_bytes(4, "little") + records.tobytes()
+
+
+def meshes(count: int, seed: int) -> dict[str, Any]:
+    """A request for inverse kinematics among so many different mesh files of 1280 triangles."""
+    import trimesh  # slow to import, and only this attack needs it
+
+    rng = np.random.default_rng(seed)
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.05)
+
+    def obstacle(index: int) -> dict[str, Any]:
+        triangles = ball.triangles * rng.uniform(0.8, 1.2, 3)
+        position = [1.2 + 0.2 * (index % 8), 0.0, 0.2 * (index // 8)]
+        return {
+            "name": f"part {index}",
+            "shape": "mesh_file",
+            "format": "stl",
+            "data": base64.b64encode(_stl(triangles)).decode(),
+            "pose": {"position": position, "quaternion": [0, 0, 0, 1]},
+        }
+
+    pose = {"position": [0.4, -0.2, 0.3], "quaternion": [0, 1, 0, 0]}
+    return {"pose": pose, "scene": {"obstacles": [obstacle(index) for index in range(count)]}}

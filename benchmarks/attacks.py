@@ -9,18 +9,25 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import signal
+import tempfile
+import time
 from collections.abc import Awaitable, Callable
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import orjson
 
-from benchmarks.attack_bodies import long_search, numbers, sampled
+from benchmarks.attack_bodies import long_search, meshes, numbers, sampled
 from benchmarks.command import parser, write_json
+from benchmarks.crowds import CROWDS
+from benchmarks.crowds import report as report_crowd
 from benchmarks.observed_attack import Attack, Outcome, observed
-from benchmarks.service import Service, running
+from benchmarks.service import Client, Service, running
 
 ATTACKER = "127.0.0.66"
+LONGEST_END = 30.0  # longest wait for the end of the process [s]
 
 Streams = tuple[asyncio.StreamReader, asyncio.StreamWriter]
 
@@ -131,6 +138,23 @@ async def large_bodies(port: int) -> str:
     return counted(await each(300, one))
 
 
+async def many_meshes(port: int) -> str:
+    """Four clients ask again and again for inverse kinematics among 64 mesh files, for 10 s."""
+    bodies = [post("/ik", orjson.dumps(meshes(64, seed))) for seed in range(8)]
+    end = time.perf_counter() + 10
+
+    async def one(index: int) -> list[int]:
+        statuses: list[int] = []
+        while time.perf_counter() < end:
+            reader, writer = await connect(port)
+            writer.write(bodies[(index + len(statuses)) % len(bodies)])
+            statuses.append(await asyncio.wait_for(status_of(reader), 60))
+            writer.close()
+        return statuses
+
+    return counted([status for statuses in await each(4, one) for status in statuses])
+
+
 async def long_deadlines(port: int) -> str:
     """40 searches of 100 s, for 25 s."""
 
@@ -147,13 +171,81 @@ async def long_deadlines(port: int) -> str:
     return counted([await status_of(reader) for reader in refused])
 
 
+async def requests_ahead(port: int) -> str:
+    """Eight connections send 20,000 requests each without reading an answer."""
+
+    async def one(index: int) -> float:
+        _, writer = await connect(port)
+        writer.transport.pause_reading()  # type: ignore[attr-defined]
+        with contextlib.suppress(OSError, TimeoutError):
+            for _ in range(200):
+                writer.write(b"GET /problems HTTP/1.1\r\nHost: localhost\r\n\r\n" * 100)
+                await asyncio.wait_for(writer.drain(), 5)
+        await asyncio.sleep(3)
+        writer.transport.abort()
+        return 0.0
+
+    await each(8, one)
+    return ""
+
+
+async def left_uploads(port: int) -> str:
+    """200 clients leave in the middle of an upload to `/evaluate`, 200 of a body to `/optimize`."""
+
+    async def one(index: int) -> None:
+        _, writer = await connect(port)
+        writer.write(post("/evaluate" if index % 2 else "/optimize", b"[" * 50_000, 1 << 20))
+        await writer.drain()
+        await asyncio.sleep(1)
+        writer.transport.abort()
+
+    await each(400, one)
+    await asyncio.sleep(1)
+    return ""
+
+
 ATTACKS: dict[str, Attack] = {
     "headers": endless_headers,
     "half": half_requests,
     "unread": unread_answers,
     "bodies": large_bodies,
+    "meshes": many_meshes,
     "deadlines": long_deadlines,
+    "ahead": requests_ahead,
+    "left": left_uploads,
 }
+
+
+def open_everything(service: Service) -> list[Any]:
+    """An open upload, half a head, and an answer that is not read."""
+    opened = [Client(service.port, ATTACKER) for _ in range(3)]
+    for client, content in zip(
+        opened,
+        (post("/evaluate", b"{", 1 << 20), b"GET /he", post("/optimize", orjson.dumps(sampled(5e-4)))),
+        strict=True,
+    ):
+        client.send_raw(content)
+    time.sleep(4)
+    return opened
+
+
+def time_to_end(service: Service) -> float:
+    """Time [s] from SIGTERM to the end of the process."""
+    opened = open_everything(service)
+    began = time.perf_counter()
+    service.process.send_signal(signal.SIGTERM)
+    service.process.wait(LONGEST_END)
+    del opened
+    return time.perf_counter() - began
+
+
+def left_files(service: Service, folder: Path) -> list[str]:
+    """Files in the temporary folder after `kill -9` of a service with open uploads."""
+    opened = open_everything(service)
+    service.process.kill()
+    service.process.wait(LONGEST_END)
+    del opened
+    return sorted(path.name for path in folder.iterdir() if path.name.startswith("joulepath-"))
 
 
 def line(outcome: Outcome) -> str:
@@ -166,12 +258,16 @@ def line(outcome: Outcome) -> str:
 
 
 def main() -> None:
-    """Runs the attacks, each on a new service."""
+    """Runs the attacks, each on a new service; with `--soak` one after another on the same."""
     arguments = parser(__doc__)
-    arguments.add_argument("--only", nargs="+", choices=ATTACKS, help="these attacks only")
+    arguments.add_argument("--only", nargs="+", choices=[*ATTACKS, "end", *CROWDS], help="these attacks only")
+    arguments.add_argument("--minutes", type=float, default=8.0, help="time of the mixed crowd [min]")
+    arguments.add_argument("--kill-every", type=float, default=0.0, help="kill a worker of a crowd after each such [s]")
+    arguments.add_argument("--soak", type=float, default=0.0, help="repeat them for so long on one service [s]")
     given = arguments.parse_args()
-    attacks = {name: ATTACKS[name] for name in given.only or ATTACKS}
-    results: dict[str, Any] = {"cores": len(os.sched_getaffinity(0)), "outcomes": []}
+    chosen = given.only or [*ATTACKS, "end", *CROWDS]
+    attacks = {name: attack for name, attack in ATTACKS.items() if name in chosen}
+    results: dict[str, Any] = {"cores": len(os.sched_getaffinity(0)), "outcomes": [], "crowds": {}}
     print("| attack | before, MiB | peak | after | /healthz p99, ms | most | honest 200 | other | slowest, s | seen |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
 
@@ -180,13 +276,29 @@ def main() -> None:
         results["outcomes"].append(asdict(outcome))
         print(line(outcome), flush=True)
 
-    for name, attack in attacks.items():
+    if given.soak:
         with running() as service:
-            report(name, attack, service)
-            service.log.seek(0)
-            tracebacks = service.log.read().count(b'"traceback"')
-            if tracebacks:
-                print(f"  {tracebacks} tracebacks in the log")
+            end = time.perf_counter() + given.soak
+            while time.perf_counter() < end:
+                for name, attack in attacks.items():
+                    report(name, attack, service)
+    else:
+        for name, attack in attacks.items():
+            with running() as service:
+                report(name, attack, service)
+                service.log.seek(0)
+                tracebacks = service.log.read().count(b'"traceback"')
+                if tracebacks:
+                    print(f"  {tracebacks} tracebacks in the log")
+    if "end" in chosen:
+        with running() as service:
+            results["time_to_end"] = time_to_end(service)
+        print(f"SIGTERM with an open upload, half a head and an unread answer: {results['time_to_end']:.1f} s")
+        with tempfile.TemporaryDirectory() as folder, running(TMPDIR=folder) as service:
+            results["left_files"] = left_files(service, Path(folder))
+        print(f"files left by kill -9: {results['left_files'] or 'none'}")
+    for name in [crowd for crowd in CROWDS if crowd in chosen and not given.soak]:
+        results["crowds"][name] = [asdict(phase) for phase in report_crowd(name, given.minutes, given.kill_every)]
     write_json(given.json, results)
 
 
