@@ -169,7 +169,8 @@ class Connection(asyncio.Protocol):
 
     def _end_after(self, time: float) -> None:
         self._until.cancel()
-        self._until = self._loop.call_later(time, self.reset)
+        if self in self._connections.open:  # a request may end after its client has left
+            self._until = self._loop.call_later(time, self.reset)
 
     def _miss_head(self) -> None:
         self.refuse(RequestTimeout(self._settings.head_timeout))

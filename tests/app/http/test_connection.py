@@ -119,6 +119,18 @@ def test_half_a_body_is_not_waited_for(strict: Server, path: str) -> None:
     assert strict.request_logged(path)["status"] == 408
 
 
+def test_a_client_that_has_left_is_not_timed(strict: Server) -> None:
+    """Its request ends later than its connection, which has nothing left that could be reset."""
+    for _ in range(MOST_OF_CLIENT):
+        with connected(strict) as leaving:
+            leaving.sendall(post("/evaluate", b"{", declared=1000))
+    # whoever connects later is given as much time, and is told when it is over
+    with connected(strict) as later:
+        checked(RequestTimeout, answer_on(later).problem)
+        assert ends(later)
+    assert not [entry for entry in strict.logged() if entry["level"] == "error"]
+
+
 def test_a_body_that_nobody_reads_is_not_waited_for(strict: Server) -> None:
     with connected(strict) as connection:
         connection.sendall(post("/nowhere", b"{", declared=1000))
