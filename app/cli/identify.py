@@ -6,12 +6,13 @@ import gzip
 import shutil
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
 from joulepath.app.cli import terminal
 from joulepath.app.cli.answer import OUTPUT, answered, new_id, parsed, validated, write
+from joulepath.optimizer.identify.choices import DEFAULT_TERMS, Estimator, Method, Target, Term
 
 if TYPE_CHECKING:
     from joulepath.app.convert.recorded import GivenLog
@@ -31,28 +32,18 @@ OTHERS = click.option(
 FIT = click.option(
     "--fit",
     multiple=True,
-    type=click.Choice(["friction", "rotor", "torque_constant", "power", "payload"]),
+    type=click.Choice(get_args(Target)),
     default=("friction", "rotor"),
     show_default=True,
     help="What is found. May be repeated. Power is added where the logs have it; payload is that of the last log.",
 )
 METHOD = click.option(
     "--method",
-    type=click.Choice([
-        "automatic",
-        "motor_current",
-        "electrical_power",
-        "base_parameters",
-        "essential_parameters",
-        "periodic",
-        "base_wrench",
-        "threshold_velocity",
-        "temperature",
-    ]),
+    type=click.Choice(get_args(Method)),
     default="automatic",
     show_default=True,
     help="How it is found; docs/identification.md says what each method needs.",
-)  # fmt: skip
+)
 PERIOD = click.option(
     "--period", type=click.FloatRange(0.1, 1e4), help="Period of the motion [s], for --method periodic."
 )
@@ -60,8 +51,8 @@ TERMS = click.option(
     "--term",
     "terms",
     multiple=True,
-    type=click.Choice(["coulomb", "viscous", "load", "offset", "curved"]),
-    default=("coulomb", "viscous", "load", "offset"),
+    type=click.Choice(get_args(Term)),
+    default=DEFAULT_TERMS,
     show_default=True,
     help="A term of the friction law. May be repeated.",
 )
@@ -84,7 +75,7 @@ Examples:
 @PERIOD
 @TERMS
 @click.option("--refit", is_flag=True, help="Find the links' inertials, too.")
-@click.option("--estimator", type=click.Choice(["wls", "irls", "ols"]), default="wls", help="irls: against outliers.")
+@click.option("--estimator", type=click.Choice(get_args(Estimator)), default="wls", help="irls: against outliers.")
 @click.option("--payload", type=click.FloatRange(0), help="Mass at the flange [kg]. Default: what the logs say.")
 @click.option("--com", type=(float, float, float), default=(0.0, 0.0, 0.0), help="Its centre of mass [m].")
 @click.option("--units", type=click.Choice(["rad", "deg"]), default="rad", help="Units of all joint columns.")

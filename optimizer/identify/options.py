@@ -4,30 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
-
-Target = Literal["friction", "rotor", "torque_constant", "power", "payload"]
-Term = Literal["coulomb", "viscous", "load", "offset", "curved"]
-Estimator = Literal["ols", "wls", "irls"]
-Method = Literal[
-    "automatic",
-    "motor_current",
-    "electrical_power",
-    "base_parameters",
-    "essential_parameters",
-    "periodic",
-    "base_wrench",
-    "threshold_velocity",
-    "temperature",
-]
-"""How the figures are found; docs/identification.md says what each method needs, and when to choose
-it."""
-DEFAULT_TERMS: tuple[Term, ...] = ("coulomb", "viscous", "load", "offset")
+from joulepath.optimizer.identify.choices import DEFAULT_TERMS, Estimator, Method, Target, Term
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,21 +8,9 @@ from pydantic import Field
 
 from joulepath.app.schemas.common import Request, described
 from joulepath.app.schemas.examples.values import LOG_ID
+from joulepath.optimizer.identify.choices import DEFAULT_TERMS, Estimator, Method, Target, Term
 
 MOST_LOGS = 32
-Target = Literal["friction", "rotor", "torque_constant", "power", "payload"]
-Term = Literal["coulomb", "viscous", "load", "offset", "curved"]
-Method = Literal[
-    "automatic",
-    "motor_current",
-    "electrical_power",
-    "base_parameters",
-    "essential_parameters",
-    "periodic",
-    "base_wrench",
-    "threshold_velocity",
-    "temperature",
-]
 LogIds = Annotated[list[str], Field(min_length=1, max_length=MOST_LOGS)]
 DEADLINE = 60.0
 
@@ -41,8 +29,8 @@ class FrictionTerms(Request):
     terms: Annotated[list[Term], Field(min_length=1, max_length=5)] = described(
         "Terms of the law. `curved` is the concave rise of strain-wave gears, at the speed that fits best.",
         None,
-        ["coulomb", "viscous", "load", "offset"],
-        default=["coulomb", "viscous", "load", "offset"],
+        list(DEFAULT_TERMS),
+        default=list(DEFAULT_TERMS),
     )
     knee: float | None = described(
         "Speed over which Coulomb friction reverses. Null: the robot's own.",
@@ -92,7 +80,7 @@ class IdentifyRequest(Request):
         default="keep",
     )
     friction: FrictionTerms = Field(description="Terms of the friction law.", default=FrictionTerms())
-    estimator: Literal["wls", "irls", "ols"] = described(
+    estimator: Estimator = described(
         "Weighted, reweighted (outliers count less) or ordinary least squares.", None, "wls", default="wls"
     )
     velocity_threshold: float = described(

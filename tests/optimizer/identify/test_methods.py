@@ -18,12 +18,13 @@ from joulepath.optimizer.energy.link_regressor import (
     rigid_torques,
 )
 from joulepath.optimizer.identify.arm.base_parameters import base_parameters
+from joulepath.optimizer.identify.choices import Method, Term
 from joulepath.optimizer.identify.errors import MethodNotApplicable
 from joulepath.optimizer.identify.fits.fitting import motor_torque
 from joulepath.optimizer.identify.fits.threshold import velocity_threshold
 from joulepath.optimizer.identify.identify import Identification, identify
 from joulepath.optimizer.identify.logs.log import Log, LogMove
-from joulepath.optimizer.identify.options import IdentificationOptions, Method, Term
+from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.fit_rows import rows_of
 from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import Truth, recorded, truth_of
