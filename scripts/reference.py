@@ -19,6 +19,14 @@ HEAD = """# Reference
 Every endpoint with its request, answer and problems, and the fields of each of them. SI units; arrays over time are
 `[sample][joint]`. This page is written by `python -m scripts.reference` from the OpenAPI document at `/openapi.json`.
 """
+PROBLEMS = """## Problems
+
+Every error is an `application/problem+json` document (RFC 9457) with `type`, `title`, `status`, `detail`, `instance`
+(the id of the request) and the fields in this table. `type` is the path of a page that explains it, for example
+`/problems/duration-too-short`. Problems with the status 429 or 503 come with the header `Retry-After` [s].
+
+| type | status | when, and what to do | fields |
+| --- | --- | --- | --- |"""
 _RANGES = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
 # fields of every problem
 _EVERY = {"type", "title", "status", "detail", "instance"}
@@ -35,9 +43,8 @@ def reference(document: dict[str, Any]) -> str:
     ]
     problems = [row for name in sorted(schemas) if (row := _problem(schemas[name])) is not None]
     shown = [name for name in sorted(schemas) if not _slug(schemas[name])]
-    head = ["## Problems", "", "| type | status | when | fields |", "| --- | --- | --- | --- |"]
     tables = [_table(name, schemas[name]) for name in shown]
-    return "\n".join([HEAD, "## Endpoints", "", *operations, *head, *problems, "", "## Fields", "", *tables])
+    return "\n".join([HEAD, "## Endpoints", "", *operations, PROBLEMS, *problems, "", "## Fields", "", *tables])
 
 
 def _operation(method: str, path: str, operation: dict[str, Any], schemas: dict[str, Any]) -> str:

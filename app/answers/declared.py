@@ -19,8 +19,7 @@ from operator import attrgetter
 from typing import Annotated, Any, Literal, NotRequired, Union, get_args, get_origin, get_type_hints, is_typeddict
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, create_model
-from pydantic_core import CoreSchema
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from joulepath.optimizer.declared import Axes, Internal, Keys, NotEmpty, NullIfInfinite, Unit
 
@@ -64,15 +63,6 @@ def model_of(kind: type) -> type[BaseModel]:
             raise TypeError(f"{kind.__name__}.{name} has no text below it")
         own[name] = (_type(hints[name]), _field(hints[name], texts[name]))
     return create_model(kind.__name__, __config__=_STRICT, __doc__=kind.__doc__, **own)
-
-
-class Shown:
-    """Marks a declared class in a pydantic model: `Annotated[Energy, Shown]`."""
-
-    @classmethod
-    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """The schema of the class's model."""
-        return handler(model_of(source))
 
 
 def with_unit(text: str, unit: str | None) -> str:

@@ -11,6 +11,7 @@ import orjson
 from fastapi import APIRouter, Path
 from fastapi.responses import HTMLResponse
 
+from joulepath.app.engine.result import json_document
 from joulepath.app.exceptions.transport import NotFound
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.http.problems import occasion, own_fields, problem_of, types_of_error
@@ -52,7 +53,8 @@ def _page(slug: str) -> str:
     fields = "".join(
         f"<dt><code>{name}</code></dt><dd>{_text(meaning)}</dd>" for name, meaning in own_fields(kind).items()
     )
-    example = orjson.dumps(problem_of(example_of(kind), REQUEST_ID), option=orjson.OPT_INDENT_2).decode()
+    document = json_document(problem_of(example_of(kind), REQUEST_ID))
+    example = orjson.dumps(orjson.loads(document), option=orjson.OPT_INDENT_2).decode()
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{escape(kind.title)}</title>'
         f"<style>{_STYLE}</style><h1>{escape(kind.title)}</h1>"

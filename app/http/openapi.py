@@ -6,12 +6,14 @@ from collections import defaultdict
 from collections.abc import Iterator
 from typing import Any
 
+import orjson
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
 from joulepath.app.access.rules import needed_role
 from joulepath.app.api.logs.request import LogSettings
+from joulepath.app.engine.result import json_document
 from joulepath.app.exceptions.access import CrossSite, RoleTooLow, Unauthenticated, WrongHost
 from joulepath.app.exceptions.base import InternalError
 from joulepath.app.exceptions.queue import Busy, TooManyRequests
@@ -100,7 +102,7 @@ def _document(app: FastAPI, settings: Settings, with_keys: bool) -> dict[str, An
     )
     schemas.update(others["$defs"])
     for kind in types_of_error():
-        schemas[kind.__name__]["examples"] = [problem_of(example_of(kind), REQUEST_ID)]
+        schemas[kind.__name__]["examples"] = [orjson.loads(json_document(problem_of(example_of(kind), REQUEST_ID)))]
     # FastAPI's own error model: no route answers with it
     for name in ("HTTPValidationError", "ValidationError"):
         schemas.pop(name, None)

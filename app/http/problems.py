@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import is_dataclass
 from functools import cache
 from itertools import islice
 from typing import Any, Literal
 
-import numpy as np
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, Field, ValidationError, create_model
 
@@ -56,10 +54,10 @@ def reported(error: Exception) -> DeclaredError:
 
 
 def problem_of(error: Exception, instance: str) -> dict[str, Any]:
-    """The document: the request `instance` failed with `error`."""
+    """The document, for `json_document`: the request `instance` failed with `error`."""
     error = reported(error)
     fixed = {"type": path_of(type(error)), "title": error.title, "status": error.status}
-    own = {name: _plain(getattr(error, name)) for name in _names(error.type_of_error())}
+    own = {name: getattr(error, name) for name in _names(error.type_of_error())}
     return fixed | {"detail": str(error), "instance": instance} | own
 
 
@@ -104,20 +102,10 @@ def occasion(kind: type[DeclaredError]) -> str:
     return " ".join((kind.__doc__ or "").split())
 
 
+# mypy takes the class of an exception that is a dataclass for unhashable, as its instances may be
 def _names(kind: type) -> tuple[str, ...]:
     return shown_fields(kind)
 
 
 def _model(kind: type) -> type[BaseModel]:
     return model_of(kind)
-
-
-def _plain(value: Any) -> Any:
-    """The data of an error as JSON."""
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, dict):
-        return {name: _plain(each) for name, each in value.items()}
-    if is_dataclass(value) or hasattr(value, "_fields"):
-        return {name: _plain(getattr(value, name)) for name in _names(type(value))}
-    return [_plain(each) for each in value] if isinstance(value, list | tuple) else value

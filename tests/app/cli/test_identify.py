@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import get_args
 
-import click
 import numpy as np
 import pytest
 
 from joulepath.app.api.identifications.models import IdentificationResult
-from joulepath.app.api.identifications.request import Method, Target, Term
-from joulepath.app.cli.identify import identify, summary_of
+from joulepath.app.cli.identify import summary_of
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.identify.errors import MethodNotApplicable, NoPowerChannel, NothingHeldOut
 from joulepath.optimizer.problem.arm import Payload
@@ -88,13 +85,6 @@ def test_a_method_is_asked_for_by_its_name(here: Here, logs: list[str], tmp_path
     code, content = here.problem(*command, "--method", "periodic", "--period", "5", "--validate", logs[1])
     assert code == 1
     assert checked(MethodNotApplicable, content).method == "periodic"
-
-
-@pytest.mark.parametrize(("option", "literal"), [("fit", Target), ("method", Method), ("terms", Term)])
-def test_the_choices_are_those_of_the_service(option: str, literal: object) -> None:
-    choices = next(each for each in identify.params if each.name == option).type
-    assert isinstance(choices, click.Choice)
-    assert set(choices.choices) == set(get_args(literal))
 
 
 def test_a_log_of_one_motion_is_a_problem(here: Here, tmp_path: Path) -> None:

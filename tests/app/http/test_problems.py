@@ -14,7 +14,6 @@ from joulepath.app.engine.result import json_document
 from joulepath.app.exceptions.access import Unauthenticated, WrongKey
 from joulepath.app.exceptions.base import InternalError, InvalidRequest
 from joulepath.app.exceptions.stored import PartsNeeded, StoreFault, StoreUnavailable, UnknownAnswer
-from joulepath.app.http.error_reference import page
 from joulepath.app.http.problems import path_of, problem_of, types_of_error
 from joulepath.app.schemas.examples.problems import example_of
 from joulepath.optimizer.exceptions import (
@@ -26,7 +25,6 @@ from joulepath.optimizer.exceptions import (
 )
 from joulepath.optimizer.result.candidates import CandidateReport, CandidateStatus
 from joulepath.optimizer.search.errors import CollidingBranch, StartInCollision
-from tests.app.live import ROOT
 from tests.app.problems import checked
 
 TYPES = types_of_error()
@@ -131,8 +129,3 @@ def test_the_configurations_that_collide_least_are_listed() -> None:
     assert content.depth == 0.1 and content.pair == ["table", "0.1"]
     assert [each.depth for each in content.branches] == sorted(depths)[:MOST_LISTED]
     assert "each of 100" in content.detail
-
-
-def test_the_page_of_the_documentation_is_the_generated_one() -> None:
-    written = (ROOT / "docs" / "errors.md").read_text(encoding="utf-8")
-    assert written == page(), "write it anew: python -m joulepath.app.http.error_reference > docs/errors.md"
