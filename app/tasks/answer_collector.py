@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import uuid
 from dataclasses import replace
-from typing import Any
 
 from joulepath.app.answers.declared import shown_fields
 from joulepath.app.answers.envelope import Answer
 from joulepath.app.engine.result import StoredAnswer, json_document
 from joulepath.app.exceptions.base import InvalidRequest
-from joulepath.app.tasks.answer_figures import figures_of
 
 MOST_BYTES = 1 << 26
 """Largest total size [byte], before compression, of the answers that one result refers to."""
@@ -22,21 +20,16 @@ class AnswerCollector:
     def __init__(self) -> None:
         self._answers: list[StoredAnswer] = []
 
-    def add(self, content: Answer | dict[str, Any]) -> str:
+    def add(self, content: Answer) -> str:
         """Adds an answer and returns its path. Its fields `id` and `answer`, those that it has, are set.
 
         Raises InvalidRequest above MOST_BYTES.
         """
         answer_id = str(uuid.uuid4())
         own = {"id": answer_id, "answer": StoredAnswer(answer_id, b"").path}
-        if isinstance(content, dict):
-            kept: Any = {**content, **{name: own[name] for name in own.keys() & content.keys()}}
-            figures = figures_of(content)
-        else:
-            kind: type = type(content)
-            kept = replace(content, **{name: own[name] for name in own.keys() & shown_fields(kind)})
-            figures = content.figures
-        answer = StoredAnswer(answer_id, json_document(kept), figures)
+        kind: type = type(content)
+        kept = replace(content, **{name: own[name] for name in own.keys() & shown_fields(kind)})
+        answer = StoredAnswer(answer_id, json_document(kept), content.figures)
         self._answers.append(answer)
         if sum(len(each.body) for each in self._answers) > MOST_BYTES:
             message = "The answers are too large together: use a longer `sample_period`, or ask for fewer"

@@ -6,18 +6,16 @@ from collections.abc import Mapping
 from typing import Any
 
 from joulepath.app.answers.envelope import AnswerFigures
-from joulepath.optimizer.result.energy import Energy
 
 
 def figures_of(answer: Mapping[str, Any]) -> AnswerFigures:
-    """The figures of the answer of any endpoint. Only a motion or a cycle has an energy: of its objective, electrical
-    for `evaluate`."""
+    """The figures of the JSON answer of any endpoint. Only a motion or a cycle has an energy: that of
+    its objective, electrical for `evaluate`."""
     given = answer.get("total", answer)
     energy, objective = given.get("energy"), answer.get("objective", "electrical")
-    needed = energy.of(objective) if isinstance(energy, Energy) else energy and energy[objective]["total"]
     return AnswerFigures(
         robot=answer.get("robot"),
-        energy=needed,
+        energy=energy and energy[objective]["total"],
         duration=None if energy is None else answer["duration"],
         status=answer.get("status"),
     )

@@ -9,6 +9,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
+from joulepath.app.answers.envelope import Answer
 from joulepath.app.api.evaluate.task import EvaluateAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.api.whatif.answer import WhatifAnswer
@@ -249,10 +250,10 @@ def test_refuses_a_base_that_cannot_be(client: TestClient) -> None:
 
 
 def test_answers_that_are_too_large_together_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(answer_collector, "MOST_BYTES", 25)
+    monkeypatch.setattr(answer_collector, "MOST_BYTES", 150)
     collector = AnswerCollector()
-    paths = [collector.add({"v": 1.5}) for _ in range(2)]
+    paths = [collector.add(Answer(request="a", robot="ur5e")) for _ in range(2)]
     assert len(set(paths)) == len(collector.stored) == 2
     assert paths == [answer.path for answer in collector.stored]
     with pytest.raises(InvalidRequest):
-        collector.add({"v": 1.5})
+        collector.add(Answer(request="a", robot="ur5e"))
