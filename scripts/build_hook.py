@@ -1,7 +1,7 @@
-"""What hatchling does before it builds: the C library goes into the wheel, the libraries of the studio page everywhere.
+"""Build hook of hatchling: compiles the C library for a wheel, and fetches the libraries of the studio page.
 
-None of them is in the repository. Without the one, the package could not be imported, and without the others, the page
-could not be shown.
+The repository holds neither. Without the C library the package cannot be imported; without the others the
+studio page cannot be shown.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ NATIVE = runpy.run_path(str(ROOT / "joulepath" / "optimizer" / "native" / "build
 
 
 class BuildHook(BuildHookInterface[Any]):
-    """Makes what is missing; the build fails where it cannot.
+    """Compiles and fetches what is missing, or fails the build.
 
-    A wheel is for one platform, and for every Python there: it holds C that knows nothing of Python. The source archive
-    holds the C alone.
+    A wheel is for one platform and every Python version on it, because the C library does not use Python's headers. The
+    source archive holds the C sources only.
     """
 
     def dependencies(self) -> list[str]:
-        """A C compiler and npm as Python packages, as far as they are needed and this machine has none."""
+        """Python packages of a C compiler and of npm, where the build needs them and the machine has none."""
         needed = []
         if self.target_name == "wheel" and NATIVE["compiler"]() is None:
             needed.append(pinned("ziglang", "requirements-compiler.lock"))
@@ -37,12 +37,12 @@ class BuildHook(BuildHookInterface[Any]):
         return needed
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Raises FetchFailed or BuildFailed, whose messages say why and what to do."""
+        """Fetch and compile. Raises FetchFailed or BuildFailed with cause and remedy."""
         if not VENDOR_STUDIO["is_current"]():
             self.app.display_info("Fetching the libraries of the studio page ...")
             VENDOR_STUDIO["fetch"]()
         if self.target_name == "wheel":
-            # even if there is one: it may be of other sources, or of another machine
+            # An existing library may be of other sources or of another machine.
             library = NATIVE["build"]()
             build_data["artifacts"].append(f"**/native/{library.name}")
             build_data["pure_python"] = False

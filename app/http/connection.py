@@ -50,7 +50,7 @@ class Connections:
     reset it.
     """
     most_discarded: int = 1 << 23
-    """Bytes after which the connection of a refused client is reset before that."""
+    """Bytes received from a refused client after which its connection is reset at once."""
     open: set[Connection] = field(default_factory=set)
 
     def refusal(self, connection: Connection) -> ServiceError | None:
@@ -70,8 +70,9 @@ class Connections:
 
 
 class Connection(asyncio.Protocol):
-    """One connection of a client. As a context manager, it has a request in hand, and does not wait
-    for a head.
+    """One connection of a client.
+
+    As a context manager it marks the time of a request, during which no head is awaited.
 
     Args:
         connections: all connections of the service.
@@ -97,7 +98,7 @@ class Connection(asyncio.Protocol):
         self.inner.connection_made(cast(asyncio.Transport, _Wire(self)))
         if refusal := self._connections.refusal(self):
             self.refuse(refusal)
-        # refused connections count, too: beyond as many again, nobody is told the reason
+        # Refused connections count as well. Above twice the limit, connections are reset without a response.
         if len(self._connections.open) > 2 * self._settings.max_connections:
             self.reset()
 
@@ -138,7 +139,7 @@ class Connection(asyncio.Protocol):
     def __exit__(self, *_: object) -> None:
         self._in_hand -= 1
         if not self._in_hand:
-            # uvicorn closes an idle connection before that, but not one on which half a head arrives
+            # uvicorn closes an idle connection earlier, but keeps one on which part of a head has arrived.
             self._end_after(max(self._settings.head_timeout, self._settings.write_timeout))
 
     def refuse(self, error: ServiceError) -> None:

@@ -32,12 +32,12 @@ class Runner(Protocol):
 
 
 Given = Callable[[], AbstractContextManager[None]]
-"""Makes a context in which requests may name something of the database."""
+"""Opens a context in which the task can use one item of the database by its name."""
 
 
 @dataclass(frozen=True)
 class Equipped:
-    """A task, and what it needs of the database."""
+    """A task with the items of the database that it uses."""
 
     task: Task
     given: tuple[Given, ...]
@@ -55,8 +55,8 @@ class Equipped:
 
 @dataclass(frozen=True)
 class Needs:
-    """What a task may need of the database: the robot of this name, figures and a log by their ids, and answers by
-    their ids or paths."""
+    """Items of the database that a task uses: a robot by its name, figures and a log by their ids, and kept answers
+    by their ids or paths."""
 
     robot: str | None = None
     figures: str | None = None
@@ -64,7 +64,7 @@ class Needs:
     answers: tuple[str, ...] = ()
 
     def after(self, error: UnknownRobot | UnknownFigures | UnknownLog | PartsNeeded) -> Needs:
-        """These needs, and what a worker did not know. Raises the error if that is among these already."""
+        """Adds the item that a worker asked for. Raises the worker's error if the item was provided already."""
         if isinstance(error, UnknownRobot):
             more = replace(self, robot=error.name)
         elif isinstance(error, UnknownFigures):
@@ -78,7 +78,8 @@ class Needs:
         return more
 
     async def given(self, store: Store) -> tuple[Given, ...]:
-        """What is needed. Raises UnknownRobot, UnknownFigures, UnknownLog, UnknownAnswer or StoreUnavailable."""
+        """The items, read from the database. Raises UnknownRobot, UnknownFigures, UnknownLog, UnknownAnswer or
+        StoreUnavailable."""
         found: list[Given] = []
         if self.log is not None:
             found.append(partial(log_given, await given_log(store, self.log)))

@@ -34,7 +34,7 @@ ExportOptions = UrscriptOptions | Ros2Options | MoveitOptions | FrankaOptions | 
 
 @dataclass(frozen=True)
 class Format:
-    """A format: its meaning, what writes it, and the class of its options; None if it has none."""
+    """An export format: its description, its writer, and the class of its options (None without options)."""
 
     meaning: str
     write: Callable[[Program, Any], WrittenFile]

@@ -17,11 +17,12 @@ from importlib.util import find_spec
 from pathlib import Path
 
 FOLDER = Path(__file__).resolve().parent
-# A name that ends in .so alone would be taken for a module of Python.
+# Python takes a file whose name ends in .so for an extension module.
 LIBRARY = FOLDER / "libjoulepath.so.1"
-# without contraction, all processors round alike
+# Without contraction of products and sums, all processors round alike.
 FLAGS = ["-O3", "-fPIC", "-shared", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off"]
-# what every processor of a kind understands, as gcc and clang spell it, and as zig does: a default may demand more
+# The oldest instruction set of an architecture, as gcc and clang name it, and zig. Compilers may default to a newer
+# one.
 BASELINES = {"x86_64": "-march=x86-64", "aarch64": "-march=armv8-a"}
 ZIG_BASELINE = "-mcpu=baseline"
 
@@ -45,9 +46,10 @@ def compiler() -> str | None:
 
 
 def build(folder: Path = FOLDER) -> Path:
-    """Compile the C files of a folder, for every processor of this machine's kind, to the library beside them.
+    """Compile the C files of a folder into the library beside them.
 
-    Raises BuildFailed; a library that was there before stays then.
+    The library runs on every processor of this machine's architecture. Raises BuildFailed, and leaves an
+    earlier library in place.
     """
     target = folder / LIBRARY.name
     define = f'-DSOURCES_DIGEST="{sources_digest(folder)}"'

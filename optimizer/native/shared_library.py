@@ -1,8 +1,9 @@
 """The C library that all arms share: forward kinematics, distances and the terms of dual bounds, of many
 configurations at once.
 
-It is compiled beside this file before it is imported: into the wheel, or by `make` in a clone (see `build`). It serves
-on every processor of its kind.
+`build` compiles it beside this file when a wheel is built, and `make` does in a clone. It runs on every processor of
+its
+architecture.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from joulepath.optimizer.native.build import FOLDER, LIBRARY, sources_digest
 
 _LONG, _DOUBLE, _ARRAY = ctypes.c_long, ctypes.c_double, ctypes.c_void_p
-# arguments and result of every function: those of the C
+# Arguments and result of every C function.
 _FUNCTIONS: dict[str, tuple[list[Any], Any]] = {
     "link_frames": ([_LONG, _LONG, *3 * [_ARRAY]], None),
     "bounds": ([_ARRAY, _LONG, _ARRAY, _LONG, _ARRAY, _DOUBLE, _LONG, *4 * [_ARRAY]], _LONG),
@@ -56,7 +57,7 @@ def load(path: Path) -> ctypes.CDLL:
     except (OSError, AttributeError) as error:
         raise LibraryUnusable(path, f"cannot be loaded: {error}") from error
     digest.restype = ctypes.c_char_p
-    # arguments of another version would be misread
+    # A library of other sources would misread the arguments.
     if digest() != sources_digest().encode():
         raise LibraryUnusable(path, "was compiled from other sources than those beside it")
     for name, (arguments, result) in _FUNCTIONS.items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,10 +31,6 @@ from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 SURPLUS_VALUES = (0.75, 0.5, 0.25)
 # factors tried for the duration of a baseline: where jumps of jerk are close, rounding takes jerk beyond its limit
 SLOWER = (1.0, 1 + 1e-5)
-# another candidate is refined if this multiple of what refining the best one gained would bring it
-# below: where the speed of the TCP is limited, refining gains 2 % of one and 3 % of the next. Of a
-# fixed duration, the second multiple: refining may gain 2 % of one and 6 % of the next
-RIVALRY, RIVALRY_IN_TIME = 1.25, 3.0
 # why a baseline of less energy is not the answer
 NOT_CONFIRMED = "the certificate did not confirm it, or not before the deadline"
 
@@ -71,17 +67,38 @@ def refine(incumbent: Incumbent, candidate: Candidate) -> None:
         solve_from(incumbent, candidate, sampled(slower), fine=False, duration=longest)
 
 
-def refine_rivals(incumbent: Incumbent, best: Candidate, coarse: float) -> None:
-    """Refine other candidates that may come below the best one.
+@dataclass(frozen=True)
+class RivalSettings:
+    """Which other candidates are refined, relative to the gain of refining the best one.
 
-    That one needed `coarse` [J] before it was refined. Samples of one pose are left out: they have
-    the same optimum beside them. Where powers have corners, `sharpen` has followed the rivals.
+    A rival is refined if this multiple of the gain would bring its energy below that of the best candidate.
     """
+
+    gain: float = 1.25
+    """With a free duration. Under a limit on the TCP's speed, refining gained 2 % of one candidate and 3 % of the
+    next."""
+    gain_in_time: float = 3.0
+    """With a fixed duration: 2 % of one candidate and 6 % of the next."""
+
+
+def refine_rivals(incumbent: Incumbent, best: Candidate, coarse: float, settings: RivalSettings | None = None) -> None:
+    """Refine the other candidates that may come below the best one.
+
+    Samples of one pose are left out, because the refined best candidate is their optimum, too. Where powers
+    have corners, `sharpen` has followed the rivals already.
+
+    Args:
+        incumbent: state of the search.
+        best: the best candidate, refined.
+        coarse: its energy before it was refined [J].
+        settings: which rivals are refined; None for the defaults.
+    """
+    settings = settings or RivalSettings()
     problem = incumbent.problem
     if has_corners(problem.objective, problem.arm) or best.energy is None:
         return
     in_time = problem.duration_max is not None and problem.duration_min == problem.duration_max
-    most = best.energy + (RIVALRY_IN_TIME if in_time else RIVALRY) * (coarse - best.energy)
+    most = best.energy + (settings.gain_in_time if in_time else settings.gain) * (coarse - best.energy)
     for rival in incumbent.candidates:
         is_open = rival.energy is not None and rival.energy < most and not rival.refined and not rival.refused
         if is_open and not (rival.start.sampled or rival.goal.sampled) and not incumbent.deadline.passed:
