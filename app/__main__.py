@@ -1,6 +1,7 @@
 """`python -m joulepath.app`: the service under uvicorn."""
 
-# Worker processes import this module too, so that everything that they do not need is imported inside `main`.
+# Worker processes import this module too, so that everything that they do not need is imported
+# inside `main`.
 from __future__ import annotations
 
 import signal
@@ -9,9 +10,10 @@ from types import FrameType
 
 
 def main() -> None:
-    """Serves until SIGTERM or Ctrl-C, then exits with 0; with 1 and a message if a setting is wrong, or if another
-    program has the address."""
-    # for the time before uvicorn handles signals, and after: when it is done, it raises the signal again
+    """Serves until SIGTERM or Ctrl-C, then exits with 0; with 1 and a message if a setting is
+    wrong, or if another program has the address."""
+    # for the time before uvicorn handles signals, and after: when it is done, it raises the signal
+    # again
     signal.signal(signal.SIGTERM, _exit)
     signal.signal(signal.SIGINT, _exit)
 

@@ -89,9 +89,12 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     settings = settings or Settings()
     app = FastAPI(
         title="joulepath",
-        summary="The robot-arm motion of least energy, with its energy breakdown and a certificate.",
-        description="SI units throughout: m, rad, s, kg, N·m, W, J. Arrays over time are `[sample][joint]`. "
-        "Every error is an `application/problem+json` whose `type` leads to a page that explains it.",
+        summary="The robot-arm motion of least energy, with its energy breakdown and a "
+        "certificate.",
+        description="SI units throughout: m, rad, s, kg, N·m, W, J. Arrays over time are "
+        "`[sample][joint]`. "
+        "Every error is an `application/problem+json` whose `type` leads to a page that explains "
+        "it.",
         version=__version__,
         license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
         docs_url=None,

@@ -37,10 +37,13 @@ _LARGE_BLOCK = 1 << 20
 _BACKLOG = 2048
 """Connections that wait to be accepted: as uvicorn has it."""
 _REMEDIES = {
-    errno.EADDRINUSE: "another program has this address, perhaps another service. End it, or choose another port by "
+    errno.EADDRINUSE: "another program has this address, perhaps another service. End it, or "
+    "choose another port by "
     "--port, JOULEPATH_PORT or PORT (`make serve PORT=8001`); 0 takes a free one",
-    errno.EACCES: "ports below 1024 are not for everyone. Choose a larger one by --port, JOULEPATH_PORT or PORT",
-    errno.EADDRNOTAVAIL: "this machine does not have this address. Choose one that it has by --host or JOULEPATH_HOST",
+    errno.EACCES: "ports below 1024 are not for everyone. Choose a larger one by --port, "
+    "JOULEPATH_PORT or PORT",
+    errno.EADDRNOTAVAIL: "this machine does not have this address. Choose one that it has by "
+    "--host or JOULEPATH_HOST",
 }
 
 
@@ -77,13 +80,19 @@ def listen(host: str, port: int) -> list[socket.socket]:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
         for family, _, _, _, address in dict.fromkeys(found):
             # two processes may bind the same address, and only one of them may listen
-            sockets.append(socket.create_server(cast(Any, address), family=family, backlog=_BACKLOG))
+            sockets.append(
+                socket.create_server(cast(Any, address), family=family, backlog=_BACKLOG)
+            )
     except OSError as error:
         for each in sockets:
             each.close()
-        remedy = _REMEDIES.get(error.errno or 0, "choose another address by JOULEPATH_HOST or --host")
+        remedy = _REMEDIES.get(
+            error.errno or 0, "choose another address by JOULEPATH_HOST or --host"
+        )
         reason = (error.strerror or "").partition(" (while")[0]
-        raise WrongSettings(f"The service cannot listen on {host}, port {port} ({reason}): {remedy}.") from None
+        raise WrongSettings(
+            f"The service cannot listen on {host}, port {port} ({reason}): {remedy}."
+        ) from None
     return sockets
 
 
@@ -112,7 +121,8 @@ def serve(settings: Settings) -> None:
         # the server ends the connections before this
         timeout_graceful_shutdown=math.ceil(settings.shutdown_grace) + 1,
     )
-    # what there is now stays: a garbage collection that looks through it would hold up every request for 0.1 s
+    # what there is now stays: a garbage collection that looks through it would hold up every
+    # request for 0.1 s
     keep()
     logger.info("listening", extra={"addresses": [each.getsockname()[:2] for each in sockets]})
     _Server(config, app, connections).run(sockets)

@@ -42,34 +42,44 @@ class Settings(BaseSettings):
 
     host: str = Field(default="127.0.0.1", description="Address to listen on.")
     port: int = Field(
-        default=8000, ge=0, le=65535, validation_alias=AliasChoices("JOULEPATH_PORT", "PORT"), description="TCP port."
+        default=8000,
+        ge=0,
+        le=65535,
+        validation_alias=AliasChoices("JOULEPATH_PORT", "PORT"),
+        description="TCP port.",
     )
     api_keys_file: Path | None = Field(
-        default=None, description="File of API keys, which every request then needs: see `joulepath keys`."
+        default=None,
+        description="File of API keys, which every request then needs: see `joulepath keys`.",
     )
     open: bool = Field(
         default=False,
-        description="Whether the service may listen on an address of the network without API keys. It does not make "
+        description="Whether the service may listen on an address of the network without API keys. "
+        "It does not make "
         "keys optional where there are some.",
     )
     allowed_hosts: Annotated[tuple[str, ...], NoDecode] = Field(
         default=(),
-        description="Names under which clients reach the service, separated by commas. Addresses, `localhost`, the "
+        description="Names under which clients reach the service, separated by commas. Addresses, "
+        "`localhost`, the "
         "host's own name and `host` are always among them; `*` stands for any name.",
     )
     cors_origins: Annotated[tuple[str, ...], NoDecode] = Field(
         default=(),
-        description="Origins of web pages that may call the service, e.g. `https://cell4.example`, separated by "
+        description="Origins of web pages that may call the service, e.g. `https://cell4.example`, "
+        "separated by "
         "commas; `*` stands for any.",
     )
     trusted_proxies: Annotated[tuple[IPv4Network | IPv6Network, ...], NoDecode] = Field(
         default=(),
-        description="Addresses or networks of the reverse proxies whose reports of the client's address are believed, "
+        description="Addresses or networks of the reverse proxies whose reports of the client's "
+        "address are believed, "
         "separated by commas.",
     )
     proxy_header: Literal["X-Forwarded-For", "Forwarded"] = Field(
         default="X-Forwarded-For",
-        description="The header in which these proxies report it; the other one is a client's own word.",
+        description="The header in which these proxies report it; the other one is a client's own "
+        "word.",
     )
     log_level: Literal["debug", "info", "warning", "error"] = Field(
         default="info", description="Lowest level that is logged."
@@ -77,49 +87,71 @@ class Settings(BaseSettings):
     workers: int = Field(
         default_factory=lambda: len(os.sched_getaffinity(0)),
         ge=1,
-        description="Worker processes; each solves one request at a time. Default: the CPUs that this process may use.",
+        description="Worker processes; each solves one request at a time. Default: the CPUs that "
+        "this process may use.",
     )
     robots: Annotated[tuple[str, ...], NoDecode] = Field(
         default=("ur5e",),
-        description="Robots whose kernels every worker loads before it is ready, separated by commas; others at "
+        description="Robots whose kernels every worker loads before it is ready, separated by "
+        "commas; others at "
         "their first request.",
     )
-    max_robots: int = Field(default=100, ge=0, description="Robots of users' own that the database holds at most.")
-    max_figures: int = Field(default=1000, ge=0, description="Identified figures that the database holds at most.")
+    max_robots: int = Field(
+        default=100, ge=0, description="Robots of users' own that the database holds at most."
+    )
+    max_figures: int = Field(
+        default=1000, ge=0, description="Identified figures that the database holds at most."
+    )
     queue_size: int = Field(
-        default=64, ge=0, description="Requests that may wait for a worker; further requests are `busy`."
+        default=64,
+        ge=0,
+        description="Requests that may wait for a worker; further requests are `busy`.",
     )
     client_requests: int = Field(
         default=16,
         ge=1,
-        description="Requests of one client that may be in a worker or wait for one; further ones are "
+        description="Requests of one client that may be in a worker or wait for one; further ones "
+        "are "
         "`too-many-requests`.",
     )
     max_connections: int = Field(default=512, ge=1, description="Connections that may be open.")
     client_connections: int = Field(
-        default=128, ge=1, description="Connections of one address that may be open; of a trusted proxy, any number."
+        default=128,
+        ge=1,
+        description="Connections of one address that may be open; of a trusted proxy, any number.",
     )
     max_bytes_in_flight: int = Field(
         default=1 << 28,
         ge=1024,
-        description="Largest total size of the bodies and answers of all requests in flight [byte].",
+        description="Largest total size of the bodies and answers of all requests in flight "
+        "[byte].",
     )
     client_bytes_in_flight: int = Field(
         default=1 << 27, ge=1024, description="Largest total size of those of one client [byte]."
     )
     max_head_bytes: int = Field(
-        default=32_768, ge=1024, description="Largest size of the line and the headers of a request [byte]."
+        default=32_768,
+        ge=1024,
+        description="Largest size of the line and the headers of a request [byte].",
     )
     head_timeout: float = Field(
-        default=10.0, gt=0, description="Time in which the line and the headers of a request must arrive [s]."
+        default=10.0,
+        gt=0,
+        description="Time in which the line and the headers of a request must arrive [s].",
     )
     body_timeout: float = Field(
-        default=60.0, gt=0, description="Time in which the body of a request must arrive, uploads included [s]."
+        default=60.0,
+        gt=0,
+        description="Time in which the body of a request must arrive, uploads included [s].",
     )
     write_timeout: float = Field(
-        default=20.0, gt=0, description="Time in which a client must read the next 64 KiB of its answer [s]."
+        default=20.0,
+        gt=0,
+        description="Time in which a client must read the next 64 KiB of its answer [s].",
     )
-    max_body_bytes: int = Field(default=8_388_608, ge=1024, description="Largest request body [byte].")
+    max_body_bytes: int = Field(
+        default=8_388_608, ge=1024, description="Largest request body [byte]."
+    )
     max_upload_bytes: int = Field(
         default=67_108_864,
         ge=1024,
@@ -130,19 +162,25 @@ class Settings(BaseSettings):
         ge=1024,
         description="Largest body of `POST /studies/{id}/iterations` and of `POST /whatif` [byte].",
     )
-    max_job_bytes: int = Field(default=67_108_864, ge=1024, description="Largest body of `POST /jobs` [byte].")
+    max_job_bytes: int = Field(
+        default=67_108_864, ge=1024, description="Largest body of `POST /jobs` [byte]."
+    )
     job_workers: int | None = Field(
         default=None,
         ge=1,
-        description="Workers that jobs may use at the same time. Default: one less than there are, at least 1.",
+        description="Workers that jobs may use at the same time. Default: one less than there are, "
+        "at least 1.",
     )
     cluster: str | None = Field(
         default=None,
-        description="Scheduler of a Dask cluster that works on jobs, e.g. `tcp://scheduler:8786`. Without one, the "
+        description="Scheduler of a Dask cluster that works on jobs, e.g. `tcp://scheduler:8786`. "
+        "Without one, the "
         "service's own workers do.",
     )
     max_waiting: int = Field(
-        default=100_000, ge=1, description="Requests of jobs that may wait in the database; further jobs are `busy`."
+        default=100_000,
+        ge=1,
+        description="Requests of jobs that may wait in the database; further jobs are `busy`.",
     )
     max_job_deadline: float = Field(
         default=LONGEST_DEADLINE,
@@ -154,38 +192,50 @@ class Settings(BaseSettings):
         default=120.0, gt=0, le=600, description="Longest deadline that a request may have [s]."
     )
     deadline_grace: float = Field(
-        default=5.0, gt=0, description="Time after the deadline [s] at which a worker that has not answered is killed."
+        default=5.0,
+        gt=0,
+        description="Time after the deadline [s] at which a worker that has not answered is "
+        "killed.",
     )
     stop_grace: float = Field(
         default=0.3,
         gt=0,
-        description="Time [s] in which a worker must end a task that nobody wants any more; after it, the worker is "
-        "killed. Most computations look every few milliseconds, and to start a new worker takes longer.",
+        description="Time [s] in which a worker must end a task that nobody wants any more; after "
+        "it, the worker is "
+        "killed. Most computations look every few milliseconds, and to start a new worker takes "
+        "longer.",
     )
     shutdown_grace: float = Field(
         default=6.0,
         gt=0,
-        description="Time [s] for the requests in progress at a shutdown; all ends within two seconds more.",
+        description="Time [s] for the requests in progress at a shutdown; all ends within two "
+        "seconds more.",
     )
     database_url: str = Field(
         default_factory=_default_database,
         description="Database of studies and stored answers: `sqlite:///<file>` or "
         "`postgresql://user:password@host/name`. "
-        "Default: an SQLite file in `$XDG_STATE_HOME/joulepath`, that is `~/.local/state/joulepath`.",
+        "Default: an SQLite file in `$XDG_STATE_HOME/joulepath`, that is "
+        "`~/.local/state/joulepath`.",
     )
     answers_max_bytes: int = Field(
         default=1 << 29,
         ge=0,
-        description="Largest total size [byte], compressed, of stored answers that belong to no study; the oldest are "
+        description="Largest total size [byte], compressed, of stored answers that belong to no "
+        "study; the oldest are "
         "deleted.",
     )
     logs_max_bytes: int = Field(
         default=1 << 30,
         ge=0,
-        description="Largest total size of the stored logs [byte], compressed; a further one is `too-many-logs`.",
+        description="Largest total size of the stored logs [byte], compressed; a further one is "
+        "`too-many-logs`.",
     )
     answers_max_age: float = Field(
-        default=30.0, gt=0, le=36500, description="Age at which an answer that belongs to no study is deleted [days]."
+        default=30.0,
+        gt=0,
+        le=36500,
+        description="Age at which an answer that belongs to no study is deleted [days].",
     )
 
     @property
@@ -196,7 +246,11 @@ class Settings(BaseSettings):
     @field_validator("robots", "trusted_proxies", "allowed_hosts", "cors_origins", mode="before")
     @classmethod
     def _listed(cls, given: Any) -> Any:
-        return tuple(name.strip() for name in given.split(",") if name.strip()) if isinstance(given, str) else given
+        return (
+            tuple(name.strip() for name in given.split(",") if name.strip())
+            if isinstance(given, str)
+            else given
+        )
 
     @field_validator("allowed_hosts", "cors_origins")
     @classmethod
@@ -212,7 +266,9 @@ class Settings(BaseSettings):
     def _scheduler(cls, address: str | None) -> str | None:
         if address is not None:
             if not _SCHEDULER.fullmatch(address):
-                raise ValueError(f"{address!r} is no address of a scheduler: give one as `tcp://scheduler:8786`")
+                raise ValueError(
+                    f"{address!r} is no address of a scheduler: give one as `tcp://scheduler:8786`"
+                )
             if find_spec("distributed") is None:
                 raise ValueError("a cluster needs Dask: install `joulepath[cluster]`")
         return address
@@ -220,11 +276,15 @@ class Settings(BaseSettings):
     @field_validator("robots")
     @classmethod
     def _known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        from joulepath.models.registry import robot_names  # the default needs no check, and the service starts sooner
+        from joulepath.models.registry import (
+            robot_names,
+        )  # the default needs no check, and the service starts sooner
 
         unknown = [name for name in names if name not in robot_names()]
         if unknown:
-            raise ValueError(f"there is no robot named {unknown[0]!r}: use some of {', '.join(robot_names())}")
+            raise ValueError(
+                f"there is no robot named {unknown[0]!r}: use some of {', '.join(robot_names())}"
+            )
         return names
 
 
@@ -242,5 +302,7 @@ def read_settings(given: Mapping[str, Any] | None = None) -> Settings:
         for each in error.errors():
             name = str(each["loc"][0])
             variable = name if name.startswith(prefix) else f"{prefix}{name.upper()}"
-            lines.append(f"{variable}={each['input']!r}: {each['msg'].removeprefix('Value error, ')}")
+            lines.append(
+                f"{variable}={each['input']!r}: {each['msg'].removeprefix('Value error, ')}"
+            )
         raise WrongSettings("\n".join(lines)) from error

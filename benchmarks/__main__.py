@@ -1,12 +1,15 @@
-"""All benchmarks in one run of about twenty minutes on two cores; writes benchmarks/RESULTS.md with a plot.
+"""All benchmarks in one run of about twenty minutes on two cores; writes benchmarks/RESULTS.md with
+a plot.
 
     make bench                                all sections
     make bench BENCH_ARGS="--fraction 0.1"    a tenth of the tasks, to test the benchmarks
     make bench BENCH_ARGS="--only quality"    some sections; the others keep their last results
     make bench BENCH_ARGS=--list              what there is, also apart from the sections
-    make bench BENCH_ARGS="--foreign FILE"    planning problems of others too, see docs/foreign_scenes.md
+    make bench BENCH_ARGS="--foreign FILE"    planning problems of others too, see
+    docs/foreign_scenes.md
 
-Each section is a module with a command of its own. The sections run one after another, in a process each.
+Each section is a module with a command of its own. The sections run one after another, in a process
+each.
 """
 
 from __future__ import annotations
@@ -37,7 +40,11 @@ SECTIONS: dict[str, tuple[str, tuple[str, ...], int]] = {
     "http": ("requests", ("--kind", "joint to pose", "--line-every", "0", "--seed", "2"), 200),
     "scenes": ("scenes", (), 300),
     "success": ("requests", ("--clients", "2", "--line-every", "20", "--seed", "3"), 1000),
-    "tight": ("requests", ("--kind", "joint to pose", "--line-every", "0", "--bound", "tight"), 100),
+    "tight": (
+        "requests",
+        ("--kind", "joint to pose", "--line-every", "0", "--bound", "tight"),
+        100,
+    ),
     "arms": ("arms", (), 10),
     "quality": ("quality", (), 100),
     "load": ("load", (), 0),
@@ -71,16 +78,22 @@ def _run(name: str, module: str, arguments: list[str]) -> dict[str, Any] | None:
 
 def commands() -> list[tuple[str, str]]:
     """All commands of this folder, each with the first line of what it says of itself."""
-    found = {path.stem: path for path in Path(__file__).parent.glob("*.py") if path.stem != "__main__"}
+    found = {
+        path.stem: path for path in Path(__file__).parent.glob("*.py") if path.stem != "__main__"
+    }
     found["planners"] = Path(__file__).parent / "planners" / "__main__.py"
     texts = {name: path.read_text(encoding="utf-8") for name, path in sorted(found.items())}
     return [
-        (name, text[3:].partition("\n")[0].removesuffix('"""')) for name, text in texts.items() if "__main__" in text
+        (name, text[3:].partition("\n")[0].removesuffix('"""'))
+        for name, text in texts.items()
+        if "__main__" in text
     ]
 
 
 def foreign(file: Path, fraction: float) -> dict[str, Any] | None:
-    """Runs the section of the planning problems in a file and returns its results; None if it wrote none."""
+    """Runs the section of the planning problems in a file and returns its results; None if it wrote
+    none.
+    """
     count = 0 if fraction >= 1 else max(round(FOREIGN_COUNT * fraction), 1)
     return _run("foreign", "foreign", [str(file), "--count", str(count)])
 
@@ -93,26 +106,45 @@ def stored(name: str) -> dict[str, Any] | None:
 
 def main() -> int:
     """Runs the sections and writes the report."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--fraction", type=float, default=1.0, help="fraction of the tasks (%(default)s)")
-    parser.add_argument("--only", nargs="+", choices=SECTIONS, default=list(SECTIONS), help="sections (all)")
-    parser.add_argument("--output", type=Path, default=report.RESULTS, help="file for the report (%(default)s)")
-    parser.add_argument("--foreign", type=Path, help="file of planning problems of others; without it, none are run")
-    parser.add_argument("--list", action="store_true", help="what there is, also apart from the sections")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--fraction", type=float, default=1.0, help="fraction of the tasks (%(default)s)"
+    )
+    parser.add_argument(
+        "--only", nargs="+", choices=SECTIONS, default=list(SECTIONS), help="sections (all)"
+    )
+    parser.add_argument(
+        "--output", type=Path, default=report.RESULTS, help="file for the report (%(default)s)"
+    )
+    parser.add_argument(
+        "--foreign", type=Path, help="file of planning problems of others; without it, none are run"
+    )
+    parser.add_argument(
+        "--list", action="store_true", help="what there is, also apart from the sections"
+    )
     given = parser.parse_args()
     if given.list:
         print("\n".join(f"python -m benchmarks.{name:20} {title}" for name, title in commands()))
         return 0
     FOLDER.mkdir(parents=True, exist_ok=True)
     machine, began = described(), time.perf_counter()
-    results = {name: run(name, given.fraction) if name in given.only else stored(name) for name in SECTIONS}
+    results = {
+        name: run(name, given.fraction) if name in given.only else stored(name) for name in SECTIONS
+    }
     results["foreign"] = (
-        stored("foreign") if given.foreign is None else foreign(given.foreign.resolve(), given.fraction)
+        stored("foreign")
+        if given.foreign is None
+        else foreign(given.foreign.resolve(), given.fraction)
     )
     took = time.perf_counter() - began
     report.write(given.output, machine, results, took, whole=len(given.only) == len(SECTIONS))
     broken = [name for name in given.only if results[name] is None]
-    print(f"{given.output} written after {took:.0f} s" + (f"; without results: {', '.join(broken)}" if broken else ""))
+    print(
+        f"{given.output} written after {took:.0f} s"
+        + (f"; without results: {', '.join(broken)}" if broken else "")
+    )
     return 1 if broken else 0
 
 

@@ -3,10 +3,11 @@
     python -m benchmarks.agreement --count 100
     python -m benchmarks.agreement --count 10 --kind "isolated bus"
 
-Every random request is answered by `/optimize` with a free duration, with the duration of that answer and with
-durations around it, by `/pareto`, by `/compare`, and by `/cycle` as an open cycle of one stop. All are the same
-problem, or a more constrained one. Reported are the relative differences of the energies from that of the free answer;
-of durations around it, what they need less.
+Every random request is answered by `/optimize` with a free duration, with the duration of that
+answer and with durations around it, by `/pareto`, by `/compare`, and by `/cycle` as an open cycle
+of one stop. All are the same problem, or a more constrained one. Reported are the relative
+differences of the energies from that of the free answer; of durations around it, what they need
+less.
 """
 
 from __future__ import annotations
@@ -51,7 +52,9 @@ ROUNDING = 1e-12
 
 @dataclass
 class Outcome:
-    """What the endpoints answered to a request: the free energy [J], and the relative differences from it."""
+    """What the endpoints answered to a request: the free energy [J], and the relative differences
+    from it.
+    """
 
     index: int
     kind: str
@@ -70,8 +73,15 @@ def request(seed: int, index: int, kind: str | None = None) -> tuple[str, Json]:
     name = ROBOTS[0] if rng.random() < 0.5 else str(rng.choice(ROBOTS[1:]))
     robot = load_robot(name)
     q_start, q_goal = _ends(rng, robot)
-    goal: Json = {"q": q_goal.tolist()} if index % 2 == 0 else {"pose": as_pose(flange(robot, q_goal))}
-    fields: Json = {"robot": name, "start": {"q": q_start.tolist()}, "goal": goal, "collisions": False}
+    goal: Json = (
+        {"q": q_goal.tolist()} if index % 2 == 0 else {"pose": as_pose(flange(robot, q_goal))}
+    )
+    fields: Json = {
+        "robot": name,
+        "start": {"q": q_start.tolist()},
+        "goal": goal,
+        "collisions": False,
+    }
     return kind, fields | _variation(rng, robot, kind)
 
 
@@ -89,12 +99,21 @@ def _variation(rng: np.random.Generator, robot: Robot, kind: str) -> Json:
     if kind in ("payload", "isolated bus"):
         mass = float(rng.uniform(0.3, 0.9) * robot.rated_payload)
         payload = {"mass": mass, "com": rng.uniform([-0.1, -0.1, -0.05], [0.1, 0.1, 0.1]).tolist()}
-        return {"payload": payload} | ({"bus": {"mode": "isolated"}} if kind == "isolated bus" else {})
+        return {"payload": payload} | (
+            {"bus": {"mode": "isolated"}} if kind == "isolated bus" else {}
+        )
     if kind == "tight limits":
         names = {"velocity": limits.v_max, "acceleration": limits.a_max, "jerk": limits.j_max}
-        return {"limits": {name: (value * rng.uniform(0.2, 1.0)).tolist() for name, value in names.items()}}
+        return {
+            "limits": {
+                name: (value * rng.uniform(0.2, 1.0)).tolist() for name, value in names.items()
+            }
+        }
     if kind == "TCP speed":
-        tcp = {"position": rng.uniform(-0.15, 0.15, 3).tolist(), "rpy": rng.uniform(-1.0, 1.0, 3).tolist()}
+        tcp = {
+            "position": rng.uniform(-0.15, 0.15, 3).tolist(),
+            "rpy": rng.uniform(-1.0, 1.0, 3).tolist(),
+        }
         return {"tcp": tcp, "limits": {"tcp_speed": float(rng.uniform(0.15, 1.0))}}
     return {}
 
@@ -102,7 +121,9 @@ def _variation(rng: np.random.Generator, robot: Robot, kind: str) -> Json:
 def examine(index: int, kind: str, body: Json, deadline: float) -> Outcome:
     """Asks every endpoint for the motion of a request."""
     outcome, began = Outcome(index, kind, body), time.process_time()
-    free = _answer(outcome, "free", OptimizeTask(OptimizeRequest.model_validate(body), ""), deadline)
+    free = _answer(
+        outcome, "free", OptimizeTask(OptimizeRequest.model_validate(body), ""), deadline
+    )
     if free is not None:
         energy, duration = _energy(free), float(free["duration"])
         outcome.energy = energy
@@ -133,7 +154,10 @@ def _others(outcome: Outcome, energy: float, free: Json, deadline: float) -> Non
     """The last point of a front, the row of a comparison, and the cycle of one stop."""
     body = outcome.request
     front = _answer(
-        outcome, "front", ParetoTask(ParetoRequest.model_validate(body | {"points": POINTS}), "", "json"), deadline
+        outcome,
+        "front",
+        ParetoTask(ParetoRequest.model_validate(body | {"points": POINTS}), "", "json"),
+        deadline,
     )
     if front is not None:
         last = front["points"][-1]["energy"]
@@ -166,14 +190,18 @@ def _energy(answer: Json) -> float:
 
 
 def summary(outcomes: list[Outcome]) -> Json:
-    """The spread of the differences by endpoint, with the request of the worst; and what was refused."""
+    """The spread of the differences by endpoint, with the request of the worst; and what was
+    refused.
+    """
     answered = [each for each in outcomes if np.isfinite(each.energy)]
     names = ("fixed", "fixed around", "front", "compare", "cycle")
     rows = {name: [each for each in answered if name in each.differences] for name in names}
     return {
         "count": len(outcomes),
         "answered": len(answered),
-        "differences": {name: Spread.of([abs(each.differences[name]) for each in rows[name]]) for name in names},
+        "differences": {
+            name: Spread.of([abs(each.differences[name]) for each in rows[name]]) for name in names
+        },
         "dearer": [each.index for each in answered if each.is_dearer],
         # the free answer is refused as well where no motion exists
         "refused_by_some": {each.index: each.refused for each in answered if each.refused},
@@ -191,7 +219,9 @@ def failed_requirements(results: Json) -> list[str]:
                 f"required {P95:.2%} and {MOST:.2%} or less"
             )
     found += [f"front: request {index} ends above the free answer" for index in results["dearer"]]
-    found += [f"request {index}: refused by {name}" for index, name in results["refused_by_some"].items()]
+    found += [
+        f"request {index}: refused by {name}" for index, name in results["refused_by_some"].items()
+    ]
     return found
 
 
@@ -200,16 +230,28 @@ def main() -> int:
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, default=100, help="requests (%(default)s)")
     arguments.add_argument("--kind", choices=KINDS, help="only this kind (default: in turn)")
-    arguments.add_argument("--deadline", type=float, default=60.0, help="of each request [s] (%(default)s)")
+    arguments.add_argument(
+        "--deadline", type=float, default=60.0, help="of each request [s] (%(default)s)"
+    )
     given = arguments.parse_args()
     on_one_core()
     outcomes: list[Outcome] = []
     for index in range(given.count):
         outcomes.append(examine(index, *request(given.seed, index, given.kind), given.deadline))
         shown = {name: f"{value:+.1e}" for name, value in outcomes[-1].differences.items()}
-        print(index, outcomes[-1].kind, shown, outcomes[-1].refused or "", f"{outcomes[-1].cpu:.1f} s", flush=True)
+        print(
+            index,
+            outcomes[-1].kind,
+            shown,
+            outcomes[-1].refused or "",
+            f"{outcomes[-1].cpu:.1f} s",
+            flush=True,
+        )
     results = summary(outcomes)
-    print(f"{results['answered']} of {results['count']} requests have a motion; {results['cpu']:.0f} s")
+    print(
+        f"{results['answered']} of {results['count']} requests have a motion; {results['cpu']:.0f} "
+        "s"
+    )
     for name, spread in results["differences"].items():
         print(f"{name:14s} {spread.times(100).formatted(' %', 3)}")
     write_json(given.json, results)

@@ -1,11 +1,13 @@
-"""Every robot: random requests from joint positions to a pose. Each gets a certified motion, or a reason that is true.
+"""Every robot: random requests from joint positions to a pose. Each gets a certified motion, or a
+reason that is true.
 
     python -m benchmarks.arms --count 10
     python -m benchmarks.arms --count 200 --robots panda gen3
 
-Starts the service with its default settings and sends the same number of requests for each robot. Answers are checked
-as in `benchmarks.requests`. Both ends of a request are drawn free of collisions, so that there is one true reason to
-refuse it: that the motors cannot hold the arm there. The exit code is 1 if an answer or a refusal is wrong.
+Starts the service with its default settings and sends the same number of requests for each robot.
+Answers are checked as in `benchmarks.requests`. Both ends of a request are drawn free of
+collisions, so that there is one true reason to refuse it: that the motors cannot hold the arm
+there. The exit code is 1 if an answer or a refusal is wrong.
 """
 
 from __future__ import annotations
@@ -32,7 +34,9 @@ def row(name: str, outcomes: Sequence[Outcome]) -> dict[str, Any]:
     errors = [f"{name}, {each.name}: {error}" for each in outcomes for error in each.errors]
     for each in outcomes:
         if each.problem and not each.errors:
-            found = refusal_errors(load_robot(name), each.problem, each.task.q_start, each.task.q_goal)
+            found = refusal_errors(
+                load_robot(name), each.problem, each.task.q_start, each.task.q_goal
+            )
             errors += [f"{name}, {each.name}: {error}" for error in found]
     return {
         "robot": name,
@@ -46,8 +50,12 @@ def row(name: str, outcomes: Sequence[Outcome]) -> dict[str, Any]:
     }
 
 
-def of_robot(service: Service, name: str, seed: int, count: int, deadline: float | None) -> dict[str, Any]:
-    """Sends the requests of one robot, the first of them twice, so that a worker has loaded what they need."""
+def of_robot(
+    service: Service, name: str, seed: int, count: int, deadline: float | None
+) -> dict[str, Any]:
+    """Sends the requests of one robot, the first of them twice, so that a worker has loaded what
+    they need.
+    """
     tasks = list(request_tasks(seed, count, KIND, robot=name))
     if deadline is not None:
         for task in tasks:
@@ -60,7 +68,9 @@ def main() -> int:
     """Runs the requests and prints a line per robot."""
     arguments = parser(__doc__, seed=4)
     arguments.add_argument("--count", type=int, default=10, help="requests per robot (%(default)s)")
-    arguments.add_argument("--robots", nargs="+", choices=robot_names(), default=robot_names(), help="(all)")
+    arguments.add_argument(
+        "--robots", nargs="+", choices=robot_names(), default=robot_names(), help="(all)"
+    )
     arguments.add_argument("--deadline", type=float, help="of each request [s] (the service's)")
     given = arguments.parse_args()
     for name in given.robots:
@@ -71,8 +81,10 @@ def main() -> int:
             one = of_robot(service, name, given.seed, given.count, given.deadline)
             rows.append(one)
             print(
-                f"{name:11s} {one['answered']:3d} of {one['count']} answered, {len(one['errors'])} errors, gap median "
-                f"{one['gap'].p50:5.1%}, time median {one['wall'].p50:.2f} s, 95th percentile {one['wall'].p95:.2f} s",
+                f"{name:11s} {one['answered']:3d} of {one['count']} answered, {len(one['errors'])} "
+                "errors, gap median "
+                f"{one['gap'].p50:5.1%}, time median {one['wall'].p50:.2f} s, 95th percentile "
+                f"{one['wall'].p95:.2f} s",
                 flush=True,
             )
     errors = [error for one in rows for error in one["errors"]]

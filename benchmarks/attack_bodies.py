@@ -18,7 +18,12 @@ def move() -> dict[str, Any]:
 
 def sampled(period: float) -> dict[str, Any]:
     """A motion of nearly 10 s with samples at this period [s]."""
-    return move() | {"duration": 9.9, "sample_period": period, "method": "time_scaling", "deadline": 60}
+    return move() | {
+        "duration": 9.9,
+        "sample_period": period,
+        "method": "time_scaling",
+        "deadline": 60,
+    }
 
 
 def long_search(deadline: float) -> dict[str, Any]:
@@ -27,7 +32,13 @@ def long_search(deadline: float) -> dict[str, Any]:
         {"pose": {"position": position, "quaternion": [0.0, 1.0, 0.0, 0.0]}}
         for position in ([0.4, 0.2, 0.35], [0.3, -0.4, 0.2])
     )
-    return {"start": start, "goal": goal, "objective": "mechanical", "duration": {"max": 5.0}, "deadline": deadline}
+    return {
+        "start": start,
+        "goal": goal,
+        "objective": "mechanical",
+        "duration": {"max": 5.0},
+        "deadline": deadline,
+    }
 
 
 def numbers(size: int) -> bytes:

@@ -1,7 +1,8 @@
-"""Attacks on a service of its own, over loopback, bounded in count and time: what happens to memory and to others.
+"""Attacks on a service of its own, over loopback, bounded in count and time: what happens to memory
+and to others.
 
-Beside each attack, one client asks for `/healthz` forty times a second, and an honest one optimises short motions.
-Both have other addresses than the attacker.
+Beside each attack, one client asks for `/healthz` forty times a second, and an honest one optimises
+short motions. Both have other addresses than the attacker.
 """
 
 from __future__ import annotations
@@ -39,7 +40,10 @@ async def connect(port: int) -> Streams:
 
 def post(path: str, body: bytes, declared: int | None = None) -> bytes:
     """A request, whose declared size may be larger."""
-    head = f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nCache-Control: no-cache\r\n"
+    head = (
+        f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: "
+        "application/json\r\nCache-Control: no-cache\r\n"
+    )
     return f"{head}Content-Length: {declared or len(body)}\r\n\r\n".encode() + body
 
 
@@ -58,7 +62,9 @@ async def status_of(reader: asyncio.StreamReader) -> int:
 
 def counted(values: list[Any]) -> str:
     """How often each value is there."""
-    names = ["lost" if isinstance(value, BaseException) or value == 0 else str(value) for value in values]
+    names = [
+        "lost" if isinstance(value, BaseException) or value == 0 else str(value) for value in values
+    ]
     return ", ".join(f"{names.count(name)} × {name}" for name in sorted(set(names)))
 
 
@@ -221,7 +227,11 @@ def open_everything(service: Service) -> list[Any]:
     opened = [Client(service.port, ATTACKER) for _ in range(3)]
     for client, content in zip(
         opened,
-        (post("/evaluate", b"{", 1 << 20), b"GET /he", post("/optimize", orjson.dumps(sampled(5e-4)))),
+        (
+            post("/evaluate", b"{", 1 << 20),
+            b"GET /he",
+            post("/optimize", orjson.dumps(sampled(5e-4))),
+        ),
         strict=True,
     ):
         client.send_raw(content)
@@ -252,7 +262,8 @@ def line(outcome: Outcome) -> str:
     """The outcome as a row of a table."""
     return (
         f"| {outcome.attack} | {outcome.before:.0f} | {outcome.peak:.0f} | {outcome.after:.0f} | "
-        f"{outcome.healthz_p99:.0f} | {outcome.healthz_most:.0f} | {outcome.answered} | {outcome.refused} | "
+        f"{outcome.healthz_p99:.0f} | {outcome.healthz_most:.0f} | {outcome.answered} | "
+        f"{outcome.refused} | "
         f"{outcome.honest_most:.1f} | {outcome.seen} |"
     )
 
@@ -260,15 +271,26 @@ def line(outcome: Outcome) -> str:
 def main() -> None:
     """Runs the attacks, each on a new service; with `--soak` one after another on the same."""
     arguments = parser(__doc__)
-    arguments.add_argument("--only", nargs="+", choices=[*ATTACKS, "end", *CROWDS], help="these attacks only")
-    arguments.add_argument("--minutes", type=float, default=8.0, help="time of the mixed crowd [min]")
-    arguments.add_argument("--kill-every", type=float, default=0.0, help="kill a worker of a crowd after each such [s]")
-    arguments.add_argument("--soak", type=float, default=0.0, help="repeat them for so long on one service [s]")
+    arguments.add_argument(
+        "--only", nargs="+", choices=[*ATTACKS, "end", *CROWDS], help="these attacks only"
+    )
+    arguments.add_argument(
+        "--minutes", type=float, default=8.0, help="time of the mixed crowd [min]"
+    )
+    arguments.add_argument(
+        "--kill-every", type=float, default=0.0, help="kill a worker of a crowd after each such [s]"
+    )
+    arguments.add_argument(
+        "--soak", type=float, default=0.0, help="repeat them for so long on one service [s]"
+    )
     given = arguments.parse_args()
     chosen = given.only or [*ATTACKS, "end", *CROWDS]
     attacks = {name: attack for name, attack in ATTACKS.items() if name in chosen}
     results: dict[str, Any] = {"cores": len(os.sched_getaffinity(0)), "outcomes": [], "crowds": {}}
-    print("| attack | before, MiB | peak | after | /healthz p99, ms | most | honest 200 | other | slowest, s | seen |")
+    print(
+        "| attack | before, MiB | peak | after | /healthz p99, ms | most | honest 200 | other | "
+        "slowest, s | seen |"
+    )
     print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
 
     def report(name: str, attack: Attack, service: Service) -> None:
@@ -293,12 +315,17 @@ def main() -> None:
     if "end" in chosen:
         with running() as service:
             results["time_to_end"] = time_to_end(service)
-        print(f"SIGTERM with an open upload, half a head and an unread answer: {results['time_to_end']:.1f} s")
+        print(
+            "SIGTERM with an open upload, half a head and an unread answer: "
+            f"{results['time_to_end']:.1f} s"
+        )
         with tempfile.TemporaryDirectory() as folder, running(TMPDIR=folder) as service:
             results["left_files"] = left_files(service, Path(folder))
         print(f"files left by kill -9: {results['left_files'] or 'none'}")
     for name in [crowd for crowd in CROWDS if crowd in chosen and not given.soak]:
-        results["crowds"][name] = [asdict(phase) for phase in report_crowd(name, given.minutes, given.kill_every)]
+        results["crowds"][name] = [
+            asdict(phase) for phase in report_crowd(name, given.minutes, given.kill_every)
+        ]
     write_json(given.json, results)
 
 

@@ -1,13 +1,15 @@
-"""Attacks the proven lower bound: motions that the service did not find, none of which may spend less than the bound.
+"""Attacks the proven lower bound: motions that the service did not find, none of which may spend
+less than the bound.
 
     python -m benchmarks.bound_attack --count 1000 --starts 20
     python -m benchmarks.bound_attack --robot panda --load 0.2 --bound tight
 
-Every request is solved, and its lower bound kept. Then motions are optimised from random starts on POINTS control
-points, each to a random configuration that reaches the goal, from one that reaches the start: any branch, any full
-turn, any member of a self-motion, any allowed orientation. The kinds of targets take turns, and half of the requests
-has other conditions: payload, mounting, bus, dwell, a fixed duration, the mechanical objective. With `--load` friction
-grows with the torque that a joint carries.
+Every request is solved, and its lower bound kept. Then motions are optimised from random starts on
+POINTS control points, each to a random configuration that reaches the goal, from one that reaches
+the start: any branch, any full turn, any member of a self-motion, any allowed orientation. The
+kinds of targets take turns, and half of the requests has other conditions: payload, mounting, bus,
+dwell, a fixed duration, the mechanical objective. With `--load` friction grows with the torque that
+a joint carries.
 """
 
 from __future__ import annotations
@@ -57,7 +59,9 @@ ROUNDING = 1e-9
 
 
 def _general(robot: Robot, rng: np.random.Generator) -> Array:
-    return np.asarray(rng.uniform(np.maximum(robot.limits.q_min, -np.pi), np.minimum(robot.limits.q_max, np.pi)))
+    return np.asarray(
+        rng.uniform(np.maximum(robot.limits.q_min, -np.pi), np.minimum(robot.limits.q_max, np.pi))
+    )
 
 
 def _at(*joints: tuple[int, float]) -> Callable[[Robot, np.random.Generator], Array]:
@@ -91,7 +95,9 @@ def request(robot: Robot, seed: int, index: int, **fixed: Any) -> tuple[str, Pro
         list(CONFIGURATIONS)[index % len(CONFIGURATIONS)],
         TARGETS[index // len(CONFIGURATIONS) % len(TARGETS)],
     )
-    arm, fields = _conditions(robot, rng) if rng.random() < 0.5 else (Arm(robot=robot, collisions=False), {})
+    arm, fields = (
+        _conditions(robot, rng) if rng.random() < 0.5 else (Arm(robot=robot, collisions=False), {})
+    )
     start = _general(robot, rng)
     q_goal = CONFIGURATIONS[where](robot, rng)
     T = tcp_pose(arm, q_goal)
@@ -104,15 +110,25 @@ def request(robot: Robot, seed: int, index: int, **fixed: Any) -> tuple[str, Pro
         "free": ConeOrientedPose(T[:3, 3], axis, T[:3, :3] @ axis, np.pi),
         "several": AnyOf((Pose(T), Pose(tcp_pose(arm, _general(robot, rng))))),
     }
-    begin: Any = Pose(tcp_pose(arm, CONFIGURATIONS[where](robot, rng))) if what == "start and goal" else start
-    return f"{what}, {where}", Problem(arm=arm, start=begin, goal=targets[what], deadline=DEADLINE, **fields, **fixed)
+    begin: Any = (
+        Pose(tcp_pose(arm, CONFIGURATIONS[where](robot, rng)))
+        if what == "start and goal"
+        else start
+    )
+    return f"{what}, {where}", Problem(
+        arm=arm, start=begin, goal=targets[what], deadline=DEADLINE, **fields, **fixed
+    )
 
 
 def _conditions(robot: Robot, rng: np.random.Generator) -> tuple[Arm, dict[str, Any]]:
     """Random conditions: the arm, and fields of the problem."""
     mass = float(rng.uniform(0.0, robot.rated_payload))
     com = rng.uniform([-0.05, -0.05, 0.0], [0.05, 0.05, 0.1])
-    buses = [Bus(), Bus(mode="isolated"), Bus(mode="recuperating", efficiency=float(rng.uniform(0.3, 1.0)))]
+    buses = [
+        Bus(),
+        Bus(mode="isolated"),
+        Bus(mode="recuperating", efficiency=float(rng.uniform(0.3, 1.0))),
+    ]
     arm = Arm(
         robot=robot,
         collisions=False,
@@ -133,7 +149,9 @@ def _conditions(robot: Robot, rng: np.random.Generator) -> tuple[Arm, dict[str, 
 
 
 def configurations(problem: Problem, target: Any, rng: np.random.Generator) -> Array:
-    """Configurations (n, nq) [rad] that reach a target: every branch, every full turn, members of self-motions."""
+    """Configurations (n, nq) [rad] that reach a target: every branch, every full turn, members of
+    self-motions.
+    """
     if isinstance(target, np.ndarray):
         return target[None]
     if isinstance(target, AnyOf):
@@ -151,11 +169,15 @@ def configurations(problem: Problem, target: Any, rng: np.random.Generator) -> A
 
 
 def attack(problem: Problem, starts: int, rng: np.random.Generator) -> tuple[float, str]:
-    """The least energy [J] of motions from random starts, and the label of the goal configuration that has it."""
+    """The least energy [J] of motions from random starts, and the label of the goal configuration
+    that has it.
+    """
     prepared, least, label = PreparedProblem.of(problem), np.inf, ""
     arm, space = problem.arm, bspline.uniform(POINTS)
     for _ in range(starts):
-        begins, ends = (configurations(problem, getattr(problem, name), rng) for name in ("start", "goal"))
+        begins, ends = (
+            configurations(problem, getattr(problem, name), rng) for name in ("start", "goal")
+        )
         if not len(begins) or not len(ends):
             continue
         q_start = begins[int(rng.integers(len(begins)))]
@@ -164,9 +186,13 @@ def attack(problem: Problem, starts: int, rng: np.random.Generator) -> tuple[flo
         if rng.random() < 0.7:
             points[space.free] += perturbation(rng, space, len(q_start))
         limits = arm.active_limits
-        guess = Guess(space, np.clip(points, limits.q_min, limits.q_max), problem.duration_min or 0.0)
+        guess = Guess(
+            space, np.clip(points, limits.q_min, limits.q_max), problem.duration_min or 0.0
+        )
         direct = replace(problem, start=q_start, goal=q_goal)
-        solver = FreeSpline(replace(prepared, problem=direct), q_start, q_goal, Deadline.after(PATIENCE))
+        solver = FreeSpline(
+            replace(prepared, problem=direct), q_start, q_goal, Deadline.after(PATIENCE)
+        )
         spline = solver.improve(guess).spline
         if spline is None:
             continue
@@ -183,21 +209,31 @@ def _near(choices: Array, q: Array, coulomb: Array, rng: np.random.Generator) ->
 
 
 def _loaded(robot: Robot, share: float) -> Robot:
-    """The robot with friction that grows with the load, if the share of it that is lost is not zero."""
+    """The robot with friction that grows with the load, if the share of it that is lost is not
+    zero.
+    """
     if not share:
         return robot
     load = np.full(robot.nq, share)
-    return replace(robot, friction_laws={n: replace(law, load=load) for n, law in robot.friction_laws.items()})
+    return replace(
+        robot, friction_laws={n: replace(law, load=load) for n, law in robot.friction_laws.items()}
+    )
 
 
 def main() -> int:
     """Prints every broken bound, and how near the attack came; returns 1 if one is broken."""
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, default=60, help="requests (%(default)s)")
-    arguments.add_argument("--starts", type=int, default=20, help="motions for each request (%(default)s)")
+    arguments.add_argument(
+        "--starts", type=int, default=20, help="motions for each request (%(default)s)"
+    )
     arguments.add_argument("--robot", default="ur5e", help="robot (%(default)s)")
-    arguments.add_argument("--load", type=float, default=0.0, help="share of a joint's load that is lost (%(default)s)")
-    arguments.add_argument("--bound", choices=("normal", "tight"), default="normal", help="bound (%(default)s)")
+    arguments.add_argument(
+        "--load", type=float, default=0.0, help="share of a joint's load that is lost (%(default)s)"
+    )
+    arguments.add_argument(
+        "--bound", choices=("normal", "tight"), default="normal", help="bound (%(default)s)"
+    )
     given = arguments.parse_args()
     on_one_core()
     robot = _loaded(load_robot(given.robot), given.load)
@@ -215,18 +251,33 @@ def main() -> int:
         energy = solution.energy.of(problem.objective)
         rng = np.random.default_rng([given.seed, index, 1])
         least, label = attack(problem, given.starts, rng)
-        row = {"index": index, "kind": kind, "energy": energy, "bound": solution.lower_bound, "attack": least}
+        row = {
+            "index": index,
+            "kind": kind,
+            "energy": energy,
+            "bound": solution.lower_bound,
+            "attack": least,
+        }
         rows.append(row | {"status": solution.status})
         summary = f"index {index} ({kind}, {solution.status}): {energy:.4f} J, attack {least:.4f} J"
         print(f"{summary}, bound {solution.lower_bound:.4f} J", flush=True)
         if min(least, energy) < solution.lower_bound - ROUNDING * abs(energy):
             broken.append(f"{summary} to {label}, bound {solution.lower_bound:.9f} J")
             print("BROKEN", broken[-1])
-    excess = [row["energy"] / row["attack"] - 1 for row in rows if np.isfinite(row["attack"]) and row["attack"] > 0]
-    print(f"requests                 {len(rows)} solved, {refused} refused; {given.starts} starts each")
+    excess = [
+        row["energy"] / row["attack"] - 1
+        for row in rows
+        if np.isfinite(row["attack"]) and row["attack"] > 0
+    ]
+    print(
+        f"requests                 {len(rows)} solved, {refused} refused; {given.starts} starts "
+        "each"
+    )
     print(f"bounds broken            {len(broken)}")
     print(f"answer above the attack  {Spread.of(excess).times(100).formatted(' %', 2)}")
-    write_json(given.json, {"seed": given.seed, "starts": given.starts, "rows": rows, "broken": broken})
+    write_json(
+        given.json, {"seed": given.seed, "starts": given.starts, "rows": rows, "broken": broken}
+    )
     return 1 if broken else 0
 
 

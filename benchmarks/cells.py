@@ -1,8 +1,9 @@
-"""Seeded random cells and tasks in them: tables with things on them, shelves, boxes with walls, cages of bars.
+"""Seeded random cells and tasks in them: tables with things on them, shelves, boxes with walls,
+cages of bars.
 
-Task `index` of a seed is the first draw of (seed, index) that has a solution: start and goal are collision-free, and
-the path planner finds a path between them in AMPLE seconds. `python -m benchmarks.path_existence` asks other planners
-about the draws that are left out.
+Task `index` of a seed is the first draw of (seed, index) that has a solution: start and goal are
+collision-free, and the path planner finds a path between them in AMPLE seconds. `python -m
+benchmarks.path_existence` asks other planners about the draws that are left out.
 """
 
 from __future__ import annotations
@@ -25,7 +26,16 @@ from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.nlp.clearance_constraint import RESERVE
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.scene import Box, Capsule, Cylinder, Obstacle, Scene, Shape, Sphere, capsule_between
+from joulepath.optimizer.problem.scene import (
+    Box,
+    Capsule,
+    Cylinder,
+    Obstacle,
+    Scene,
+    Shape,
+    Sphere,
+    capsule_between,
+)
 
 Cell = Literal["table", "shelf", "bin", "cage"]
 CELLS: tuple[Cell, ...] = ("table", "shelf", "bin", "cage")
@@ -38,7 +48,8 @@ GRIP = 0.15
 
 @dataclass(frozen=True)
 class CellTask:
-    """From q_start (nq,) [rad] to the TCP pose T_goal (4, 4), which q_goal reaches; found at draw number `draws`.
+    """From q_start (nq,) [rad] to the TCP pose T_goal (4, 4), which q_goal reaches; found at draw
+    number `draws`.
 
     `blocked`: the straight line in joint space between q_start and q_goal collides.
     """
@@ -67,7 +78,10 @@ def cell_task(seed: int, index: int) -> CellTask:
         rng = np.random.default_rng([seed, index, draw])
         obstacles, starts, goals = _DRAWS[cell](rng)
         arm = Arm(
-            robot=load_robot("ur5e"), scene=Scene([table, *obstacles]), tool=(TOOL,), T_flange_tcp=_at(0, 0, GRIP)
+            robot=load_robot("ur5e"),
+            scene=Scene([table, *obstacles]),
+            tool=(TOOL,),
+            T_flange_tcp=_at(0, 0, GRIP),
         )
         model = CollisionModel(arm)
         T_start, T_goal = starts(), goals()
@@ -102,7 +116,9 @@ def _clear(arm: Arm, model: CollisionModel, T: Array) -> list[Array]:
     """Configurations (nq,) [rad] of a TCP pose that keep all margins, and RESERVE beyond them."""
     kinematics = required_inverse_kinematics(arm.robot, "goal")
     try:
-        found = kinematics.solve(T, arm.T_flange_tcp, arm.active_limits, windings=False, target="goal")
+        found = kinematics.solve(
+            T, arm.T_flange_tcp, arm.active_limits, windings=False, target="goal"
+        )
     except (UnreachablePose, SingularPose):
         return []
     # what a request may start or end at
@@ -125,14 +141,24 @@ def _on_table(rng: np.random.Generator) -> _Cell:
             Sphere(size[2] / 4),
         )[kind]
         x, y = _around(rng, 0.3, 0.8)
-        things.append(_thing(f"thing {number}", shape, _at(x, y, size[2] / 2, _yaw(rng.uniform(-np.pi, np.pi)))))
+        things.append(
+            _thing(
+                f"thing {number}", shape, _at(x, y, size[2] / 2, _yaw(rng.uniform(-np.pi, np.pi)))
+            )
+        )
     return things, lambda: _above(rng, 0.1, 0.4), lambda: _above(rng, 0.1, 0.4)
 
 
 def _shelf(rng: np.random.Generator) -> _Cell:
-    """Three boards between two sides, and a back; the goal is between two boards, the start in front."""
+    """Three boards between two sides, and a back; the goal is between two boards, the start in
+    front.
+    """
     turn, distance = _yaw(rng.uniform(-np.pi, np.pi)), float(rng.uniform(0.55, 0.7))
-    low, gap, width = float(rng.uniform(0.05, 0.3)), float(rng.uniform(0.28, 0.38)), float(rng.uniform(0.6, 0.9))
+    low, gap, width = (
+        float(rng.uniform(0.05, 0.3)),
+        float(rng.uniform(0.28, 0.38)),
+        float(rng.uniform(0.6, 0.9)),
+    )
     depth, height = 0.3, 0.02 + 2 * gap
 
     def board(name: str, size: list[float], middle: tuple[float, float, float]) -> Obstacle:
@@ -140,19 +166,25 @@ def _shelf(rng: np.random.Generator) -> _Cell:
 
     x = distance + depth / 2
     boards = [board(f"board {k}", [depth, width, 0.02], (x, 0, low + k * gap)) for k in range(3)]
-    sides = [board(f"side {s}", [depth, 0.02, height], (x, s * width / 2, low + gap)) for s in (-1, 1)]
+    sides = [
+        board(f"side {s}", [depth, 0.02, height], (x, s * width / 2, low + gap)) for s in (-1, 1)
+    ]
     back = board("back", [0.02, width, height], (distance + depth + 0.01, 0, low + gap))
 
     def inside() -> Array:
         floor = low + gap * int(rng.integers(2))
         y = float(rng.uniform(-0.3, 0.3)) * width
-        return np.asarray(turn @ _at(distance + rng.uniform(0.02, 0.12), y, floor + gap / 2, _FORWARD))
+        return np.asarray(
+            turn @ _at(distance + rng.uniform(0.02, 0.12), y, floor + gap / 2, _FORWARD)
+        )
 
     return [*boards, *sides, back], lambda: _above(rng, 0.1, 0.5), inside
 
 
 def _bin(rng: np.random.Generator) -> _Cell:
-    """Two boxes open above, their four walls each; from the inside of one to the inside of the other."""
+    """Two boxes open above, their four walls each; from the inside of one to the inside of the
+    other.
+    """
     walls, middles = [], []
     first = rng.uniform(-np.pi, np.pi)
     for number, angle in enumerate((first, first + rng.uniform(0.9, 2.5))):
@@ -162,16 +194,26 @@ def _bin(rng: np.random.Generator) -> _Cell:
         for side in (-1, 1):
             across, along = [length, 0.02, height], [0.02, width, height]
             walls.append(
-                _thing(f"wall {number} {2 * side}", Box(np.array(across)), T @ _at(0, side * width / 2, height / 2))
+                _thing(
+                    f"wall {number} {2 * side}",
+                    Box(np.array(across)),
+                    T @ _at(0, side * width / 2, height / 2),
+                )
             )
             walls.append(
-                _thing(f"wall {number} {side}", Box(np.array(along)), T @ _at(side * length / 2, 0, height / 2))
+                _thing(
+                    f"wall {number} {side}",
+                    Box(np.array(along)),
+                    T @ _at(side * length / 2, 0, height / 2),
+                )
             )
 
     def inside(which: int) -> Array:
         T, height = middles[which]
         x, y = rng.uniform(-0.06, 0.06, 2)
-        return np.asarray(T @ _at(x, y, rng.uniform(0.05, 0.5 * height + 0.03), _DOWN @ _yaw(rng.uniform(-1, 1))))
+        return np.asarray(
+            T @ _at(x, y, rng.uniform(0.05, 0.5 * height + 0.03), _DOWN @ _yaw(rng.uniform(-1, 1)))
+        )
 
     return walls, lambda: inside(0), lambda: inside(1)
 
@@ -186,7 +228,11 @@ def _cage(rng: np.random.Generator) -> _Cell:
     for number in range(2):
         lying = np.eye(4)
         lying[:3, :3] = Rotation.from_euler("x", np.pi / 2).as_matrix()
-        T = _yaw(rng.uniform(-np.pi, np.pi)) @ _at(rng.uniform(0.3, 0.6), 0, rng.uniform(0.7, 1.0)) @ lying
+        T = (
+            _yaw(rng.uniform(-np.pi, np.pi))
+            @ _at(rng.uniform(0.3, 0.6), 0, rng.uniform(0.7, 1.0))
+            @ lying
+        )
         bars.append(_thing(f"beam {number}", Capsule(0.02, 1.0), T))
     return bars, lambda: _above(rng, 0.1, 0.6), lambda: _above(rng, 0.1, 0.6)
 
@@ -228,4 +274,6 @@ def _yaw(angle: float) -> Array:
 
 # the TCP's z axis points down, or outwards along x
 _DOWN = np.diag([1.0, -1.0, -1.0, 1.0])
-_FORWARD = np.array([[0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+_FORWARD = np.array(
+    [[0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+)

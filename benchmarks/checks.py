@@ -1,4 +1,6 @@
-"""Checks of the service's answers from outside: certificate, start and goal, limits, energy, baselines."""
+"""Checks of the service's answers from outside: certificate, start and goal, limits, energy,
+baselines.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +19,9 @@ from joulepath.optimizer.problem.problem import Problem
 
 # as the contract has them
 RATIO, REACH, BALANCE = 1 + 1e-6, 1e-6, 1e-3
-# relative: two durations within SAME are equal; a baseline needs less energy only beyond SLACK, the quadrature error.
-# Ruckig's motion, of which the answer is a spline, is slower as one by up to MERGED where jumps of its jerk are close
+# relative: two durations within SAME are equal; a baseline needs less energy only beyond SLACK, the
+# quadrature error. Ruckig's motion, of which the answer is a spline, is slower as one by up to
+# MERGED where jumps of its jerk are close
 SAME, SLACK, MERGED = 1e-9, 1e-6, 2e-5
 LIMITS = ("position", "velocity", "acceleration", "jerk", "torque")
 PARTS = ("idle", "potential", "kinetic", "friction", "copper", "inverter", "braking", "recovered")
@@ -27,7 +30,10 @@ PARTS = ("idle", "potential", "kinetic", "friction", "copper", "inverter", "brak
 def balance_error(answer: dict[str, Any]) -> float:
     """|sum of the energy's parts - total| / |total|."""
     electrical = answer["energy"]["electrical"]
-    return float(abs(sum(electrical[part] for part in PARTS) - electrical["total"]) / abs(electrical["total"]))
+    return float(
+        abs(sum(electrical[part] for part in PARTS) - electrical["total"])
+        / abs(electrical["total"])
+    )
 
 
 def objective(answer: dict[str, Any]) -> float:
@@ -35,14 +41,22 @@ def objective(answer: dict[str, Any]) -> float:
     return float(answer["energy"][answer["objective"]]["total"])
 
 
-def errors_found(body: dict[str, Any], answer: dict[str, Any], T_start: Array, T_goal: Array) -> list[str]:
-    """A message for every error in an answer; T_start and T_goal (4, 4) are the flange poses of the request."""
-    return [*_certificate_errors(answer), *_replay_errors(body, answer, T_start, T_goal), *_energy_errors(body, answer)]
+def errors_found(
+    body: dict[str, Any], answer: dict[str, Any], T_start: Array, T_goal: Array
+) -> list[str]:
+    """A message for every error in an answer; T_start and T_goal (4, 4) are the flange poses of the
+    request.
+    """
+    return [
+        *_certificate_errors(answer),
+        *_replay_errors(body, answer, T_start, T_goal),
+        *_energy_errors(body, answer),
+    ]
 
 
 def refusal_errors(robot: Robot, problem: str, q_start: Array, q_goal: Array) -> list[str]:
-    """A message if the answer to a request between two configurations (nq,) [rad], both free of collisions, is a
-    problem, and the motors can hold the arm at both without any payload.
+    """A message if the answer to a request between two configurations (nq,) [rad], both free of
+    collisions, is a problem, and the motors can hold the arm at both without any payload.
 
     Gravity's torques are those of Pinocchio.
     """
@@ -51,7 +65,10 @@ def refusal_errors(robot: Robot, problem: str, q_start: Array, q_goal: Array) ->
     worst = float((np.max(held, axis=0) / robot.limits.tau_max).max())
     if problem == "torque-infeasible" and worst > 1:
         return []
-    return [f"refused as {problem}, but both ends are free, and holding takes {worst:.0%} of the torque limits"]
+    return [
+        f"refused as {problem}, but both ends are free, and holding takes {worst:.0%} of the "
+        "torque limits"
+    ]
 
 
 def _certificate_errors(answer: dict[str, Any]) -> Iterator[str]:
@@ -70,7 +87,9 @@ def _certificate_errors(answer: dict[str, Any]) -> Iterator[str]:
             yield f"certificate: {name} {certificate[name]}"
 
 
-def _replay_errors(body: dict[str, Any], answer: dict[str, Any], T_start: Array, T_goal: Array) -> Iterator[str]:
+def _replay_errors(
+    body: dict[str, Any], answer: dict[str, Any], T_start: Array, T_goal: Array
+) -> Iterator[str]:
     """Checks the returned spline against the request, without the certificate."""
     robot = load_robot(answer["robot"])
     spline = answer["trajectory"]["spline"]
@@ -84,10 +103,15 @@ def _replay_errors(body: dict[str, Any], answer: dict[str, Any], T_start: Array,
     ):
         reached = flange(robot, q)
         error = float(np.linalg.norm(reached[:3, 3] - T[:3, 3]))
-        rotation = float(np.linalg.norm(pin.log3(np.ascontiguousarray(T[:3, :3].T @ reached[:3, :3]))))
+        rotation = float(
+            np.linalg.norm(pin.log3(np.ascontiguousarray(T[:3, :3].T @ reached[:3, :3])))
+        )
         joints = float(np.abs(q - asked["q"]).max()) if "q" in asked else 0.0
         if not max(error, rotation, joints) <= REACH:
-            yield f"replay: {name} is off by {error:.2g} m, {rotation:.2g} rad, joints by {joints:.2g} rad"
+            yield (
+                f"replay: {name} is off by {error:.2g} m, {rotation:.2g} rad, joints by "
+                f"{joints:.2g} rad"
+            )
     for name, ratio in worst_ratios(problem_of(body), motion).items():
         if not ratio <= RATIO:
             yield f"replay: {name} ratio {ratio}"
@@ -104,11 +128,16 @@ def _energy_errors(body: dict[str, Any], answer: dict[str, Any]) -> Iterator[str
         yield f"optimality gap {gap} is not 1 - {bound} / {total}"
     for baseline in answer["baselines"]:
         if beats(body, answer, baseline):
-            yield f"{baseline['name']} is within limits and needs {-baseline['saving']:.3%} less energy"
+            yield (
+                f"{baseline['name']} is within limits and needs {-baseline['saving']:.3%} less "
+                "energy"
+            )
 
 
 def beats(body: dict[str, Any], answer: dict[str, Any], baseline: dict[str, Any]) -> bool:
-    """Whether a baseline is within limits, has an allowed duration, and needs less energy than the answer."""
+    """Whether a baseline is within limits, has an allowed duration, and needs less energy than the
+    answer.
+    """
     if not baseline["within_limits"]:
         return False
     least, most = allowed(body.get("duration"))

@@ -1,4 +1,6 @@
-"""Shared by the benchmarks' commands: one thread for linear algebra, common options, results as JSON."""
+"""Shared by the benchmarks' commands: one thread for linear algebra, common options, results as
+JSON.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def on_one_core() -> None:
-    """Restarts this process if its linear algebra may use several threads. Call it before any measurement."""
+    """Restarts this process if its linear algebra may use several threads. Call it before any
+    measurement.
+    """
     if any(os.environ.get(name) != "1" for name in THREADS):
         os.environ.update(dict.fromkeys(THREADS, "1"))
         sys.stdout.flush()
@@ -23,7 +27,9 @@ def on_one_core() -> None:
 
 def parser(description: str | None, seed: int = 0) -> argparse.ArgumentParser:
     """A parser with the options that every command has: `--seed` and `--json`."""
-    result = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    result = argparse.ArgumentParser(
+        description=description, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     result.add_argument("--seed", type=int, default=seed, help="seed of the tasks (%(default)s)")
     result.add_argument("--json", type=Path, help="also write the results to this file")
     return result
@@ -33,4 +39,6 @@ def write_json(path: Path | None, results: dict[str, Any]) -> None:
     """Writes results as JSON. Does nothing if `path` is None."""
     if path is not None:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(orjson.dumps(results, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2))
+        path.write_bytes(
+            orjson.dumps(results, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2)
+        )

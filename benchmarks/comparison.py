@@ -22,7 +22,9 @@ MARKERS = "osD^vPX*<"
 
 @dataclass(frozen=True)
 class Row:
-    """One planner: times (n,) [s], energies (n,) [J] and largest ratios (n,) value / limit; NaN without a motion."""
+    """One planner: times (n,) [s], energies (n,) [J] and largest ratios (n,) value / limit; NaN
+    without a motion.
+    """
 
     title: str
     versions: str
@@ -41,7 +43,9 @@ class Row:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All planners on the same tasks; `best` (n,) [J] is the least energy of any motion within limits."""
+    """All planners on the same tasks; `best` (n,) [J] is the least energy of any motion within
+    limits.
+    """
 
     rows: list[Row]
     best: Array
@@ -65,9 +69,16 @@ class Comparison:
         """The section of the report in Markdown."""
         reference = next((row for row in self.rows if row.title == WHOLE), None)
         header = [
-            "planner", "time: median [ms]", "95th percentile [ms]", "solved [%]", "within limits [%]",
-            "largest value / limit", "energy above the best: median [%]", "95th percentile [%]", "duration: median [s]",
-        ]  # fmt: skip
+            "planner",
+            "time: median [ms]",
+            "95th percentile [ms]",
+            "solved [%]",
+            "within limits [%]",
+            "largest value / limit",
+            "energy above the best: median [%]",
+            "95th percentile [%]",
+            "duration: median [s]",
+        ]
         lines = [header, ["---"] * len(header)]
         for row in self.rows:
             above = self.above(row)
@@ -86,9 +97,12 @@ class Comparison:
             )
         text = "## Other planners\n\n"
         text += (
-            f"{len(self.best)} joint-to-joint tasks (seed {self.seed}), all limits of the robot, free duration, one "
-            "core each, in the same run. The same exact formulas give all energies on a grid of 1 ms, on which the "
-            f"limits are checked, too. A motion is within limits if it exceeds none of them by more than {WITHIN:.1%}. "
+            f"{len(self.best)} joint-to-joint tasks (seed {self.seed}), all limits of the robot, "
+            "free duration, one "
+            "core each, in the same run. The same exact formulas give all energies on a grid of 1 "
+            "ms, on which the "
+            "limits are checked, too. A motion is within limits if it exceeds none of them by "
+            f"more than {WITHIN:.1%}. "
             "The best is the least energy of any motion within limits, task by task.\n\n"
         )
         text += "\n".join(f"| {' | '.join(line)} |" for line in lines)
@@ -108,10 +122,15 @@ class Comparison:
             if not faster and not less:
                 continue
             by = f", by at most {np.nanmax(saved):.2%}" if less else ""
-            lines.append(f"- {row.title}: faster on {faster}, less energy within limits on {less}{by}.")
+            lines.append(
+                f"- {row.title}: faster on {faster}, less energy within limits on {less}{by}."
+            )
         if not lines:
             return "No planner is faster, or needs less energy within limits, on any task."
-        head = f"Tasks, of {len(self.best)}, on which another planner is better than joulepath's whole answer:"
+        head = (
+            f"Tasks, of {len(self.best)}, on which another planner is better than joulepath's "
+            "whole answer:"
+        )
         return head + "\n\n" + "\n".join(lines)
 
 
@@ -141,7 +160,9 @@ def _worst(row: Row) -> str:
 
 
 def draw(planners: Comparison, path: Path) -> None:
-    """Plots medians with quartiles, and every task as a dot; a hollow marker means that limits are violated."""
+    """Plots medians with quartiles, and every task as a dot; a hollow marker means that limits are
+    violated.
+    """
     figure = Figure(figsize=(9, 6), layout="constrained")
     axes = figure.subplots()
     colours = iter(COLOURS)
@@ -156,11 +177,21 @@ def draw(planners: Comparison, path: Path) -> None:
         x, y = np.percentile(wall, [25, 50, 75]), np.percentile(above, [25, 50, 75])
         within = bool((row.ratio[known] <= 1 + WITHIN).all())
         axes.errorbar(
-            x[1], y[1], xerr=[[x[1] - x[0]], [x[2] - x[1]]], yerr=[[y[1] - y[0]], [y[2] - y[1]]],
-            color=colour, marker=marker, markersize=9, markerfacecolor=colour if within else "white",
-            linewidth=1, label=row.title + ("" if within else " (violates limits)"), zorder=3,
-        )  # fmt: skip
-    axes.set(xscale="log", xlabel="time to compute [ms]", ylabel="energy above the best motion found [%]")
+            x[1],
+            y[1],
+            xerr=[[x[1] - x[0]], [x[2] - x[1]]],
+            yerr=[[y[1] - y[0]], [y[2] - y[1]]],
+            color=colour,
+            marker=marker,
+            markersize=9,
+            markerfacecolor=colour if within else "white",
+            linewidth=1,
+            label=row.title + ("" if within else " (violates limits)"),
+            zorder=3,
+        )
+    axes.set(
+        xscale="log", xlabel="time to compute [ms]", ylabel="energy above the best motion found [%]"
+    )
     axes.set_yscale("symlog", linthresh=1)
     ticks = (-1, -0.5, 0, 0.5, 1, 2, 5, 10, 20)
     axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
@@ -169,7 +200,8 @@ def draw(planners: Comparison, path: Path) -> None:
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False, fontsize=8)
     figure.suptitle(
-        f"Time against energy, {len(planners.best)} random joint-to-joint tasks, one core: medians and quartiles",
+        f"Time against energy, {len(planners.best)} random joint-to-joint tasks, one core: medians "
+        "and quartiles",
         fontsize=10,
     )
     figure.savefig(path, dpi=150)

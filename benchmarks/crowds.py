@@ -1,7 +1,9 @@
-"""Crowds of clients on a service of their own: those that leave early, those with tight deadlines, all kinds at once.
+"""Crowds of clients on a service of their own: those that leave early, those with tight deadlines,
+all kinds at once.
 
-An honest client optimises short motions before, during and after; beside it, one asks for `/healthz`. Wanted: no status
-500, all workers there afterwards, and an honest client that keeps a third of the answers that it gets alone.
+An honest client optimises short motions before, during and after; beside it, one asks for
+`/healthz`. Wanted: no status 500, all workers there afterwards, and an honest client that keeps a
+third of the answers that it gets alone.
 """
 
 from __future__ import annotations
@@ -34,7 +36,8 @@ HURRY = 1.0  # the same of a hurried one, which comes again [s]
 TIGHT = 2.0  # deadline of those that wait for their answers [s]
 PATIENCE = 60.0  # longest time for an answer [s]
 HEAD = (
-    "| crowd | phase | s | honest 200 per s | honest other | crowd | workers | /readyz | /healthz p99, ms | most |\n"
+    "| crowd | phase | s | honest 200 per s | honest other | crowd | workers | /readyz | /healthz "
+    "p99, ms | most |\n"
     "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
 )
 NOTED = ('"traceback"', "mended the queue", "did not end in time", "begins again")
@@ -43,8 +46,8 @@ LEFT = 0  # in place of the status of a client that did not wait for one
 
 @dataclass(frozen=True)
 class Phase:
-    """What was seen in a phase of `time` [s]: statuses of the honest client and of the crowd, workers and `/readyz` at
-    its end, times for `/healthz` [ms]."""
+    """What was seen in a phase of `time` [s]: statuses of the honest client and of the crowd,
+    workers and `/readyz` at its end, times for `/healthz` [ms]."""
 
     name: str
     time: float
@@ -56,11 +59,14 @@ class Phase:
     healthz_most: float
 
 
-async def ask(port: int, address: str, path: str, body: dict[str, Any], longest: float = PATIENCE) -> int:
+async def ask(
+    port: int, address: str, path: str, body: dict[str, Any], longest: float = PATIENCE
+) -> int:
     """The status of the answer; LEFT if that takes longer [s] than the client waits."""
     content = orjson.dumps(body)
     head = (
-        f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nConnection: close\r\n"
+        f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nConnection: "
+        "close\r\n"
         f"Cache-Control: no-cache\r\nContent-Length: {len(content)}\r\n\r\n"
     )
     reader, writer = await asyncio.open_connection("127.0.0.1", port, local_addr=(address, 0))
@@ -112,7 +118,9 @@ async def mixed(port: int, address: str, rng: random.Random) -> int:
             ("/jobs", {"requests": [{"optimize": move() | {"deadline": 5.0}}]}),
         ]
     )
-    status = await ask(port, address, path, body, rng.choice([LEAVING, 0.3, 1.0, PATIENCE, PATIENCE]))
+    status = await ask(
+        port, address, path, body, rng.choice([LEAVING, 0.3, 1.0, PATIENCE, PATIENCE])
+    )
     await asyncio.sleep(rng.uniform(0.0, 0.2))
     return status
 
@@ -125,11 +133,15 @@ CROWDS: dict[str, tuple[Kind, int, int]] = {
     "tight": (tight, 60, len(ADDRESSES)),
     "mixed": (mixed, 24, len(ADDRESSES)),
 }
-"""Each crowd: what one of its connections does again and again, how many there are, and from how many addresses."""
+"""Each crowd: what one of its connections does again and again, how many there are, and from how
+many addresses.
+"""
 
 
 async def crowd(service: Service, name: str, seconds: float, kill_every: float) -> Counter[int]:
-    """How often each status was answered to the crowd; workers are killed meanwhile if a period [s] is given."""
+    """How often each status was answered to the crowd; workers are killed meanwhile if a period [s]
+    is given.
+    """
     kind, connections, addresses = CROWDS[name]
     end, seen = time.perf_counter() + seconds, Counter[int]()
 
@@ -155,7 +167,9 @@ async def crowd(service: Service, name: str, seconds: float, kill_every: float) 
 
 def workers_of(service: Service) -> list[int]:
     """Process ids of the workers: what the fork server has started."""
-    children = Path(f"/proc/{service.process.pid}/task/{service.process.pid}/children").read_text().split()
+    children = (
+        Path(f"/proc/{service.process.pid}/task/{service.process.pid}/children").read_text().split()
+    )
     pids = service.worker_pids()
     return [pid for pid in pids if str(pid) not in children]
 
@@ -168,7 +182,9 @@ def observed(service: Service, name: str, attack: Callable[[], Counter[int]]) ->
         taken = time.perf_counter() - began
         walls, answers = end_probe(), end_honest()
     metrics = service.client().get("/metrics").raw.decode()
-    workers = next(line for line in metrics.splitlines() if line.startswith("joulepath_workers_warm "))
+    workers = next(
+        line for line in metrics.splitlines() if line.startswith("joulepath_workers_warm ")
+    )
     return Phase(
         name,
         taken,
@@ -190,21 +206,30 @@ def alone() -> Counter[int]:
 def line(name: str, phase: Phase) -> str:
     """A row of the table."""
     share = phase.honest.get(200, 0) / phase.time
-    crowd = ", ".join(f"{count} × {status or 'left'}" for status, count in sorted(phase.crowd.items()))
-    others = ", ".join(f"{count} × {status}" for status, count in sorted(phase.honest.items()) if status != 200)
+    crowd = ", ".join(
+        f"{count} × {status or 'left'}" for status, count in sorted(phase.crowd.items())
+    )
+    others = ", ".join(
+        f"{count} × {status}" for status, count in sorted(phase.honest.items()) if status != 200
+    )
     return (
-        f"| {name} | {phase.name} | {phase.time:.0f} | {share:.2f} | {others} | {crowd} | {phase.workers} | "
+        f"| {name} | {phase.name} | {phase.time:.0f} | {share:.2f} | {others} | {crowd} | "
+        f"{phase.workers} | "
         f"{phase.ready} | {phase.healthz_p99:.0f} | {phase.healthz_most:.0f} |"
     )
 
 
 def report(name: str, minutes: float, kill_every: float) -> list[Phase]:
-    """The phases of a crowd on a new service, which are printed, too. The mixed crowd takes so long [min]."""
+    """The phases of a crowd on a new service, which are printed, too. The mixed crowd takes so long
+    [min].
+    """
     seconds = 60 * minutes if name == "mixed" else min(SHORT, 60 * minutes)
     with running() as service:
         phases = [
             observed(service, "before", alone),
-            observed(service, "during", lambda: asyncio.run(crowd(service, name, seconds, kill_every))),
+            observed(
+                service, "during", lambda: asyncio.run(crowd(service, name, seconds, kill_every))
+            ),
         ]
         time.sleep(SETTLING)
         phases.append(observed(service, "after", alone))
@@ -214,5 +239,7 @@ def report(name: str, minutes: float, kill_every: float) -> list[Phase]:
         service.log.seek(0)
         log = service.log.read()
     noted = {word: log.count(word.encode()) for word in NOTED}
-    print("in the log: " + ", ".join(f"{count} × {word}" for word, count in noted.items()), flush=True)
+    print(
+        "in the log: " + ", ".join(f"{count} × {word}" for word, count in noted.items()), flush=True
+    )
     return phases

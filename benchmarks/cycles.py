@@ -1,4 +1,5 @@
-"""Cycles of stops: what deciding all stops together saves against move by move, the proven gap, and the time.
+"""Cycles of stops: what deciding all stops together saves against move by move, the proven gap, and
+the time.
 
     python -m benchmarks.rounds --count 20
     python -m benchmarks.rounds --count 50 --dwell 0
@@ -10,16 +11,18 @@
     python -m benchmarks.rounds --count 5 --stops 12 --free
     python -m benchmarks.rounds --count 1 --stops 245 --deadline 600
 
-A UR5e starts from rest at given joint positions over the table, takes up 2 kg at every other stop, puts it down at the
-next one, and comes back. Poses are drawn with the tool nearly down where the arm reaches them. It dwells 0.3 s at each,
-or as long as `--dwell` says: what it draws then, no choice of configurations saves. Collisions are ignored, so that
-every cycle has an answer. With `--anywhere`, the start is one more such pose, in any configuration: choosing move by
-move, the first move chooses it. With `--turned`, the parts are cycle: the tool may be turned by any angle about its
-axis at every stop. With `--time`, each cycle gets so many times the duration of
-least energy; the excess is what its answer needs beyond the least of its feasible baselines and of the cycle in its own
-time with a wait, and ends the benchmark if there is any. With `--passes`, it passes through the first stops without a
-rest, and carries the part nowhere; then a cycle that needs more than the one that stops there ends the benchmark. With
-`--free`, the order is free, and the arm carries nothing either.
+A UR5e starts from rest at given joint positions over the table, takes up 2 kg at every other stop,
+puts it down at the next one, and comes back. Poses are drawn with the tool nearly down where the
+arm reaches them. It dwells 0.3 s at each, or as long as `--dwell` says: what it draws then, no
+choice of configurations saves. Collisions are ignored, so that every cycle has an answer. With
+`--anywhere`, the start is one more such pose, in any configuration: choosing move by move, the
+first move chooses it. With `--turned`, the parts are cycle: the tool may be turned by any angle
+about its axis at every stop. With `--time`, each cycle gets so many times the duration of least
+energy; the excess is what its answer needs beyond the least of its feasible baselines and of the
+cycle in its own time with a wait, and ends the benchmark if there is any. With `--passes`, it
+passes through the first stops without a rest, and carries the part nowhere; then a cycle that needs
+more than the one that stops there ends the benchmark. With `--free`, the order is free, and the arm
+carries nothing either.
 """
 
 from __future__ import annotations
@@ -53,8 +56,8 @@ NEAREST, FARTHEST, HEIGHTS, TILT = 0.35, 0.7, (0.05, 0.4), 0.2
 
 # of a stop [s]
 DWELL = 0.3
-# of a cycle: largest jump of a joint between legs [rad]; its energy without that of the legs and rests, and without its
-# parts, relative. All are sums of the same numbers in another order
+# of a cycle: largest jump of a joint between legs [rad]; its energy without that of the legs and
+# rests, and without its parts, relative. All are sums of the same numbers in another order
 SUMS = ("joins [rad]", "energy of the legs", "parts of the energy")
 EXACT = 1e-9
 # relative: as exact as energies of equal motions are
@@ -90,7 +93,10 @@ def rounds(
         yield Cycle(
             arm=arm,
             start=first if anywhere else HOME,
-            stops=[_stop(j, _target(pose, turned), passes, free, dwell) for j, pose in enumerate(targets)],
+            stops=[
+                _stop(j, _target(pose, turned), passes, free, dwell)
+                for j, pose in enumerate(targets)
+            ],
             order=FreeOrder() if free else None,
             deadline=deadline,
         )
@@ -100,7 +106,9 @@ def _target(pose: Pose, turned: bool) -> Pose | ConeOrientedPose:
     return ConeOrientedPose.about(pose, np.array([0.0, 0.0, 1.0])) if turned else pose
 
 
-def _stop(number: int, pose: Pose | ConeOrientedPose, passes: int, free: bool, dwell: float) -> Stop:
+def _stop(
+    number: int, pose: Pose | ConeOrientedPose, passes: int, free: bool, dwell: float
+) -> Stop:
     if passes or free:
         passed = number < passes
         return Stop(name=str(number), target=pose, dwell=0.0 if passed else dwell, via=passed)
@@ -114,19 +122,28 @@ def in_time(asked: Cycle, own: CycleSolution, factor: float) -> Cycle:
 
 
 def excess(answer: CycleSolution, own: CycleSolution | None) -> float:
-    """What a cycle needs beyond the least of its feasible baselines, relative; `own` is it in its own time, which may
-    wait where that draws least, on its motors.
+    """What a cycle needs beyond the least of its feasible baselines, relative; `own` is it in its
+    own time, which may wait where that draws least, on its motors.
 
-    Not of `controller_default`, whose acceleration jumps where it begins: no certificate confirms that.
+    Not of `controller_default`, whose acceleration jumps where it begins: no certificate confirms
+    that.
     """
-    others = [each for each in answer.baselines if each.within_limits and each.name != "controller_default"]
+    others = [
+        each
+        for each in answer.baselines
+        if each.within_limits and each.name != "controller_default"
+    ]
     known = [each.electrical for each in others]
     if own is not None and answer.duration >= own.duration:
         held = [
-            holding_power(move.planned.arm_after, _torque_at(move.planned.arm_after, move.solution.goal.q))
+            holding_power(
+                move.planned.arm_after, _torque_at(move.planned.arm_after, move.solution.goal.q)
+            )
             for move in own.moves
         ]
-        known.append(own.energy.electrical.total + (answer.duration - own.duration) * float(min(held)))
+        known.append(
+            own.energy.electrical.total + (answer.duration - own.duration) * float(min(held))
+        )
     return answer.energy.electrical.total / min(known) - 1 if known else 0.0
 
 
@@ -136,10 +153,19 @@ def _torque_at(arm: Arm, q: Array) -> Array:
 
 
 def _sums(answer: CycleSolution) -> dict[str, float]:
-    """What must be zero but for rounding: jumps between legs, and the legs' energies without the cycle's."""
+    """What must be zero but for rounding: jumps between legs, and the legs' energies without the
+    cycle's.
+    """
     electrical = answer.energy.electrical
-    own = sum(move.solution.energy.electrical.total + move.dwell_energy + move.wait_energy for move in answer.moves)
-    errors = answer.joins, abs(own / electrical.total - 1), abs(electrical.parts_sum / electrical.total - 1)
+    own = sum(
+        move.solution.energy.electrical.total + move.dwell_energy + move.wait_energy
+        for move in answer.moves
+    )
+    errors = (
+        answer.joins,
+        abs(own / electrical.total - 1),
+        abs(electrical.parts_sum / electrical.total - 1),
+    )
     return dict(zip(SUMS, errors, strict=True))
 
 
@@ -148,17 +174,31 @@ def main() -> None:
     arguments = parser(__doc__, seed=0)
     arguments.add_argument("--count", type=int, default=20, help="cycles (%(default)s)")
     arguments.add_argument("--stops", type=int, default=6, help="stops of a cycle (%(default)s)")
-    arguments.add_argument("--deadline", type=float, default=60.0, help="deadline of a cycle [s] (%(default)s)")
-    arguments.add_argument("--passes", type=int, default=0, help="stops that are passed (%(default)s)")
+    arguments.add_argument(
+        "--deadline", type=float, default=60.0, help="deadline of a cycle [s] (%(default)s)"
+    )
+    arguments.add_argument(
+        "--passes", type=int, default=0, help="stops that are passed (%(default)s)"
+    )
     arguments.add_argument("--free", action="store_true", help="the order is free")
-    arguments.add_argument("--anywhere", action="store_true", help="the start is a pose, in any configuration")
-    arguments.add_argument("--turned", action="store_true", help="the tool may be turned about its axis at the stops")
-    arguments.add_argument("--time", type=float, help="give each cycle so many times its own duration")
-    arguments.add_argument("--dwell", type=float, default=DWELL, help="dwell at each stop [s] (%(default)s)")
+    arguments.add_argument(
+        "--anywhere", action="store_true", help="the start is a pose, in any configuration"
+    )
+    arguments.add_argument(
+        "--turned", action="store_true", help="the tool may be turned about its axis at the stops"
+    )
+    arguments.add_argument(
+        "--time", type=float, help="give each cycle so many times its own duration"
+    )
+    arguments.add_argument(
+        "--dwell", type=float, default=DWELL, help="dwell at each stop [s] (%(default)s)"
+    )
     given = arguments.parse_args()
     on_one_core()
     compile_kernel(load_robot("ur5e"))
-    plan_cycle(next(rounds(given.seed + 1, 1, 1, given.deadline)))  # loads what the others find loaded
+    plan_cycle(
+        next(rounds(given.seed + 1, 1, 1, given.deadline))
+    )  # loads what the others find loaded
     found: dict[str, list[float]] = {}
     optimal = legs = certified = 0
     how = (given.passes, given.free, given.dwell, given.anywhere, given.turned)
@@ -191,9 +231,13 @@ def main() -> None:
             print(f"{name:32s} at most {spread.maximum:.1e}")
         else:
             print(f"{name:32s} {spread.formatted(digits=3)}, least {spread.minimum:.3f}")
-    write_json(given.json, {"seed": given.seed, "count": given.count, "stops": given.stops} | results)
+    write_json(
+        given.json, {"seed": given.seed, "count": given.count, "stops": given.stops} | results
+    )
     if results[EXCESS].maximum > NO_EXCESS:
-        raise SystemExit(f"a cycle needs {results[EXCESS].maximum:.2%} more than another one in hand")
+        raise SystemExit(
+            f"a cycle needs {results[EXCESS].maximum:.2%} more than another one in hand"
+        )
     if certified < legs or max(results[name].maximum for name in SUMS) > EXACT:
         raise SystemExit("a leg is not certified, or the legs are not the cycle")
 

@@ -1,13 +1,14 @@
-"""Overrun of short deadlines by hard requests. The exit code is 1 if one overruns by more than MOST.
+"""Overrun of short deadlines by hard requests. The exit code is 1 if one overruns by more than
+MOST.
 
     python -m benchmarks.deadlines --count 200 --seed 0
     python -m benchmarks.deadlines --only "slow TCP" fronts --count 40
 
 Each kind of request is hard in its own way: a TCP so slow that a motion takes minutes, 64
-obstacles, motions of ten minutes with 20,000 samples, 32 targets, the mechanical objective, and fronts.
-Each is run as a worker runs it, from the validated request to the encoded
-document, in this process, with a deadline of 20 ms to 2 s. The overrun is the time after the
-deadline at which the document or problem is there.
+obstacles, motions of ten minutes with 20,000 samples, 32 targets, the mechanical objective, and
+fronts. Each is run as a worker runs it, from the validated request to the encoded document, in this
+process, with a deadline of 20 ms to 2 s. The overrun is the time after the deadline at which the
+document or problem is there.
 """
 
 from __future__ import annotations
@@ -48,7 +49,9 @@ ROBOT = "ur5e"
 
 @dataclass(frozen=True)
 class Outcome:
-    """One request: its kind, deadline and overrun [s], and the status of its answer or the type of its problem."""
+    """One request: its kind, deadline and overrun [s], and the status of its answer or the type of
+    its problem.
+    """
 
     kind: str
     index: int
@@ -87,7 +90,10 @@ def obstacles(rng: np.random.Generator) -> Fields:
     for k in range(64):
         at = rng.normal(size=3)
         at *= rng.uniform(0.45, 1.1) / np.linalg.norm(at)
-        placed = {"name": f"thing {k}", "pose": {"position": at.tolist(), "rotvec": rng.uniform(-1, 1, 3).tolist()}}
+        placed = {
+            "name": f"thing {k}",
+            "pose": {"position": at.tolist(), "rotvec": rng.uniform(-1, 1, 3).tolist()},
+        }
         shape: Fields = [
             {"shape": "sphere", "radius": float(rng.uniform(0.02, 0.06))},
             {"shape": "box", "size": rng.uniform(0.02, 0.12, 3).tolist()},
@@ -96,7 +102,11 @@ def obstacles(rng: np.random.Generator) -> Fields:
         ][k % 4]
         shapes.append(placed | shape)
     capsules = [
-        {"start": [0, 0, 0.02], "end": rng.uniform([-0.05, -0.05, 0.08], [0.05, 0.05, 0.15]).tolist(), "radius": 0.01}
+        {
+            "start": [0, 0, 0.02],
+            "end": rng.uniform([-0.05, -0.05, 0.08], [0.05, 0.05, 0.15]).tolist(),
+            "radius": 0.01,
+        }
         for _ in range(16)
     ]
     return between(rng) | {"scene": {"obstacles": shapes}, "tool": {"capsules": capsules}}
@@ -116,7 +126,11 @@ def many_targets(rng: np.random.Generator) -> Fields:
 def mechanical(rng: np.random.Generator) -> Fields:
     """The mechanical objective, whose bound rules out little."""
     duration = {"max": float(rng.uniform(3, 600))}
-    return between(rng, True) | {"objective": "mechanical", "duration": duration, "sample_period": COARSE}
+    return between(rng, True) | {
+        "objective": "mechanical",
+        "duration": duration,
+        "sample_period": COARSE,
+    }
 
 
 OPTIMIZE: dict[str, Callable[[np.random.Generator], Fields]] = {
@@ -137,7 +151,9 @@ def front(rng: np.random.Generator, index: int) -> Task:
 
 
 def _optimize(kind: str) -> Callable[[np.random.Generator, int], Task]:
-    return lambda rng, index: OptimizeTask(OptimizeRequest.model_validate(OPTIMIZE[kind](rng)), "benchmark")
+    return lambda rng, index: OptimizeTask(
+        OptimizeRequest.model_validate(OPTIMIZE[kind](rng)), "benchmark"
+    )
 
 
 KINDS: dict[str, Callable[[np.random.Generator, int], Task]] = {
@@ -166,8 +182,12 @@ def run(kind: str, seed: int, index: int) -> Outcome:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command; returns the exit code."""
     command = parser(__doc__)
-    command.add_argument("--count", type=int, default=160, help="requests, the kinds in turn (%(default)s)")
-    command.add_argument("--only", nargs="+", choices=KINDS, default=list(KINDS), help="kinds (all)")
+    command.add_argument(
+        "--count", type=int, default=160, help="requests, the kinds in turn (%(default)s)"
+    )
+    command.add_argument(
+        "--only", nargs="+", choices=KINDS, default=list(KINDS), help="kinds (all)"
+    )
     command.add_argument("--verbose", action="store_true", help="a line for each request")
     given = command.parse_args(arguments)
     on_one_core()
@@ -184,12 +204,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         of_kind = [each for each in outcomes if each.kind == kind]
         if of_kind:
             counts = ", ".join(
-                f"{count} {name}" for name, count in Counter(each.result for each in of_kind).most_common()
+                f"{count} {name}"
+                for name, count in Counter(each.result for each in of_kind).most_common()
             )
             print(f"{kind:26} {max(each.overrun for each in of_kind):+12.3f} s   {counts}")
     late = [each.overrun for each in outcomes]
     print(f"overrun: {Spread.of(late).formatted(' s', 3)}; allowed {MOST:g} s")
-    write_json(given.json, {"seed": given.seed, "most": MOST, "outcomes": [vars(each) for each in outcomes]})
+    write_json(
+        given.json,
+        {"seed": given.seed, "most": MOST, "outcomes": [vars(each) for each in outcomes]},
+    )
     return int(max(late) > MOST)
 
 

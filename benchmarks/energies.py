@@ -4,10 +4,11 @@
     python -m benchmarks.energies --count 200 --compare build/energies.json
     python -m benchmarks.energies --kind slow --count 200
 
-Five kinds of tasks take turns: joint to joint, joint to pose, the mechanical objective, a payload, and the cells of
-`benchmarks.cells`. The library solves each of them. `--compare` exits with 1 if the task, the outcome or the energy of
-an index differs from the stored run. Energies may differ by RELATIVE. `--kind slow` solves slow moves instead, and
-compares them with variants of themselves: see `benchmarks.slow_moves`.
+Five kinds of tasks take turns: joint to joint, joint to pose, the mechanical objective, a payload,
+and the cells of `benchmarks.cells`. The library solves each of them. `--compare` exits with 1 if
+the task, the outcome or the energy of an index differs from the stored run. Energies may differ by
+RELATIVE. `--kind slow` solves slow moves instead, and compares them with variants of themselves:
+see `benchmarks.slow_moves`.
 """
 
 from __future__ import annotations
@@ -38,7 +39,8 @@ Kind = Literal["joint to joint", "joint to pose", "mechanical", "payload", "cell
 KINDS: tuple[Kind, ...] = ("joint to joint", "joint to pose", "mechanical", "payload", "cell")
 # so long that no search ends early, and its result does not depend on the machine [s]
 AMPLE = 600.0
-# rounding of reordered sums, amplified by the solver's convergence criterion: relative difference of two energies
+# rounding of reordered sums, amplified by the solver's convergence criterion: relative difference
+# of two energies
 RELATIVE = 1e-6
 # of the numbers of a task (joints [rad], entries of the goal's matrix): rounding alone
 SAME_TASK = 1e-9
@@ -51,13 +53,16 @@ def problem_of(seed: int, index: int) -> tuple[Kind, Problem]:
     kind, robot = KINDS[index % len(KINDS)], load_robot("ur5e")
     if kind == "cell":
         cell = cell_task(seed, index)
-        return kind, Problem(arm=cell.arm, start=cell.q_start, goal=Pose(cell.T_goal), deadline=AMPLE)
+        return kind, Problem(
+            arm=cell.arm, start=cell.q_start, goal=Pose(cell.T_goal), deadline=AMPLE
+        )
     rng = np.random.default_rng([seed, index])
     q_start, q_goal = collision_free(rng, robot), collision_free(rng, robot)
     goal: Array | Pose = q_goal if kind == "joint to joint" else Pose(flange(robot, q_goal))
     if kind == "mechanical":
         longest = float(rng.uniform(*MECHANICAL))
-        # its lower bound rules out little: without full turns eight candidates remain, with them it takes minutes
+        # its lower bound rules out little: without full turns eight candidates remain, with them it
+        # takes minutes
         return kind, Problem(
             arm=Arm(robot=robot),
             start=q_start,
@@ -71,11 +76,15 @@ def problem_of(seed: int, index: int) -> tuple[Kind, Problem]:
     if kind == "payload":
         mass = float(rng.uniform(0.5, robot.rated_payload))
         payload = Payload(mass=mass, com=rng.uniform([-0.05, -0.05, 0.0], [0.05, 0.05, 0.15]))
-    return kind, Problem(arm=Arm(robot=robot, payload=payload), start=q_start, goal=goal, deadline=AMPLE)
+    return kind, Problem(
+        arm=Arm(robot=robot, payload=payload), start=q_start, goal=goal, deadline=AMPLE
+    )
 
 
 def solve(seed: int, index: int) -> dict[str, Any]:
-    """The outcome of one task: energy of the objective [J] and duration [s], or the name of the error."""
+    """The outcome of one task: energy of the objective [J] and duration [s], or the name of the
+    error.
+    """
     kind, problem = problem_of(seed, index)
     goal = problem.goal.T.ravel() if isinstance(problem.goal, Pose) else problem.goal
     row: dict[str, Any] = {
@@ -92,7 +101,9 @@ def solve(seed: int, index: int) -> dict[str, Any]:
     except JoulepathError as error:
         return row | {"outcome": type(error).__name__, "wall": time.perf_counter() - began}
     energy = solution.energy
-    total = energy.electrical.total if problem.objective == "electrical" else energy.mechanical.total
+    total = (
+        energy.electrical.total if problem.objective == "electrical" else energy.mechanical.total
+    )
     return row | {
         "outcome": solution.status,
         "energy": total,
@@ -132,7 +143,9 @@ def differences(rows: Sequence[dict[str, Any]], stored: Sequence[dict[str, Any]]
 
 def same_task(numbers: Sequence[float], others: Sequence[float]) -> bool:
     """Whether two tasks have the same start and goal up to rounding."""
-    return len(numbers) == len(others) and bool(np.allclose(numbers, others, rtol=0.0, atol=SAME_TASK))
+    return len(numbers) == len(others) and bool(
+        np.allclose(numbers, others, rtol=0.0, atol=SAME_TASK)
+    )
 
 
 def main() -> int:
@@ -140,7 +153,9 @@ def main() -> int:
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, default=200, help="tasks (%(default)s)")
     arguments.add_argument("--compare", type=Path, help="a stored run to compare with")
-    arguments.add_argument("--kind", choices=("ordinary", "slow"), default="ordinary", help="moves (%(default)s)")
+    arguments.add_argument(
+        "--kind", choices=("ordinary", "slow"), default="ordinary", help="moves (%(default)s)"
+    )
     given = arguments.parse_args()
     on_one_core()
     compile_kernel(load_robot("ur5e"))
@@ -150,16 +165,22 @@ def main() -> int:
     rows = []
     for index in range(given.count):
         rows.append(row := solve(given.seed, index))
-        found = row["outcome"] if row["energy"] is None else f"{row['energy']:.6f} J, {row['outcome']}"
+        found = (
+            row["outcome"] if row["energy"] is None else f"{row['energy']:.6f} J, {row['outcome']}"
+        )
         print(f"{index:4d} {row['kind']:14s} {found}, {row['wall']:.2f} s", flush=True)
     write_json(given.json, {"seed": given.seed, "tasks": rows})
     if given.compare is None:
         return 0
     stored = orjson.loads(given.compare.read_bytes())
     if stored["seed"] != given.seed:
-        raise SystemExit(f"{given.compare} holds seed {stored['seed']}: give --seed {stored['seed']}")
+        raise SystemExit(
+            f"{given.compare} holds seed {stored['seed']}: give --seed {stored['seed']}"
+        )
     by_index = {row["index"]: row for row in stored["tasks"]}
-    known = [relative_difference(row, by_index[row["index"]]) for row in rows if row["index"] in by_index]
+    known = [
+        relative_difference(row, by_index[row["index"]]) for row in rows if row["index"] in by_index
+    ]
     print(f"largest relative difference {max(known, default=0.0):.2g} over {len(known)} tasks")
     messages = differences(rows, stored["tasks"])
     for message in messages:

@@ -1,12 +1,14 @@
-"""The `shortest` of `duration-too-short` against faster motions: from random starts, and of `/optimize`.
+"""The `shortest` of `duration-too-short` against faster motions: from random starts, and of
+`/optimize`.
 
     python -m benchmarks.fastest --count 60 --starts 8
     python -m benchmarks.fastest --count 400 --starts 20 --robot panda
 
-A move is asked for in a tenth of the time that its joints need, which is refused with `shortest`. Every other move has
-a payload of up to the robot's rating, and of four moves two are within ±1.5 rad and two general. Then faster motions
-are looked for: by minimum-time solves from random smooth motions, and by `optimize` without a duration, and in 99 % of
-`shortest`. What the certificate confirms counts. Collisions are ignored.
+A move is asked for in a tenth of the time that its joints need, which is refused with `shortest`.
+Every other move has a payload of up to the robot's rating, and of four moves two are within ±1.5
+rad and two general. Then faster motions are looked for: by minimum-time solves from random smooth
+motions, and by `optimize` without a duration, and in 99 % of `shortest`. What the certificate
+confirms counts. Collisions are ignored.
 """
 
 from __future__ import annotations
@@ -36,7 +38,8 @@ from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 NEAR = 1.5  # rad
 # payloads as shares of the robot's rating, and where their centre of mass is [m], at most
 LOAD, ASIDE, AHEAD = (0.5, 1.0), 0.05, 0.12
-# a random start: amplitudes of its sines [rad], the greatest first, samples, and durations in multiples of the shortest
+# a random start: amplitudes of its sines [rad], the greatest first, samples, and durations in
+# multiples of the shortest
 AMPLITUDE, SINES, SAMPLES, SLOWER = 0.6, 4, 121, (1.0, 3.0)
 # a share by which another motion has to be faster to count
 COUNTS = 0.01
@@ -44,8 +47,9 @@ COUNTS = 0.01
 
 @dataclass(frozen=True)
 class Outcome:
-    """One move: `shortest` [s], whether it is `proven`, and the durations [s] of the fastest motion from random starts
-    and from `optimize`, infinite if there is none; `seconds` of processor time until the refusal."""
+    """One move: `shortest` [s], whether it is `proven`, and the durations [s] of the fastest motion
+    from random starts and from `optimize`, infinite if there is none; `seconds` of processor time
+    until the refusal."""
 
     index: int
     shortest: float
@@ -68,7 +72,10 @@ def problems(robot: Robot, seed: int, count: int) -> Iterator[Problem]:
         most = NEAR if index % 4 < 2 else np.pi
         lower, upper = np.maximum(limits.q_min, -most), np.minimum(limits.q_max, most)
         # a joint whose range does not hold zero has its own
-        lower, upper = np.where(lower < upper, lower, limits.q_min), np.where(lower < upper, upper, limits.q_max)
+        lower, upper = (
+            np.where(lower < upper, lower, limits.q_min),
+            np.where(lower < upper, upper, limits.q_max),
+        )
         q_start, q_goal = rng.uniform(lower, upper, (2, robot.nq))
         payload = Payload()
         if index % 2:
@@ -83,8 +90,14 @@ def problems(robot: Robot, seed: int, count: int) -> Iterator[Problem]:
 
 
 def refused(problem: Problem) -> DurationTooShort | None:
-    """The refusal of a tenth of the time that the joints need; None if the move is refused for another reason."""
-    least = float(shortest_duration(np.asarray(problem.goal) - np.asarray(problem.start), problem.arm.active_limits))
+    """The refusal of a tenth of the time that the joints need; None if the move is refused for
+    another reason.
+    """
+    least = float(
+        shortest_duration(
+            np.asarray(problem.goal) - np.asarray(problem.start), problem.arm.active_limits
+        )
+    )
     try:
         optimize(replace(problem, duration_max=max(least / 10, LEAST_DURATION)))
     except DurationTooShort as error:
@@ -95,15 +108,21 @@ def refused(problem: Problem) -> DurationTooShort | None:
 
 
 def from_random_starts(problem: Problem, starts: int, rng: np.random.Generator) -> float:
-    """Duration [s] of the fastest of the motions that minimum-time solves from random smooth motions find."""
+    """Duration [s] of the fastest of the motions that minimum-time solves from random smooth
+    motions find.
+    """
     run, best = Run(problem), np.inf
     run.prepare()
     incumbent, candidate = run.incumbent, run.incumbent.candidates[0]
     least, interval = candidate.shortest, fastest(run.incumbent.prepared)
     for number in range(starts):
-        q, t = _random(candidate.q_start, candidate.q_goal, least * float(rng.uniform(*SLOWER)), rng)
+        q, t = _random(
+            candidate.q_start, candidate.q_goal, least * float(rng.uniform(*SLOWER)), rng
+        )
         solver, fine = solver_of(incumbent, candidate, interval), number % 2 == 0
-        found = in_time(incumbent, lambda s=solver, q=q, t=t, fine=fine: s.solve_from(q, t, fine)).spline  # type: ignore[misc]
+        found = in_time(
+            incumbent, lambda s=solver, q=q, t=t, fine=fine: s.solve_from(q, t, fine)
+        ).spline  # type: ignore[misc]
         if found is None or found.duration >= best:
             continue
         if incumbent.certified(candidate, found, incumbent.prepared.energy(found)).valid:
@@ -111,18 +130,26 @@ def from_random_starts(problem: Problem, starts: int, rng: np.random.Generator) 
     return best
 
 
-def _random(q_start: Array, q_goal: Array, duration: float, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Samples q (k, nq) [rad] at t (k,) [s]: the straight line at a random pace, and sines beside it."""
+def _random(
+    q_start: Array, q_goal: Array, duration: float, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Samples q (k, nq) [rad] at t (k,) [s]: the straight line at a random pace, and sines beside
+    it.
+    """
     tau = np.linspace(0.0, 1.0, SAMPLES)
     sines = np.sin(np.pi * np.outer(tau, np.arange(1, SINES + 1)))
     height = AMPLITUDE * rng.normal(size=(SINES, len(q_start))) / np.arange(1, SINES + 1)[:, None]
     # flat at both ends, so that it begins and ends at rest
-    beside = (quintic.fraction(np.minimum(1.0, 8 * np.minimum(tau, 1 - tau))))[:, None] * (sines @ height)
+    beside = (quintic.fraction(np.minimum(1.0, 8 * np.minimum(tau, 1 - tau))))[:, None] * (
+        sines @ height
+    )
     return q_start + np.outer(quintic.fraction(tau), q_goal - q_start) + beside, tau * duration
 
 
 def optimized(problem: Problem, shortest: float) -> float:
-    """Duration [s] of the fastest motion that `optimize` finds, without a duration and in 99 % of the shortest."""
+    """Duration [s] of the fastest motion that `optimize` finds, without a duration and in 99 % of
+    the shortest.
+    """
     best = np.inf
     for longest in (None, (1 - COUNTS) * shortest):
         try:
@@ -138,7 +165,9 @@ def main() -> None:
     """Compares every move, and prints the worst and how many are more than 1 % too slow."""
     arguments = parser(__doc__, seed=31)
     arguments.add_argument("--count", type=int, default=60, help="moves (%(default)s)")
-    arguments.add_argument("--starts", type=int, default=8, help="random starts of each (%(default)s)")
+    arguments.add_argument(
+        "--starts", type=int, default=8, help="random starts of each (%(default)s)"
+    )
     arguments.add_argument("--robot", default="ur5e", help="(%(default)s)")
     asked = arguments.parse_args()
     on_one_core()
@@ -151,15 +180,27 @@ def main() -> None:
             if error is None:
                 continue
             shortest = error.shortest or np.inf
-            started = from_random_starts(problem, asked.starts, np.random.default_rng([asked.seed, index, 1]))
-            outcomes.append(Outcome(index, shortest, error.proven, started, optimized(problem, shortest), seconds))
+            started = from_random_starts(
+                problem, asked.starts, np.random.default_rng([asked.seed, index, 1])
+            )
+            outcomes.append(
+                Outcome(
+                    index, shortest, error.proven, started, optimized(problem, shortest), seconds
+                )
+            )
             if outcomes[-1].ratio > 1 + COUNTS:
                 print(f"move {index}: {outcomes[-1]}, ratio {outcomes[-1].ratio:.4f}", flush=True)
     ratios = [each.ratio for each in outcomes]
     above = sum(ratio > 1 + COUNTS for ratio in ratios)
-    print(f"{len(outcomes)} moves of {asked.robot}, {asked.starts} random starts each: worst ratio {max(ratios):.4f},")
+    print(
+        f"{len(outcomes)} moves of {asked.robot}, {asked.starts} random starts each: worst ratio "
+        f"{max(ratios):.4f},"
+    )
     print(f"{above} above 1 %, {sum(each.proven for each in outcomes)} proven,")
-    print(f"processor time of a refusal {Spread.of([each.seconds for each in outcomes]).formatted(' s', 2)}")
+    print(
+        "processor time of a refusal "
+        f"{Spread.of([each.seconds for each in outcomes]).formatted(' s', 2)}"
+    )
     write_json(asked.json, {"worst": max(ratios), "above": above, "moves": outcomes})
 
 

@@ -3,9 +3,10 @@
     python -m benchmarks.foreign FILE
     python -m benchmarks.foreign FILE --count 10 --seed 1 --families cage box --kinds joint
 
-FILE is JSON in the format of docs/foreign_scenes.md, which says where such sets come from. Every problem is asked with
-its goal as joint positions and as a pose, as a worker runs it: from the validated request, with a deadline. Pinocchio
-and Coal replay every answer at a period of 1 ms. The exit code is 1 if an answer collides.
+FILE is JSON in the format of docs/foreign_scenes.md, which says where such sets come from. Every
+problem is asked with its goal as joint positions and as a pose, as a worker runs it: from the
+validated request, with a deadline. Pinocchio and Coal replay every answer at a period of 1 ms. The
+exit code is 1 if an answer collides.
 """
 
 from __future__ import annotations
@@ -43,7 +44,9 @@ TOUCHED = ["wrist_2", "wrist_3"]
 
 @dataclass(frozen=True)
 class ForeignProblem:
-    """One problem of a file: its name, its family, and the bodies of its requests by the kind of goal."""
+    """One problem of a file: its name, its family, and the bodies of its requests by the kind of
+    goal.
+    """
 
     name: str
     family: str
@@ -52,7 +55,9 @@ class ForeignProblem:
 
 @dataclass(frozen=True)
 class Outcome:
-    """One request: times [s] by the wall and of the processor, energy [J] of the answer or the type of the problem."""
+    """One request: times [s] by the wall and of the processor, energy [J] of the answer or the type
+    of the problem.
+    """
 
     name: str
     family: str
@@ -91,12 +96,18 @@ def problems_of(path: Path) -> list[ForeignProblem]:
 
 
 def _renamed(obstacle: dict[str, Any]) -> dict[str, Any]:
-    """The obstacle with a name that no body of the arm has; without a margin unless the file gives one."""
+    """The obstacle with a name that no body of the arm has; without a margin unless the file gives
+    one.
+    """
     return {"margin": 0.0} | obstacle | {"name": f"scene {obstacle['name']}"}
 
 
-def chosen(problems: Iterable[ForeignProblem], families: Sequence[str], count: int, seed: int) -> list[ForeignProblem]:
-    """`count` problems of each family, drawn by `seed`; all of them if `count` is 0 or more than there are."""
+def chosen(
+    problems: Iterable[ForeignProblem], families: Sequence[str], count: int, seed: int
+) -> list[ForeignProblem]:
+    """`count` problems of each family, drawn by `seed`; all of them if `count` is 0 or more than
+    there are.
+    """
     found: list[ForeignProblem] = []
     problems = list(problems)
     for family in families:
@@ -121,7 +132,9 @@ def run(problem: ForeignProblem, kind: Kind, deadline: float) -> Outcome:
         type_ = str(problem_of(error, "benchmark")["type"]).rsplit("/", 1)[-1]
         return outcome(**took, problem=type_, detail=str(error))
     took = {"wall": time.perf_counter() - began, "cpu": time.process_time() - used}
-    best = min((c for c in solution.candidates if c.energy is not None), key=lambda c: c.energy or 0.0)
+    best = min(
+        (c for c in solution.candidates if c.energy is not None), key=lambda c: c.energy or 0.0
+    )
     return outcome(
         **took,
         energy=solution.energy.of(asked.objective),
@@ -160,7 +173,8 @@ def _row(kind: Kind, family: str, outcomes: Sequence[Outcome]) -> dict[str, Any]
 def print_summary(results: dict[str, Any]) -> None:
     """Prints the table."""
     print(
-        f"{'goal':6}{'family':20}{'answered':>12}  {'wall p50':>9}{'p95':>7}{'max':>7} s  {'cpu p50':>8}{'p95':>7} s  "
+        f"{'goal':6}{'family':20}{'answered':>12}  {'wall p50':>9}{'p95':>7}{'max':>7} s  "
+        f"{'cpu p50':>8}{'p95':>7} s  "
         f"{'energy p25':>10}{'p50':>7}{'p75':>7} J  {'collide':>7}  problems"
     )
     for row in results["rows"]:
@@ -169,7 +183,8 @@ def print_summary(results: dict[str, Any]) -> None:
         print(
             f"{row['kind']:6}{row['family']:20}{row['answered']:5} of {row['count']:3}  "
             f"{wall.p50:9.2f}{wall.p95:7.2f}{wall.maximum:7.2f} s  {cpu.p50:8.2f}{cpu.p95:7.2f} s  "
-            f"{energy.p25:10.1f}{energy.p50:7.1f}{energy.p75:7.1f} J  {row['collisions']:7}  {problems or 'none'}"
+            f"{energy.p25:10.1f}{energy.p50:7.1f}{energy.p75:7.1f} J  {row['collisions']:7}  "
+            f"{problems or 'none'}"
         )
 
 
@@ -177,17 +192,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command; returns the exit code."""
     command = parser(__doc__)
     command.add_argument("file", type=Path, help="file of problems")
-    command.add_argument("--count", type=int, default=0, help="problems of each family, drawn by --seed (0: all)")
+    command.add_argument(
+        "--count", type=int, default=0, help="problems of each family, drawn by --seed (0: all)"
+    )
     command.add_argument("--families", nargs="+", help="families (all)")
-    command.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS), help="kinds of goal (both)")
-    command.add_argument("--deadline", type=float, default=DEADLINE, help="deadline of a request [s] (%(default)s)")
+    command.add_argument(
+        "--kinds", nargs="+", choices=KINDS, default=list(KINDS), help="kinds of goal (both)"
+    )
+    command.add_argument(
+        "--deadline", type=float, default=DEADLINE, help="deadline of a request [s] (%(default)s)"
+    )
     command.add_argument("--verbose", action="store_true", help="a line for each request")
     given = command.parse_args(arguments)
     problems = problems_of(given.file)
     families = list(dict.fromkeys(each.family for each in problems))
     unknown = sorted(set(given.families or ()) - set(families))
     if unknown:
-        command.error(f"no family {', '.join(unknown)} in {given.file}: it has {', '.join(families)}")
+        command.error(
+            f"no family {', '.join(unknown)} in {given.file}: it has {', '.join(families)}"
+        )
     on_one_core()
     warm_up(ROBOT)
     outcomes: list[Outcome] = []
@@ -198,7 +221,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if given.verbose:
                 result = found.problem or f"{found.energy:.2f} J"
                 print(
-                    f"{found.name:26} {kind:6} {found.wall:6.2f} s  {result}  {found.detail or found.reason}",
+                    f"{found.name:26} {kind:6} {found.wall:6.2f} s  {result}  "
+                    f"{found.detail or found.reason}",
                     flush=True,
                 )
     results = summary(outcomes)

@@ -1,15 +1,21 @@
-"""Identification on real logs and on simulated arms, against its gates. The exit code is 1 if one is missed.
+"""Identification on real logs and on simulated arms, against its gates. The exit code is 1 if one
+is missed.
 
     JOULEPATH_TEST_DATA=FOLDER python -m benchmarks.identification
     python -m benchmarks.identification --only synthetic standins --runs 200
 
-- `ur3e`: power from motion alone. Each motion is left out with its reverse and predicted; then five random moves at a
+- `ur3e`: power from motion alone. Each motion is left out with its reverse and predicted; then five
+  random moves at a
   time predict the rest of the log.
-- `tx40`: friction against published values from the same log, and each half of the log predicted from the other.
-- `synthetic`: simulated UR10e with known figures: how many figures lie within three standard deviations, and how many
-  energies of moves that no fit has seen between P5 and P95. The same with moves each of which draws a power of its own
+- `tx40`: friction against published values from the same log, and each half of the log predicted
+  from the other.
+- `synthetic`: simulated UR10e with known figures: how many figures lie within three standard
+  deviations, and how many
+  energies of moves that no fit has seen between P5 and P95. The same with moves each of which draws
+  a power of its own
   beside the model's. 200 runs take some minutes.
-- `standins`: simulated logs in the place of real ones that are not public: another motion of the same day and other
+- `standins`: simulated logs in the place of real ones that are not public: another motion of the
+  same day and other
   days of a UR10e, a payload from two logs of different days, halves of a log of a Panda.
 """
 
@@ -38,16 +44,21 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows, rows_of
 from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import Truth, off_the_model, recorded, truth_of
 
-# of simulated arms, days of each, the first that of the fit, and the standard deviation of their friction
+# of simulated arms, days of each, the first that of the fit, and the standard deviation of their
+# friction
 UNITS, DAYS, DAY_SD = 4, 8, 0.03
 DRAWS = 100
 MOVES_OF_A_DRAW = 5
 # share of the runs in which a figure is told, for its own share to count
 OFTEN = 0.2
-# W, standard deviation of the power that each simulated move draws beside the model's: 1 % of a move's energy
+# W, standard deviation of the power that each simulated move draws beside the model's: 1 % of a
+# move's energy
 MOVE_EFFECT = 0.6
 TX40_OPTIONS = IdentificationOptions(
-    terms=("coulomb", "viscous", "offset"), couplings=(WRIST,), method="base_parameters", held_out=0.0
+    terms=("coulomb", "viscous", "offset"),
+    couplings=(WRIST,),
+    method="base_parameters",
+    held_out=0.0,
 )
 
 
@@ -74,7 +85,10 @@ def ur3e_power(place: Path | None, _: int) -> list[Gate]:
     found = identify(robot, [log], IdentificationOptions(held_out=1.0)).validation
     assert found is not None and found.fitted.power is not None
     assert found.coverage is not None and found.half_width is not None
-    errors, draws = found.fitted.power, _draws(robot, rows_of(robot, [log]), IdentificationOptions(held_out=0.0))
+    errors, draws = (
+        found.fitted.power,
+        _draws(robot, rows_of(robot, [log]), IdentificationOptions(held_out=0.0)),
+    )
     return [
         Gate("ur3e, left out with its reverse: RMSE [W]", errors.rmse, 0.0, 2.0),
         Gate("ur3e, same: mean error of energy [%]", errors.energy_mean, 0.0, 1.3),
@@ -86,14 +100,17 @@ def ur3e_power(place: Path | None, _: int) -> list[Gate]:
 
 
 def _draws(robot: Robot, rows: Rows, options: IdentificationOptions) -> float:
-    """P90 [%] of the error of the energy of all other motions, predicted from five moves at random."""
+    """P90 [%] of the error of the energy of all other motions, predicted from five moves at
+    random."""
     random, errors = np.random.default_rng(0), list[float]()
     moves = np.unique(rows.move)
     for _ in range(DRAWS):
         seen = np.isin(rows.move, random.choice(moves, MOVES_OF_A_DRAW, replace=False))
         rest = rows.take(~np.isin(rows.group, rows.group[seen]))
         blind = fit_rows(robot, rows.take(seen), options)
-        errors.append(float(rest.weight @ blind.arm.power(rest)[0] / (rest.weight @ rest.power)) - 1)
+        errors.append(
+            float(rest.weight @ blind.arm.power(rest)[0] / (rest.weight @ rest.power)) - 1
+        )
     return 100 * float(np.percentile(np.abs(errors), 90))
 
 
@@ -109,14 +126,21 @@ def tx40_torque(place: Path | None, _: int) -> list[Gate]:
         arm, rest = fit_rows(robot, rows.take(half), TX40_OPTIONS).arm, rows.take(~half)
         error = rest.effort - arm.torque(rest)
         for joint, most in enumerate((10.0, 8.0, 13.0, 12.0, 22.0, 20.0)):
-            of = moving(rest, rest.effort, joint, TX40_OPTIONS.velocity_threshold, TX40_OPTIONS.couplings)
-            relative = 100 * float(np.linalg.norm(error[of, joint]) / np.linalg.norm(rest.effort[of, joint]))
-            found.append(Gate(f"tx40, {name} half predicts the other: J{joint + 1} [%]", relative, 0.0, most))
+            of = moving(
+                rest, rest.effort, joint, TX40_OPTIONS.velocity_threshold, TX40_OPTIONS.couplings
+            )
+            relative = 100 * float(
+                np.linalg.norm(error[of, joint]) / np.linalg.norm(rest.effort[of, joint])
+            )
+            found.append(
+                Gate(f"tx40, {name} half predicts the other: J{joint + 1} [%]", relative, 0.0, most)
+            )
     return found
 
 
 def agreeing(fitted: Estimate, reference: dict[str, tuple[float, float]]) -> int:
-    """How many published friction figures with a standard deviation below 5 % are met within 3 of them, or 3 %.
+    """How many published friction figures with a standard deviation below 5 % are met within 3 of
+    them, or 3 %.
 
     The published terms of joints 5 and 6 have the coupling's viscous friction in them.
     """
@@ -127,11 +151,16 @@ def agreeing(fitted: Estimate, reference: dict[str, tuple[float, float]]) -> int
         ours[f"fv{joint + 1}"] = values["viscous", joint] + (shared if joint >= 4 else 0.0)
         ours[f"fs{joint + 1}"] = values["coulomb", joint]
     told = [name for name in ours if reference[name][1] < 0.05 * abs(reference[name][0])]
-    return sum(abs(ours[n] - reference[n][0]) <= max(3 * reference[n][1], 0.03 * abs(reference[n][0])) for n in told)
+    return sum(
+        abs(ours[n] - reference[n][0]) <= max(3 * reference[n][1], 0.03 * abs(reference[n][0]))
+        for n in told
+    )
 
 
 def synthetic(_: Path | None, runs: int) -> list[Gate]:
-    """Simulated arms with known figures: from currents and power, and from power alone; with moves off the model."""
+    """Simulated arms with known figures: from currents and power, and from power alone; with moves
+    off the model.
+    """
     return [
         gate
         for channels in ("currents and power", "power alone")
@@ -145,7 +174,10 @@ def _of_simulated_arms(channels: str, effect: float, runs: int) -> list[Gate]:
     for seed in range(runs):
         truth = truth_of(robot, seed)
         log = off_the_model(recorded(robot, truth, moves=14, seed=seed).log(), effect, seed)
-        found = identify(robot, [replace(log, effort=None, effort_meaning=None) if channels == "power alone" else log])
+        found = identify(
+            robot,
+            [replace(log, effort=None, effort_meaning=None) if channels == "power alone" else log],
+        )
         assert found.validation is not None and found.validation.coverage is not None
         shares.append(found.validation.coverage)
         for each in found.parameters:
@@ -154,7 +186,9 @@ def _of_simulated_arms(channels: str, effect: float, runs: int) -> list[Gate]:
                 within.setdefault((each.figure, each.joint), []).append(near)
     # of a figure that is told in a few runs alone, a share says little
     often = [each for each in within.values() if len(each) >= OFTEN * runs]
-    title = f"synthetic, {runs} arms from {channels}" + f", moves off by {effect:g} W" * bool(effect)
+    title = f"synthetic, {runs} arms from {channels}" + f", moves off by {effect:g} W" * bool(
+        effect
+    )
     every = [near for each in within.values() for near in each]
     worst, least = min(float(np.mean(each)) for each in often), 0.0 if effect else 0.95
     return [
@@ -183,7 +217,9 @@ def _days() -> list[Gate]:
     for unit in range(UNITS):
         truth, random = truth_of(robot, unit), np.random.default_rng(unit)
         found = identify(
-            robot, [log_of(robot, day_of(robot, truth, 100 + unit, 1.0, 10))], IdentificationOptions(held_out=0.0)
+            robot,
+            [log_of(robot, day_of(robot, truth, 100 + unit, 1.0, 10))],
+            IdentificationOptions(held_out=0.0),
         )
         for day in range(DAYS):
             friction = random.normal(1.0, DAY_SD) if day else 1.0
@@ -193,7 +229,12 @@ def _days() -> list[Gate]:
             (unknown if day else same).append(errors)
     relative = np.max([each.relative for each in same], axis=0)
     gates = [
-        Gate(f"stand-in of a UR10e, {UNITS} units, another motion: J{joint + 1} [%]", float(relative[joint]), 0.0, most)
+        Gate(
+            f"stand-in of a UR10e, {UNITS} units, another motion: J{joint + 1} [%]",
+            float(relative[joint]),
+            0.0,
+            most,
+        )
         for joint, most in enumerate((7.0, 1.7, 1.8, 3.3, 6.3, 6.2))
     ]
     shaft = float(np.median([day.shaft_energy for day in unknown]))
@@ -214,7 +255,9 @@ def _payloads() -> list[Gate]:
         truth, friction = truth_of(robot, unit), np.random.default_rng(unit).normal(1.0, DAY_SD)
         empty = log_of(robot, day_of(robot, truth, 400 + unit, 1.0, 10))
         full = log_of(robot, day_of(robot, truth, 500 + unit, friction, 10, payload))
-        carried = identify(robot, [empty, full], IdentificationOptions(fit=("payload",), held_out=0.0)).payload
+        carried = identify(
+            robot, [empty, full], IdentificationOptions(fit=("payload",), held_out=0.0)
+        ).payload
         assert carried is not None
         off.append(100 * abs(carried.mass / payload.mass - 1))
         sd.append(float(np.sqrt(carried.covariance[0, 0])))
@@ -234,10 +277,17 @@ def _halves() -> list[Gate]:
         rows = rows_of(robot, [log_of(robot, recording, torque=True)], True)
         first = np.arange(len(rows.q)) < len(rows.q) // 2
         for half in (first, ~first):
-            arm = fit_rows(robot, rows.take(half), IdentificationOptions(held_out=0.0, refit=True)).arm
+            arm = fit_rows(
+                robot, rows.take(half), IdentificationOptions(held_out=0.0, refit=True)
+            ).arm
             worst = np.maximum(worst, torque_errors([(arm, rows.take(~half))], 0.02).relative)
     return [
-        Gate(f"stand-in of a Panda, {UNITS} units, halves: J{joint} [%]", float(worst[joint - 1]), 0.0, 1.6)
+        Gate(
+            f"stand-in of a Panda, {UNITS} units, halves: J{joint} [%]",
+            float(worst[joint - 1]),
+            0.0,
+            1.6,
+        )
         for joint in (2, 3, 4)
     ]
 
@@ -254,7 +304,9 @@ OF_LOGS = ("ur3e", "tx40")
 def main() -> int:
     """Prints every gate. Returns 1 if one is missed."""
     arguments = parser(__doc__)
-    arguments.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), help="parts (all)")
+    arguments.add_argument(
+        "--only", nargs="+", choices=PARTS, default=list(PARTS), help="parts (all)"
+    )
     arguments.add_argument("--runs", type=int, default=20, help="simulated arms (%(default)s)")
     given, place = arguments.parse_args(), folder()
     on_one_core()
@@ -266,7 +318,10 @@ def main() -> int:
         for gate in PARTS[part](place, given.runs):
             gates.append(gate)
             limits = f"{gate.least:g} to {gate.most:g}"
-            print(f"{'kept  ' if gate.kept else 'MISSED'}  {gate.what}: {gate.value:.4g} ({limits})", flush=True)
+            print(
+                f"{'kept  ' if gate.kept else 'MISSED'}  {gate.what}: {gate.value:.4g} ({limits})",
+                flush=True,
+            )
     write_json(given.json, {"gates": [gate.__dict__ | {"kept": gate.kept} for gate in gates]})
     return 0 if all(gate.kept for gate in gates) else 1
 

@@ -1,4 +1,5 @@
-"""Real logs of two arms, from the folder that the environment variable JOULEPATH_TEST_DATA names."""
+"""Real logs of two arms, from the folder that the environment variable JOULEPATH_TEST_DATA
+names."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ from joulepath.optimizer.identify.options import Coupling
 PLACE = "JOULEPATH_TEST_DATA"
 MISSING = f"{PLACE} does not name the folder of the real logs."
 
-# Stäubli TX40: motor turns per joint turn, of which the last motor is driven through joint 5, too; and its rate [Hz]
+# Stäubli TX40: motor turns per joint turn, of which the last motor is driven through joint 5, too;
+# and its rate [Hz]
 RATIOS = (32.0, 32.0, 45.0, -48.0, 45.0, 32.0)
 TX40_RATE = 5000.0
 # rad; of joints 2 and 3 where the motors' positions are 0
@@ -42,28 +44,44 @@ def _directly(place: str | None) -> Path | None:
 def ur3e(place: Path) -> tuple[Robot, Log]:
     """A UR3e at 25 Hz over 19 moves, with currents and the power of its bus."""
     robot = load_robot("ur3e")
-    return robot, read_log(place / "ur3e_rad" / "ur3e_power.csv", robot, LogOptions(name="ur3e")).log
+    return robot, read_log(
+        place / "ur3e_rad" / "ur3e_power.csv", robot, LogOptions(name="ur3e")
+    ).log
 
 
 def tx40(place: Path) -> tuple[Robot, Log]:
-    """A TX40 at 5 kHz over 9 s: positions and torques of the motors, turned into those of the joints."""
+    """A TX40 at 5 kHz over 9 s: positions and torques of the motors, turned into those of the
+    joints.
+    """
     files = place / "staubli_tx40"
     urdf = (files / "tx40.urdf").read_text()
-    figures, _ = own_figures("tx40", Description(urdf=urdf, tip="tool0", acceleration=20.0, payload=2.0))
+    figures, _ = own_figures(
+        "tx40", Description(urdf=urdf, tip="tool0", acceleration=20.0, payload=2.0)
+    )
     robot = own_robot("tx40", figures)
-    motors, torques = (np.loadtxt(files / name, delimiter=",", skiprows=1) for name in ("pos.csv", "curr.csv"))
+    motors, torques = (
+        np.loadtxt(files / name, delimiter=",", skiprows=1) for name in ("pos.csv", "curr.csv")
+    )
     turns = np.diag(RATIOS)
     turns[5, 4] = RATIOS[5]
     q = np.linalg.solve(turns, motors.T).T + ZEROS
     table = np.column_stack([np.arange(len(q)) / TX40_RATE, q, torques @ turns])
     text = StringIO()
-    text.write(",".join(["t", *(f"{part}{k}" for part in ("q", "tau") for k in range(1, 7))]) + "\n")
+    text.write(
+        ",".join(["t", *(f"{part}{k}" for part in ("q", "tau") for k in range(1, 7))]) + "\n"
+    )
     np.savetxt(text, table, delimiter=",", fmt="%.9g")
-    return robot, read_log(text.getvalue().encode(), robot, LogOptions(effort="torque", name="tx40")).log
+    return robot, read_log(
+        text.getvalue().encode(), robot, LogOptions(effort="torque", name="tx40")
+    ).log
 
 
 def tx40_reference(place: Path) -> dict[str, tuple[float, float]]:
-    """Published base parameters of this log by weighted least squares: value and standard deviation."""
+    """Published base parameters of this log by weighted least squares: value and standard
+    deviation.
+    """
     with (place / "staubli_tx40" / "bp5.csv").open() as file:
-        found: dict[str, Array] = {row[0]: np.array(row[1:], dtype=float) for row in csv.reader(file)}
+        found: dict[str, Array] = {
+            row[0]: np.array(row[1:], dtype=float) for row in csv.reader(file)
+        }
     return {name: (float(row[2]), abs(float(row[2] * row[3] / 100))) for name, row in found.items()}

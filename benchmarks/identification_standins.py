@@ -1,8 +1,9 @@
-"""Simulated logs in the place of real ones that are not public or not at hand, with what real logs have beside noise.
+"""Simulated logs in the place of real ones that are not public or not at hand, with what real logs
+have beside noise.
 
-Friction differs from day to day and falls while the arm warms up, the gears have ripple, the drive filters and
-quantises its currents, positions have the steps of their sensors, and times jitter. None of it is in the model that is
-fitted.
+Friction differs from day to day and falls while the arm warms up, the gears have ripple, the drive
+filters and quantises its currents, positions have the steps of their sensors, and times jitter.
+None of it is in the model that is fitted.
 """
 
 from __future__ import annotations
@@ -16,7 +17,15 @@ from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.reading import LogOptions, read_log
 from joulepath.optimizer.problem.arm import Payload
-from tests.identification_logs import Noise, Recording, Truth, csv_of, recorded, rigid_torques, with_current
+from tests.identification_logs import (
+    Noise,
+    Recording,
+    Truth,
+    csv_of,
+    recorded,
+    rigid_torques,
+    with_current,
+)
 
 RATE = 500.0
 # of friction: its fall over a log, and the ripple of the gears with their waves per radian
@@ -50,7 +59,12 @@ def day_of(
     drag = exact.torque - rigid - today.rotor_inertia * exact.a - today.offset
     cooler = WARMING * np.linspace(0.5, -0.5, len(q))[:, None]
     moving = np.abs(exact.exact_v) > 1e-3
-    ripple = RIPPLE * today.coulomb * np.sin(WAVES * exact.exact_q + random.uniform(0, 6, robot.nq)) * moving
+    ripple = (
+        RIPPLE
+        * today.coulomb
+        * np.sin(WAVES * exact.exact_q + random.uniform(0, 6, robot.nq))
+        * moving
+    )
     current = _of_drive((exact.torque + cooler * drag + ripple) / today.torque_constant)
     return replace(
         with_current(exact, current),
@@ -66,11 +80,15 @@ def _of_drive(current: Array) -> Array:
     return np.asarray(np.round(filtered / CURRENT_STEP) * CURRENT_STEP)
 
 
-def log_of(robot: Robot, recording: Recording, payload: Payload | None = None, torque: bool = False) -> Log:
+def log_of(
+    robot: Robot, recording: Recording, payload: Payload | None = None, torque: bool = False
+) -> Log:
     """The recording as the reader reads it from its file, with torques or with currents."""
     body = csv_of(recording, "own", without="aP", effort="torque" if torque else "current")
     return read_log(
-        body, robot, LogOptions(payload=payload or recording.payload, effort="torque" if torque else "current")
+        body,
+        robot,
+        LogOptions(payload=payload or recording.payload, effort="torque" if torque else "current"),
     ).log
 
 

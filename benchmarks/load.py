@@ -1,4 +1,6 @@
-"""The service under steady load: each client sends its next request as soon as the last one is answered."""
+"""The service under steady load: each client sends its next request as soon as the last one is
+answered.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ VALID = b'"certificate"'
 
 @dataclass
 class Record:
-    """Results of all clients: wall times [s], statuses, lost requests, and most simultaneous requests."""
+    """Results of all clients: wall times [s], statuses, lost requests, and most simultaneous
+    requests.
+    """
 
     walls: list[float] = field(default_factory=list)
     statuses: Counter[int] = field(default_factory=Counter)
@@ -100,13 +104,16 @@ def main() -> None:
         results = steady(service, given.seed, given.clients, given.seconds)
     wall = results["wall"]
     print(
-        f"{results['clients']} clients for {results['seconds']:.0f} s: {results['answers']} answers, "
-        f"{results['per_second']:.1f} per second, {results['statuses']}, lost {results['lost'] or 'none'}"
+        f"{results['clients']} clients for {results['seconds']:.0f} s: {results['answers']} "
+        "answers, "
+        f"{results['per_second']:.1f} per second, {results['statuses']}, lost "
+        f"{results['lost'] or 'none'}"
     )
     print(f"wall {wall.times(1e3).formatted(' ms', 0)}")
     print(f"99th percentile {wall.p99 * 1e3:.0f} ms = {wall.p99 / wall.p50:.1f} × median")
     print(
-        f"memory of {results['processes']} processes, MiB: second quarter {results['memory_first']:.0f}, "
+        f"memory of {results['processes']} processes, MiB: second quarter "
+        f"{results['memory_first']:.0f}, "
         f"last {results['memory_last']:.0f}; same processes throughout: {results['same_workers']}"
     )
     write_json(given.json, results)

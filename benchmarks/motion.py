@@ -1,4 +1,5 @@
-"""Motions of any planner on one fine grid: exact energy, and the ratio of every value to its limit."""
+"""Motions of any planner on one fine grid: exact energy, and the ratio of every value to its
+limit."""
 
 from __future__ import annotations
 
@@ -29,7 +30,9 @@ class Motion(Protocol):
         """Duration [s]."""
 
     def sample(self, t: Array) -> tuple[Array, Array, Array, Array | None]:
-        """q, v, a and jerk (k, nq) at times t (k,) [s]; jerk is None if the acceleration is discontinuous."""
+        """q, v, a and jerk (k, nq) at times t (k,) [s]; jerk is None if the acceleration is
+        discontinuous.
+        """
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,8 @@ class SplineMotion:
 
 @dataclass(frozen=True)
 class Replay:
-    """A motion on the fine grid: duration [s], energy, and the largest value / limit per kind of limit.
+    """A motion on the fine grid: duration [s], energy, and the largest value / limit per kind of
+    limit.
 
     `end_error` [rad] is the largest joint error at start and goal.
     """
@@ -74,12 +78,16 @@ class Replay:
 
 
 def replay(problem: Problem, motion: Motion, q_start: Array, q_goal: Array) -> Replay:
-    """Evaluates a motion between two configurations (nq,) [rad] by Pinocchio and the exact energy formulas."""
+    """Evaluates a motion between two configurations (nq,) [rad] by Pinocchio and the exact energy
+    formulas.
+    """
     t, weights = fine_grid(motion.duration)
     q, v, a, jerk = motion.sample(t)
     tau = torques(problem, q, v, a)
     model, data = _model(problem)
-    potential = [pin.computePotentialEnergy(model, data, np.ascontiguousarray(q[i])) for i in (0, -1)]
+    potential = [
+        pin.computePotentialEnergy(model, data, np.ascontiguousarray(q[i])) for i in (0, -1)
+    ]
     energy = breakdown(weights, v, a, tau, potential[1] - potential[0], problem.arm)
     ends = max(float(np.abs(q[0] - q_start).max()), float(np.abs(q[-1] - q_goal).max()))
     return Replay(motion.duration, energy, _ratios(problem, q, v, a, jerk, tau), ends)
@@ -110,10 +118,16 @@ def fine_grid(duration: float) -> tuple[Array, Array]:
 
 def _model(problem: Problem) -> tuple[pin.Model, pin.Data]:
     payload = problem.arm.payload
-    model = problem.arm.robot.loaded_model(payload.mass, payload.com, payload.inertia, problem.arm.gravity)
+    model = problem.arm.robot.loaded_model(
+        payload.mass, payload.com, payload.inertia, problem.arm.gravity
+    )
     return model, model.createData()
 
 
-def _ratios(problem: Problem, q: Array, v: Array, a: Array, jerk: Array | None, tau: Array) -> dict[str, float]:
+def _ratios(
+    problem: Problem, q: Array, v: Array, a: Array, jerk: Array | None, tau: Array
+) -> dict[str, float]:
     jerk = np.full_like(a, np.inf) if jerk is None else jerk
-    return limit_ratios(problem.arm.active_limits, q, v, a, jerk, limited_torque(problem.arm, tau, v, a))
+    return limit_ratios(
+        problem.arm.active_limits, q, v, a, jerk, limited_torque(problem.arm, tau, v, a)
+    )

@@ -1,4 +1,6 @@
-"""What an attack does to a service: memory of its main process, times for `/healthz`, answers of an honest client."""
+"""What an attack does to a service: memory of its main process, times for `/healthz`, answers of an
+honest client.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ Attack = Callable[[int], Awaitable[str]]
 
 @dataclass(frozen=True)
 class Outcome:
-    """Memory of the main process [MiB], times for `/healthz` [ms], answers of the honest client, and what was seen."""
+    """Memory of the main process [MiB], times for `/healthz` [ms], answers of the honest client,
+    and what was seen.
+    """
 
     attack: str
     before: float
@@ -54,7 +58,9 @@ def probe(port: int, pipe: Connection) -> None:
 
 
 def honest(port: int, pipe: Connection) -> None:
-    """Status and time [s] of each request of a client that waits for its answers, as `probe` measures."""
+    """Status and time [s] of each request of a client that waits for its answers, as `probe`
+    measures.
+    """
     answers: list[tuple[int, float]] = []
     client = Client(port, HONEST)
     pipe.send(None)
@@ -69,8 +75,12 @@ def honest(port: int, pipe: Connection) -> None:
 
 
 @contextmanager
-def beside(target: Callable[[int, Connection], None], port: int) -> Iterator[Callable[[], list[Any]]]:
-    """Runs `target` in a process of its own, so that it does not wait for the attacker; gives what ends it."""
+def beside(
+    target: Callable[[int, Connection], None], port: int
+) -> Iterator[Callable[[], list[Any]]]:
+    """Runs `target` in a process of its own, so that it does not wait for the attacker; gives what
+    ends it.
+    """
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=target, args=(port, theirs), daemon=True)

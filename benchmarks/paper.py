@@ -1,9 +1,11 @@
-"""Comparison of the founding paper's three tables with this model; written into docs/paper.md between its markers.
+"""Comparison of the founding paper's three tables with this model; written into docs/paper.md
+between its markers.
 
     python -m benchmarks.paper            # writes the page
     python -m benchmarks.paper --print    # prints what it would write
 
-`tests/reference/README.md` names the paper. Its joint convention is not Universal Robots'; see `to_ur`.
+`tests/reference/README.md` names the paper. Its joint convention is not Universal Robots'; see
+`to_ur`.
 """
 
 from __future__ import annotations
@@ -35,7 +37,9 @@ REFERENCE = ROOT / "tests" / "reference"
 SECONDS = 1.5
 """Duration [s] of the motion from home to a configuration, and of the motion back."""
 TOLERANCE = 0.10
-"""Relative deviation from a common factor within which a row of Table 3 counts as proportional to our power."""
+"""Relative deviation from a common factor within which a row of Table 3 counts as proportional to
+our power.
+"""
 
 # Universal Robots, "DH parameters for calculations of kinematics and dynamics": a, d [m], alpha
 ALPHA = (np.pi / 2, 0, 0, np.pi / 2, -np.pi / 2, 0)
@@ -47,7 +51,9 @@ UR5_MASSES = np.array([3.7, 8.393, 2.33, 1.219, 1.219, 0.1879])
 
 def table(name: str) -> Array:
     """The numbers of a table of the paper."""
-    return np.asarray(np.loadtxt(REFERENCE / f"paper_{name}.csv", delimiter=",", skiprows=1), dtype=float)
+    return np.asarray(
+        np.loadtxt(REFERENCE / f"paper_{name}.csv", delimiter=",", skiprows=1), dtype=float
+    )
 
 
 def to_ur(degrees: Array) -> Array:
@@ -86,7 +92,9 @@ def older_links() -> Array:
 
 @dataclass(frozen=True)
 class Agreement:
-    """Agreement of Table 3 with our powers: rank correlation, and the factor common to most rows within TOLERANCE."""
+    """Agreement of Table 3 with our powers: rank correlation, and the factor common to most rows
+    within TOLERANCE.
+    """
 
     rank_correlation: float
     factor: float
@@ -95,11 +103,15 @@ class Agreement:
 
     @staticmethod
     def of(ours: Array, theirs: Array) -> Agreement:
-        """Tries every factor at which a row enters or leaves the band; `needed` is the tolerance for twelve rows."""
+        """Tries every factor at which a row enters or leaves the band; `needed` is the tolerance
+        for twelve rows.
+        """
         ratios = theirs / ours
         # 1e-9 of slack, so that a row on the edge of the band counts
         factors = np.concatenate([ratios / (1 - TOLERANCE), ratios / (1 + TOLERANCE)])
-        inside = [int((np.abs(ratios / factor - 1) <= TOLERANCE * (1 + 1e-9)).sum()) for factor in factors]
+        inside = [
+            int((np.abs(ratios / factor - 1) <= TOLERANCE * (1 + 1e-9)).sum()) for factor in factors
+        ]
         best = np.flatnonzero(np.array(inside) == max(inside))
         # twelve neighbours in order of ratio, the factor in their middle
         order = np.sort(ratios)
@@ -117,7 +129,9 @@ def forward(geometry: tuple[Sequence[float], Sequence[float]], q: Array) -> Arra
     T = np.eye(4)
     for a, d, alpha, angle in zip(*geometry, ALPHA, q, strict=True):
         c, s, ca, sa = np.cos(angle), np.sin(angle), np.cos(alpha), np.sin(alpha)
-        T = T @ np.array([[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]])
+        T = T @ np.array(
+            [[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]]
+        )
     return T
 
 
@@ -143,7 +157,8 @@ def table_1() -> list[str]:
     """Table 1 beside the poses of Table 2's configurations, with the geometries of UR5 and UR5e."""
     asked = poses()
     reached = {
-        name: [forward(geometry, q) for q in configurations()] for name, geometry in (("UR5", UR5), ("UR5e", UR5E))
+        name: [forward(geometry, q) for q in configurations()]
+        for name, geometry in (("UR5", UR5), ("UR5e", UR5E))
     }
     errors = {
         name: np.array([T[:3, 3] - A[:3, 3] for T, A in zip(found, asked, strict=True)])
@@ -152,12 +167,19 @@ def table_1() -> list[str]:
 
     def cells(k: int) -> list[str]:
         x, y, z, roll, pitch, yaw = table("table1_poses")[k]
-        turned = float(np.degrees(np.linalg.norm(pin.log3(asked[k][:3, :3].T @ reached["UR5"][k][:3, :3]))))
+        turned = float(
+            np.degrees(np.linalg.norm(pin.log3(asked[k][:3, :3].T @ reached["UR5"][k][:3, :3])))
+        )
         away = [f"{1000 * np.linalg.norm(errors[name][k]):.1f}" for name in ("UR5", "UR5e")]
         return [f"{x:g}, {y:g}, {z:g}", f"{roll:g}, {pitch:g}, {yaw:g}", *away, f"{turned:.2f}"]
 
     lines = _head(
-        "", "position [m]", "roll, pitch, yaw [rad]", "UR5: away [mm]", "UR5e: away [mm]", "turned [°]"
+        "",
+        "position [m]",
+        "roll, pitch, yaw [rad]",
+        "UR5: away [mm]",
+        "UR5e: away [mm]",
+        "turned [°]",
     ) + _rows(cells)
     for name, error in errors.items():
         offset = 1000 * error.mean(axis=0)
@@ -165,7 +187,8 @@ def table_1() -> list[str]:
         lines += [
             "",
             f"With the {name}'s geometry the offset common to all rows is "
-            f"({', '.join(f'{part:.1f}' for part in offset)}) mm; {spread:.1f} mm RMS remain around it.",
+            f"({', '.join(f'{part:.1f}' for part in offset)}) mm; {spread:.1f} mm RMS remain "
+            "around it.",
         ]
     return lines
 
@@ -185,9 +208,19 @@ def table_2() -> list[str]:
         apart = [wrapped(solution.q - q) for solution in solutions]
         best = int(np.argmin([np.abs(each).max() for each in apart]))
         branch = str(solutions[best].label).split(" ")[0]
-        return [text(q), text(q + apart[best]), branch, f"{np.degrees(np.abs(apart[best]).max()):.1f}"]
+        return [
+            text(q),
+            text(q + apart[best]),
+            branch,
+            f"{np.degrees(np.abs(apart[best]).max()):.1f}",
+        ]
 
-    names = ("paper, in UR's convention [°]", "ours: exact for the UR5e [°]", "branch", "largest difference [°]")
+    names = (
+        "paper, in UR's convention [°]",
+        "ours: exact for the UR5e [°]",
+        "branch",
+        "largest difference [°]",
+    )
     return _head("", *names) + _rows(cells)
 
 
@@ -222,14 +255,18 @@ def table_3() -> list[str]:
         agreement = agreements[name]
         lines += [
             "",
-            f"{words}: Spearman's rank correlation {agreement.rank_correlation:.4f}; {agreement.rows} rows within 10 % "
-            f"of the factor {agreement.factor:.1f}; twelve rows within {100 * agreement.needed:.1f} % of one factor.",
+            f"{words}: Spearman's rank correlation {agreement.rank_correlation:.4f}; "
+            f"{agreement.rows} rows within 10 % "
+            f"of the factor {agreement.factor:.1f}; twelve rows within "
+            f"{100 * agreement.needed:.1f} % of one factor.",
         ]
     return lines
 
 
 def savings() -> list[str]:
-    """Energies of the paper's motion to each configuration, of ours, and of the controller's default."""
+    """Energies of the paper's motion to each configuration, of ours, and of the controller's
+    default.
+    """
 
     def saved(ours: float, theirs: float) -> str:
         return f"{100 * (1 - ours / theirs):.1f}"
@@ -237,11 +274,16 @@ def savings() -> list[str]:
     def cells(k: int) -> list[str]:
         q = configurations()[k]
         there = there_and_back(Arm(robot=load_robot("ur5e")), q).segments[0]
-        solution = optimize(Problem(arm=Arm(robot=load_robot("ur5e")), start=HOME, goal=q, windings=False))
+        solution = optimize(
+            Problem(arm=Arm(robot=load_robot("ur5e")), start=HOME, goal=q, windings=False)
+        )
         default = next(each for each in solution.baselines if each.name == "controller_default")
         linear, ours = there.energy, solution.energy
         return [
-            *(f"{each:.1f}" for each in (linear.electrical.total, linear.mechanical.total, there.kinetic_start)),
+            *(
+                f"{each:.1f}"
+                for each in (linear.electrical.total, linear.mechanical.total, there.kinetic_start)
+            ),
             f"{default.electrical:.1f}",
             f"{solution.duration:.2f}",
             *(f"{each:.1f}" for each in (ours.electrical.total, ours.mechanical.total)),

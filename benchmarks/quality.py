@@ -23,27 +23,38 @@ def main() -> None:
     """Solves every task that has a reference, and compares the energies."""
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, help="tasks (all that have a reference)")
-    arguments.add_argument("--reference", type=Path, default=FILE, help="the stored references (%(default)s)")
-    arguments.add_argument("--deadline", type=float, default=AMPLE, help="of each search [s] (%(default)s)")
+    arguments.add_argument(
+        "--reference", type=Path, default=FILE, help="the stored references (%(default)s)"
+    )
+    arguments.add_argument(
+        "--deadline", type=float, default=AMPLE, help="of each search [s] (%(default)s)"
+    )
     given = arguments.parse_args()
     on_one_core()
     robot = load_robot("ur5e")
     compile_kernel(robot)
     reference = load(given.reference)
     if reference["fingerprint"] != fingerprint(robot):
-        raise SystemExit("The robot's parameters have changed: renew the references by python -m benchmarks.reference")
+        raise SystemExit(
+            "The robot's parameters have changed: renew the references by python -m "
+            "benchmarks.reference"
+        )
     rows: list[dict[str, Any]] = []
     for row in reference["tasks"][: given.count]:
         if row["energy"] is None:  # no start has a motion
             continue
         task = move(reference["seed"], row["index"])
         try:
-            energy = optimize(replace(problem_of(task), deadline=given.deadline)).energy.electrical.total
+            energy = optimize(
+                replace(problem_of(task), deadline=given.deadline)
+            ).energy.electrical.total
         except JoulepathError as error:
             print(f"index {task.index}: {error!r}")
             energy = float("inf")
         excess, fine_excess = energy / row["energy"] - 1, energy / row["fine"] - 1
-        rows.append({"index": task.index, "energy": energy, "excess": excess, "fine_excess": fine_excess})
+        rows.append(
+            {"index": task.index, "energy": energy, "excess": excess, "fine_excess": fine_excess}
+        )
     worst = sorted(rows, key=lambda row: row["excess"], reverse=True)
     results = {
         "seed": reference["seed"],
@@ -57,8 +68,14 @@ def main() -> None:
         "within_one_percent": sum(row["excess"] <= 0.01 for row in rows) / len(rows),
         "worst": worst[:5],
     }
-    print(f"energy above the best of {results['starts']} starts: {results['excess'].times(100).formatted(' %', 2)}")
-    print(f"above the references refined on a finer grid: {results['fine_excess'].times(100).formatted(' %', 2)}")
+    print(
+        f"energy above the best of {results['starts']} starts: "
+        f"{results['excess'].times(100).formatted(' %', 2)}"
+    )
+    print(
+        "above the references refined on a finer grid: "
+        f"{results['fine_excess'].times(100).formatted(' %', 2)}"
+    )
     print(f"within one percent: {results['within_one_percent']:.0%}")
     print(f"worst: {[(row['index'], round(row['excess'], 4)) for row in worst[:5]]}")
     write_json(given.json, results)

@@ -1,13 +1,16 @@
-"""Reference energies of seeded tasks: the best of many starts on a fine grid, by two independent solvers.
+"""Reference energies of seeded tasks: the best of many starts on a fine grid, by two independent
+solvers.
 
-    python -m benchmarks.reference            writes benchmarks/reference_energies.json, in about half an hour
+    python -m benchmarks.reference            writes benchmarks/reference_energies.json, in about
+    half an hour
 
 A run that was interrupted continues when it is started again.
 
-Each task is solved by joulepath's SQP from STARTS initial guesses (the straight line and random perturbations of it) on
-POINTS control points, and by IPOPT from IPOPT_STARTS initial guesses on the same spline. The SQP then refines IPOPT's
-motions, so that they satisfy the limits between the nodes, too. Finally it refines the best motion on twice as many
-spans. Limits are those of the robot, and the duration is free. `make bench` compares answers with the stored energies.
+Each task is solved by joulepath's SQP from STARTS initial guesses (the straight line and random
+perturbations of it) on POINTS control points, and by IPOPT from IPOPT_STARTS initial guesses on the
+same spline. The SQP then refines IPOPT's motions, so that they satisfy the limits between the
+nodes, too. Finally it refines the best motion on twice as many spans. Limits are those of the
+robot, and the duration is free. `make bench` compares answers with the stored energies.
 """
 
 from __future__ import annotations
@@ -50,11 +53,15 @@ PATIENCE = 60.0  # longest time for one start [s]
 
 
 def perturbation(rng: np.random.Generator, space: bspline.Basis, nq: int) -> Array:
-    """Random displacement (m, nq) [rad] of an initial guess's free control points: waves that vanish at both ends."""
+    """Random displacement (m, nq) [rad] of an initial guess's free control points: waves that
+    vanish at both ends.
+    """
     size = np.exp(rng.uniform(*np.log(PERTURBATIONS)))
     at = bspline.greville(space.knots)[space.free]
     waves = np.sin(np.pi * np.outer(at, np.arange(1, MODES + 1)))
-    return np.asarray(waves @ (rng.normal(size=(MODES, nq)) * (size / np.arange(1, MODES + 1)[:, None])))
+    return np.asarray(
+        waves @ (rng.normal(size=(MODES, nq)) * (size / np.arange(1, MODES + 1)[:, None]))
+    )
 
 
 @cache
@@ -78,7 +85,9 @@ class Search:
         self.energy = np.inf
 
     def improve(self, guess: Guess) -> float:
-        """The energy [J] reached from an initial guess, inf without a motion. The best motion is stored."""
+        """The energy [J] reached from an initial guess, inf without a motion. The best motion is
+        stored.
+        """
         interval = duration_intervals(self.prepared, self.move.q_goal)[0]
         deadline = Deadline.after(PATIENCE)
         solver = FreeSpline(self.prepared, self.move.q_start, self.move.q_goal, deadline, interval)
@@ -140,12 +149,15 @@ def _ipopt(found: Search, moved: Array | None) -> float:
 
 
 def fingerprint(robot: Robot) -> str:
-    """Hash of the robot's parameters that energies and limits depend on: references are valid for these only."""
+    """Hash of the robot's parameters that energies and limits depend on: references are valid for
+    these only.
+    """
     friction = next(iter(robot.friction_laws.values()))
     parts_of = (robot.limits, robot.drives, friction, robot.electronics)
     # not `vars`: it has what was computed from the fields, too
     parameters = {each.name: getattr(part, each.name) for part in parts_of for each in fields(part)}
-    # names are no parameters, and joint ranges do not limit a motion between two configurations within them
+    # names are no parameters, and joint ranges do not limit a motion between two configurations
+    # within them
     left_out = {"name", "q_min", "q_max"}
     # terms of friction that the robot does not have
     left_out |= {term for term in ("load", "bend") if not np.any(parameters[term])}
@@ -166,8 +178,12 @@ def main() -> None:
     """Solves the tasks and stores the results."""
     arguments = parser(__doc__, seed=SEED)
     arguments.add_argument("--count", type=int, default=TASKS, help="tasks (%(default)s)")
-    arguments.add_argument("--starts", type=int, default=STARTS, help="initial guesses of the SQP (%(default)s)")
-    arguments.add_argument("--ipopt-starts", type=int, default=IPOPT_STARTS, help="and of IPOPT (%(default)s)")
+    arguments.add_argument(
+        "--starts", type=int, default=STARTS, help="initial guesses of the SQP (%(default)s)"
+    )
+    arguments.add_argument(
+        "--ipopt-starts", type=int, default=IPOPT_STARTS, help="and of IPOPT (%(default)s)"
+    )
     arguments.add_argument("--processes", type=int, default=2, help="processes (%(default)s)")
     arguments.add_argument("--output", type=Path, default=FILE, help="file to write (%(default)s)")
     given = arguments.parse_args()
@@ -188,12 +204,18 @@ def main() -> None:
     continued = {name: before.get(name) for name in settings} == settings
     rows: list[dict[str, Any]] = before["tasks"] if continued else []
     done = {row["index"] for row in rows}
-    one: Callable[[int], dict[str, Any]] = partial(search, given.seed, given.starts, given.ipopt_starts)
+    one: Callable[[int], dict[str, Any]] = partial(
+        search, given.seed, given.starts, given.ipopt_starts
+    )
     with multiprocessing.get_context("spawn").Pool(given.processes) as pool:
-        for row in pool.imap_unordered(one, (index for index in range(given.count) if index not in done)):
+        for row in pool.imap_unordered(
+            one, (index for index in range(given.count) if index not in done)
+        ):
             rows = sorted([*rows, row], key=lambda each: int(each["index"]))
             print(row, flush=True)
-            output.write_bytes(orjson.dumps({**settings, "tasks": rows}, option=orjson.OPT_INDENT_2) + b"\n")
+            output.write_bytes(
+                orjson.dumps({**settings, "tasks": rows}, option=orjson.OPT_INDENT_2) + b"\n"
+            )
 
 
 if __name__ == "__main__":

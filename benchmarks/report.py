@@ -1,4 +1,6 @@
-"""benchmarks/RESULTS.md from the results of the sections: requirements, distributions, other planners."""
+"""benchmarks/RESULTS.md from the results of the sections: requirements, distributions, other
+planners.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +14,13 @@ from benchmarks.service import ROOT
 RESULTS = ROOT / "benchmarks" / "RESULTS.md"
 
 
-def write(path: Path, machine: Results, results: dict[str, Results | None], took: float, whole: bool) -> None:
+def write(
+    path: Path, machine: Results, results: dict[str, Results | None], took: float, whole: bool
+) -> None:
     """Writes the report to `path` and the plot beside it."""
-    planners = Comparison.of({name: found for name, found in results.items() if name.startswith("planner-") and found})
+    planners = Comparison.of(
+        {name: found for name, found in results.items() if name.startswith("planner-") and found}
+    )
     parts = [
         _heading(machine, took, whole),
         _requirements(results),
@@ -38,13 +44,21 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def _heading(machine: Results, took: float, whole: bool) -> str:
     packages = ", ".join(f"{name} {version}" for name, version in machine["packages"].items())
-    scope = f"one run of {took / 60:.1f} minutes" if whole else "several runs, because not all sections ran again"
+    scope = (
+        f"one run of {took / 60:.1f} minutes"
+        if whole
+        else "several runs, because not all sections ran again"
+    )
     return (
         "# Results\n\n"
-        f"`make bench` wrote this page on {machine['date']}, in {scope}. Machine: {machine['cores']} cores of "
-        f"{machine['cpu']}, {machine['memory']:.0f} GiB of memory, load {machine['load']:.1f} before the run. "
-        f"Python {machine['python']}, {packages}. Each number is for one core unless stated otherwise. Times are wall "
-        "times. All tasks are random with a fixed seed, and none is left out: `benchmarks/tasks.py` and "
+        f"`make bench` wrote this page on {machine['date']}, in {scope}. Machine: "
+        f"{machine['cores']} cores of "
+        f"{machine['cpu']}, {machine['memory']:.0f} GiB of memory, load {machine['load']:.1f} "
+        "before the run. "
+        f"Python {machine['python']}, {packages}. Each number is for one core unless stated "
+        "otherwise. Times are wall "
+        "times. All tasks are random with a fixed seed, and none is left out: "
+        "`benchmarks/tasks.py` and "
         "`benchmarks/cells.py`."
     )
 
@@ -55,7 +69,16 @@ def _requirements(results: dict[str, Results | None]) -> str:
 
 
 def _distributions(results: dict[str, Results | None]) -> str:
-    header = ["task", "quantity", "n", "25th percentile", "median", "75th percentile", "95th percentile", "maximum"]
+    header = [
+        "task",
+        "quantity",
+        "n",
+        "25th percentile",
+        "median",
+        "75th percentile",
+        "95th percentile",
+        "maximum",
+    ]
     return "## Distributions\n\n" + table(header, _spreads(results))
 
 
@@ -63,14 +86,22 @@ def _spreads(results: dict[str, Results | None]) -> Iterator[list[str]]:
     """One row per measured distribution."""
     if solver := results.get("solver"):
         yield _spread("one candidate, B-spline", "time [ms]", solver["bspline"]["wall"], MS)
-        yield _spread("one candidate, time scaling", "time [ms]", solver["time_scaling"]["wall"], MS)
+        yield _spread(
+            "one candidate, time scaling", "time [ms]", solver["time_scaling"]["wall"], MS
+        )
         ratio = solver["self_collision"]["ratio"]
-        yield _spread("one candidate, B-spline", "time with / without self-collision constraints", ratio, 1, 2)
+        yield _spread(
+            "one candidate, B-spline", "time with / without self-collision constraints", ratio, 1, 2
+        )
     if scenes := results.get("scenes"):
         for kind, wall in scenes["wall"].items():
             yield _spread(f"among obstacles, {kind}", "time [ms]", wall, MS, 0)
         yield _spread("among obstacles", "obstacles", scenes["obstacles"], 1, 0)
-    for section, how in (("http", "one client"), ("success", "two clients"), ("tight", "tight bound")):
+    for section, how in (
+        ("http", "one client"),
+        ("success", "two clients"),
+        ("tight", "tight bound"),
+    ):
         for kind, wall in (results.get(section) or {"wall": {}})["wall"].items():
             if wall["count"]:
                 yield _spread(f"request, {kind}, {how}", "time [ms]", wall, MS, 0)
@@ -78,7 +109,10 @@ def _spreads(results: dict[str, Results | None]) -> Iterator[list[str]]:
         for kind, gap in (results.get(section) or {"gaps": {}})["gaps"].items():
             if gap["count"]:
                 yield _spread(
-                    f"random feasible requests, {kind}{what}", "gap, 1 - lower bound / energy [%]", gap, PERCENT
+                    f"random feasible requests, {kind}{what}",
+                    "gap, 1 - lower bound / energy [%]",
+                    gap,
+                    PERCENT,
                 )
     if quality := results.get("quality"):
         for name, points in (("excess", "control_points"), ("fine_excess", "fine_control_points")):
@@ -89,7 +123,9 @@ def _spreads(results: dict[str, Results | None]) -> Iterator[list[str]]:
 
 
 def _spread(task: str, quantity: str, spread: Results, factor: float, digits: int = 1) -> list[str]:
-    numbers = (f"{spread[name] * factor:.{digits}f}" for name in ("p25", "p50", "p75", "p95", "maximum"))
+    numbers = (
+        f"{spread[name] * factor:.{digits}f}" for name in ("p25", "p50", "p75", "p95", "maximum")
+    )
     return [task, quantity, str(spread["count"]), *numbers]
 
 
@@ -98,8 +134,13 @@ def _notes(results: dict[str, Results | None]) -> str:
     lines = []
     if scenes := results.get("scenes"):
         planned = sum(scenes["from_planned_path"].values())
-        lines.append(f"Among obstacles, the straight line in joint space collides in {scenes['blocked']} tasks.")
-        lines.append(f"Among obstacles, {planned} answers start from a planned collision-free path.")
+        lines.append(
+            f"Among obstacles, the straight line in joint space collides in {scenes['blocked']} "
+            "tasks."
+        )
+        lines.append(
+            f"Among obstacles, {planned} answers start from a planned collision-free path."
+        )
         lines += [f"Not solved: {each}." for each in scenes["unsolved"]]
     for section in ("http", "success", "tight"):
         found = results.get(section) or {"refused": [], "errors": []}
@@ -114,7 +155,15 @@ def _arms(found: Results | None) -> str:
     """Requests to a pose, per robot."""
     if found is None:
         return ""
-    header = ["robot", "joints", "answered", "errors", "time: median [ms]", "95th percentile [ms]", "gap: median [%]"]
+    header = [
+        "robot",
+        "joints",
+        "answered",
+        "errors",
+        "time: median [ms]",
+        "95th percentile [ms]",
+        "gap: median [%]",
+    ]
     rows = (
         [
             f"`{row['robot']}`",
@@ -127,7 +176,8 @@ def _arms(found: Results | None) -> str:
         for row in found["rows"]
     )
     text = (
-        "Random requests from joint positions to a pose, one client, one worker. A refusal without a true reason is an "
+        "Random requests from joint positions to a pose, one client, one worker. A refusal "
+        "without a true reason is an "
     )
     return f"## Robots\n\n{text}error.\n\n{table(header, rows)}"
 
@@ -137,10 +187,14 @@ def _load(found: Results | None) -> str:
         return ""
     return (
         "## Load\n\n"
-        f"Each of {found['clients']} clients sends its next request as soon as the last one is answered. "
-        f"{found['most_in_flight']} requests are in flight at all times on {found['cores']} workers. The service gives "
-        f"{found['per_second']:.0f} answers per second, {found['answers']} in all. The resident memory of its "
-        f"processes adds up to {found['memory_first']:.0f} MiB in the second quarter of the time, and to "
+        f"Each of {found['clients']} clients sends its next request as soon as the last one is "
+        "answered. "
+        f"{found['most_in_flight']} requests are in flight at all times on {found['cores']} "
+        "workers. The service gives "
+        f"{found['per_second']:.0f} answers per second, {found['answers']} in all. The resident "
+        "memory of its "
+        f"processes adds up to {found['memory_first']:.0f} MiB in the second quarter of the time, "
+        "and to "
         f"{found['memory_last']:.0f} MiB in the last."
     )
 

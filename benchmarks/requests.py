@@ -1,12 +1,14 @@
-"""Random requests to the service over HTTP. Every answer is checked; the exit code is 1 if a requirement fails.
+"""Random requests to the service over HTTP. Every answer is checked; the exit code is 1 if a
+requirement fails.
 
     python -m benchmarks.requests --count 300 --seed 0
     python -m benchmarks.requests --count 200 --robot panda --kind "joint to pose"
     python -m benchmarks.requests --count 100 --kind "joint to pose" --bound tight --line-every 0
 
-Starts the service with its default settings and sends joint-to-pose and pose-to-pose requests in turn. The certificate
-of each answer is checked, its spline is replayed here, and baselines, energy balance and lower bound are compared. Some
-tasks are also solved by time scaling with the same duration.
+Starts the service with its default settings and sends joint-to-pose and pose-to-pose requests in
+turn. The certificate of each answer is checked, its spline is replayed here, and baselines, energy
+balance and lower bound are compared. Some tasks are also solved by time scaling with the same
+duration.
 """
 
 from __future__ import annotations
@@ -63,7 +65,9 @@ def examine(task: RequestTask, answer: Answer) -> Outcome:
         typed = answer.headers.get("content-type", "").startswith(PROBLEM) and answer.status < 500
         outcome.problem = str(content.get("type", "")).rpartition("/")[2] or "untyped"
         if not typed:
-            outcome.errors.append(f"{answer.status} {outcome.problem} is no problem of the contract")
+            outcome.errors.append(
+                f"{answer.status} {outcome.problem} is no problem of the contract"
+            )
         return outcome
     outcome.errors = errors_found(task.body, content, task.T_start, task.T_goal)
     outcome.energy = objective(content)
@@ -76,7 +80,9 @@ def examine(task: RequestTask, answer: Answer) -> Outcome:
 
 
 def compare_with_line(client: Client, task: RequestTask, outcome: Outcome, duration: float) -> None:
-    """Requests the time-scaled motion of the same duration, and sets the relative excess of the energy over it."""
+    """Requests the time-scaled motion of the same duration, and sets the relative excess of the
+    energy over it.
+    """
     answer = client.optimize({**task.body, "method": "time_scaling", "duration": duration})
     content = answer.content
     if answer.status == 200:
@@ -85,8 +91,12 @@ def compare_with_line(client: Client, task: RequestTask, outcome: Outcome, durat
         outcome.errors.append(f"time scaling: {answer.status}")
 
 
-def send_all(service: Service, tasks: Sequence[RequestTask], clients: int = 1, line_every: int = 0) -> list[Outcome]:
-    """Sends every task by `clients` clients and checks the answers; compares every `line_every`-th with the line."""
+def send_all(
+    service: Service, tasks: Sequence[RequestTask], clients: int = 1, line_every: int = 0
+) -> list[Outcome]:
+    """Sends every task by `clients` clients and checks the answers; compares every `line_every`-th
+    with the line.
+    """
     local = threading.local()
 
     def one(task: RequestTask) -> Outcome:
@@ -121,7 +131,9 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "gap": Spread.of([o.gap for o in solved]),
         "gaps": {kind: Spread.of([o.gap for o in solved if o.task.kind == kind]) for kind in KINDS},
         "widest": max(solved, key=lambda o: o.gap).name if solved else "",
-        "wall": {kind: Spread.of([o.wall for o in solved if o.task.kind == kind]) for kind in KINDS},
+        "wall": {
+            kind: Spread.of([o.wall for o in solved if o.task.kind == kind]) for kind in KINDS
+        },
         "slowest": max(outcomes, key=lambda o: o.wall).name if outcomes else "",
         "candidates": Spread.of([o.candidates for o in solved]),
         "solves": Spread.of([o.solves for o in solved]),
@@ -129,7 +141,8 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "compared": len(relative_excess),
         "relative_excess": max(relative_excess, default=0.0),
         "worst": max(
-            (o for o in outcomes if o.relative_excess is not None), key=lambda o: o.relative_excess or 0.0
+            (o for o in outcomes if o.relative_excess is not None),
+            key=lambda o: o.relative_excess or 0.0,
         ).name
         if relative_excess
         else "",
@@ -140,10 +153,14 @@ def failed_requirements(results: dict[str, Any]) -> list[str]:
     """A message for every requirement that a run fails."""
     found = list(results["errors"])
     if results["valid_fraction"] < ANSWERED:
-        found.append(f"{results['valid_fraction']:.2%} of the answers are valid: required {ANSWERED:.0%} or more")
+        found.append(
+            f"{results['valid_fraction']:.2%} of the answers are valid: required {ANSWERED:.0%} or "
+            "more"
+        )
     if results["relative_excess"] > MOST_EXCESS:
         found.append(
-            f"{results['worst']}: {results['relative_excess']:.2%} more energy than the time-scaled motion, required "
+            f"{results['worst']}: {results['relative_excess']:.2%} more energy than the "
+            "time-scaled motion, required "
             f"{MOST_EXCESS:.0%} or less"
         )
     return found
@@ -151,7 +168,10 @@ def failed_requirements(results: dict[str, Any]) -> list[str]:
 
 def print_summary(results: dict[str, Any]) -> None:
     """Prints the statistics of a run."""
-    print(f"valid answers                 {results['valid']} of {results['count']} ({results['valid_fraction']:.2%})")
+    print(
+        f"valid answers                 {results['valid']} of {results['count']} "
+        f"({results['valid_fraction']:.2%})"
+    )
     print(f"status optimal                {results['optimal']} of {results['answered']}")
     print(f"problems                      {results['problems'] or 'none'}")
     for line in results["refused"][:20]:
@@ -164,7 +184,8 @@ def print_summary(results: dict[str, Any]) -> None:
     )
     for kind, gap in results["gaps"].items():
         print(
-            f"    {kind:14s}            median {gap.p50:.1%}, 90th percentile {gap.p90:.1%}, maximum {gap.maximum:.1%}"
+            f"    {kind:14s}            median {gap.p50:.1%}, 90th percentile {gap.p90:.1%}, "
+            f"maximum {gap.maximum:.1%}"
         )
     for kind, wall in results["wall"].items():
         print(f"wall time, {kind:14s}     {wall.times(1e3).formatted(' ms', 0)}")
@@ -172,7 +193,8 @@ def print_summary(results: dict[str, Any]) -> None:
     print(f"candidates                    {results['candidates'].formatted('', 0)}")
     print(f"NLPs solved                   {results['solves'].formatted('', 0)}")
     print(
-        f"excess over time scaling      maximum {results['relative_excess']:+.2%} of {results['compared']} tasks with "
+        f"excess over time scaling      maximum {results['relative_excess']:+.2%} of "
+        f"{results['compared']} tasks with "
         f"the same duration {results['worst'] and '(' + results['worst'] + ')'}"
     )
 
@@ -181,15 +203,23 @@ def main() -> int:
     """Runs the requests and checks the requirements."""
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, default=300, help="requests (%(default)s)")
-    arguments.add_argument("--clients", type=int, default=1, help="simultaneous requests (%(default)s)")
+    arguments.add_argument(
+        "--clients", type=int, default=1, help="simultaneous requests (%(default)s)"
+    )
     arguments.add_argument("--robot", choices=robot_names(), default="ur5e", help="(%(default)s)")
     arguments.add_argument("--deadline", type=float, help="of each request [s] (the service's)")
-    arguments.add_argument("--bound", choices=("normal", "tight"), default="normal", help="bound (%(default)s)")
+    arguments.add_argument(
+        "--bound", choices=("normal", "tight"), default="normal", help="bound (%(default)s)"
+    )
     arguments.add_argument("--kind", choices=KINDS, help="only this kind (default: in turn)")
-    arguments.add_argument("--line-every", type=int, default=5, help="compare every n-th task with time scaling")
+    arguments.add_argument(
+        "--line-every", type=int, default=5, help="compare every n-th task with time scaling"
+    )
     given = arguments.parse_args()
     tasks = list(request_tasks(given.seed, given.count, given.kind, given.robot))
-    settings = {"bound": given.bound} | ({} if given.deadline is None else {"deadline": given.deadline})
+    settings = {"bound": given.bound} | (
+        {} if given.deadline is None else {"deadline": given.deadline}
+    )
     tasks = [replace(task, body=task.body | settings) for task in tasks]
     with running() as service:
         outcomes = send_all(service, tasks, given.clients, given.line_every)

@@ -38,10 +38,17 @@ class Requirement:
 
 def requirements(results: dict[str, Results | None]) -> list[Requirement]:
     """The requirements of all sections that have results."""
-    return [each for name, rows in SECTIONS.items() if (found := results.get(name)) is not None for each in rows(found)]
+    return [
+        each
+        for name, rows in SECTIONS.items()
+        if (found := results.get(name)) is not None
+        for each in rows(found)
+    ]
 
 
-def _percentiles(task: str, wall: Results, digits: int = 0, **bounds: float) -> Iterator[Requirement]:
+def _percentiles(
+    task: str, wall: Results, digits: int = 0, **bounds: float
+) -> Iterator[Requirement]:
     """Requirements [ms] on percentiles of wall times [s]."""
     names = {"p50": "median", "p95": "95th percentile"}
     return (
@@ -65,7 +72,9 @@ def _solver(found: Results) -> Iterator[Requirement]:
 
 
 def _http(found: Results) -> Iterator[Requirement]:
-    yield from _percentiles("request, joint to pose", found["wall"]["joint to pose"], p50=100, p95=250)
+    yield from _percentiles(
+        "request, joint to pose", found["wall"]["joint to pose"], p50=100, p95=250
+    )
     yield from _gap("request, joint to pose", found["gap"], p50=5, p90=10)
 
 
@@ -75,7 +84,9 @@ def _scenes(found: Results) -> Iterator[Requirement]:
         yield from _percentiles(task, found["wall"][kind], p50=bound)
         solved = PERCENT * found["solved"][kind] / found["count"]
         yield Requirement(task, "solved tasks [%]", "mean", solved, 99, at_least=True, digits=1)
-    yield Requirement("among obstacles", "answers in collision", "count", len(found["collisions"]), 0)
+    yield Requirement(
+        "among obstacles", "answers in collision", "count", len(found["collisions"]), 0
+    )
 
 
 def _success(found: Results) -> Iterator[Requirement]:
@@ -85,7 +96,9 @@ def _success(found: Results) -> Iterator[Requirement]:
     yield Requirement(task, "errors found in answers", "count", len(found["errors"]), 0)
     yield from _gap(task, found["gap"], p50=5, p90=13)
     excess = PERCENT * found["relative_excess"]
-    yield Requirement(task, "energy above time scaling, same duration [%]", "maximum", excess, 1, digits=2)
+    yield Requirement(
+        task, "energy above time scaling, same duration [%]", "maximum", excess, 1, digits=2
+    )
 
 
 def _tight(found: Results) -> Iterator[Requirement]:
@@ -100,12 +113,21 @@ def _gap(task: str, gap: Results, p50: float, p90: float) -> Iterator[Requiremen
 
 def _arms(found: Results) -> Iterator[Requirement]:
     task, rows = "every robot, joint to pose", found["rows"]
-    valid = PERCENT * sum(row["answered"] for row in rows) / max(sum(row["count"] for row in rows), 1)
+    valid = (
+        PERCENT * sum(row["answered"] for row in rows) / max(sum(row["count"] for row in rows), 1)
+    )
     yield Requirement(task, "answers [%]", "mean", valid, 99, at_least=True, digits=1)
     yield Requirement(task, "wrong answers and refusals", "count", len(found["errors"]), 0)
     for row in rows:
         quantity = "gap, 1 - lower bound / energy [%]"
-        yield Requirement(f"`{row['robot']}`, to a pose", quantity, "median", PERCENT * row["gap"]["p50"], 12, digits=1)
+        yield Requirement(
+            f"`{row['robot']}`, to a pose",
+            quantity,
+            "median",
+            PERCENT * row["gap"]["p50"],
+            12,
+            digits=1,
+        )
         if row["joints"] > 6:
             yield from _percentiles(f"`{row['robot']}`, to a pose", row["wall"], p50=200, p95=600)
 
@@ -114,17 +136,30 @@ def _quality(found: Results) -> Iterator[Requirement]:
     task = f"best of {found['starts']} starts with {found['control_points']} control points"
     quantity, excess = "energy above it [%]", found["excess"]
     within = PERCENT * found["within_one_percent"]
-    yield Requirement(task, "tasks with at most 1 % more energy [%]", "mean", within, 95, at_least=True)
+    yield Requirement(
+        task, "tasks with at most 1 % more energy [%]", "mean", within, 95, at_least=True
+    )
     yield Requirement(task, quantity, "maximum", PERCENT * excess["maximum"], 3, digits=2)
 
 
 def _load(found: Results) -> Iterator[Requirement]:
     task, wall = f"{found['clients']} clients for {found['seconds']:.0f} s", found["wall"]
-    errors = sum(count for status, count in found["statuses"].items() if status != "200") + len(found["lost"])
+    errors = sum(count for status, count in found["statuses"].items() if status != "200") + len(
+        found["lost"]
+    )
     yield Requirement(task, "errors", "count", errors, 0)
-    yield Requirement(task, "99th percentile / median of the time", "value", wall["p99"] / wall["p50"], 4, digits=1)
+    yield Requirement(
+        task,
+        "99th percentile / median of the time",
+        "value",
+        wall["p99"] / wall["p50"],
+        4,
+        digits=1,
+    )
     growth = found["memory_last"] / found["memory_first"]
-    yield Requirement(task, "memory, last / second quarter of the time", "median", growth, 1.05, digits=3)
+    yield Requirement(
+        task, "memory, last / second quarter of the time", "median", growth, 1.05, digits=3
+    )
     yield Requirement(task, "workers replaced", "runs", 0 if found["same_workers"] else 1, 0)
 
 

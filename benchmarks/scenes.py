@@ -3,8 +3,10 @@
     python -m benchmarks.scenes --count 300 --seed 0
     python -m benchmarks.scenes --count 60 --method time_scaling
 
-Tables, shelves, boxes and cages take turns; every task has a collision-free path. Each is solved twice: joint to joint,
-which is one candidate, and joint to pose, a whole request. Pinocchio and Coal replay every answer at a period of
+Tables, shelves, boxes and cages take turns; every task has a collision-free path. Each is solved
+twice: joint to joint,
+which is one candidate, and joint to pose, a whole request. Pinocchio and Coal replay every answer
+at a period of
 0.1 ms.
 """
 
@@ -63,7 +65,9 @@ def run(task: CellTask, kind: str, method: MethodName = "bspline") -> Outcome:
     arm = task.arm
     goal: Array | Pose = task.q_goal if kind == KINDS[0] else Pose(task.T_goal)
     problem = Problem(
-        arm=Arm(robot=load_robot("ur5e"), scene=arm.scene, tool=arm.tool, T_flange_tcp=arm.T_flange_tcp),
+        arm=Arm(
+            robot=load_robot("ur5e"), scene=arm.scene, tool=arm.tool, T_flange_tcp=arm.T_flange_tcp
+        ),
         start=task.q_start,
         goal=goal,
         windings=kind != KINDS[0],
@@ -102,20 +106,32 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "draws": sum(o.task.draws for o in by_kind[KINDS[0]]),
         "obstacles": Spread.of([len(o.task.arm.scene.obstacles) for o in by_kind[KINDS[0]]]),
         "solved": {kind: sum(o.error is None for o in of) for kind, of in by_kind.items()},
-        "from_planned_path": {kind: sum(o.from_planned_path for o in of) for kind, of in by_kind.items()},
+        "from_planned_path": {
+            kind: sum(o.from_planned_path for o in of) for kind, of in by_kind.items()
+        },
         "wall": {kind: Spread.of([o.wall for o in of]) for kind, of in by_kind.items()},
-        "solves": {kind: Spread.of([o.solves for o in of if o.error is None]) for kind, of in by_kind.items()},
-        "cells": {cell: {kind: _solved(of, cell) for kind, of in by_kind.items()} for cell in CELLS},
+        "solves": {
+            kind: Spread.of([o.solves for o in of if o.error is None])
+            for kind, of in by_kind.items()
+        },
+        "cells": {
+            cell: {kind: _solved(of, cell) for kind, of in by_kind.items()} for cell in CELLS
+        },
         "errors": dict(Counter(o.error for o in outcomes if o.error)),
         "unsolved": [f"{o.name}: {o.error}" for o in outcomes if o.error],
-        "collisions": [f"{o.name}: in collision at {o.collisions} instants" for o in solved if o.collisions],
+        "collisions": [
+            f"{o.name}: in collision at {o.collisions} instants" for o in solved if o.collisions
+        ],
         "least_proven": min((o.proven for o in solved), default=np.nan),
     }
 
 
 def _solved(outcomes: Sequence[Outcome], cell: str) -> str:
     of = [o for o in outcomes if o.task.cell == cell]
-    return f"{sum(o.error is None for o in of)} of {len(of)}, median {Spread.of([o.wall for o in of]).p50:.2f} s"
+    return (
+        f"{sum(o.error is None for o in of)} of {len(of)}, median "
+        f"{Spread.of([o.wall for o in of]).p50:.2f} s"
+    )
 
 
 def failed_requirements(results: dict[str, Any]) -> list[str]:
@@ -123,14 +139,17 @@ def failed_requirements(results: dict[str, Any]) -> list[str]:
     found = list(results["collisions"])
     for kind, number in results["solved"].items():
         if number < SOLVED * results["count"]:
-            found.append(f"{kind}: {number} of {results['count']} solved, required {SOLVED:.0%} or more")
+            found.append(
+                f"{kind}: {number} of {results['count']} solved, required {SOLVED:.0%} or more"
+            )
     return found
 
 
 def print_summary(results: dict[str, Any]) -> None:
     """Prints the statistics of a run."""
     print(
-        f"tasks                       {results['count']} of {results['draws']} draws; straight line in collision in "
+        f"tasks                       {results['count']} of {results['draws']} draws; straight "
+        "line in collision in "
         f"{results['blocked']}"
     )
     print(f"obstacles                   {results['obstacles'].formatted('', 0)}")
@@ -152,10 +171,16 @@ def main() -> int:
     """Solves the tasks and checks the requirements."""
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, default=300, help="tasks (%(default)s)")
-    arguments.add_argument("--method", choices=METHODS, default="bspline", help="method (%(default)s)")
+    arguments.add_argument(
+        "--method", choices=METHODS, default="bspline", help="method (%(default)s)"
+    )
     given = arguments.parse_args()
     on_one_core()
-    outcomes = [run(task, kind, given.method) for task in cell_tasks(given.seed, given.count) for kind in KINDS]
+    outcomes = [
+        run(task, kind, given.method)
+        for task in cell_tasks(given.seed, given.count)
+        for kind in KINDS
+    ]
     results = summary(outcomes)
     print_summary(results)
     write_json(given.json, results)

@@ -28,7 +28,9 @@ PAUSE = 0.005  # between two attempts [s]
 
 @dataclass(frozen=True)
 class Answer:
-    """A response: status, raw body, headers in lower case, and wall time from sending to the last byte [s]."""
+    """A response: status, raw body, headers in lower case, and wall time from sending to the last
+    byte [s].
+    """
 
     status: int
     raw: bytes
@@ -42,14 +44,18 @@ class Answer:
 
 
 COMPUTED = {"Cache-Control": "no-cache"}
-"""Headers of a request whose answer is to be computed, although an equal request was answered before."""
+"""Headers of a request whose answer is to be computed, although an equal request was answered
+before.
+"""
 
 
 class Client:
     """One persistent connection from a loopback address; not thread-safe."""
 
     def __init__(self, port: int, address: str = "127.0.0.1") -> None:
-        self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=120, source_address=(address, 0))
+        self._connection = http.client.HTTPConnection(
+            "127.0.0.1", port, timeout=120, source_address=(address, 0)
+        )
 
     def get(self, path: str) -> Answer:
         """Raises OSError or http.client.HTTPException if there is no answer."""
@@ -132,7 +138,9 @@ class Service:
 
 @contextmanager
 def running(ready: bool = True, **environment: str) -> Iterator[Service]:
-    """A service with default settings on a free port; it ends with the context. Waits for `/readyz` if `ready`."""
+    """A service with default settings on a free port; it ends with the context. Waits for `/readyz`
+    if `ready`.
+    """
     port = _free_port()
     # a SIGTERM to the benchmark then ends the service, too
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
@@ -140,7 +148,9 @@ def running(ready: bool = True, **environment: str) -> Iterator[Service]:
     with tempfile.TemporaryFile() as log, tempfile.TemporaryDirectory() as folder:
         given = {"JOULEPATH_DATABASE_URL": f"sqlite:///{folder}/joulepath.db"} | given
         began = time.perf_counter()
-        process = subprocess.Popen([sys.executable, "-m", "joulepath.app"], cwd=ROOT, env=given, stdout=log, stderr=log)
+        process = subprocess.Popen(
+            [sys.executable, "-m", "joulepath.app"], cwd=ROOT, env=given, stdout=log, stderr=log
+        )
         service = Service(process, port, began, log)
         try:
             if ready:
@@ -161,20 +171,30 @@ def a_cluster(workers: int) -> Iterator[str]:
     port = _free_port()
     address = f"tcp://127.0.0.1:{port}"
     commands = [
-        ["distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", f"{port}", "--no-dashboard"],
+        [
+            "distributed.cli.dask_scheduler",
+            "--host",
+            "127.0.0.1",
+            "--port",
+            f"{port}",
+            "--no-dashboard",
+        ],
         ["joulepath.app.cli", "cluster-worker", address],
     ]
     given = os.environ | {"JOULEPATH_WORKERS": f"{workers}", "JOULEPATH_LOG_LEVEL": "error"}
     with contextlib.ExitStack() as stack:
         for command in commands:
-            process = subprocess.Popen([sys.executable, "-m", *command], cwd=ROOT, env=given, stderr=subprocess.DEVNULL)
+            process = subprocess.Popen(
+                [sys.executable, "-m", *command], cwd=ROOT, env=given, stderr=subprocess.DEVNULL
+            )
             stack.callback(process.wait)
             stack.callback(process.terminate)
         yield address
 
 
 def _free_port() -> int:
-    """A port that no connection of a client gets by chance: Linux gives them ports from 32768 on."""
+    """A port that no connection of a client gets by chance: Linux gives them ports from 32768
+    on."""
     for port in random.sample(range(20_000, 32_000), 100):
         with socket.socket() as free, contextlib.suppress(OSError):
             free.bind(("127.0.0.1", port))
@@ -193,7 +213,9 @@ def descendants(pid: int) -> set[int]:
     parents: dict[int, int] = {}
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
-            parents[int(folder.name)] = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
+            parents[int(folder.name)] = int(
+                (folder / "stat").read_text().rpartition(")")[2].split()[1]
+            )
     found, waiting = set[int](), {pid}
     while waiting:
         waiting = {child for child, parent in parents.items() if parent in waiting}

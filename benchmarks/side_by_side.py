@@ -1,9 +1,11 @@
-"""Planners on the same seeded tasks, task by task in turns: their ratio hardly hangs on a machine whose speed changes.
+"""Planners on the same seeded tasks, task by task in turns: their ratio hardly hangs on a machine
+whose speed changes.
 
     python -m benchmarks.side_by_side answer drake --count 20
 
-Every planner has a process of its own, on one core. The first one plans a task before and after each of the others, and
-all do so `--repeat` times. The median of a planner's times for a task counts.
+Every planner has a process of its own, on one core. The first one plans a task before and after
+each of the others, and all do so `--repeat` times. The median of a planner's times for a task
+counts.
 """
 
 from __future__ import annotations
@@ -57,11 +59,15 @@ class Worker:
         for line in self._process.stdout:
             if line.startswith(WALL):
                 return float(line.removeprefix(WALL))
-        raise RuntimeError("a planner's process ended; `make bench` installs the packages that the planners need")
+        raise RuntimeError(
+            "a planner's process ended; `make bench` installs the packages that the planners need"
+        )
 
 
 def serve(name: str, seed: int, count: int) -> None:
-    """Plans the tasks whose numbers come in, and tells their wall times [s]; at first that of building all."""
+    """Plans the tasks whose numbers come in, and tells their wall times [s]; at first that of
+    building all.
+    """
     planner, tasks = planner_of(name), list(moves(seed, count))
     print(f"{WALL}{attempt(planner, tasks[0])[0]}", flush=True)
     for line in sys.stdin:
@@ -88,7 +94,9 @@ def main() -> None:
     arguments.add_argument("first", choices=PLANNERS)
     arguments.add_argument("others", choices=PLANNERS, nargs="+")
     arguments.add_argument("--count", type=int, default=20, help="tasks (%(default)s)")
-    arguments.add_argument("--repeat", type=int, default=1, help="plans of a task by each of the others (%(default)s)")
+    arguments.add_argument(
+        "--repeat", type=int, default=1, help="plans of a task by each of the others (%(default)s)"
+    )
     given = arguments.parse_args()
     names, workers = [given.first, *given.others], list[Worker]()
     try:
@@ -102,10 +110,18 @@ def main() -> None:
         print(f"{name:10s} {Spread.of(own.tolist()).times(1e3).formatted(' ms')}")
     ratios = {}
     for name, own in zip(given.others, walls[1:], strict=True):
-        ratio, spread = float(np.median(own) / np.median(walls[0])), Spread.of((own / walls[0]).tolist())
+        ratio, spread = (
+            float(np.median(own) / np.median(walls[0])),
+            Spread.of((own / walls[0]).tolist()),
+        )
         ratios[name] = ratio
-        print(f"{name} / {given.first}: ratio of the medians {ratio:.1f}; ratio per task: {spread.formatted()}")
-    write_json(given.json, {"seed": given.seed, "names": names, "walls": walls.tolist(), "ratios": ratios})
+        print(
+            f"{name} / {given.first}: ratio of the medians {ratio:.1f}; ratio per task: "
+            f"{spread.formatted()}"
+        )
+    write_json(
+        given.json, {"seed": given.seed, "names": names, "walls": walls.tolist(), "ratios": ratios}
+    )
 
 
 if __name__ == "__main__":

@@ -1,11 +1,13 @@
-"""How far the energies of slow moves are above those of the same moves with other durations, spaces and methods.
+"""How far the energies of slow moves are above those of the same moves with other durations, spaces
+and methods.
 
     python -m benchmarks.energies --kind slow --count 200
 
-Three kinds take turns: all joints at no more than REDUCED, one joint at a speed of ONE_JOINT, all at TENTH of their
-limits of speed. Each answer is compared with fixed durations near its own, with four times the control points, evenly
-spaced and next to its own knots, and with the Lagrange method. Exits with 1 if the 95th percentile of the excess over
-the best of them is above MOST_EXCESS.
+Three kinds take turns: all joints at no more than REDUCED, one joint at a speed of ONE_JOINT, all
+at TENTH of their limits of speed. Each answer is compared with fixed durations near its own, with
+four times the control points, evenly spaced and next to its own knots, and with the Lagrange
+method. Exits with 1 if the 95th percentile of the excess over the best of them is above
+MOST_EXCESS.
 """
 
 from __future__ import annotations
@@ -46,7 +48,8 @@ REDUCED, ONE_JOINT, TENTH = 0.25, (0.02, 0.6), 0.1
 MOST_EXCESS = 3e-3
 # durations that are tried, in multiples of the answer's
 NEAR = (0.9, 0.97, 0.99, 0.997, 1.003, 1.01, 1.03, 1.1)
-# multiple of the control points, those of a first solve, and the relative decrease that ends the solve
+# multiple of the control points, those of a first solve, and the relative decrease that ends the
+# solve
 MORE, FEW, PROGRESS = 4, 13, 1e-5
 # so long that no search ends early [s]
 AMPLE = 600.0
@@ -67,17 +70,23 @@ def slow_problem(seed: int, index: int) -> tuple[SlowKind, Problem]:
 
 
 def other_searches(problem: Problem, duration: float) -> Iterator[tuple[str, float]]:
-    """Energies [J] of the same move, each with its name, at durations near that of the answer and by another method."""
+    """Energies [J] of the same move, each with its name, at durations near that of the answer and
+    by another method.
+    """
     for factor in NEAR:
         longest = duration * factor
         with suppress(JoulepathError):
-            yield f"{factor:g} T", _energy(replace(problem, duration_min=longest, duration_max=longest))
+            yield (
+                f"{factor:g} T",
+                _energy(replace(problem, duration_min=longest, duration_max=longest)),
+            )
     with suppress(JoulepathError):
         yield "lagrange", _energy(replace(problem, method="lagrange"))
 
 
 def more_points(problem: Problem, spline: Spline) -> Iterator[tuple[str, float]]:
-    """Energies [J] of the same move, each with its name, from the answer's motion in larger spaces."""
+    """Energies [J] of the same move, each with its name, from the answer's motion in larger
+    spaces."""
     prepared = PreparedProblem.of(problem)
     solver = FreeSpline(prepared, spline.control_points[0], spline.control_points[-1], NEVER)
     q, t = sampled(spline)
@@ -102,7 +111,9 @@ def _finer(solver: FreeSpline, spline: Spline) -> SolveResult:
 
 
 def compare(seed: int, count: int, json: Path | None) -> int:
-    """Solves the moves, prints how far they are above the best of their variants; 1 if that is too far."""
+    """Solves the moves, prints how far they are above the best of their variants; 1 if that is too
+    far.
+    """
     rows = []
     for index in range(count):
         kind, problem = slow_problem(seed, index)
@@ -123,7 +134,8 @@ def compare(seed: int, count: int, json: Path | None) -> int:
         }
         rows.append(row)
         print(
-            f"{index:4d} {kind:10s} {energy:9.2f} J, {answer.duration:7.3f} s, excess {row['excess']:7.3%} ({best}), "
+            f"{index:4d} {kind:10s} {energy:9.2f} J, {answer.duration:7.3f} s, excess "
+            f"{row['excess']:7.3%} ({best}), "
             f"{spent:.2f} s",
             flush=True,
         )

@@ -1,8 +1,9 @@
 """Time of one candidate, joint to joint, on one core: the free B-spline and the time-scaled line.
 
-The time is that of the method alone, from two configurations to a motion within all limits, also between the nodes. The
-refinement of the incumbent, the baselines and the certificate are not included. If start and goal have no
-self-collision, the B-spline is also timed with self-collision constraints, each task with and without in turn.
+The time is that of the method alone, from two configurations to a motion within all limits, also
+between the nodes. The refinement of the incumbent, the baselines and the certificate are not
+included. If start and goal have no self-collision, the B-spline is also timed with self-collision
+constraints, each task with and without in turn.
 """
 
 from __future__ import annotations
@@ -55,18 +56,24 @@ def measure(seed: int, count: int, method: MethodName) -> dict[str, Any]:
         "wall": Spread.of([wall for _, wall, _ in runs]),
         "iterations": Spread.of([outcome.iterations for _, _, outcome in runs]),
         "statuses": dict(Counter(outcome.status.value for _, _, outcome in runs)),
-        "unsolved": [f"seed {move.seed} index {move.index}" for move, _, o in runs if o.spline is None],
+        "unsolved": [
+            f"seed {move.seed} index {move.index}" for move, _, o in runs if o.spline is None
+        ],
     }
 
 
 def with_self_collision(seed: int, count: int) -> dict[str, Any]:
-    """Statistics of the time with self-collision constraints, and of its ratio to the time without, task by task."""
+    """Statistics of the time with self-collision constraints, and of its ratio to the time without,
+    task by task.
+    """
     model = CollisionModel(Arm(robot=load_robot("ur5e")))
     ratios, walls = [], []
     for move in moves(seed, count):
         if model.least_distance(np.stack([move.q_start, move.q_goal]), RESERVE) <= RESERVE:
             continue
-        without, with_links = (solve(move, "bspline", collisions)[0] for collisions in (False, True))
+        without, with_links = (
+            solve(move, "bspline", collisions)[0] for collisions in (False, True)
+        )
         ratios.append(with_links / without)
         walls.append(with_links)
     return {"wall": Spread.of(walls), "ratio": Spread.of(ratios)}
@@ -80,7 +87,9 @@ def main() -> None:
     on_one_core()
     compile_kernel(load_robot("ur5e"))
     warm_up("ur5e")
-    results: dict[str, Any] = {method: measure(given.seed, given.count, method) for method in METHODS}
+    results: dict[str, Any] = {
+        method: measure(given.seed, given.count, method) for method in METHODS
+    }
     for method, found in results.items():
         print(f"{method:13s} time {found['wall'].times(1e3).formatted(' ms')}")
         print(f"{method:13s} iterations {found['iterations'].formatted('', 0)}")

@@ -28,7 +28,10 @@ class Spread:
         """The statistics of a sample; NaN for an empty one."""
         if not len(values):
             return Spread(0, *[math.nan] * 8)
-        return Spread(len(values), *(float(np.percentile(values, p)) for p in (0, 25, 50, 75, 90, 95, 99, 100)))
+        return Spread(
+            len(values),
+            *(float(np.percentile(values, p)) for p in (0, 25, 50, 75, 90, 95, 99, 100)),
+        )
 
     def times(self, factor: float) -> Spread:
         """The same statistics in another unit."""
@@ -39,5 +42,6 @@ class Spread:
         numbers = {name: f"{value:.{digits}f}" for name, value in asdict(self).items()}
         return (
             f"median {numbers['p50']}{unit}, 95th percentile {numbers['p95']}{unit} "
-            f"(quartiles {numbers['p25']} and {numbers['p75']}, maximum {numbers['maximum']}, n = {self.count})"
+            f"(quartiles {numbers['p25']} and {numbers['p75']}, maximum {numbers['maximum']}, n = "
+            f"{self.count})"
         )

@@ -1,4 +1,6 @@
-"""Seeded random tasks. Task `index` of a seed is drawn by a generator with seed (seed, index); none is left out."""
+"""Seeded random tasks. Task `index` of a seed is drawn by a generator with seed (seed, index); none
+is left out.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,8 @@ MOUNTS = {"floor": [0.0, 0.0, -9.81], "wall": [9.81, 0.0, 0.0], "ceiling": [0.0,
 
 @dataclass(frozen=True)
 class Move:
-    """A motion between two configurations (nq,) [rad]; each joint is uniform over one turn within its limits.
+    """A motion between two configurations (nq,) [rad]; each joint is uniform over one turn within
+    its limits.
 
     Collisions are ignored, because the other planners do not check them.
     """
@@ -35,7 +38,9 @@ class Move:
 
 @dataclass(frozen=True)
 class RequestTask:
-    """A body for `POST /optimize`, and the configurations (nq,) [rad] and poses T_base_flange (4, 4) it was made of."""
+    """A body for `POST /optimize`, and the configurations (nq,) [rad] and poses T_base_flange (4,
+    4) it was made of.
+    """
 
     seed: int
     index: int
@@ -61,11 +66,13 @@ def moves(seed: int, count: int, robot: Robot | None = None) -> Iterator[Move]:
     return (move(seed, index, robot) for index in range(count))
 
 
-def request_task(seed: int, index: int, kind: Kind | None = None, robot: str = "ur5e") -> RequestTask:
+def request_task(
+    seed: int, index: int, kind: Kind | None = None, robot: str = "ur5e"
+) -> RequestTask:
     """Task `index` of a seed: a request with default settings between reachable targets.
 
-    A target is the pose, or the joint positions, of a configuration that is uniform over the joint ranges and without
-    self-collision. The kinds alternate if `kind` is None.
+    A target is the pose, or the joint positions, of a configuration that is uniform over the joint
+    ranges and without self-collision. The kinds alternate if `kind` is None.
     """
     arm = load_robot(robot)
     rng = np.random.default_rng([seed, index])
@@ -86,7 +93,9 @@ def collision_free(rng: np.random.Generator, robot: Robot) -> Array:
             return np.asarray(q)
 
 
-def request_tasks(seed: int, count: int, kind: Kind | None = None, robot: str = "ur5e") -> Iterator[RequestTask]:
+def request_tasks(
+    seed: int, count: int, kind: Kind | None = None, robot: str = "ur5e"
+) -> Iterator[RequestTask]:
     """The first `count` requests of a seed, all of one kind if `kind` is given."""
     return (request_task(seed, index, kind, robot) for index in range(count))
 

@@ -1,4 +1,5 @@
-"""Sends a request to a service on this machine and prints what one wants to know first. Needs Python alone.
+"""Sends a request to a service on this machine and prints what one wants to know first. Needs
+Python alone.
 
 python3 examples/first_saving.py [FILE] [ADDRESS]
 """
@@ -17,14 +18,19 @@ HERE = Path(__file__).parent
 
 def ask(path: Path, address: str) -> dict[str, Any]:
     """The answer to the request in a file. Exits with the service's reason if there is none."""
-    request = urllib.request.Request(f"{address}/optimize", path.read_bytes(), {"Content-Type": "application/json"})
+    request = urllib.request.Request(
+        f"{address}/optimize", path.read_bytes(), {"Content-Type": "application/json"}
+    )
     try:
         with urllib.request.urlopen(request) as reply:
             answer: dict[str, Any] = json.load(reply)
             return answer
     except urllib.error.HTTPError as error:
         problem = json.load(error)
-        where = ["/".join(map(str, each["loc"])) + ": " + each["msg"] for each in problem.get("errors", [])]
+        where = [
+            "/".join(map(str, each["loc"])) + ": " + each["msg"]
+            for each in problem.get("errors", [])
+        ]
         sys.exit("\n".join([problem["detail"], *where]))
     except urllib.error.URLError as error:
         sys.exit(f"No service answers at {address} ({error.reason}). Start one with `make serve`.")
@@ -42,7 +48,10 @@ def main() -> None:
             needs = f"{each['electrical']:5.0f} J in {each['duration']:.2f} s"
             print(f"{each['name']:22s} {needs}  ({100 * each['saving']:.0f} % saved)")
     print(f"no motion needs less   {bound:5.0f} J")
-    print("turn to, in degrees:  ", [round(57.29577951308232 * q, 1) for q in answer["branch"]["goal"]["q"]])
+    print(
+        "turn to, in degrees:  ",
+        [round(57.29577951308232 * q, 1) for q in answer["branch"]["goal"]["q"]],
+    )
     print("greatest value / limit:", round(max(answer["certificate"]["worst_ratio"].values()), 3))
     for warning in answer.get("warnings", []):
         print("note:", warning)

@@ -1,13 +1,16 @@
 """Writes the paper's requests: from the home of the UR5e paper
 
 - paper_pose_1.json to paper_pose_15.json: to each pose of its Table 1
-- paper_position_1.json to paper_position_3.json: to any of the five orientations of each position of that table
-- paper_motion_1.json to paper_motion_15.json, for `POST /evaluate`: the paper's own motion to each configuration of its
+- paper_position_1.json to paper_position_3.json: to any of the five orientations of each position
+  of that table
+- paper_motion_1.json to paper_motion_15.json, for `POST /evaluate`: the paper's own motion to each
+  configuration of its
   Table 2 and back, at constant joint speed
 
     .venv/bin/python examples/make_paper_requests.py
 
-`tests/reference/README.md` names the paper and tells what is known of its frames and joint convention.
+`tests/reference/README.md` names the paper and tells what is known of its frames and joint
+convention.
 """
 
 from __future__ import annotations
@@ -42,7 +45,9 @@ def requests() -> dict[str, dict[str, Any]]:
         }
         for row in rows
     ]
-    by_name: dict[str, Any] = {f"paper_pose_{number}.json": goal for number, goal in enumerate(goals, start=1)}
+    by_name: dict[str, Any] = {
+        f"paper_pose_{number}.json": goal for number, goal in enumerate(goals, start=1)
+    }
     positions = range(0, len(goals), ORIENTATIONS)
     for number, first in enumerate(positions, start=1):
         by_name[f"paper_position_{number}.json"] = {"any_of": goals[first : first + ORIENTATIONS]}
@@ -73,7 +78,12 @@ def to_ur(degrees: list[float]) -> list[float]:
 def text(request: dict[str, Any]) -> str:
     """A request as it stands in its file: indented, but for lists of numbers."""
     indented = json.dumps(request, indent=2)
-    return re.sub(r"\[\s+([^\[\]{}]*?)\s+\]", lambda found: f"[{' '.join(found[1].split())}]", indented) + "\n"
+    return (
+        re.sub(
+            r"\[\s+([^\[\]{}]*?)\s+\]", lambda found: f"[{' '.join(found[1].split())}]", indented
+        )
+        + "\n"
+    )
 
 
 if __name__ == "__main__":

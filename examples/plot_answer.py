@@ -1,7 +1,10 @@
-"""Draws an answer: joint positions, speeds and motor torques, and the power drawn from the bus, over time.
+"""Draws an answer: joint positions, speeds and motor torques, and the power drawn from the bus,
+over time.
 
-    .venv/bin/python examples/plot_answer.py examples/optimize/paper_pose_1.json   asks the service and draws its answer
-    .venv/bin/python examples/plot_answer.py answer.json                           draws an answer that was saved
+    .venv/bin/python examples/plot_answer.py examples/optimize/paper_pose_1.json   asks the service
+    and draws its answer
+    .venv/bin/python examples/plot_answer.py answer.json                           draws an answer
+    that was saved
 
 The service is asked for the robot's limits either way. Needs matplotlib.
 """
@@ -25,7 +28,8 @@ COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 
 
 def call(url: str, body: bytes | None = None) -> dict[str, Any]:
-    """The JSON that the service answers; a refusal ends the program with the service's own words."""
+    """The JSON that the service answers; a refusal ends the program with the service's own
+    words."""
     request = urllib.request.Request(url, body, {"Content-Type": "application/json"})
     try:
         with urllib.request.urlopen(request, timeout=120) as answer:
@@ -33,16 +37,25 @@ def call(url: str, body: bytes | None = None) -> dict[str, Any]:
     except urllib.error.HTTPError as error:
         sys.exit(f"{url}: {error.code} {json.load(error).get('detail', error.reason)}")
     except urllib.error.URLError as error:
-        sys.exit(f"{url}: {error.reason}. Start the service with `make serve`, or name it with --service.")
+        sys.exit(
+            f"{url}: {error.reason}. Start the service with `make serve`, or name it with "
+            "--service."
+        )
     return content
 
 
 def command(document: str | None, file: str) -> argparse.ArgumentParser:
     """The command line of a program that draws what the service answers to a `file`."""
-    parser = argparse.ArgumentParser(description=document, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=document, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("file", type=Path, help=file)
-    parser.add_argument("--service", default="http://127.0.0.1:8000", help="where the service is (%(default)s)")
-    parser.add_argument("--output", type=Path, help="the picture (default: the file's name with .png, here)")
+    parser.add_argument(
+        "--service", default="http://127.0.0.1:8000", help="where the service is (%(default)s)"
+    )
+    parser.add_argument(
+        "--output", type=Path, help="the picture (default: the file's name with .png, here)"
+    )
     return parser
 
 
@@ -60,25 +73,42 @@ def limits_of(service: str, robot: str, request: dict[str, Any]) -> dict[str, li
     for name in ("velocity", "torque"):
         given = (request.get("limits") or {}).get(name)
         own: list[float] = figures[name]["value"]
-        limits[name] = own if given is None else given if isinstance(given, list) else [given] * len(own)
+        limits[name] = (
+            own if given is None else given if isinstance(given, list) else [given] * len(own)
+        )
     return limits
 
 
-def draw_joints(axes: Axes, t: Sequence[float], samples: Sequence[Sequence[float]], joints: Sequence[int]) -> None:
+def draw_joints(
+    axes: Axes, t: Sequence[float], samples: Sequence[Sequence[float]], joints: Sequence[int]
+) -> None:
     """One line per joint."""
     for joint in joints:
-        axes.plot(t, [sample[joint] for sample in samples], color=COLOURS[joint % len(COLOURS)], label=f"J{joint + 1}")
+        axes.plot(
+            t,
+            [sample[joint] for sample in samples],
+            color=COLOURS[joint % len(COLOURS)],
+            label=f"J{joint + 1}",
+        )
 
 
 def draw_limit(axes: Axes, limit: float) -> None:
     """A line at both ends of a symmetric limit."""
     for value in (limit, -limit):
         axes.axhline(value, color="0.35", linestyle="--", linewidth=1)
-    axes.annotate("limit", (1, limit), xycoords=("axes fraction", "data"), xytext=(3, -3), textcoords="offset points")
+    axes.annotate(
+        "limit",
+        (1, limit),
+        xycoords=("axes fraction", "data"),
+        xytext=(3, -3),
+        textcoords="offset points",
+    )
 
 
 def draw(answer: dict[str, Any], limits: dict[str, list[float]]) -> Figure:
-    """The whole figure: one panel each for position, speed and power, one per group of joints of equal torque limit."""
+    """The whole figure: one panel each for position, speed and power, one per group of joints of
+    equal torque limit.
+    """
     motion, energy = answer["trajectory"], answer["energy"]
     t, joints = motion["t"], range(len(motion["q"][0]))
     groups = [
@@ -107,15 +137,22 @@ def draw(answer: dict[str, Any], limits: dict[str, list[float]]) -> Figure:
     power.fill_between(t, motion["power"], color="black", alpha=0.12, linewidth=0)
     power.set(ylabel="bus power [W]", xlabel="time [s]", ylim=(0, None), xlim=(t[0], t[-1]))
     power.annotate(
-        f"{energy['electrical']['total']:.1f} J, mean {energy['mean_power']:.0f} W, peak {energy['peak_power']:.0f} W",
+        f"{energy['electrical']['total']:.1f} J, mean {energy['mean_power']:.0f} W, peak "
+        f"{energy['peak_power']:.0f} W",
         (0.5, 0.08),
         xycoords="axes fraction",
         ha="center",
     )
-    figure.legend(*position.get_legend_handles_labels(), loc="outside lower center", ncols=len(joints), frameon=False)
+    figure.legend(
+        *position.get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=len(joints),
+        frameon=False,
+    )
     branch = answer["branch"]
     figure.suptitle(
-        f"{answer['robot']}, {answer['method']}, least {answer['objective']} energy: {answer['duration']:.3f} s, "
+        f"{answer['robot']}, {answer['method']}, least {answer['objective']} energy: "
+        f"{answer['duration']:.3f} s, "
         f"{branch['start']['label']} to {branch['goal']['label']}",
         fontsize=10,
     )
@@ -125,10 +162,14 @@ def draw(answer: dict[str, Any], limits: dict[str, list[float]]) -> Figure:
 
 def main() -> None:
     """Ask if need be, draw, save."""
-    arguments = command(__doc__, "a request, which is sent to the service, or a saved answer").parse_args()
+    arguments = command(
+        __doc__, "a request, which is sent to the service, or a saved answer"
+    ).parse_args()
     content = json.loads(arguments.file.read_text())
     saved = "trajectory" in content
-    answer = content if saved else call(f"{arguments.service}/optimize", json.dumps(content).encode())
+    answer = (
+        content if saved else call(f"{arguments.service}/optimize", json.dumps(content).encode())
+    )
     limits = limits_of(arguments.service, answer["robot"], {} if saved else content)
     save(draw(answer, limits), arguments, dpi=150)
 

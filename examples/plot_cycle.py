@@ -15,22 +15,37 @@ from examples.plot_answer import COLOURS, call, command, save
 
 
 def draw(answer: dict[str, Any], powers: list[tuple[list[float], list[float]]]) -> Figure:
-    """Power drawn from the supply; `powers` has times from the start of the cycle [s] and powers [W] of each leg."""
+    """Power drawn from the supply; `powers` has times from the start of the cycle [s] and powers
+    [W] of each leg.
+    """
     figure = Figure(figsize=(9, 3.6), layout="constrained")
     axes = figure.subplots()
     for leg, (t, power) in zip(answer["legs"], powers, strict=True):
         loaded = leg["payload_mass"] > 0
-        axes.fill_between(t, power, color=COLOURS[1] if loaded else COLOURS[0], alpha=0.35 if leg["answer"] else 0.8)
+        axes.fill_between(
+            t,
+            power,
+            color=COLOURS[1] if loaded else COLOURS[0],
+            alpha=0.35 if leg["answer"] else 0.8,
+        )
         axes.plot(t, power, color="0.25", linewidth=0.8)
         if leg["answer"] and leg["goal"]["stop"] != "start":
             end = leg["t0"] + leg["duration"]
             axes.axvline(end, color="0.6", linewidth=0.6)
             axes.annotate(
-                leg["goal"]["stop"], (end, 1), (2, -2), ("data", "axes fraction"), "offset points", va="top",
-                fontsize=8, rotation=90,
-            )  # fmt: skip
+                leg["goal"]["stop"],
+                (end, 1),
+                (2, -2),
+                ("data", "axes fraction"),
+                "offset points",
+                va="top",
+                fontsize=8,
+                rotation=90,
+            )
     energy = answer["energy"]["electrical"]["total"]
-    saved = ", ".join(f"{each['saving']:.0%} less than {each['name']}" for each in answer["baselines"])
+    saved = ", ".join(
+        f"{each['saving']:.0%} less than {each['name']}" for each in answer["baselines"]
+    )
     axes.set_title(f"{answer['robot']}: {energy:.0f} J a cycle, {saved}", fontsize=10)
     axes.set(xlabel="time [s]", ylabel="power from the supply [W]", xlim=(0, answer["duration"]))
     axes.set_ylim(bottom=0)

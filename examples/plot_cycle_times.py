@@ -1,9 +1,10 @@
 """Draws the energy of a cycle over its time: one request for each of some times, and its baselines.
 
-    .venv/bin/python -m examples.plot_cycle_times examples/cycle/pick_and_place.json --output cycle_times.png
+    .venv/bin/python -m examples.plot_cycle_times examples/cycle/pick_and_place.json --output
+    cycle_times.png
 
-asks the service once without a time, then for each of `--ratios` of the duration of that answer, and draws the answers.
-Needs matplotlib.
+asks the service once without a time, then for each of `--ratios` of the duration of that answer,
+and draws the answers. Needs matplotlib.
 """
 
 from __future__ import annotations
@@ -17,11 +18,16 @@ from matplotlib.figure import Figure
 from examples.plot_answer import COLOURS, call, command, save
 
 RATIOS = (0.97, 1.05, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0)
-BASELINES = {"same_factor": "every move slowed alike", "fastest_then_wait": "as fast as possible, then waiting"}
+BASELINES = {
+    "same_factor": "every move slowed alike",
+    "fastest_then_wait": "as fast as possible, then waiting",
+}
 
 
 def draw(answers: Sequence[dict[str, Any]]) -> Figure:
-    """Energy over duration: the answers', their lower bounds and their baselines; the first one chose its time."""
+    """Energy over duration: the answers', their lower bounds and their baselines; the first one
+    chose its time.
+    """
     figure = Figure(figsize=(8, 4.2), layout="constrained")
     axes = figure.subplots()
     free, timed = answers[0], sorted(answers, key=lambda each: each["duration"])
@@ -34,14 +40,32 @@ def draw(answers: Sequence[dict[str, Any]]) -> Figure:
             for each in answer["baselines"]
             if each["name"] == name and each["within_limits"]
         ]
-        axes.plot(*zip(*known, strict=True), color=colour, marker="s", markersize=3, linewidth=1, label=title)
+        axes.plot(
+            *zip(*known, strict=True),
+            color=colour,
+            marker="s",
+            markersize=3,
+            linewidth=1,
+            label=title,
+        )
     axes.plot(times, energies, color=COLOURS[0], marker="o", markersize=4, label="answer")
     axes.plot(
-        times, [each["energy"]["lower_bound"] for each in timed], color=COLOURS[0], linestyle=":", label="lower bound"
+        times,
+        [each["energy"]["lower_bound"] for each in timed],
+        color=COLOURS[0],
+        linestyle=":",
+        label="lower bound",
     )
     best = free["duration"], free["energy"]["electrical"]["total"]
-    axes.annotate("no time given", best, (46, -60), textcoords="offset points", ha="center", fontsize=9,
-                  arrowprops={"arrowstyle": "-", "color": "0.5"})  # fmt: skip
+    axes.annotate(
+        "no time given",
+        best,
+        (46, -60),
+        textcoords="offset points",
+        ha="center",
+        fontsize=9,
+        arrowprops={"arrowstyle": "-", "color": "0.5"},
+    )
     axes.set(xlabel="time of the cycle [s]", ylabel="energy of the cycle [J]")
     axes.set_ylim(bottom=0)
     axes.spines[["right", "top"]].set_visible(False)
@@ -52,7 +76,9 @@ def draw(answers: Sequence[dict[str, Any]]) -> Figure:
 def main() -> None:
     """Ask, draw, save."""
     parser = command(__doc__, "a request for POST /cycle")
-    parser.add_argument("--ratios", type=float, nargs="+", default=RATIOS, help="of the duration (%(default)s)")
+    parser.add_argument(
+        "--ratios", type=float, nargs="+", default=RATIOS, help="of the duration (%(default)s)"
+    )
     arguments = parser.parse_args()
     asked: dict[str, Any] = json.loads(arguments.file.read_bytes())
 

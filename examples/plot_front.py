@@ -21,16 +21,36 @@ def draw(front: dict[str, Any]) -> Figure:
     axes = figure.subplots()
     points = front["points"]
     durations, energies = ([point[name] for point in points] for name in ("duration", "energy"))
-    axes.step(durations, energies, where="post", color="0.6", linewidth=1, label="least energy within a duration")
+    axes.step(
+        durations,
+        energies,
+        where="post",
+        color="0.6",
+        linewidth=1,
+        label="least energy within a duration",
+    )
     groups: dict[str, list[dict[str, Any]]] = {}
     for point in points:
         groups.setdefault(f"{point['start']} to {point['goal']}", []).append(point)
     for colour, (label, group) in zip(cycle(COLOURS), groups.items(), strict=False):
-        axes.plot([p["duration"] for p in group], [p["energy"] for p in group], "o", color=colour, label=label)
+        axes.plot(
+            [p["duration"] for p in group],
+            [p["energy"] for p in group],
+            "o",
+            color=colour,
+            label=label,
+        )
     axes.plot(
-        durations, [p["lower_bound"] for p in points], "_", color="0.35", label="proven lower bound at that duration"
+        durations,
+        [p["lower_bound"] for p in points],
+        "_",
+        color="0.35",
+        label="proven lower bound at that duration",
     )
-    title = f"{front['robot']}: the motions that none beats in both {front['objective']} energy and duration"
+    title = (
+        f"{front['robot']}: the motions that none beats in both {front['objective']} energy "
+        "and duration"
+    )
     axes.set_title(title, fontsize=10)
     axes.set(xlabel="duration [s]", ylabel=f"{front['objective']} energy [J]")
     axes.margins(y=0.12)

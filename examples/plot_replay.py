@@ -1,4 +1,5 @@
-"""Draws the motors' torques of a motion, planned and played in MuJoCo, on the arm as planned and with more friction.
+"""Draws the motors' torques of a motion, planned and played in MuJoCo, on the arm as planned and
+with more friction.
 
     .venv/bin/python -m examples.plot_replay docs/replay_torques.png
 
@@ -25,7 +26,10 @@ from joulepath.optimizer.replay.simulated_arm import SimulatedArm, with_changes
 
 # Okabe and Ito's palette, which colour-blind readers can tell apart
 COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
-LOW, HOME = np.array([0.5, -2.57, 2.57, -1.07, -1.07, 0.5]), np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
+LOW, HOME = (
+    np.array([0.5, -2.57, 2.57, -1.07, -1.07, 0.5]),
+    np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]),
+)
 STEP, FRICTION = 2.5e-4, 1.3
 # simulated steps from one mark to the next
 MARKS = 120
@@ -33,7 +37,9 @@ MARKS = 120
 
 def main() -> None:
     """Optimises the motion, plays it twice, and draws both."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("file", type=Path, help="file for the picture")
     file = parser.parse_args().file
     arm = Arm(robot=load_robot("ur5e"), payload=Payload(mass=2.0, com=np.array([0.0, 0.0, 0.06])))
@@ -44,17 +50,28 @@ def main() -> None:
     simulated, t = SimulatedArm(arm), np.arange(len(motion.q)) * motion.step
     figure = Figure(figsize=(9, 7), layout="constrained")
     rows = figure.subplots(2, 1, sharex=True)
-    titles = ("The arm as planned", f"Friction times {FRICTION:g}, which the controller does not know")
+    titles = (
+        "The arm as planned",
+        f"Friction times {FRICTION:g}, which the controller does not know",
+    )
     for axes, title, factor in zip(rows, titles, (1.0, FRICTION), strict=True):
         simulated.carry(with_changes(arm, friction=factor))
         played = play(simulated, motion, asked)
         for joint, colour in enumerate(COLOURS):
             axes.plot(t, planned[:, joint], color=colour, linewidth=1.2)
             axes.plot(
-                t[::MARKS], played.tau_motor[::MARKS, joint], "o", color=colour, markersize=4, label=f"J{joint + 1}"
+                t[::MARKS],
+                played.tau_motor[::MARKS, joint],
+                "o",
+                color=colour,
+                markersize=4,
+                label=f"J{joint + 1}",
             )
         off = float(np.abs(played.q - motion.q).max())
-        axes.set(title=f"{title}: joints within {1e3 * off:.2g} mrad of the motion", ylabel="motor torque [N·m]")
+        axes.set(
+            title=f"{title}: joints within {1e3 * off:.2g} mrad of the motion",
+            ylabel="motor torque [N·m]",
+        )
         axes.grid(alpha=0.3)
     rows[1].set_xlabel("time [s]")
     rows[0].legend(ncols=6, fontsize="small", title="lines: planned, dots: simulated")

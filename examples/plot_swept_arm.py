@@ -1,6 +1,8 @@
-"""Draws where an arm passes: its capsules at some instants of the motion, the scene, and the path of the TCP.
+"""Draws where an arm passes: its capsules at some instants of the motion, the scene, and the path
+of the TCP.
 
-    .venv/bin/python -m examples.plot_swept_arm examples/optimize/bin_to_shelf.json docs/bin_to_shelf.png
+    .venv/bin/python -m examples.plot_swept_arm examples/optimize/bin_to_shelf.json
+    docs/bin_to_shelf.png
 
 Solves the request with the library, from the repository's folder. Needs matplotlib.
 """
@@ -26,7 +28,9 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import TOOL
 
 # Okabe and Ito's blue to orange, which colour-blind readers can tell apart
-OVER_TIME = LinearSegmentedColormap.from_list("over time", ["#0072B2", "#56B4E9", "#F0E442", "#E69F00", "#D55E00"])
+OVER_TIME = LinearSegmentedColormap.from_list(
+    "over time", ["#0072B2", "#56B4E9", "#F0E442", "#E69F00", "#D55E00"]
+)
 OBSTACLE, LIGHT = "#9A9A9A", np.array([-0.4, -0.5, 0.77])
 AROUND, ALONG = 14, 4
 # what is drawn: its middle, and half its extent along x and y [m]
@@ -51,11 +55,17 @@ def capsule(a: Array, b: Array, radius: float) -> list[Array]:
 def quads(rings: Array) -> list[Array]:
     """Polygons between neighbouring points of a grid (n, m, 3)."""
     n, m, _ = rings.shape
-    return [rings[[i, i, i + 1, i + 1], [j, j + 1, j + 1, j]] for i in range(n - 1) for j in range(m - 1)]
+    return [
+        rings[[i, i, i + 1, i + 1], [j, j + 1, j + 1, j]]
+        for i in range(n - 1)
+        for j in range(m - 1)
+    ]
 
 
 def hull(points: Array) -> list[Array]:
-    """Triangles (3, 3) of a convex hull, each cut into smaller ones, so that they can be sorted by depth."""
+    """Triangles (3, 3) of a convex hull, each cut into smaller ones, so that they can be sorted by
+    depth.
+    """
     triangles = list(points[ConvexHull(points).simplices])
     for _ in range(4):
         longest = [max(np.linalg.norm(t - np.roll(t, 1, axis=0), axis=1)) for t in triangles]
@@ -68,7 +78,9 @@ def hull(points: Array) -> list[Array]:
 def quartered(t: Array) -> list[Array]:
     """Four triangles that make up one."""
     ab, bc, ca = (t + np.roll(t, -1, axis=0)) / 2
-    return [np.array(part) for part in ([t[0], ab, ca], [ab, t[1], bc], [ca, bc, t[2]], [ab, bc, ca])]
+    return [
+        np.array(part) for part in ([t[0], ab, ca], [ab, t[1], bc], [ca, bc, t[2]], [ab, bc, ca])
+    ]
 
 
 def surface(body: Body, T: Array) -> list[Array]:
@@ -84,7 +96,9 @@ def surface(body: Body, T: Array) -> list[Array]:
     if body.core.disc_radius:
         axis = (T @ body.T_link_core)[:3, :3]
         turn = np.linspace(0, 2 * np.pi, 2 * AROUND)
-        circle = body.core.disc_radius * (np.cos(turn)[:, None] * axis[:, 0] + np.sin(turn)[:, None] * axis[:, 1])
+        circle = body.core.disc_radius * (
+            np.cos(turn)[:, None] * axis[:, 0] + np.sin(turn)[:, None] * axis[:, 1]
+        )
         return hull(np.concatenate([point + circle for point in points]))
     return hull(points)
 
@@ -127,7 +141,10 @@ def draw(request: OptimizeRequest, file: Path, instants: int, view: tuple[float,
             colour = "#666666" if body.link <= 1 else to_hex(OVER_TIME(k / (instants - 1)))
             at_end = k in (0, instants - 1) or body.link <= 1
             add(
-                body, frames[k, body.link], "#333333" if body.name == TOOL and at_end else colour, 1 if at_end else 0.22
+                body,
+                frames[k, body.link],
+                "#333333" if body.name == TOOL and at_end else colour,
+                1 if at_end else 0.22,
             )
 
     figure = plt.figure(figsize=(9, 7.2))
@@ -136,12 +153,20 @@ def draw(request: OptimizeRequest, file: Path, instants: int, view: tuple[float,
         if body.cloud is not None:
             # the centres of its parts
             centres = body.cloud.tree.centres[body.cloud.tree.parts(body.patch)]
-            axes.scatter(*(centres @ body.T_link_core[:3, :3].T + body.T_link_core[:3, 3]).T, color=OBSTACLE, s=2)
-    axes.add_collection3d(Poly3DCollection(polygons, facecolors=colours, edgecolors="none", zsort="average"))
+            axes.scatter(
+                *(centres @ body.T_link_core[:3, :3].T + body.T_link_core[:3, 3]).T,
+                color=OBSTACLE,
+                s=2,
+            )
+    axes.add_collection3d(
+        Poly3DCollection(polygons, facecolors=colours, edgecolors="none", zsort="average")
+    )
     path = tcp_pose(problem.arm, spline.curve(np.linspace(0, spline.duration, 200)))[:, :3, 3]
     axes.plot(*path.T, color="black", linewidth=1.6, zorder=10, label="path of the TCP")
     for point, share, name in ((path[0], 0.0, "start"), (path[-1], 1.0, "goal")):
-        axes.scatter(*point, color=to_hex(OVER_TIME(share)), edgecolors="black", s=45, zorder=11, label=name)
+        axes.scatter(
+            *point, color=to_hex(OVER_TIME(share)), edgecolors="black", s=45, zorder=11, label=name
+        )
     (x_low, y_low), (x_high, y_high) = MIDDLE - HALF, MIDDLE + HALF
     axes.set(xlim=(x_low, x_high), ylim=(y_low, y_high), zlim=(-0.02, 0.88))
     axes.set_box_aspect((*(2 * HALF), 0.9), zoom=1.25)
@@ -149,18 +174,28 @@ def draw(request: OptimizeRequest, file: Path, instants: int, view: tuple[float,
     axes.view_init(*view)
     axes.legend(loc="upper left", frameon=False)
     clearance = solution.certificate.clearance
-    proven = "" if clearance is None else f", every margin kept by {1e3 * clearance.min_clearance:.2f} mm or more"
-    figure.suptitle(f"{solution.energy.electrical.total:.1f} J in {spline.duration:.2f} s{proven}", y=0.93)
+    proven = (
+        ""
+        if clearance is None
+        else f", every margin kept by {1e3 * clearance.min_clearance:.2f} mm or more"
+    )
+    figure.suptitle(
+        f"{solution.energy.electrical.total:.1f} J in {spline.duration:.2f} s{proven}", y=0.93
+    )
     figure.savefig(file, dpi=110, bbox_inches="tight")
 
 
 def main() -> None:
     """Reads the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("request", type=Path, help="a request for POST /optimize")
     parser.add_argument("picture", type=Path, help="where to write the picture")
     parser.add_argument("--instants", type=int, default=10, help="how many arms to draw")
-    parser.add_argument("--view", type=float, nargs=2, default=(24.0, 160.0), help="elevation and azimuth [degrees]")
+    parser.add_argument(
+        "--view", type=float, nargs=2, default=(24.0, 160.0), help="elevation and azimuth [degrees]"
+    )
     given = parser.parse_args()
     request = OptimizeRequest.model_validate_json(given.request.read_text())
     draw(request, given.picture, given.instants, tuple(given.view))

@@ -37,7 +37,13 @@ from .optimizer.export.rapid import RapidOptions
 from .optimizer.export.ros_messages import MoveitOptions, Ros2Options
 from .optimizer.export.rows import TableOptions
 from .optimizer.export.urscript import UrscriptOptions
-from .optimizer.identify.errors import MethodNotApplicable, NoPowerChannel, NotExcited, NothingHeldOut, PayloadUnknown
+from .optimizer.identify.errors import (
+    MethodNotApplicable,
+    NoPowerChannel,
+    NotExcited,
+    NothingHeldOut,
+    PayloadUnknown,
+)
 from .optimizer.identify.identify import Identification, identify
 from .optimizer.identify.logs.log import Log, LogMove
 from .optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge

@@ -1,1 +1,2 @@
-"""Robots: their figures, each with a source, and the loader. Knows nothing of optimisation or HTTP."""
+"""Robots: their figures, each with a source, and the loader. Knows nothing of optimisation or
+HTTP."""

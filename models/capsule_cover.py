@@ -1,8 +1,9 @@
 """Whether capsules hold surfaces: every point of every triangle, not only its corners.
 
-A capsule is convex: it holds a triangle if, and only if, it holds the three corners. A triangle that no single capsule
-holds is cut in two at the middle of its longest edge, until every piece lies in one capsule. This is a proof for every
-point of the surface; no point is sampled. A corner of a piece that is in no capsule is a point of the surface outside.
+A capsule is convex: it holds a triangle if, and only if, it holds the three corners. A triangle
+that no single capsule holds is cut in two at the middle of its longest edge, until every piece lies
+in one capsule. This is a proof for every point of the surface; no point is sampled. A corner of a
+piece that is in no capsule is a point of the surface outside.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ import numpy as np
 
 from joulepath.models.robot import Array, LinkCapsule
 
-# pieces with a longest edge below this [m] are not cut any further: they lie outside, or where capsules only touch
+# pieces with a longest edge below this [m] are not cut any further: they lie outside, or where
+# capsules only touch
 SMALLEST = 2e-5
 
 
@@ -24,15 +26,18 @@ def outside(points: Array, capsules: Sequence[LinkCapsule]) -> Array:
         begin, along = capsule.axis[0], capsule.axis[1] - capsule.axis[0]
         from_begin = points - begin
         share = np.clip(from_begin @ along / max(float(along @ along), 1e-18), 0.0, 1.0)
-        distances.append(np.linalg.norm(from_begin - share[:, None] * along, axis=1) - capsule.radius)
+        distances.append(
+            np.linalg.norm(from_begin - share[:, None] * along, axis=1) - capsule.radius
+        )
     return np.array(distances)
 
 
 def not_held(triangles: Array, capsules: Sequence[LinkCapsule]) -> Array:
-    """Pieces (k, 3, 3) [m] of triangles (t, 3, 3) [m] that no capsule is shown to hold; none if all are held.
+    """Pieces (k, 3, 3) [m] of triangles (t, 3, 3) [m] that no capsule is shown to hold; none if all
+    are held.
 
-    A piece has a corner outside of all capsules, or its longest edge is below SMALLEST. Triangles and capsules are in
-    the same frame.
+    A piece has a corner outside of all capsules, or its longest edge is below SMALLEST. Triangles
+    and capsules are in the same frame.
     """
     found, pieces = [np.empty((0, 3, 3))], triangles
     while len(pieces):
@@ -48,7 +53,9 @@ def not_held(triangles: Array, capsules: Sequence[LinkCapsule]) -> Array:
 
 
 def cut(triangles: Array, edge: np.ndarray[tuple[int, ...], np.dtype[np.intp]]) -> Array:
-    """Both halves (2 k, 3, 3) of triangles (k, 3, 3), cut at the middle of edge (k,): 0 joins corners 0 and 1."""
+    """Both halves (2 k, 3, 3) of triangles (k, 3, 3), cut at the middle of edge (k,): 0 joins
+    corners 0 and 1.
+    """
     rows = np.arange(len(triangles))
     a, b, c = (triangles[rows, (edge + k) % 3] for k in range(3))
     middle = (a + b) / 2

@@ -1,14 +1,15 @@
-"""Fit capsules to the links: `python -m joulepath.models.fit_capsules ROBOT MESHES [link …]` prints rows for
-figures.yaml.
+"""Fit capsules to the links: `python -m joulepath.models.fit_capsules ROBOT MESHES [link …]` prints
+rows for figures.yaml.
 
-MESHES is a folder as in `joulepath.models.meshes`. The fit starts from the capsules in figures.yaml and is local:
-how many
-capsules a link has, and where each of them begins, is the choice of who writes the rows.
+MESHES is a folder as in `joulepath.models.meshes`. The fit starts from the capsules in figures.yaml
+and is local: how many capsules a link has, and where each of them begins, is the choice of who
+writes the rows.
 
-It minimises ∫ (OFFSET + d) dV over what is inside of a capsule and outside of the link: d [m] is the distance from the
-link, so that far overhang costs most. What lies inside of an adjacent link at every angle of the joint costs nothing,
-as nothing else can be there. Samples of the surfaces outside of all capsules are penalised. Both are smoothed, more
-and more sharply. Radii then grow until every triangle is held: see `capsule_cover`.
+It minimises ∫ (OFFSET + d) dV over what is inside of a capsule and outside of the link: d [m] is
+the distance from the link, so that far overhang costs most. What lies inside of an adjacent link at
+every angle of the joint costs nothing, as nothing else can be there. Samples of the surfaces
+outside of all capsules are penalised. Both are smoothed, more and more sharply. Radii then grow
+until every triangle is held: see `capsule_cover`.
 """
 
 from __future__ import annotations
@@ -32,8 +33,15 @@ from joulepath.models.robot import Array, LinkCapsule, Mask, Robot
 CELL, REACH = 0.003, 0.08
 OFFSET = 0.002
 # smoothing [m] and weight of the penalty of each stage, and its most iterations
-STAGES = ((0.004, 1e-2, 40), (0.002, 5e-2, 40), (0.001, 3e-1, 60), (0.001, 3e-1, 60), (0.001, 3e-1, 60))
-# surface samples stay this far inside [m]; what the last stage leaves outside is mended by larger radii
+STAGES = (
+    (0.004, 1e-2, 40),
+    (0.002, 5e-2, 40),
+    (0.001, 3e-1, 60),
+    (0.001, 3e-1, 60),
+    (0.001, 3e-1, 60),
+)
+# surface samples stay this far inside [m]; what the last stage leaves outside is mended by larger
+# radii
 INSIDE = 3e-4
 # unit of the variables [m]: the first step of the solver is of length 1
 UNIT = 0.004
@@ -45,7 +53,9 @@ DIGIT = 1e-4
 
 @dataclass(frozen=True)
 class _Solid:
-    """A link on a grid: lowest corner [m], cells inside of its surfaces, distance [m] of every cell from the link."""
+    """A link on a grid: lowest corner [m], cells inside of its surfaces, distance [m] of every cell
+    from the link.
+    """
 
     corner: Array
     is_inside: Mask
@@ -62,7 +72,9 @@ class _Solid:
 
 @dataclass(frozen=True)
 class _Task:
-    """What the fit sees of a link: cells (c, 3) [m] outside, their weights (c,), and points of surfaces (p, 3) [m]."""
+    """What the fit sees of a link: cells (c, 3) [m] outside, their weights (c,), and points of
+    surfaces (p, 3) [m].
+    """
 
     cells: Array
     weights: Array
@@ -73,18 +85,31 @@ def fit(robot: Robot, folder: Path, link: int) -> list[LinkCapsule]:
     """Capsules that hold the link, from those that the robot has."""
     rng = np.random.default_rng(0)
     surfaces = list(link_surfaces(folder, robot.name, link).values())
-    checked = _outermost(np.vstack([sampled(each, CHECKED_SAMPLES, rng) for each in surfaces]), surfaces)
-    task = replace(_weighed(robot, folder, link, rng), points=checked[rng.choice(len(checked), SURFACE_SAMPLES)])
+    checked = _outermost(
+        np.vstack([sampled(each, CHECKED_SAMPLES, rng) for each in surfaces]), surfaces
+    )
+    task = replace(
+        _weighed(robot, folder, link, rng),
+        points=checked[rng.choice(len(checked), SURFACE_SAMPLES)],
+    )
     z = np.array([[*c.axis.ravel(), c.radius] for c in robot.capsules if c.link == link]).ravel()
     lower, upper = (np.tile([*[far] * 6, radius], len(z) // 7) / UNIT for far, radius in _RANGES)
     bounds = Bounds(lower, upper)
     for width, penalty, most in STAGES:
         found = minimize(
-            _cost, z / UNIT, (task, width, penalty), "L-BFGS-B", jac=True, bounds=bounds, options={"maxiter": most}
+            _cost,
+            z / UNIT,
+            (task, width, penalty),
+            "L-BFGS-B",
+            jac=True,
+            bounds=bounds,
+            options={"maxiter": most},
         )
         z = found.x * UNIT
         missed = checked[outside(checked, _capsules(z, link)).min(axis=0) > -INSIDE]
-        task = replace(task, points=np.vstack([task.points, missed[rng.permutation(len(missed))[:1000]]]))
+        task = replace(
+            task, points=np.vstack([task.points, missed[rng.permutation(len(missed))[:1000]]])
+        )
     capsules = _capsules(z, link)
     for _ in range(2):
         # where one had to grow, another may be larger than it has to be
@@ -96,7 +121,9 @@ _RANGES = ((-1.0, LEAST_RADIUS), (1.0, GREATEST_RADIUS))
 
 
 def _weighed(robot: Robot, folder: Path, link: int, rng: np.random.Generator) -> _Task:
-    """The cells around a link that may be in collision, each with OFFSET + distance, times its volume."""
+    """The cells around a link that may be in collision, each with OFFSET + distance, times its
+    volume.
+    """
     solid = _solid(folder, robot, link)
     index = np.argwhere((solid.distance > 0) & (solid.distance < REACH))
     cells, distance = solid.corner + (index + 0.5) * CELL, solid.distance[tuple(index.T)]
@@ -119,9 +146,13 @@ def _solid(folder: Path, robot: Robot, link: int) -> _Solid:
     """The grid of a link: inside is what the outside does not reach through its surfaces."""
     rng = np.random.default_rng(0)
     surfaces = link_surfaces(folder, robot.name, link).values()
-    points = np.vstack([np.vstack([sampled(each, 1_000_000, rng), each.reshape(-1, 3)]) for each in surfaces])
+    points = np.vstack(
+        [np.vstack([sampled(each, 1_000_000, rng), each.reshape(-1, 3)]) for each in surfaces]
+    )
     corner = points.min(axis=0) - REACH - 2 * CELL
-    is_wall = np.zeros(np.ceil((points.max(axis=0) + REACH + 2 * CELL - corner) / CELL).astype(int), dtype=bool)
+    is_wall = np.zeros(
+        np.ceil((points.max(axis=0) + REACH + 2 * CELL - corner) / CELL).astype(int), dtype=bool
+    )
     is_wall[tuple(((points - corner) / CELL).astype(int).T)] = True
     parts = label(~is_wall)[0]
     is_outside = parts == parts[0, 0, 0]
@@ -129,7 +160,9 @@ def _solid(folder: Path, robot: Robot, link: int) -> _Solid:
 
 
 def _outermost(points: Array, surfaces: list[Array]) -> Array:
-    """The points (k, 3) without those that a coarse grid shows to be deep inside: most of a detailed mesh is."""
+    """The points (k, 3) without those that a coarse grid shows to be deep inside: most of a
+    detailed mesh is.
+    """
     corner = np.concatenate(surfaces).reshape(-1, 3).min(axis=0) - 4 * CELL
     index = ((points - corner) / CELL).astype(int)
     is_wall = np.zeros(index.max(axis=0) + 5, dtype=bool)
@@ -139,7 +172,9 @@ def _outermost(points: Array, surfaces: list[Array]) -> Array:
 
 
 def _cost(scaled: Array, task: _Task, width: float, penalty: float) -> tuple[float, Array]:
-    """Weighed overhang [cm³ · m] and penalty, and the gradient in the scaled variables: two ends and a radius each."""
+    """Weighed overhang [cm³ · m] and penalty, and the gradient in the scaled variables: two ends
+    and a radius each.
+    """
     rows = (scaled * UNIT).reshape(-1, 7)
     gradient = np.zeros_like(rows)
     depth, pull = _nearest(rows, task.cells)
@@ -153,7 +188,9 @@ def _cost(scaled: Array, task: _Task, width: float, penalty: float) -> tuple[flo
 
 
 def _nearest(rows: Array, points: Array) -> tuple[Array, _Pull]:
-    """Signed distance (k,) [m] of points (k, 3) from the nearest capsule, and what adds its gradients."""
+    """Signed distance (k,) [m] of points (k, 3) from the nearest capsule, and what adds its
+    gradients.
+    """
     distance, toward, share = np.empty((len(rows), len(points))), [], []
     for k, row in enumerate(rows):
         begin, along = row[:3], row[3:6] - row[:3]
@@ -190,7 +227,8 @@ def _capsules(z: Array, link: int) -> list[LinkCapsule]:
 
 
 def _rounded(capsules: list[LinkCapsule], samples: Array) -> list[LinkCapsule]:
-    """Axes to DIGIT, and each radius in turn as small as the samples (k, 3) [m] that no other capsule holds allow.
+    """Axes to DIGIT, and each radius in turn as small as the samples (k, 3) [m] that no other
+    capsule holds allow.
 
     A sample that no capsule holds belongs to the nearest.
     """
@@ -232,7 +270,10 @@ def main() -> None:
     for name in sys.argv[3:] or robot.link_names:
         print(f"  {name}:\n    value:")
         for capsule in fit(robot, folder, robot.link_names.index(name)):
-            print(f"      - [{', '.join(f'{x:.4f}' for x in [*capsule.axis.ravel(), capsule.radius])}]", flush=True)
+            print(
+                f"      - [{', '.join(f'{x:.4f}' for x in [*capsule.axis.ravel(), capsule.radius])}]",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,6 @@
-"""What an arm looks like by its own figures: tubes between the joints, and round housings with caps at them."""
+"""What an arm looks like by its own figures: tubes between the joints, and round housings with caps
+at them.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ FOOT, WIDER = 0.02, 1.22
 
 @dataclass(frozen=True)
 class Body:
-    """A round body about the line from `start` to `end` [m] in the frame of its link, with a radius [m]."""
+    """A round body about the line from `start` to `end` [m] in the frame of its link, with a radius
+    [m].
+    """
 
     kind: Kind
     start: list[float]
@@ -36,7 +40,9 @@ class Body:
 
 @dataclass
 class _Housing:
-    """What a link's capsules fill about a joint's axis, the z axis of `T` (4, 4): from `low` to `high` [m]."""
+    """What a link's capsules fill about a joint's axis, the z axis of `T` (4, 4): from `low` to
+    `high` [m].
+    """
 
     T: Array
     low: float
@@ -61,10 +67,13 @@ def link_bodies(figures: dict[str, Any]) -> list[list[Body]]:
     """The bodies of every link by a robot's figures, base first."""
     kinematics = figures["kinematics"]
     names = ["base", *kinematics["link_names"]["value"]]
-    capsules = [np.reshape(figures["collision"].get(name, {}).get("value", []), (-1, 7)) for name in names]
+    capsules = [
+        np.reshape(figures["collision"].get(name, {}).get("value", []), (-1, 7)) for name in names
+    ]
     placements = [_placement(row) for row in kinematics["joint_origin"]["value"]]
     typical = max(float(np.linalg.norm(T[:3, 3])) for T in placements) / 8
-    # the housings of both links at every joint, about the same axis and measured from the same point
+    # the housings of both links at every joint, about the same axis and measured from the same
+    # point
     pairs = [
         (_housing(capsules[joint], T, typical), _housing(capsules[joint + 1], np.eye(4), typical))
         for joint, T in enumerate(placements)
@@ -94,7 +103,9 @@ def _placement(origin: list[float]) -> Array:
 
 
 def _housing(capsules: Array, T: Array, typical: float) -> _Housing:
-    """The part along the z axis of T that a link's capsules (n, 7) fill around it; a `typical` one [m] without any."""
+    """The part along the z axis of T that a link's capsules (n, 7) fill around it; a `typical` one
+    [m] without any.
+    """
     start, end, radius = capsules[:, :3], capsules[:, 3:6], np.repeat(capsules[:, 6], SAMPLES)
     share = np.linspace(0, 1, SAMPLES)[:, None]
     points = (start[:, None] + share * (end - start)[:, None]).reshape(-1, 3) - T[:3, 3]
@@ -106,12 +117,19 @@ def _housing(capsules: Array, T: Array, typical: float) -> _Housing:
         return _Housing(T, -small, small, small)
     along, aside, radius = along[near], aside[near], radius[near]
     wide = SLIMMER * np.sqrt(np.maximum(radius**2 - aside**2, 0.4 * radius**2))
-    return _Housing(T, float((along - 0.8 * radius).min()), float((along + 0.8 * radius).max()), float(wide.max()))
+    return _Housing(
+        T,
+        float((along - 0.8 * radius).min()),
+        float((along + 0.8 * radius).max()),
+        float(wide.max()),
+    )
 
 
 def _meet(first: _Housing, second: _Housing) -> None:
     """Lets the two housings at a joint end where they meet."""
-    lower, upper = (first, second) if first.low + first.high < second.low + second.high else (second, first)
+    lower, upper = (
+        (first, second) if first.low + first.high < second.low + second.high else (second, first)
+    )
     border = min((lower.high + upper.low) / 2, upper.high - 0.3 * upper.radius)
     lower.high = upper.low = max(lower.low + 0.3 * lower.radius, border)
     slim = min(lower.radius, upper.radius)
@@ -132,7 +150,10 @@ def _bodies(own: _Housing, other: _Housing) -> list[Body]:
     outward = -1 if own.low + own.high < other.low + other.high else 1
     inner, outer = (own.low, own.high) if outward > 0 else (own.high, own.low)
     edge = outer - outward * 0.16 * own.radius
-    return [own.body(inner, edge, own.radius, "housing"), own.body(edge, outer, 0.9 * own.radius, "cap")]
+    return [
+        own.body(inner, edge, own.radius, "housing"),
+        own.body(edge, outer, 0.9 * own.radius, "cap"),
+    ]
 
 
 def _ring(own: _Housing, other: _Housing) -> Body:
@@ -145,7 +166,9 @@ def _ring(own: _Housing, other: _Housing) -> Body:
 def _tube(
     capsules: Array, start: Array, start_radius: float, end: Array, end_radius: float, is_base: bool
 ) -> list[Body]:
-    """The tube between two ends of a link, as thick as its long capsules (n, 7); none where the ends overlap."""
+    """The tube between two ends of a link, as thick as its long capsules (n, 7); none where the
+    ends overlap.
+    """
     span = float(np.linalg.norm(end - start))
     if span < 0.35 * (start_radius + end_radius):
         return []

@@ -1,4 +1,6 @@
-"""A robot from its figures: section, figure, then value, unit, source, trust and note, as in a `figures.yaml`."""
+"""A robot from its figures: section, figure, then value, unit, source, trust and note, as in a
+`figures.yaml`.
+"""
 
 from __future__ import annotations
 
@@ -28,9 +30,13 @@ NO_LINKS = ("elbow", "meshes", "never_meet")
 
 
 def robot_of(name: str, figures: dict[str, Any]) -> Robot:
-    """The robot that the figures describe. Raises ValueError if one of them has not one entry for each joint."""
+    """The robot that the figures describe. Raises ValueError if one of them has not one entry for
+    each joint.
+    """
     model = pin.buildModelFromXML(urdf_of(name, figures))
-    drives = Drives(**{part: _joints(figures["drives"][part], model.nq) for part in Drives.__dataclass_fields__})
+    drives = Drives(
+        **{part: _joints(figures["drives"][part], model.nq) for part in Drives.__dataclass_fields__}
+    )
     model.armature = drives.rotor_inertia
     limits, electronics = figures["limits"], figures["electronics"]
     capsules = _capsules(figures, model)
@@ -54,7 +60,9 @@ def robot_of(name: str, figures: dict[str, Any]) -> Robot:
         friction_laws=_friction_laws(figures, model.nq),
         default_motion=_default_motion(figures),
         capsules=capsules,
-        never_in_collision=frozenset((first, second) for first, second in figures["collision"]["never_meet"]["value"]),
+        never_in_collision=frozenset(
+            (first, second) for first, second in figures["collision"]["never_meet"]["value"]
+        ),
         figures=figures,
         torque_side=_torque_side(limits),
         elbow=_elbow(figures, capsules),
@@ -63,28 +71,38 @@ def robot_of(name: str, figures: dict[str, Any]) -> Robot:
 
 
 def _joints(figure: dict[str, Any], nq: int) -> Array:
-    """Value of a figure as a read-only array (nq,): the robot is shared by all who load it. Raises ValueError."""
+    """Value of a figure as a read-only array (nq,): the robot is shared by all who load it. Raises
+    ValueError.
+    """
     return read_only(figure["value"], (nq,), "A figure over joints")
 
 
 def _base_link(kinematics: dict[str, Any]) -> Array:
-    """Pose (4, 4) of ROS's `base_link` in `base`; the same frame for a robot without this figure. Raises ValueError."""
+    """Pose (4, 4) of ROS's `base_link` in `base`; the same frame for a robot without this figure.
+    Raises ValueError.
+    """
     if "base_link_origin" not in kinematics:
         return read_only(np.eye(4), (4, 4), "A pose")
     origin = read_only(kinematics["base_link_origin"]["value"], (6,), "kinematics.base_link_origin")
-    return read_only(pin.SE3(pin.rpy.rpyToMatrix(*origin[3:]), origin[:3]).homogeneous, (4, 4), "A pose")
+    return read_only(
+        pin.SE3(pin.rpy.rpyToMatrix(*origin[3:]), origin[:3]).homogeneous, (4, 4), "A pose"
+    )
 
 
 def _torque_side(limits: dict[str, Any]) -> TorqueSide:
     """Raises ValueError for another word than `motor` and `link`."""
     side = limits["torque_side"]["value"]
     if side not in get_args(TorqueSide):
-        raise ValueError(f"limits.torque_side is {side!r}: it must be one of {', '.join(get_args(TorqueSide))}.")
+        raise ValueError(
+            f"limits.torque_side is {side!r}: it must be one of {', '.join(get_args(TorqueSide))}."
+        )
     return cast(TorqueSide, side)
 
 
 def _capsules(figures: dict[str, Any], model: pin.Model) -> tuple[LinkCapsule, ...]:
-    """Capsules of all links, from the base on; those of a link in the order of its figure. Raises ValueError."""
+    """Capsules of all links, from the base on; those of a link in the order of its figure. Raises
+    ValueError.
+    """
     rows = [
         (link, read_only(row, (7,), f"A capsule of {name}"))
         for link, name in enumerate(link_names(model))
@@ -100,12 +118,17 @@ def _default_motion(figures: dict[str, Any]) -> DefaultMotion | None:
     if "default_motion" not in figures:
         return None
     return DefaultMotion(
-        **{part: float(figures["default_motion"][part]["value"]) for part in ("velocity", "acceleration")}
+        **{
+            part: float(figures["default_motion"][part]["value"])
+            for part in ("velocity", "acceleration")
+        }
     )
 
 
 def _elbow(figures: dict[str, Any], capsules: tuple[LinkCapsule, ...]) -> LinkCapsule | None:
-    """The last capsule of the link that the figure `elbow` names; None for a robot without this figure."""
+    """The last capsule of the link that the figure `elbow` names; None for a robot without this
+    figure.
+    """
     if "elbow" not in figures["collision"]:
         return None
     link = figures["collision"]["elbow"]["value"]
@@ -113,7 +136,8 @@ def _elbow(figures: dict[str, Any], capsules: tuple[LinkCapsule, ...]) -> LinkCa
 
 
 def _load(name: str, law: dict[str, Any], nq: int) -> Array | None:
-    """Share of the carried torque that is lost, (nq,); None where the figures name none. Raises ValueError.
+    """Share of the carried torque that is lost, (nq,); None where the figures name none. Raises
+    ValueError.
 
     From a share of 1 on a joint could not be moved by its load at all.
     """
@@ -121,7 +145,9 @@ def _load(name: str, law: dict[str, Any], nq: int) -> Array | None:
         return None
     load = _joints(law["load"], nq)
     if not ((load >= 0) & (load < 1)).all():
-        raise ValueError(f"friction_laws.{name}.load must be at least 0 and below 1 for every joint.")
+        raise ValueError(
+            f"friction_laws.{name}.load must be at least 0 and below 1 for every joint."
+        )
     return load
 
 

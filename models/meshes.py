@@ -1,7 +1,7 @@
 """Triangles of the meshes that the capsules of a robot hold, in its link frames.
 
-The meshes are no part of this package: a folder has them as `visual/NAME.obj` and `collision/NAME.obj`, as the package
-`airo-models` on PyPI ships those of the maker's description.
+The meshes are no part of this package: a folder has them as `visual/NAME.obj` and
+`collision/NAME.obj`, as the package `airo-models` on PyPI ships those of the maker's description.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ from joulepath.models.robot import Array
 
 # what is shown, in detail, and the coarser surfaces that the maker made for collision checking
 KINDS = ("visual", "collision")
-# where the meshes stand: of upper arm, forearm and wrists the shift [m] along the joint's axis, which is all that
-# differs between arms of one maker. From github.com/UniversalRobots/Universal_Robots_ROS2_Description
+# where the meshes stand: of upper arm, forearm and wrists the shift [m] along the joint's axis,
+# which is all that differs between arms of one maker. From
+# github.com/UniversalRobots/Universal_Robots_ROS2_Description
 SHIFTS = {
     "ur3e": (0.12, 0.027, -0.104, -0.08535, -0.0921),
     "ur5e": (0.138, 0.007, -0.127, -0.0997, -0.0989),
@@ -31,7 +32,9 @@ _TURNS = ((0.0, 0.0, np.pi), (0.0, 0.0, np.pi), _ALONG, _ALONG, _UPRIGHT, (0.0, 
 
 
 def installed(robot: str) -> Path | None:
-    """The folder of a robot's meshes in the package `airo-models`, which need not be imported; None without it."""
+    """The folder of a robot's meshes in the package `airo-models`, which need not be imported; None
+    without it.
+    """
     package = find_spec("airo_models")
     if robot not in SHIFTS or package is None or package.origin is None:
         return None
@@ -51,9 +54,13 @@ def mesh_placement(robot: str, link: int) -> pin.SE3:
 
 
 def link_surfaces(folder: Path, robot: str, link: int) -> dict[str, Array]:
-    """Triangles (t, 3, 3) [m] of each of KINDS, in the frame of the link. `robot` is one of SHIFTS."""
+    """Triangles (t, 3, 3) [m] of each of KINDS, in the frame of the link. `robot` is one of
+    SHIFTS."""
     T = mesh_placement(robot, link)
-    return {kind: _triangles(mesh_file(folder, kind, link)) @ T.rotation.T + T.translation for kind in KINDS}
+    return {
+        kind: _triangles(mesh_file(folder, kind, link)) @ T.rotation.T + T.translation
+        for kind in KINDS
+    }
 
 
 def sampled(triangles: Array, count: int, rng: np.random.Generator) -> Array:

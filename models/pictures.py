@@ -1,7 +1,9 @@
-"""A robot as it looks: the meshes of its maker, simplified, as one GLB file with a node for each link.
+"""A robot as it looks: the meshes of its maker, simplified, as one GLB file with a node for each
+link.
 
-The nodes are named as the links and stand in the link frames [m]: who draws the file moves each to where its link is.
-Simplification needs the package `fast-simplification`, which is optional, as the meshes are.
+The nodes are named as the links and stand in the link frames [m]: who draws the file moves each to
+where its link is. Simplification needs the package `fast-simplification`, which is optional, as the
+meshes are.
 """
 
 from __future__ import annotations
@@ -28,12 +30,15 @@ FACES = 22_000
 _SMALL = 100
 # edges that are sharper stay sharp in the light [rad]
 _CREASE = np.radians(35)
-# positions are rounded to these shares of a metre, 0.06 mm, and normals to those of their length: they compress better
+# positions are rounded to these shares of a metre, 0.06 mm, and normals to those of their length:
+# they compress better
 _STEPS, _NORMAL_STEPS = 1 << 14, 1 << 5
 
 
 def picture_sources(robot: str) -> list[Path] | None:
-    """Files that a robot's picture is made of, base first. None if they, or what simplifies them, are not installed."""
+    """Files that a robot's picture is made of, base first. None if they, or what simplifies them,
+    are not installed.
+    """
     folder = installed(robot)
     if folder is None or find_spec("fast_simplification") is None:
         return None
@@ -41,7 +46,9 @@ def picture_sources(robot: str) -> list[Path] | None:
 
 
 def picture(robot: str) -> bytes:
-    """The GLB file of a robot that has `picture_sources`, with normals and colours. Takes about a second."""
+    """The GLB file of a robot that has `picture_sources`, with normals and colours. Takes about a
+    second.
+    """
     import trimesh  # most processes never need it
 
     sources = picture_sources(robot)
@@ -50,7 +57,10 @@ def picture(robot: str) -> bytes:
     share = FACES / sum(len(part.faces) for parts in links for part, _ in parts)
     scene = trimesh.Scene()
     for link, (name, parts) in enumerate(zip(_links(robot), links, strict=True)):
-        mesh = _merged([(_simplified(part, share), colour) for part, colour in parts], mesh_placement(robot, link))
+        mesh = _merged(
+            [(_simplified(part, share), colour) for part, colour in parts],
+            mesh_placement(robot, link),
+        )
         scene.add_geometry(mesh, node_name=name, geom_name=name)
     return bytes(scene.export(file_type="glb", include_normals=True))  # type: ignore[no-untyped-call]
 
@@ -60,7 +70,9 @@ def _links(robot: str) -> list[str]:
 
 
 def _parts(path: Path) -> list[tuple[Trimesh, Array]]:
-    """A mesh file by its materials: each part and its colour, red, green, blue and opacity from 0 to 255."""
+    """A mesh file by its materials: each part and its colour, red, green, blue and opacity from 0
+    to 255.
+    """
     import trimesh
 
     parts = []
@@ -73,7 +85,9 @@ def _parts(path: Path) -> list[tuple[Trimesh, Array]]:
 
 
 def _simplified(part: Trimesh, share: float) -> Trimesh:
-    """A part with about this share of its faces. All its corners are corners of the part: capsules hold it, too."""
+    """A part with about this share of its faces. All its corners are corners of the part: capsules
+    hold it, too.
+    """
     if len(part.faces) <= _SMALL:
         return part
     simple = part.simplify_quadric_decimation(percent=1 - share)
@@ -88,7 +102,10 @@ def _merged(parts: list[tuple[Trimesh, Array]], T: pin.SE3) -> Trimesh:
     import trimesh
 
     shaded = [trimesh.graph.smooth_shade(part, angle=_CREASE) for part, _ in parts]
-    colours = [np.tile(colour, (len(part.vertices), 1)) for part, (_, colour) in zip(shaded, parts, strict=True)]
+    colours = [
+        np.tile(colour, (len(part.vertices), 1))
+        for part, (_, colour) in zip(shaded, parts, strict=True)
+    ]
     mesh = trimesh.util.concatenate(shaded)
     assert isinstance(mesh, trimesh.Trimesh)
     mesh.apply_transform(T.homogeneous)

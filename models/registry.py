@@ -28,13 +28,21 @@ def robot_names() -> tuple[str, ...]:
     Returns:
         The names in alphabetical order.
     """
-    return tuple(sorted(folder.name for folder in files("joulepath.models").iterdir() if (folder / FIGURES).is_file()))
+    return tuple(
+        sorted(
+            folder.name
+            for folder in files("joulepath.models").iterdir()
+            if (folder / FIGURES).is_file()
+        )
+    )
 
 
 _LOADING = threading.Lock()
 
 
-def load_robot(robot: str | PathLike[str], figures: str | PathLike[str] | dict[str, Any] | None = None) -> Robot:
+def load_robot(
+    robot: str | PathLike[str], figures: str | PathLike[str] | dict[str, Any] | None = None
+) -> Robot:
     """Load a robot that comes with the library, or a user's own arm.
 
     A robot is loaded once per process: all threads get the same object.
@@ -62,7 +70,8 @@ def load_robot(robot: str | PathLike[str], figures: str | PathLike[str] | dict[s
         )
 
         return read_robot(Path(robot))
-    # robots are compared by identity, and `cache` lets two threads that miss at the same time both load one
+    # robots are compared by identity, and `cache` lets two threads that miss at the same time both
+    # load one
     with _LOADING:
         return _load_robot(robot)
 
@@ -91,12 +100,15 @@ def _load_robot(name: str) -> Robot:
 
 
 def load_figures(name: str) -> dict[str, Any]:
-    """The robot's figures as they are in figures.yaml: section, figure, then value, unit, source, trust and note.
+    """The robot's figures as they are in figures.yaml: section, figure, then value, unit, source,
+    trust and note.
 
     Raises LookupError for a name that is not in `robot_names()`.
     """
     if name not in robot_names():
-        raise LookupError(f"There is no robot named {name!r}: use one of {', '.join(robot_names())}.")
+        raise LookupError(
+            f"There is no robot named {name!r}: use one of {', '.join(robot_names())}."
+        )
     text = (files("joulepath.models") / name / FIGURES).read_text(encoding="utf-8")
     figures: dict[str, Any] = yaml.load(text, Loader=LOADER)
     return figures

@@ -1,4 +1,5 @@
-"""A robot: its Pinocchio model, and its figures: limits, drives, electronics, friction, capsules."""
+"""A robot: its Pinocchio model, and its figures: limits, drives, electronics, friction,
+capsules."""
 
 from __future__ import annotations
 
@@ -14,13 +15,15 @@ Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 TorqueSide = Literal["motor", "link"]
 
-# robots of whom models, kernels and inverse kinematics are kept ready; users may bring any number of arms
+# robots of whom models, kernels and inverse kinematics are kept ready; users may bring any number
+# of arms
 MOST_ROBOTS = 64
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Symmetric limits of every joint, shape (nq,) each, SI units; `q_min`, `q_max` need not be symmetric.
+    """Symmetric limits of every joint, shape (nq,) each, SI units; `q_min`, `q_max` need not be
+    symmetric.
 
     `tau_max` limits the torque at the joint on the side that the robot's `torque_side` names.
     """
@@ -38,15 +41,22 @@ class Limits:
         return np.stack([self.v_max, self.a_max, self.j_max])
 
     def scaled(self, factors: Limits | float) -> Limits:
-        """These limits with those on speed, acceleration, jerk and torque multiplied by a factor, or one per joint."""
+        """These limits with those on speed, acceleration, jerk and torque multiplied by a factor,
+        or one per joint.
+        """
         rates = ("v_max", "a_max", "j_max", "tau_max")
         return replace(
             self,
-            **{n: getattr(self, n) * (getattr(factors, n) if isinstance(factors, Limits) else factors) for n in rates},
+            **{
+                n: getattr(self, n)
+                * (getattr(factors, n) if isinstance(factors, Limits) else factors)
+                for n in rates
+            },
         )
 
     def tightened(self, **given: Array | None) -> Limits:
-        """These limits with the given ones in their place. The caller checks that they are tighter."""
+        """These limits with the given ones in their place. The caller checks that they are
+        tighter."""
         return replace(self, **{name: value for name, value in given.items() if value is not None})
 
 
@@ -54,13 +64,15 @@ class Limits:
 class FrictionLaw:
     """Joint friction torque, odd in the speed v.
 
-    tau_f = (coulomb + load · |tau_link|) · v / sqrt(v² + knee²) + curved · asinh(v / speed) + viscous · v
+    tau_f = (coulomb + load · |tau_link|) · v / sqrt(v² + knee²) + curved · asinh(v / speed) +
+    viscous · v
 
-    The first term is Coulomb friction with its step spread over `knee` [rad/s]. It grows with the torque tau_link of
-    the rigid bodies alone, which passes through the gear, the rotor's does not. The second term is the concave rise
-    that strain-wave gears show, the third viscous friction. Arrays have shape (nq,): coulomb, curved [N·m], load [1],
-    speed [rad/s], viscous [N·m·s/rad]. `load` is None for a law that does not depend on the load. With `bend` [N·m]
-    above zero |tau_link| is sqrt(tau_link² + bend²).
+    The first term is Coulomb friction with its step spread over `knee` [rad/s]. It grows with the
+    torque tau_link of the rigid bodies alone, which passes through the gear, the rotor's does not.
+    The second term is the concave rise that strain-wave gears show, the third viscous friction.
+    Arrays have shape (nq,): coulomb, curved [N·m], load [1], speed [rad/s], viscous [N·m·s/rad].
+    `load` is None for a law that does not depend on the load. With `bend` [N·m] above zero
+    |tau_link| is sqrt(tau_link² + bend²).
     """
 
     name: str
@@ -76,20 +88,26 @@ class FrictionLaw:
     LOAD_FORMULA: ClassVar[str] = FORMULA.replace("coulomb", "(coulomb + load |tau_link|)")
 
     def torque(self, v: Any, tau_link: Any = None, xp: Any = np) -> Any:
-        """Friction torque [N·m] for joint speeds v and torques of the rigid bodies tau_link [N·m], shapes (..., nq).
+        """Friction torque [N·m] for joint speeds v and torques of the rigid bodies tau_link [N·m],
+        shapes (..., nq).
 
-        A law that does not depend on the load needs no tau_link. `xp` is numpy, or casadi for symbols.
+        A law that does not depend on the load needs no tau_link. `xp` is numpy, or casadi for
+        symbols.
         """
         dry = self.coulomb
         if self.load is not None:
             dry = dry + self.load * xp.sqrt(tau_link * tau_link + self.bend * self.bend)
         return (
-            dry * v / xp.sqrt(v * v + self.knee * self.knee) + self.curved * xp.asinh(v / self.speed) + self.viscous * v
+            dry * v / xp.sqrt(v * v + self.knee * self.knee)
+            + self.curved * xp.asinh(v / self.speed)
+            + self.viscous * v
         )
 
     @property
     def unloaded(self) -> FrictionLaw:
-        """The law of a joint that carries nothing: the least friction, as no coefficient is negative."""
+        """The law of a joint that carries nothing: the least friction, as no coefficient is
+        negative.
+        """
         return replace(self, load=None)
 
 
@@ -124,7 +142,9 @@ class Electronics:
 
 @dataclass(frozen=True)
 class DefaultMotion:
-    """The robot controller's default motion: speed [rad/s] and acceleration [rad/s²] of a leading-axis trapezoid."""
+    """The robot controller's default motion: speed [rad/s] and acceleration [rad/s²] of a
+    leading-axis trapezoid.
+    """
 
     velocity: float
     acceleration: float
@@ -144,16 +164,19 @@ class LinkCapsule:
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A robot arm: serial chain of revolute joints, world frame = `base`, last frame = `flange`. Compared by identity.
+    """A robot arm: serial chain of revolute joints, world frame = `base`, last frame = `flange`.
+    Compared by identity.
 
-    `model` holds link inertias and rotor inertia (as armature), but neither payload nor tilted gravity: `loaded_model`
-    adds them. `friction_laws` are named; the first one is the default. `figures` is what `GET /robots/{name}` shows:
-    every figure with its unit, source and trust letter. `default_motion` is None where the maker publishes none.
+    `model` holds link inertias and rotor inertia (as armature), but neither payload nor tilted
+    gravity: `loaded_model` adds them. `friction_laws` are named; the first one is the default.
+    `figures` is what `GET /robots/{name}` shows: every figure with its unit, source and trust
+    letter. `default_motion` is None where the maker publishes none.
 
-    Every link, as its meshes are, lies within its `capsules`. `never_in_collision` holds pairs of links that cannot
-    touch at any joint positions, without adjacent links. `elbow` is the capsule around the elbow, whose speed can be
-    limited; None for an arm without one. `default_motion` is None for an arm whose controller's defaults are unknown.
-    `torque_side`: the torque limits are for the `motor`, rotor and friction included, or for the `link`, without them.
+    Every link, as its meshes are, lies within its `capsules`. `never_in_collision` holds pairs of
+    links that cannot touch at any joint positions, without adjacent links. `elbow` is the capsule
+    around the elbow, whose speed can be limited; None for an arm without one. `default_motion` is
+    None for an arm whose controller's defaults are unknown. `torque_side`: the torque limits are
+    for the `motor`, rotor and friction included, or for the `link`, without them.
     `T_base_base_link` (4, 4) is the pose of ROS's frame `base_link` in `base`.
     """
 
@@ -204,16 +227,23 @@ class Robot:
         return any(law.load is not None for law in self.friction_laws.values())
 
     def loaded_model(
-        self, mass: float, com: Array, inertia: Array, gravity: Array, link_mass_scale: Array | None = None
+        self,
+        mass: float,
+        com: Array,
+        inertia: Array,
+        gravity: Array,
+        link_mass_scale: Array | None = None,
     ) -> pin.Model:
         """A copy of the model with a payload fixed to the flange, another gravity and scaled links.
 
-        mass [kg], com (3,) [m] in the flange frame, inertia (3, 3) [kg·m²] about the com in flange axes, gravity (3,)
-        [m/s²] in the base frame. `link_mass_scale` (nq,) multiplies mass and inertia of the moving links, not of the
-        rotors.
+        mass [kg], com (3,) [m] in the flange frame, inertia (3, 3) [kg·m²] about the com in flange
+        axes, gravity (3,) [m/s²] in the base frame. `link_mass_scale` (nq,) multiplies mass and
+        inertia of the moving links, not of the rotors.
         """
         model = self.model.copy()
-        for i, scale in enumerate([] if link_mass_scale is None else link_mass_scale.tolist(), start=1):
+        for i, scale in enumerate(
+            [] if link_mass_scale is None else link_mass_scale.tolist(), start=1
+        ):
             body = model.inertias[i]
             model.inertias[i] = pin.Inertia(scale * body.mass, body.lever, scale * body.inertia)
         last = model.njoints - 1
@@ -229,6 +259,9 @@ def link_names(model: pin.Model) -> tuple[str, ...]:
 
     A link that the model has no frame of goes by the name of the joint that carries it.
     """
-    # a link that a fixed joint carries, as the flange is, comes after the one that the moving joint carries
-    first = {frame.parentJoint: frame.name for frame in reversed(model.frames) if frame.type == pin.BODY}
+    # a link that a fixed joint carries, as the flange is, comes after the one that the moving joint
+    # carries
+    first = {
+        frame.parentJoint: frame.name for frame in reversed(model.frames) if frame.type == pin.BODY
+    }
     return tuple(first.get(joint, model.names[joint]) for joint in range(model.njoints))

@@ -1,6 +1,8 @@
-"""The check of a shape's size, wherever the shape comes from: a URDF, a request, or the figures of a robot.
+"""The check of a shape's size, wherever the shape comes from: a URDF, a request, or the figures of
+a robot.
 
-A collision check takes a shape at its word: one of no size is never hit, and makes a motion through it look free.
+A collision check takes a shape at its word: one of no size is never hit, and makes a motion through
+it look free.
 """
 
 from __future__ import annotations
@@ -22,23 +24,31 @@ class ShapeSizes:
     largest: float = 100.0
     """Greatest one [m], and greatest distance of a part from its frame."""
     flat: float = 1e-6
-    """Least ratio of the smallest to the largest extent of a body: below it, its volume is lost in rounding."""
+    """Least ratio of the smallest to the largest extent of a body: below it, its volume is lost in
+    rounding.
+    """
 
 
 SIZES = ShapeSizes()
 
 
 class WrongSize(ValueError):
-    """A shape has a size that no body has. The message begins with the name that the check was given."""
+    """A shape has a size that no body has. The message begins with the name that the check was
+    given.
+    """
 
 
 def check_lengths(name: str, values: float | Array, largest: float = SIZES.largest) -> None:
-    """Raises WrongSize unless all radii, lengths or edges [m] are from the smallest size to the `largest`."""
+    """Raises WrongSize unless all radii, lengths or edges [m] are from the smallest size to the
+    `largest`.
+    """
     given = np.ravel(values)
     # written so that NaN is refused
     wrong = given[~((SIZES.smallest <= given) & (given <= largest))]
     if wrong.size:
-        raise WrongSize(f"{name} must be between {SIZES.smallest:g} and {largest:g} m, not {wrong[0]:g}.")
+        raise WrongSize(
+            f"{name} must be between {SIZES.smallest:g} and {largest:g} m, not {wrong[0]:g}."
+        )
 
 
 def check_extent(name: str, points: Array) -> None:
@@ -46,19 +56,24 @@ def check_extent(name: str, points: Array) -> None:
     extent = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
     if not SIZES.smallest <= extent < np.inf:
         raise WrongSize(
-            f"{name} must extend over {SIZES.smallest:g} m or more, not {extent:g} m: correct its points or its scale."
+            f"{name} must extend over {SIZES.smallest:g} m or more, not {extent:g} m: correct its "
+            "points or its scale."
         )
 
 
 def check_scale(name: str, scale: Array, points: Array) -> None:
-    """Raises WrongSize for factors (3,) on points (n, 3) that leave nothing of them, or press them flat.
+    """Raises WrongSize for factors (3,) on points (n, 3) that leave nothing of them, or press them
+    flat.
 
     Negative factors mirror the points, and are allowed.
     """
     factors, extents = np.abs(scale), np.ptp(points, axis=0)
     pressed = (extents * factors < SIZES.smallest) & (extents * factors.max() >= SIZES.smallest)
     if (factors == 0).any() or pressed.any():
-        raise WrongSize(f"{name} must not press the mesh flat, as {' '.join(f'{each:g}' for each in scale)} does.")
+        raise WrongSize(
+            f"{name} must not press the mesh flat, as {' '.join(f'{each:g}' for each in scale)} "
+            "does."
+        )
     check_extent(f"{name} is wrong: the mesh", points * scale)
 
 
@@ -73,7 +88,8 @@ def check_surface(name: str, points: Array) -> None:
 def hull_of_body(name: str, points: Array) -> Array:
     """The corners (k, 3) of the convex hull of points (n, 3) [m].
 
-    Raises WrongSize if they lie within the smallest size, or in a plane; the message begins with `name`.
+    Raises WrongSize if they lie within the smallest size, or in a plane; the message begins with
+    `name`.
     """
     check_extent(name, points)
     extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)

@@ -1,4 +1,6 @@
-"""How far a robot's parameters can be trusted: the meaning of the trust letters, and a sentence on its energies."""
+"""How far a robot's parameters can be trusted: the meaning of the trust letters, and a sentence on
+its energies.
+"""
 
 from __future__ import annotations
 
@@ -23,18 +25,26 @@ _GROUPS = {
 
 
 def energy_trust(figures: dict[str, Any]) -> str:
-    """One sentence on what the energies of a robot rest on, from the trust letters of its figures."""
+    """One sentence on what the energies of a robot rest on, from the trust letters of its
+    figures."""
     by_letter: dict[str, list[str]] = {letter: [] for letter in _GROUPS}
     for words, section in _energy_figures(figures).items():
         by_letter[worst_letter(section)].append(words)
-    groups = [f"{_GROUPS[letter]} ({', '.join(names)})" for letter, names in by_letter.items() if names]
+    groups = [
+        f"{_GROUPS[letter]} ({', '.join(names)})" for letter, names in by_letter.items() if names
+    ]
     *first, last = groups
-    return f"Energies rest on {', '.join(first)} and {last}." if first else f"Energies rest on {last}."
+    return (
+        f"Energies rest on {', '.join(first)} and {last}." if first else f"Energies rest on {last}."
+    )
 
 
 def _energy_figures(figures: dict[str, Any]) -> dict[str, Any]:
-    """What an energy depends on, in words, and the figures of each. Friction is the default law's."""
-    inertials, drives, electronics = (figures[section] for section in ("inertials", "drives", "electronics"))
+    """What an energy depends on, in words, and the figures of each. Friction is the default
+    law's."""
+    inertials, drives, electronics = (
+        figures[section] for section in ("inertials", "drives", "electronics")
+    )
     return {
         "link masses": inertials["mass"],
         "centres of mass": inertials["center_of_mass"],
@@ -43,7 +53,9 @@ def _energy_figures(figures: dict[str, Any]) -> dict[str, Any]:
         "rotor inertias": drives["rotor_inertia"],
         "friction": next(iter(figures["friction_laws"].values())),
         "copper loss": drives["copper"],
-        "inverter loss": {part: figure for part, figure in drives.items() if part.startswith("inverter")},
+        "inverter loss": {
+            part: figure for part, figure in drives.items() if part.startswith("inverter")
+        },
         "idle power": electronics["idle_power"],
         "regeneration": electronics["regeneration"],
         "acceleration limits": figures["limits"]["acceleration"],

@@ -1,4 +1,6 @@
-"""The URDF of a robot, made from its figures: a chain of revolute joints about z, from `base` to `flange`."""
+"""The URDF of a robot, made from its figures: a chain of revolute joints about z, from `base` to
+`flange`.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +15,8 @@ BASE, FLANGE = "base", "flange"
 def urdf_of(name: str, figures: dict[str, Any]) -> str:
     """The URDF text. Raises ValueError if a figure has not one entry for each joint.
 
-    A joint turns about the z axis of the frame that its origin gives in the frame of the link before. The root link is
-    `base`, the last one `flange`.
+    A joint turns about the z axis of the frame that its origin gives in the frame of the link
+    before. The root link is `base`, the last one `flange`.
     """
     kinematics, inertials, limits = figures["kinematics"], figures["inertials"], figures["limits"]
     links = kinematics["link_names"]["value"]
@@ -24,12 +26,26 @@ def urdf_of(name: str, figures: dict[str, Any]) -> str:
         [BASE, *links[:-1]],
         links,
         *(kinematics[part]["value"] for part in ("joint_names", "joint_origin")),
-        *(inertials[part]["value"] for part in ("mass", "center_of_mass", "inertia_frame_rpy", "inertia")),
+        *(
+            inertials[part]["value"]
+            for part in ("mass", "center_of_mass", "inertia_frame_rpy", "inertia")
+        ),
         *(limits[part]["value"] for part in ("position_min", "position_max", "velocity", "torque")),
     )
-    for parent, child, joint, origin, mass, com, rpy, inertia, lower, upper, velocity, torque in zip(
-        *columns, strict=True
-    ):
+    for (
+        parent,
+        child,
+        joint,
+        origin,
+        mass,
+        com,
+        rpy,
+        inertia,
+        lower,
+        upper,
+        velocity,
+        torque,
+    ) in zip(*columns, strict=True):
         element = _joint(robot, joint, "revolute", parent, child, origin)
         SubElement(element, "axis", xyz="0 0 1")
         bounds = {"lower": lower, "upper": upper, "velocity": velocity, "effort": torque}
@@ -40,7 +56,9 @@ def urdf_of(name: str, figures: dict[str, Any]) -> str:
     return ElementTree.tostring(robot, encoding="unicode", xml_declaration=True)
 
 
-def _joint(robot: Element, name: str, kind: str, parent: str, child: str, origin: Sequence[float]) -> Element:
+def _joint(
+    robot: Element, name: str, kind: str, parent: str, child: str, origin: Sequence[float]
+) -> Element:
     element = SubElement(robot, "joint", name=name, type=kind)
     SubElement(element, "parent", link=parent)
     SubElement(element, "child", link=child)
@@ -48,7 +66,9 @@ def _joint(robot: Element, name: str, kind: str, parent: str, child: str, origin
     return element
 
 
-def _link(robot: Element, name: str, mass: float, origin: Sequence[float], inertia: Sequence[float]) -> None:
+def _link(
+    robot: Element, name: str, mass: float, origin: Sequence[float], inertia: Sequence[float]
+) -> None:
     body = SubElement(SubElement(robot, "link", name=name), "inertial")
     _origin(body, origin)
     SubElement(body, "mass", value=repr(float(mass)))

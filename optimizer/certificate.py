@@ -1,7 +1,9 @@
-"""Certificate of a motion: an independent check of the returned spline by Pinocchio on a grid of at most 1 ms.
+"""Certificate of a motion: an independent check of the returned spline by Pinocchio on a grid of at
+most 1 ms.
 
-It takes nothing from the solver except the spline and the energy reported for it. Torques, energies and the pose of the
-TCP come from Pinocchio's own recursions, not from the compiled kernel or the kinematics of the optimiser.
+It takes nothing from the solver except the spline and the energy reported for it. Torques, energies
+and the pose of the TCP come from Pinocchio's own recursions, not from the compiled kernel or the
+kinematics of the optimiser.
 """
 
 from __future__ import annotations
@@ -45,12 +47,15 @@ WHOLE, REST = 3e-6, 1.5e-6
 
 
 @one_thread()
-def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, reported: Energy) -> Certificate:
+def certify(
+    problem: Problem, spline: Spline, q_start: Array, q_goal: Array, reported: Energy
+) -> Certificate:
     """Certificate of `spline` as a motion of `problem` whose energy is `reported`.
 
-    A problem with several targets must be `narrowed` to those reached. q_start, q_goal (nq,) [rad] are the joint
-    positions that the answer names as its ends. The grid is uniform and includes both ends. A spline that does not
-    cover the grid gives NaN, which passes no tolerance. Ends by DeadlinePassed if the watched deadline passes.
+    A problem with several targets must be `narrowed` to those reached. q_start, q_goal (nq,) [rad]
+    are the joint positions that the answer names as its ends. The grid is uniform and includes both
+    ends. A spline that does not cover the grid gives NaN, which passes no tolerance. Ends by
+    DeadlinePassed if the watched deadline passes.
     """
     arm, replay = problem.arm, _Replay(problem.arm, spline)
     if len(replay.t) > BLOCK:
@@ -65,13 +70,18 @@ def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, rep
         start_error=replay.end_error(single(problem.start), q_start, replay.q[0]),
         goal_error=replay.end_error(single(problem.goal), q_goal, replay.q[-1]),
         rest_error=replay.rest_error,
-        pass_error=float(deviations(spline.curve, np.array(problem.passes)).max()) if problem.passes else 0.0,
+        pass_error=float(deviations(spline.curve, np.array(problem.passes)).max())
+        if problem.passes
+        else 0.0,
         energy_error=_worst(
             relative_error(energy.electrical.total, reported.electrical.total),
             relative_error(energy.mechanical.total, reported.mechanical.total),
         ),
         balance_error=_worst(
-            *(relative_error(each.electrical.parts_sum, each.electrical.total) for each in (energy, reported))
+            *(
+                relative_error(each.electrical.parts_sum, each.electrical.total)
+                for each in (energy, reported)
+            )
         ),
         clearance=clearance,
         close_pass=close_pass(arm, spline, clearance),
@@ -79,7 +89,8 @@ def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, rep
 
 
 class _Replay:
-    """A motion on the grid, by Pinocchio: t (k,) [s]; q, v, a, jerk (k, nq) in rad and s; tau (k, nq) [N·m].
+    """A motion on the grid, by Pinocchio: t (k,) [s]; q, v, a, jerk (k, nq) in rad and s; tau (k,
+    nq) [N·m].
 
     tau is the torque of rigid bodies and rotors, without friction.
     """
@@ -106,7 +117,9 @@ class _Replay:
             if low:
                 checkpoint()
             block = slice(low, low + BLOCK)
-            pin.rneaInParallel(1, pool, *(np.asfortranarray(x[block].T) for x in (q, v, a)), tau[:, block])
+            pin.rneaInParallel(
+                1, pool, *(np.asfortranarray(x[block].T) for x in (q, v, a)), tau[:, block]
+            )
         return tau.T
 
     @property
@@ -114,12 +127,17 @@ class _Replay:
         """Energy of the motion by Simpson's rule, without waiting afterwards."""
         potential, kinetic = pin.computePotentialEnergy, pin.computeKineticEnergy
         ends = [
-            (potential(self.model, self.data, self.q[k]), kinetic(self.model, self.data, self.q[k], self.v[k]))
+            (
+                potential(self.model, self.data, self.q[k]),
+                kinetic(self.model, self.data, self.q[k], self.v[k]),
+            )
             for k in (0, -1)
         ]
         gain_potential, gain_kinetic = (after - before for before, after in zip(*ends, strict=True))
         weights = simpson_weights(self.t)
-        return breakdown(weights, self.v, self.a, self.tau, gain_potential, self.arm, gain_kinetic, self._lost)
+        return breakdown(
+            weights, self.v, self.a, self.tau, gain_potential, self.arm, gain_kinetic, self._lost
+        )
 
     @property
     def final_holding_power(self) -> float:
@@ -129,10 +147,12 @@ class _Replay:
 
     @property
     def limit_ratios(self) -> dict[str, float]:
-        """The worst value / limit of position, velocity, acceleration and jerk; that of torque is a bound.
+        """The worst value / limit of position, velocity, acceleration and jerk; that of torque is a
+        bound.
 
-        Between two samples, a torque may peak where a joint reverses and friction changes sign. The others are
-        polynomials, whose peaks are beyond the samples by less than the tolerance of a ratio.
+        Between two samples, a torque may peak where a joint reverses and friction changes sign. The
+        others are polynomials, whose peaks are beyond the samples by less than the tolerance of a
+        ratio.
         """
         samples = TorqueSamples(self.t[None], self.v[None], self.a[None], self.tau[None])
         tau = torque_bounds(self.arm, self._spline.curve, self.torques, samples)[None]
@@ -142,11 +162,15 @@ class _Replay:
     def rest_error(self) -> float:
         """The worst |v| / v_max and |a| / a_max at the two ends."""
         limits, ends = self.arm.active_limits, [0, -1]
-        return float(np.max([np.abs(self.v[ends]) / limits.v_max, np.abs(self.a[ends]) / limits.a_max]))
+        return float(
+            np.max([np.abs(self.v[ends]) / limits.v_max, np.abs(self.a[ends]) / limits.a_max])
+        )
 
     @property
     def path_ratios(self) -> dict[str, float]:
-        """The worst value / limit of the tool's angle in its cone and of the speeds of TCP and elbow, if limited."""
+        """The worst value / limit of the tool's angle in its cone and of the speeds of TCP and
+        elbow, if limited.
+        """
         arm, ratios = self.arm, {}
         if arm.tool_cone is None and arm.tcp_speed is None and arm.elbow_speed is None:
             return {}
@@ -158,7 +182,9 @@ class _Replay:
             angles = _tool_angles(arm.tool_cone, rotations @ self._T_last_tcp[:3, :3])
             ratios["tool_cone"] = float(np.max(angles)) / arm.tool_cone.half_angle
         if arm.tcp_speed is not None:
-            ratios["tcp_speed"] = _greatest_speed(twists[last], self._T_last_tcp[:3, 3]) / arm.tcp_speed
+            ratios["tcp_speed"] = (
+                _greatest_speed(twists[last], self._T_last_tcp[:3, 3]) / arm.tcp_speed
+            )
         if arm.elbow_speed is not None and elbow is not None:
             speeds = [_greatest_speed(twists[elbow.link], end) for end in elbow.axis]
             ratios["elbow_speed"] = _worst(*speeds) / arm.elbow_speed
@@ -167,41 +193,60 @@ class _Replay:
     def tool_path_ratios(self, problem: Problem) -> dict[str, float]:
         """The worst deviations from the tool path over their tolerances, between the samples, too.
 
-        From one sample to the next the TCP leaves the chord between them by at most an eighth of its acceleration times
-        the squared time, and so does the path; the rotation likewise. Both are taken from second differences.
+        From one sample to the next the TCP leaves the chord between them by at most an eighth of
+        its acceleration times the squared time, and so does the path; the rotation likewise. Both
+        are taken from second differences.
         """
         path = problem.tool_path
         if path is None:
             return {}
         start, goal = (
-            each.T if isinstance(each, Pose) else each if isinstance(each, ConeOrientedPose) else self.tcp_pose(each)
+            each.T
+            if isinstance(each, Pose)
+            else each
+            if isinstance(each, ConeOrientedPose)
+            else self.tcp_pose(each)
             for each in (single(problem.start), single(problem.goal))
         )
         course = ToolCourse.of(path, start, goal)
-        instants = np.append(np.arange(0, len(self.q) - 1, len(self.q) // ON_PATH + 1), len(self.q) - 1)
+        instants = np.append(
+            np.arange(0, len(self.q) - 1, len(self.q) // ON_PATH + 1), len(self.q) - 1
+        )
         T = np.array([self.tcp_pose(self.q[k]) for k in instants])
         checkpoint()
         if not np.isfinite(T).all():
             return dict.fromkeys(("path_position", "path_rotation"), np.nan)
         position, rotation = course.deviation(T)
-        moving = T[:, :3] if path.about is None else T[:, :3] @ np.column_stack([[*path.about, 0], [0, 0, 0, 1]])
-        between = 2 * float(np.linalg.norm(np.diff(moving, n=2, axis=0), axis=(1, 2)).max(initial=0.0)) / 8
+        moving = (
+            T[:, :3]
+            if path.about is None
+            else T[:, :3] @ np.column_stack([[*path.about, 0], [0, 0, 0, 1]])
+        )
+        between = (
+            2
+            * float(np.linalg.norm(np.diff(moving, n=2, axis=0), axis=(1, 2)).max(initial=0.0))
+            / 8
+        )
         return {
             "path_position": float(position.max() + between) / path.position_tolerance,
             "path_rotation": float(rotation.max() + between) / path.rotation_tolerance,
         } | self._path_speed_ratio(path)
 
     def _path_speed_ratio(self, path: ToolPath) -> dict[str, float]:
-        """The least speed that the path asks for over that of the TCP where it is beyond the ramps at both ends.
+        """The least speed that the path asks for over that of the TCP where it is beyond the ramps
+        at both ends.
 
-        Of a fixed speed, the largest deviation from it over its tolerance, and on the ramps that above it.
+        Of a fixed speed, the largest deviation from it over its tolerance, and on the ramps that
+        above it.
 
-        Between two samples the speed is less than on the line between them by at most an eighth of its curvature times
-        the squared time, which is taken from second differences.
+        Between two samples the speed is less than on the line between them by at most an eighth of
+        its curvature times the squared time, which is taken from second differences.
         """
         if path.least_speed is None:
             return {}
-        speed = _speeds(self._link_motions(False, [self._last])[1][self._last], self._T_last_tcp[:3, 3])
+        speed = _speeds(
+            self._link_motions(False, [self._last])[1][self._last], self._T_last_tcp[:3, 3]
+        )
         gone = np.append(0.0, np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(self.t)))
         beyond = (gone >= path.ramp) & (gone <= gone[-1] - path.ramp)
         dip = 2 * float(np.abs(np.diff(speed, n=2)[beyond[1:-1]]).max(initial=0.0)) / 8
@@ -213,9 +258,11 @@ class _Replay:
         return {"path_speed": path.least_speed / least if least > 0 else np.inf}
 
     def _link_motions(self, rotating: bool, moving: list[int]) -> tuple[Array, dict[int, Array]]:
-        """Rotations (k, 3, 3) of the last link in the base frame, if `rotating`, and the motions of the links `moving`.
+        """Rotations (k, 3, 3) of the last link in the base frame, if `rotating`, and the motions of
+        the links `moving`.
 
-        A motion (k, 6) is the velocity of the link's origin [m/s] and its angular velocity [rad/s], in its own frame.
+        A motion (k, 6) is the velocity of the link's origin [m/s] and its angular velocity [rad/s],
+        in its own frame.
         """
         rotations = np.empty((len(self.q) if rotating else 0, 3, 3))
         twists = {joint: np.empty((len(self.q), 6)) for joint in moving}
@@ -232,9 +279,10 @@ class _Replay:
     def end_error(self, target: Single, named: Array, reached: Array) -> EndError:
         """Error of the TCP at `reached` (nq,) [rad] against the target.
 
-        Forward kinematics cannot tell joint positions apart that differ by full turns. The rotation is therefore at
-        least the largest deviation of a joint from the joint positions named, and from those of a joint target. For a
-        pose with an orientation tolerance it is measured from the nearest allowed orientation.
+        Forward kinematics cannot tell joint positions apart that differ by full turns. The rotation
+        is therefore at least the largest deviation of a joint from the joint positions named, and
+        from those of a joint target. For a pose with an orientation tolerance it is measured from
+        the nearest allowed orientation.
         """
         joint_error = float(np.abs(reached - named).max())
         T_reached = self.tcp_pose(reached)
@@ -257,19 +305,27 @@ class _Replay:
 
 
 def _greatest_speed(motions: Array, point: Array) -> float:
-    """Greatest speed [m/s] of a point (3,) [m], fixed to a link and given in its frame, over the link's `motions`."""
+    """Greatest speed [m/s] of a point (3,) [m], fixed to a link and given in its frame, over the
+    link's `motions`.
+    """
     return float(_speeds(motions, point).max())
 
 
 def _speeds(motions: Array, point: Array) -> Array:
-    """Speeds (k,) [m/s] of a point (3,) [m], fixed to a link and given in its frame, in the link's `motions`."""
+    """Speeds (k,) [m/s] of a point (3,) [m], fixed to a link and given in its frame, in the link's
+    `motions`.
+    """
     return np.asarray(np.linalg.norm(motions[:, :3] + np.cross(motions[:, 3:], point), axis=1))
 
 
 def _tool_angles(cone: ToolCone, R_base_tcp: Array) -> Array:
-    """Angles (k,) [rad] between the tool axis and the direction of its cone, for orientations (k, 3, 3)."""
+    """Angles (k,) [rad] between the tool axis and the direction of its cone, for orientations (k,
+    3, 3).
+    """
     tool_axis = R_base_tcp @ cone.axis
-    angles: Array = np.arctan2(np.linalg.norm(np.cross(tool_axis, cone.direction), axis=1), tool_axis @ cone.direction)
+    angles: Array = np.arctan2(
+        np.linalg.norm(np.cross(tool_axis, cone.direction), axis=1), tool_axis @ cone.direction
+    )
     return angles
 
 

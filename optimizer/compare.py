@@ -12,7 +12,14 @@ from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, Jou
 from joulepath.optimizer.methods import METHODS
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.problem import MethodName, Problem
-from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, forward, nobody
+from joulepath.optimizer.progress import (
+    CandidatesFound,
+    CandidateTried,
+    Improved,
+    Tell,
+    forward,
+    nobody,
+)
 from joulepath.optimizer.result.energy import Objective
 from joulepath.optimizer.result.solution import Solution
 
@@ -92,7 +99,9 @@ def compare(
         JoulepathError: no method found a motion; the error is that of the first of `methods`.
     """
     if not methods or len(set(methods)) < len(methods) or not set(methods) <= METHODS.keys():
-        raise InvalidProblem("methods", f"methods must name some of {', '.join(METHODS)}, each once.")
+        raise InvalidProblem(
+            "methods", f"methods must name some of {', '.join(METHODS)}, each once."
+        )
     shares = DeadlineShares(Deadline.after(problem.deadline, clock), len(methods))
     tell, found = forward(tell), dict[MethodName, Compared]()
     tell(CandidatesFound(len(methods)))

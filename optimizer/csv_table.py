@@ -30,12 +30,14 @@ _SPREADSHEET = b"PK\x03\x04"
 
 
 def line_of(file: Lines, row: int, longest: int) -> str:
-    """The next line, which is line `row`; empty at the end of the file. Raises InvalidTable, also above `longest`, and
-    DeadlinePassed once a watched deadline has passed."""
+    """The next line, which is line `row`; empty at the end of the file. Raises InvalidTable, also
+    above `longest`, and DeadlinePassed once a watched deadline has passed."""
     checkpoint()
     raw = file.readline(longest + 1)
     if len(raw) > longest:
-        raise InvalidTable(f"Line {row} is longer than {longest} characters: send one row per line.", row)
+        raise InvalidTable(
+            f"Line {row} is longer than {longest} characters: send one row per line.", row
+        )
     if row == 1 and raw.startswith(_SPREADSHEET):
         raise InvalidTable("The file is a spreadsheet: export it as CSV.", row)
     if row == 1 and raw.startswith((b"\xff\xfe", b"\xfe\xff")):
@@ -49,7 +51,9 @@ def line_of(file: Lines, row: int, longest: int) -> str:
 
 
 def header_of(file: Lines, longest: int, separators: str = SEPARATORS) -> tuple[list[str], str]:
-    """Names of the columns in the first line, and what separates them, as `names_of` says. Raises InvalidTable."""
+    """Names of the columns in the first line, and what separates them, as `names_of` says. Raises
+    InvalidTable.
+    """
     first = line_of(file, 1, longest)
     if not first:
         raise InvalidTable("The file is empty: send a header and two or more rows.")
@@ -57,21 +61,26 @@ def header_of(file: Lines, longest: int, separators: str = SEPARATORS) -> tuple[
 
 
 def names_of(header: str, separators: str = SEPARATORS) -> tuple[list[str], str]:
-    """Names of the columns of a header, in lower case, and what separates them: the most frequent of `separators`,
-    where a space counts only if there is none of the others."""
-    separator = max(separators, key=lambda each: header.count(each) * (0.01 if each == " " else 1.0))
+    """Names of the columns of a header, in lower case, and what separates them: the most frequent
+    of `separators`, where a space counts only if there is none of the others."""
+    separator = max(
+        separators, key=lambda each: header.count(each) * (0.01 if each == " " else 1.0)
+    )
     cells = header.split() if separator == " " else header.split(separator)
     return [name.strip().strip("\"'").strip().lower() for name in cells], separator
 
 
 def with_points(lines: Sequence[str], first: int) -> Iterator[str]:
-    """Lines from line `first` on, with decimal points in place of decimal commas. Raises InvalidTable."""
+    """Lines from line `first` on, with decimal points in place of decimal commas. Raises
+    InvalidTable.
+    """
     for row, line in enumerate(lines, first):
         if "," not in line:
             yield line
         elif "." in line:
             raise InvalidTable(
-                f"Line {row} has both commas and points in its numbers: use one of them as the decimal sign, and "
+                f"Line {row} has both commas and points in its numbers: use one of them as the "
+                "decimal sign, and "
                 "nothing between thousands.",
                 row,
             )
@@ -80,16 +89,24 @@ def with_points(lines: Sequence[str], first: int) -> Iterator[str]:
 
 
 def numbers_of(
-    lines: Sequence[str], rows: Sequence[int], columns: list[str], separator: str, used: Sequence[int]
+    lines: Sequence[str],
+    rows: Sequence[int],
+    columns: list[str],
+    separator: str,
+    used: Sequence[int],
 ) -> Array:
-    """The columns with the indices `used` of the lines with the numbers `rows`, (k, used). Raises InvalidTable.
+    """The columns with the indices `used` of the lines with the numbers `rows`, (k, used). Raises
+    InvalidTable.
 
-    Where not all columns are used, the caller makes sure that the lines have as many cells as the header.
+    Where not all columns are used, the caller makes sure that the lines have as many cells as the
+    header.
     """
     # with a choice of columns, numpy accepts lines that are too long
     chosen = None if len(used) == len(columns) else used
     try:
-        values = np.loadtxt(lines, delimiter=separator, comments=None, quotechar='"', ndmin=2, usecols=chosen)
+        values = np.loadtxt(
+            lines, delimiter=separator, comments=None, quotechar='"', ndmin=2, usecols=chosen
+        )
     except ValueError:
         raise _first_error(lines, rows, columns, separator, used) from None
     if values.shape != (len(lines), len(used)) or not np.isfinite(values).all():
@@ -98,7 +115,11 @@ def numbers_of(
 
 
 def _first_error(
-    lines: Sequence[str], rows: Sequence[int], columns: list[str], separator: str, used: Sequence[int]
+    lines: Sequence[str],
+    rows: Sequence[int],
+    columns: list[str],
+    separator: str,
+    used: Sequence[int],
 ) -> InvalidTable:
     for row, line in zip(rows, lines, strict=True):
         cells = next(csv.reader([line], delimiter=separator), [])
@@ -111,8 +132,12 @@ def _first_error(
                 finite = False
             if not finite:
                 name = columns[k]
-                return InvalidTable(f"{name} in line {row} is no finite number: correct or delete it.", row, name)
-    return InvalidTable(f"The lines from line {rows[0]} on cannot be read: write plain numbers.", rows[0])
+                return InvalidTable(
+                    f"{name} in line {row} is no finite number: correct or delete it.", row, name
+                )
+    return InvalidTable(
+        f"The lines from line {rows[0]} on cannot be read: write plain numbers.", rows[0]
+    )
 
 
 def wrong_length(line: str, row: int, cells: int, columns: int, separator: str) -> InvalidTable:
@@ -120,7 +145,10 @@ def wrong_length(line: str, row: int, cells: int, columns: int, separator: str) 
     message = f"Line {row} has {cells} columns, but the header has {columns}: correct the line."
     # numbers without a fraction have no comma
     if separator == "," and 1.5 * columns < cells <= 2 * columns:
-        message += " For numbers with a decimal comma, separate the columns by semicolons, also in the header."
+        message += (
+            " For numbers with a decimal comma, separate the columns by semicolons, also "
+            "in the header."
+        )
     elif any(other in line for other in SEPARATORS.replace(separator, "")):
         message += f" The header separates them by {_WORDS[separator]}: do so in every line."
     return InvalidTable(message, row)

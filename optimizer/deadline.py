@@ -1,10 +1,12 @@
 """Deadline of a computation: an instant of a clock, at which it ends with the best result so far.
 
-A loop that can return what it has so far reads `Deadline.passed`. Below such loops lies work that may take long by
-itself and is of no use in part: torques at a million instants, distances of a thousand pairs, a quadratic program. It
-calls `checkpoint`, which raises DeadlinePassed once the deadline has passed that a caller further up watches.
+A loop that can return what it has so far reads `Deadline.passed`. Below such loops lies work that
+may take long by itself and is of no use in part: torques at a million instants, distances of a
+thousand pairs, a quadratic program. It calls `checkpoint`, which raises DeadlinePassed once the
+deadline has passed that a caller further up watches.
 
-A computation whose result nobody wants any more ends at its next `checkpoint`, too: see `stoppable`.
+A computation whose result nobody wants any more ends at its next `checkpoint`, too: see
+`stoppable`.
 """
 
 from __future__ import annotations
@@ -21,7 +23,9 @@ Clock = Callable[[], float]
 
 @dataclass(frozen=True)
 class Deadline:
-    """The instant `at` [s] of `clock`, a function that returns the time [s]; a test may pass its own."""
+    """The instant `at` [s] of `clock`, a function that returns the time [s]; a test may pass its
+    own.
+    """
 
     at: float = math.inf
     clock: Clock = time.perf_counter
@@ -62,7 +66,8 @@ class DeadlineShares:
     Args:
         deadline: instant at which the last run must end.
         runs: number of runs.
-        least: shortest share [s]; a run whose time was used up by earlier ones still says so itself.
+        least: shortest share [s]; a run whose time was used up by earlier ones still says so
+            itself.
     """
 
     def __init__(self, deadline: Deadline, runs: int, least: float = 1e-3) -> None:
@@ -81,21 +86,24 @@ class DeadlineShares:
 
 
 LONG_PAST = 1e6
-"""Time [s] by which every deadline has passed for a computation that is stopped. It is finite, so that shares of it are
-numbers."""
+"""Time [s] by which every deadline has passed for a computation that is stopped. It is finite, so
+that shares of it are numbers."""
 
 
 class Stopped(BaseException):
-    """Nobody wants the result of the computation. Handlers of errors let it pass: whoever runs the computation catches
-    it."""
+    """Nobody wants the result of the computation. Handlers of errors let it pass: whoever runs the
+    computation catches it."""
 
 
-_wanted_no_more: ContextVar[Callable[[], bool] | None] = ContextVar("whether the computation is stopped", default=None)
+_wanted_no_more: ContextVar[Callable[[], bool] | None] = ContextVar(
+    "whether the computation is stopped", default=None
+)
 
 
 @contextmanager
 def stoppable(is_stopped: Callable[[], bool]) -> Iterator[None]:
-    """Within the context, once `is_stopped` says so, every deadline has passed, and `checkpoint` raises Stopped.
+    """Within the context, once `is_stopped` says so, every deadline has passed, and `checkpoint`
+    raises Stopped.
 
     `is_stopped` is called often, must be fast, and must never take back that it is so.
     """
@@ -113,7 +121,9 @@ def is_stopped() -> bool:
 
 
 def end_if_stopped() -> None:
-    """Raises Stopped if the computation is stopped: for work that must be finished whatever the deadline."""
+    """Raises Stopped if the computation is stopped: for work that must be finished whatever the
+    deadline.
+    """
     if is_stopped():
         raise Stopped
 
@@ -127,7 +137,8 @@ _watched: ContextVar[Deadline | None] = ContextVar("watched deadline", default=N
 
 @contextmanager
 def watch(deadline: Deadline) -> Iterator[None]:
-    """Within the context, `checkpoint` raises DeadlinePassed after `deadline`. Of nested contexts the innermost counts.
+    """Within the context, `checkpoint` raises DeadlinePassed after `deadline`. Of nested contexts
+    the innermost counts.
 
     Each thread watches its own.
     """
@@ -139,8 +150,8 @@ def watch(deadline: Deadline) -> Iterator[None]:
 
 
 def checkpoint(needed: float = 0.0) -> None:
-    """Raises Stopped if the computation is stopped, and DeadlinePassed if less than `needed` [s] is left until the
-    watched deadline, if there is one."""
+    """Raises Stopped if the computation is stopped, and DeadlinePassed if less than `needed` [s] is
+    left until the watched deadline, if there is one."""
     end_if_stopped()
     deadline = _watched.get()
     if deadline is not None and deadline.left < needed:

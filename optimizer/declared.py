@@ -1,7 +1,8 @@
-"""What the fields of results and errors declare beside their types: units, axes, and how they are shown.
+"""What the fields of results and errors declare beside their types: units, axes, and how they are
+shown.
 
-The text below a field is its meaning. This module only names the markers; `joulepath.app.answers.declared`
-reads them to write JSON, JSON Schema and the reference.
+The text below a field is its meaning. This module only names the markers;
+`joulepath.app.answers.declared` reads them to write JSON, JSON Schema and the reference.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from joulepath.models.robot import Array
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """Unit of a number, or of every number in an array: "J", "rad/s"; "1" for a ratio or a count."""
+    """Unit of a number, or of every number in an array: "J", "rad/s"; "1" for a ratio or a
+    count."""
 
     symbol: str
 

@@ -1,8 +1,8 @@
 """The errors of the library, each with its data.
 
-Here are the base classes and the errors that several rooms raise. Those of one room are declared in it:
-`search.errors`, `sequence.errors`, `exports.errors`, `excitation.errors`, `identification.errors` and
-`identification.logs.log_errors`.
+Here are the base classes and the errors that several rooms raise. Those of one room are declared in
+it: `search.errors`, `sequence.errors`, `exports.errors`, `excitation.errors`,
+`identification.errors` and `identification.logs.log_errors`.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ MOST_LISTED = 64
 class DeclaredError(Exception):
     """Base of all errors that a caller can correct; `str(error)` says what is wrong and what to do.
 
-    A class with a `title` is a type of error of its own, and a subclass without one belongs to the type of its base.
-    The docstring of a type says when the error occurs, and the dataclass fields are its data. Schemas, problem pages
-    and the reference are made from this declaration.
+    A class with a `title` is a type of error of its own, and a subclass without one belongs to the
+    type of its base. The docstring of a type says when the error occurs, and the dataclass fields
+    are its data. Schemas, problem pages and the reference are made from this declaration.
     """
 
     title: ClassVar[str]
@@ -57,7 +57,9 @@ class DeclaredError(Exception):
 
     @classmethod
     def slug(cls) -> str:
-        """Name of the type in URLs, made from the name of the class: `DurationTooShort` is `duration-too-short`."""
+        """Name of the type in URLs, made from the name of the class: `DurationTooShort` is
+        `duration-too-short`.
+        """
         return re.sub(r"(?<!^)(?=[A-Z])", "-", cls.type_of_error().__name__).lower()
 
 
@@ -94,7 +96,9 @@ class ContradictoryOrder(JoulepathError):
     message: Annotated[str, Internal]
     """What contradicts what."""
     names: list[str]
-    """Stops that contradict each other: each would have to come before the next one, and the last before the first."""
+    """Stops that contradict each other: each would have to come before the next one, and the last
+    before the first.
+    """
 
     def __str__(self) -> str:
         return self.message
@@ -102,9 +106,9 @@ class ContradictoryOrder(JoulepathError):
 
 @dataclass(eq=False)
 class InvalidTable(JoulepathError):
-    """The samples of a given motion or of a log cannot be read. Possible causes: a value is no finite number, or looks
-    like degrees; the times do not increase; a line has too few or too many columns; the header is missing or unknown;
-    the file is no CSV."""
+    """The samples of a given motion or of a log cannot be read. Possible causes: a value is no
+    finite number, or looks like degrees; the times do not increase; a line has too few or too many
+    columns; the header is missing or unknown; the file is no CSV."""
 
     title = "Invalid table"
     remedy = "Correct the place that `row` and `column` name."
@@ -112,8 +116,8 @@ class InvalidTable(JoulepathError):
     message: Annotated[str, Internal]
     """What is wrong with the table."""
     row: Count | None = None
-    """CSV: number of the line; the header is line 1. JSON: index into the list, from 0. Null if no single row is at
-    fault."""
+    """CSV: number of the line; the header is line 1. JSON: index into the list, from 0. Null if no
+    single row is at fault."""
     column: str | None = None
     """Name of the column, as in the header of a CSV file. Null if no single column is at fault."""
 
@@ -127,8 +131,8 @@ _LIKE_DEGREES = 20.0
 
 @dataclass(eq=False)
 class OutsideLimits(JoulepathError):
-    """A joint position at the start, the goal, a stop or the centre of an excitation is outside the joint range: that
-    of the robot, or the narrower one of `limits.position`."""
+    """A joint position at the start, the goal, a stop or the centre of an excitation is outside the
+    joint range: that of the robot, or the narrower one of `limits.position`."""
 
     title = "Joint position outside its limits"
     remedy = "Give a value between `lower` and `upper`."
@@ -148,7 +152,11 @@ class OutsideLimits(JoulepathError):
         return (
             f"The {self.target}'s {self.joint} is at {self.value:.6g} rad: "
             f"give a value between {self.lower:.6g} and {self.upper:.6g} rad."
-            + (" It looks like degrees: divide it by 57.29578." if abs(self.value) > _LIKE_DEGREES else "")
+            + (
+                " It looks like degrees: divide it by 57.29578."
+                if abs(self.value) > _LIKE_DEGREES
+                else ""
+            )
         )
 
 
@@ -173,22 +181,27 @@ class UnknownRobot(JoulepathError):
 @dataclass(eq=False)
 class _TargetError(JoulepathError):
     target: str
-    """Target at fault: `start`, `goal` (of `POST /ik`, too), or `stops/` and the name of a stop of `POST /cycle`."""
+    """Target at fault: `start`, `goal` (of `POST /ik`, too), or `stops/` and the name of a stop of
+    `POST /cycle`.
+    """
 
 
 @dataclass(eq=False)
 class UnreachablePose(_TargetError):
-    """No arm configuration within the joint range reaches the pose, or the requested `branch` does not reach it."""
+    """No arm configuration within the joint range reaches the pose, or the requested `branch` does
+    not reach it.
+    """
 
     title = "Unreachable pose"
     remedy = (
-        "Check that `position` is in metres and in the robot's base frame, and that `tcp` is right. Move the pose "
+        "Check that `position` is in metres and in the robot's base frame, and that `tcp` is "
+        "right. Move the pose "
         "closer, or leave `branch` out."
     )
 
     distance: Metres | None
-    """Distance from the wrist centre of the pose to the nearest position that it can reach. Null if a joint range or
-    `branch` is the cause."""
+    """Distance from the wrist centre of the pose to the nearest position that it can reach. Null if
+    a joint range or `branch` is the cause."""
     message: Annotated[str, Internal]
     """Why the pose cannot be reached."""
 
@@ -198,29 +211,34 @@ class UnreachablePose(_TargetError):
 
 @dataclass(eq=False)
 class SingularPose(_TargetError):
-    """The arm reaches the pose only where it can turn about an axis of its own while the TCP stays, in a way that its
-    inverse kinematics does not cover."""
+    """The arm reaches the pose only where it can turn about an axis of its own while the TCP stays,
+    in a way that its inverse kinematics does not cover."""
 
     title = "Singular pose"
     remedy = (
-        "Move the pose by a few millimetres, or give joint positions. Poses with a stretched elbow or wrist are "
+        "Move the pose by a few millimetres, or give joint positions. Poses with a stretched elbow "
+        "or wrist are "
         "answered."
     )
 
     smallest_singular_value: Ratio
-    """Smallest singular value of the Jacobian in metres and radians, of the configuration that is least singular."""
+    """Smallest singular value of the Jacobian in metres and radians, of the configuration that is
+    least singular.
+    """
 
     def __str__(self) -> str:
         return (
-            f"At the {self.target} pose the arm can turn about an axis of its own while the TCP stays, and its inverse "
-            "kinematics does not cover this: move the pose a few millimetres, or give joint positions."
+            f"At the {self.target} pose the arm can turn about an axis of its own while the TCP "
+            "stays, and its inverse "
+            "kinematics does not cover this: move the pose a few millimetres, or give joint "
+            "positions."
         )
 
 
 @dataclass(eq=False)
 class UnreachableTargets(_TargetError):
-    """The arm can reach no target of an `any_of`. For each target, `unreachable` gives the cause: the pose is out of
-    reach or singular, or joint positions are outside their range."""
+    """The arm can reach no target of an `any_of`. For each target, `unreachable` gives the cause:
+    the pose is out of reach or singular, or joint positions are outside their range."""
 
     title = "No reachable target"
     remedy = "Correct at least one target."
@@ -230,7 +248,8 @@ class UnreachableTargets(_TargetError):
 
     def __str__(self) -> str:
         return (
-            f"None of the {len(self.unreachable)} {self.target} targets can be reached: correct at least one of "
+            f"None of the {len(self.unreachable)} {self.target} targets can be reached: correct at "
+            "least one of "
             "them as described in `unreachable`."
         )
 
@@ -259,11 +278,14 @@ class _SearchError(JoulepathError):
 
 
 class NoTrajectory(_SearchError):
-    """No candidate has a motion within the limits; the `reason` of each candidate gives the cause."""
+    """No candidate has a motion within the limits; the `reason` of each candidate gives the
+    cause."""
 
     title = "No trajectory found"
     remedy = "Widen a limit, allow a longer duration, or leave `branch` out."
-    detail = "No candidate gave a motion within the limits: relax a limit or allow a longer duration."
+    detail = (
+        "No candidate gave a motion within the limits: relax a limit or allow a longer duration."
+    )
 
 
 class DeadlineExceeded(_SearchError):

@@ -1,8 +1,8 @@
 """The rule that every answer keeps: it is never dearer than a feasible motion in hand.
 
-What a search finds on its way stays in hand: motions of other candidates, coarser ones, the motions that the answer is
-compared with, those that are known from before. The answer is the one of them that needs least and that its certificate
-confirms in time.
+What a search finds on its way stays in hand: motions of other candidates, coarser ones, the motions
+that the answer is compared with, those that are known from before. The answer is the one of them
+that needs least and that its certificate confirms in time.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ class InHand(Protocol[T_co]):
 
 
 def least_certified(known: Iterable[InHand[T]]) -> T | None:
-    """The answer of least objective that is certified; of equals the first, None if there is none."""
+    """The answer of least objective that is certified; of equals the first, None if there is
+    none."""
     for each in sorted(known, key=lambda each: each.cost):
         answer = each.certified()
         if answer is not None:

@@ -26,15 +26,15 @@ class IKSolution:
     """One arm configuration that reaches the pose."""
 
     label: str
-    """Branch: shoulder/elbow/wrist, or its number for an arm whose branches have no names. Full turns
-    of a joint do not change it."""
+    """Branch: shoulder/elbow/wrist, or its number for an arm whose branches have no names. Full
+    turns of a joint do not change it."""
     q: Annotated[PerJoint, Unit("rad")]
     """Joint positions."""
     limit_distance: Radians
     """Smallest distance of a joint from an end of its range."""
     smallest_singular_value: Ratio
-    """Smallest singular value of the Jacobian in metres and radians; near zero, the configuration is
-    nearly singular."""
+    """Smallest singular value of the Jacobian in metres and radians; near zero, the configuration
+    is nearly singular."""
     singular: tuple[str, ...]
     """Parts of the branch that are singular here: the configuration is on both branches of such a
     part."""

@@ -1,8 +1,9 @@
-"""Linear algebra kept to one thread per caller: the matrices are small, so more threads cost more than they give.
+"""Linear algebra kept to one thread per caller: the matrices are small, so more threads cost more
+than they give.
 
-Some BLAS libraries have a limit for each thread, others one for the whole process. So every thread that enters sets the
-limit; a thread that leaves lifts its own, and the last one that of the process. Whichever threads compute at the same
-time, all of them compute with one, and round alike.
+Some BLAS libraries have a limit for each thread, others one for the whole process. So every thread
+that enters sets the limit; a thread that leaves lifts its own, and the last one that of the
+process. Whichever threads compute at the same time, all of them compute with one, and round alike.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ from threadpoolctl import OpenBLASController, ThreadpoolController
 
 
 class _Own(threading.local):
-    """The calling thread's contexts: how many are open, and the numbers of BLAS threads before the first."""
+    """The calling thread's contexts: how many are open, and the numbers of BLAS threads before the
+    first.
+    """
 
     depth = 0
     before: Sequence[int] = ()
@@ -39,7 +42,9 @@ class _SharedLimit:
         with self._lock:
             # finding the libraries takes milliseconds
             self._libraries = self._libraries or [
-                library for library in ThreadpoolController().lib_controllers if library.user_api == "blas"
+                library
+                for library in ThreadpoolController().lib_controllers
+                if library.user_api == "blas"
             ]
             self._own.before = [library.num_threads for library in self._libraries]
             if self._users == 0:
@@ -54,7 +59,9 @@ class _SharedLimit:
             return
         with self._lock:
             self._users -= 1
-            for library, own, shared in zip(self._libraries, self._own.before, self._before, strict=True):
+            for library, own, shared in zip(
+                self._libraries, self._own.before, self._before, strict=True
+            ):
                 if _counts_per_thread(library):
                     _set(library, own)
                 elif self._users == 0:
@@ -62,7 +69,9 @@ class _SharedLimit:
 
 
 def _counts_per_thread(library: Any) -> bool:
-    """Whether each thread has a limit of its own, as threadpoolctl sets it: MKL, and OpenBLAS on OpenMP."""
+    """Whether each thread has a limit of its own, as threadpoolctl sets it: MKL, and OpenBLAS on
+    OpenMP.
+    """
     openmp = library.internal_api == "openblas" and library.threading_layer == "openmp"
     return bool(library.internal_api == "mkl" or openmp)
 

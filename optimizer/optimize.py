@@ -45,11 +45,15 @@ def optimize(problem: Problem, clock: Clock = time.perf_counter, tell: Tell = no
 
 
 def warm_up(robot_name: str) -> None:
-    """Load a robot and its kernel and solve a small problem, so that the first request does not wait for them."""
+    """Load a robot and its kernel and solve a small problem, so that the first request does not
+    wait for them.
+    """
     robot = load_robot(robot_name)
     kernel_for(robot)
     middle = (robot.limits.q_min + robot.limits.q_max) / 2
     for method, solver in METHODS.items():
         # what takes seconds would keep the others waiting
         if solver.most_solved is None:
-            optimize(Problem(arm=Arm(robot=robot), start=middle + 0.1, goal=middle + 0.4, method=method))
+            optimize(
+                Problem(arm=Arm(robot=robot), start=middle + 0.1, goal=middle + 0.4, method=method)
+            )

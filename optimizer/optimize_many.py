@@ -43,7 +43,9 @@ class Optimized:
 
 
 def optimize_many(
-    problems: Iterable[Problem], client: DaskClient | Executor | None = None, workers: int | None = None
+    problems: Iterable[Problem],
+    client: DaskClient | Executor | None = None,
+    workers: int | None = None,
 ) -> Iterator[Optimized]:
     """Solve many problems at a time, each as `optimize` does.
 
@@ -64,7 +66,9 @@ def optimize_many(
         BrokenProcessPool: a process died.
     """
     if client is not None:
-        yield from _solved_by(client if isinstance(client, Executor) else client.get_executor(), problems)
+        yield from _solved_by(
+            client if isinstance(client, Executor) else client.get_executor(), problems
+        )
         return
     # forked processes would share the threads of libraries
     own = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))

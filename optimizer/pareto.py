@@ -1,18 +1,20 @@
 """Public entry point: `pareto(problem, points)` returns the front of energy and duration.
 
-The last point is the answer of `optimize`. A motion that needs less only by the spread of solves is the same optimum.
+The last point is the answer of `optimize`. A motion that needs less only by the spread of solves is
+the same optimum.
 
-Between two neighbours the front lies within the rectangle that they span: a motion that is slower than the left one is
-dominated unless it needs less energy, and no motion needs less energy than the right one. Durations are therefore
-chosen one by one: each is the geometric mean of the two neighbours whose rectangle has the longest sides in log T and
-energy.
+Between two neighbours the front lies within the rectangle that they span: a motion that is slower
+than the left one is dominated unless it needs less energy, and no motion needs less energy than the
+right one. Durations are therefore chosen one by one: each is the geometric mean of the two
+neighbours whose rectangle has the longest sides in log T and energy.
 
-If two neighbours belong to different candidates, the front may jump between them. The candidate of the right one has a
-fastest motion of its own. If this is slower than the left point, the jump is at its duration. That duration is tried
-next, and one just below it, as halving would only converge to it.
+If two neighbours belong to different candidates, the front may jump between them. The candidate of
+the right one has a fastest motion of its own. If this is slower than the left point, the jump is at
+its duration. That duration is tried next, and one just below it, as halving would only converge to
+it.
 
-Each duration is solved with a warm start from the motions on both sides and without one. Every other candidate whose
-lower bound for this duration is below the best energy is solved, too.
+Each duration is solved with a warm start from the motions on both sides and without one. Every
+other candidate whose lower bound for this duration is below the best energy is solved, too.
 """
 
 from __future__ import annotations
@@ -28,7 +30,14 @@ from joulepath.optimizer.deadline import Clock
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, NoTrajectory
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, forward, nobody
+from joulepath.optimizer.progress import (
+    CandidatesFound,
+    CandidateTried,
+    Improved,
+    Tell,
+    forward,
+    nobody,
+)
 from joulepath.optimizer.result.front import Dropped, Front, FrontSolver
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.errors import DurationTooShort
@@ -41,18 +50,21 @@ from joulepath.optimizer.trajectories.spline import Spline
 LEAST_POINTS, MOST_POINTS = 2, 100
 # share of the time left for the search of the fastest motion, and for each end of the front
 SHARE_OF_AN_END = 1 / 3
-# relative distance of two durations that count as one, of two around a jump that is located well enough, and below the
-# duration of a jump at which the front before the jump is solved
+# relative distance of two durations that count as one, of two around a jump that is located well
+# enough, and below the duration of a jump at which the front before the jump is solved
 SAME_DURATION, SAME_JUMP, BEFORE_JUMP = 2e-4, 2e-3, (1e-4, 1e-3)
 # least deadline of a search [s]
 LEAST_TIME = 1e-3
-# relative difference of two energies that are the same optimum: solves from other guesses and knots scatter by as much
+# relative difference of two energies that are the same optimum: solves from other guesses and knots
+# scatter by as much
 CONVERGED = 1e-3
 
 
 @dataclass(frozen=True)
 class _Node:
-    """A duration [s] that was tried: its answer or the reason for none, and its energy in the objective [J] or inf."""
+    """A duration [s] that was tried: its answer or the reason for none, and its energy in the
+    objective [J] or inf.
+    """
 
     duration: float
     answer: Solution | None
@@ -65,7 +77,9 @@ class _Node:
         return None if self.answer is None else self.answer.trajectory.spline
 
 
-def pareto(problem: Problem, points: int = 12, clock: Clock = time.perf_counter, tell: Tell = nobody) -> Front:
+def pareto(
+    problem: Problem, points: int = 12, clock: Clock = time.perf_counter, tell: Tell = nobody
+) -> Front:
     """Find the front of energy over duration, from the fastest motion to that of least energy.
 
     Args:
@@ -84,7 +98,9 @@ def pareto(problem: Problem, points: int = 12, clock: Clock = time.perf_counter,
     if not LEAST_POINTS <= points <= MOST_POINTS:
         raise InvalidProblem("points", f"points must lie between {LEAST_POINTS} and {MOST_POINTS}.")
     if problem.duration_min is not None and problem.duration_min == problem.duration_max:
-        raise InvalidProblem("duration", "A front runs over durations: leave duration out or give a range.")
+        raise InvalidProblem(
+            "duration", "A front runs over durations: leave duration out or give a range."
+        )
     with one_thread():
         return _Search(problem, points, clock, forward(tell)).front()
 
@@ -108,13 +124,22 @@ class _Search:
         spline, found = self.fastest()
         problem = self.problem
         first = max(spline.duration, problem.duration_min or 0.0)
-        # first, so that the fastest motion is known even if the deadline passes before the other end is
+        # first, so that the fastest motion is known even if the deadline passes before the other
+        # end is
         self.solve(first, [spline])
         # as `optimize` solves it: with the same durations, and without what else the front knows
-        self.least = self.add(self.run([]), problem.duration_max or math.inf) if found is None else self.keep(found)
+        self.least = (
+            self.add(self.run([]), problem.duration_max or math.inf)
+            if found is None
+            else self.keep(found)
+        )
         if (answer := self.least.answer) is not None:
-            self.tell(Improved(self.least.energy, answer.duration, answer.lower_bound, answer.goal.q))
-        while len(self.nodes) < self.n and self.left() > 0 and (k := self.next_interval()) is not None:
+            self.tell(
+                Improved(self.least.energy, answer.duration, answer.lower_bound, answer.goal.q)
+            )
+        while (
+            len(self.nodes) < self.n and self.left() > 0 and (k := self.next_interval()) is not None
+        ):
             left, right = self.nodes[k : k + 2]
             if len(self.nodes) == self.n - 1 and self.refine_last():
                 break
@@ -123,15 +148,18 @@ class _Search:
             known = [node.spline for node in (left, right) if node.spline is not None]
             self.solve(math.sqrt(left.duration * right.duration), known)
         # a dominated answer counts, too: solved to its end, it might not be dominated
-        solved = all(node.answer.status == "optimal" for node in self.nodes if node.answer is not None)
+        solved = all(
+            node.answer.status == "optimal" for node in self.nodes if node.answer is not None
+        )
         complete = self.left() > 0 and not self.cut_short and solved
         return self.result(min(spline.duration, self.nodes[0].duration), complete)
 
     def fastest(self) -> tuple[Spline, Solution | None]:
-        """The fastest motion, and the answer of least energy if it had to be found first. Raises what `optimize` does.
+        """The fastest motion, and the answer of least energy if it had to be found first. Raises
+        what `optimize` does.
 
-        Where no candidate has a motion from the starts that the fastest one is looked for from, the motion of least
-        energy is one more.
+        Where no candidate has a motion from the starts that the fastest one is looked for from, the
+        motion of least energy is one more.
         """
         self.fastest_run.prepare()
         found, answer = fastest(self.fastest_run.incumbent), None
@@ -151,15 +179,20 @@ class _Search:
         return found.spline, answer
 
     def note_end(self, run: Run) -> None:
-        """Note if the deadline ended a search for a fastest motion: it has but a share of the time."""
+        """Note if the deadline ended a search for a fastest motion: it has but a share of the
+        time."""
         self.cut_short |= run.incumbent.deadline.passed
 
     def left(self) -> float:
         """Time left [s] but for that to encode the answers so far."""
-        report = sum(report_time(self.problem, node.answer) for node in self.nodes if node.answer is not None)
+        report = sum(
+            report_time(self.problem, node.answer) for node in self.nodes if node.answer is not None
+        )
         return self.began + self.problem.deadline - report - self.clock()
 
-    def run(self, known: list[Spline], least: float | None = None, most: float | None = None) -> Run:
+    def run(
+        self, known: list[Spline], least: float | None = None, most: float | None = None
+    ) -> Run:
         """A search between two durations [s], with its share of the time left."""
         problem = self.problem
         share = 1 / max(self.n - len(self.nodes), 1)
@@ -181,11 +214,14 @@ class _Search:
         return self.add(self.run(known, duration, duration), duration)
 
     def add(self, run: Run, duration: float) -> _Node:
-        """Run a search and keep its result; `duration` [s] is its place in the front if it finds no motion."""
+        """Run a search and keep its result; `duration` [s] is its place in the front if it finds no
+        motion.
+        """
         try:
             return self.keep(run.solution())
         except (DeadlineExceeded, DurationTooShort, NoTrajectory) as error:
-            # a search has but a share of the time: the front may have time left and still lack this answer
+            # a search has but a share of the time: the front may have time left and still lack this
+            # answer
             self.cut_short |= isinstance(error, DeadlineExceeded)
             return self.insert(_Node(duration, None, reason=str(error)))
         finally:
@@ -212,7 +248,9 @@ class _Search:
             self.tell(Improved(node.energy, node.duration, q_goal=answer.goal.q))
 
     def try_switch(self, left: _Node, right: _Node) -> bool:
-        """Solve for the right candidate's fastest duration, and just below; false if it is not between the two."""
+        """Solve for the right candidate's fastest duration, and just below; false if it is not
+        between the two.
+        """
         assert right.answer is not None
         q_start, q_goal = right.answer.start.q, right.answer.goal.q
         key = q_start.tobytes() + q_goal.tobytes()
@@ -242,35 +280,56 @@ class _Search:
         return True
 
     def refine_last(self) -> bool:
-        """Search the end of least energy again from the motion of least energy, if that is not the last node."""
+        """Search the end of least energy again from the motion of least energy, if that is not the
+        last node.
+        """
         least_energy = min(self.nodes, key=lambda node: node.energy)
-        if not self.beats_least(least_energy) or least_energy is self.nodes[-1] or least_energy.spline is None:
+        if (
+            not self.beats_least(least_energy)
+            or least_energy is self.nodes[-1]
+            or least_energy.spline is None
+        ):
             return False
         most = self.problem.duration_max or math.inf
         self.add(self.run([least_energy.spline], least=self.nodes[0].duration), most)
         return True
 
     def beats_least(self, node: _Node) -> bool:
-        """Whether a node needs clearly less energy than the answer of `optimize`: by more than solves differ."""
-        return self.least.answer is None or node.energy < self.least.energy - CONVERGED * abs(self.least.energy)
+        """Whether a node needs clearly less energy than the answer of `optimize`: by more than
+        solves differ.
+        """
+        return self.least.answer is None or node.energy < self.least.energy - CONVERGED * abs(
+            self.least.energy
+        )
 
     def same_as_least(self, node: _Node) -> bool:
-        """Whether a node needs less energy than the answer of `optimize`, but by no more than solves differ."""
-        return node is not self.least and node.energy <= self.least.energy and not self.beats_least(node)
+        """Whether a node needs less energy than the answer of `optimize`, but by no more than
+        solves differ.
+        """
+        return (
+            node is not self.least
+            and node.energy <= self.least.energy
+            and not self.beats_least(node)
+        )
 
     def next_interval(self) -> int | None:
-        """The node behind which another duration tells most about the front; None if all are near enough."""
+        """The node behind which another duration tells most about the front; None if all are near
+        enough.
+        """
         found = [node.energy for node in self.nodes if node.answer is not None]
         if not found:
             return None
-        # least energy within each duration: dominated nodes and those without a motion do not lower it
+        # least energy within each duration: dominated nodes and those without a motion do not lower
+        # it
         least = list(accumulate((min(node.energy, max(found)) for node in self.nodes), min))
         last = next(k for k, energy in enumerate(least) if energy == least[-1])
         rise = math.log(self.nodes[last].duration / self.nodes[0].duration)
         fall = least[0] - least[-1]
         longest, chosen = 0.0, None
         for k, (left, right) in enumerate(pairwise(self.nodes[: last + 1])):
-            if not distinct(left.duration, right.duration, SAME_JUMP if switches(left, right) else SAME_DURATION):
+            if not distinct(
+                left.duration, right.duration, SAME_JUMP if switches(left, right) else SAME_DURATION
+            ):
                 continue
             falls = least[k] - least[k + 1]
             if falls == 0 and not switches(left, right):
@@ -289,18 +348,26 @@ class _Search:
             if node.answer is None:
                 dropped.append(Dropped(node.duration, None, node.reason))
             elif self.same_as_least(node):
-                reason = "the same least energy as that of the last point, as far as the solver converges"
+                reason = (
+                    "the same least energy as that of the last point, as far as the solver "
+                    "converges"
+                )
                 dropped.append(Dropped(node.duration, node.energy, reason))
             elif points and (node.duration, node.energy) == (points[-1].duration, least):
                 continue  # the same motion found twice
             elif node.energy >= least:
-                reason = f"dominated: the motion of {points[-1].duration:.4f} s is no slower and needs no more energy"
+                reason = (
+                    f"dominated: the motion of {points[-1].duration:.4f} s is no slower and "
+                    "needs no more energy"
+                )
                 dropped.append(Dropped(node.duration, node.energy, reason))
             else:
                 points.append(node.answer)
                 least = node.energy
         if not points:
-            raise DeadlineExceeded([candidate.report() for candidate in self.fastest_run.incumbent.candidates])
+            raise DeadlineExceeded(
+                [candidate.report() for candidate in self.fastest_run.incumbent.candidates]
+            )
         return Front(
             status="optimal" if complete else "feasible",
             shortest=shortest,

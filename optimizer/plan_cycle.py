@@ -1,5 +1,5 @@
-"""Public entry point: `plan_cycle(cycle)` returns a `CycleSolution`: the configurations and motions of a cycle of
-stops that need the least energy together."""
+"""Public entry point: `plan_cycle(cycle)` returns a `CycleSolution`: the configurations and motions
+of a cycle of stops that need the least energy together."""
 
 from __future__ import annotations
 
@@ -8,7 +8,13 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
-from joulepath.optimizer.cycle.against_stopping import SHARE, Rested, as_passed, start_from, stopping_baselines
+from joulepath.optimizer.cycle.against_stopping import (
+    SHARE,
+    Rested,
+    as_passed,
+    start_from,
+    stopping_baselines,
+)
 from joulepath.optimizer.cycle.cycle_baselines import (
     compared_again,
     controller_default,
@@ -17,7 +23,13 @@ from joulepath.optimizer.cycle.cycle_baselines import (
     of_chain,
 )
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
-from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleMove, CycleSolution, Needed, needed_by
+from joulepath.optimizer.cycle.cycle_solution import (
+    CycleBaseline,
+    CycleMove,
+    CycleSolution,
+    Needed,
+    needed_by,
+)
 from joulepath.optimizer.cycle.cycles_in_hand import CycleInHand, shared, simple_cycles
 from joulepath.optimizer.cycle.divided_paths import with_divided_paths
 from joulepath.optimizer.cycle.free_orientations import with_free_orientations
@@ -38,7 +50,9 @@ from joulepath.optimizer.progress import Improved, Tell, forward, nobody, only_i
 WELL_SHARED = 1e-3
 
 
-def plan_cycle(cycle: Cycle, clock: Clock = time.perf_counter, tell: Tell = nobody) -> CycleSolution:
+def plan_cycle(
+    cycle: Cycle, clock: Clock = time.perf_counter, tell: Tell = nobody
+) -> CycleSolution:
     """Find the cycle of least energy, every move of it certified against every limit.
 
     Choosing a branch at one stop changes what the moves from there cost, so that all stops are
@@ -94,7 +108,9 @@ def _optimized(asked: Cycle, clock: Clock, tell: Tell) -> CycleSolution:
     # the bound of the best order does not hold for the others
     found = replace(
         found,
-        status=found.status if orders.exact and found.price_of_time == 0 and by_bounds else "feasible",
+        status=found.status
+        if orders.exact and found.price_of_time == 0 and by_bounds
+        else "feasible",
         lower_bound=min(orders.bound, found.lower_bound),
     )
     return found if baseline is None else _no_dearer_than(asked, found, baseline)
@@ -106,7 +122,9 @@ def _no_dearer_than(asked: Cycle, found: CycleSolution, baseline: CycleBaseline)
     if baseline.saving >= 0:
         return found
     found = replace(found, status="feasible", moves=list(baseline.moves), price_of_time=0.0)
-    return replace(found, baselines=[compared_again(asked, each, found.needed) for each in found.baselines])
+    return replace(
+        found, baselines=[compared_again(asked, each, found.needed) for each in found.baselines]
+    )
 
 
 def _divided(asked: Cycle, clock: Clock) -> Cycle:
@@ -125,22 +143,27 @@ def _tell_found(tell: Tell, found: CycleSolution) -> None:
 
 
 def _in_given_order(asked: Cycle, clock: Clock, tell: Tell) -> CycleSolution:
-    """The cycle of least energy over the stops in their order, no worse than with rests where it passes."""
+    """The cycle of least energy over the stops in their order, no worse than with rests where it
+    passes.
+    """
     if not asked.passes:
         return _searched(asked, clock, tell)
     began, stopping = clock(), None
     # where there is none with rests, there may be one without: it takes less time
     with suppress(JoulepathError):
-        stopping = _searched(replace(asked, stopping=True, deadline=SHARE * asked.deadline), clock, nobody)
+        stopping = _searched(
+            replace(asked, stopping=True, deadline=SHARE * asked.deadline), clock, nobody
+        )
     left = max(asked.deadline - (clock() - began), LEAST_TIME)
     return _searched(replace(asked, deadline=left), clock, tell, stopping)
 
 
 @dataclass(frozen=True)
 class _Found:
-    """The moves of a chain, the price of time [W], and the bound [J] that holds for any time; `timing` is the search in
-    a given time, if there was one, and `shared`: its time is shared so that no chain can be better. `greedy` is the
-    chain of `move_by_move`; `simple` are the cycles that take no search."""
+    """The moves of a chain, the price of time [W], and the bound [J] that holds for any time;
+    `timing` is the search in a given time, if there was one, and `shared`: its time is shared so
+    that no chain can be better. `greedy` is the chain of `move_by_move`; `simple` are the cycles
+    that take no search."""
 
     nodes: list[int]
     moves: list[CycleMove]
@@ -152,13 +175,19 @@ class _Found:
     simple: Sequence[CycleInHand] = ()
 
 
-def _searched(asked: Cycle, clock: Clock, tell: Tell, stopping: CycleSolution | None = None) -> CycleSolution:
+def _searched(
+    asked: Cycle, clock: Clock, tell: Tell, stopping: CycleSolution | None = None
+) -> CycleSolution:
     """The cycle of least energy; `stopping` is that with rests at the stops that it passes."""
     search = CycleSearch(asked, clock, tell=tell)
     rested = None if stopping is None else start_from(search, stopping)
     try:
         found = _best_of(search)
-        if rested is not None and rested.nodes and rested.known.energy < needed_by(found.moves).electrical.energy:
+        if (
+            rested is not None
+            and rested.nodes
+            and rested.known.energy < needed_by(found.moves).electrical.energy
+        ):
             found = replace(_as_stopping(search, rested), timing=found.timing)
     except JoulepathError:
         if rested is None or not rested.nodes:
@@ -169,13 +198,17 @@ def _searched(asked: Cycle, clock: Clock, tell: Tell, stopping: CycleSolution | 
         bound = max(bound, found.timing.bound(found.price, ours.of(asked.objective)))
     complete = all(layer.complete for leg in search.legs for layer in leg.layers)
     # a path may be divided at other places
-    divided = any(move.tool_path is not None and move.tool_path.section is not None for move in asked.moves)
+    divided = any(
+        move.tool_path is not None and move.tool_path.section is not None for move in asked.moves
+    )
     return CycleSolution(
         status="optimal" if complete and not divided and _is_done(search, found) else "feasible",
         moves=found.moves,
         lower_bound=bound,
         price_of_time=found.price,
-        baselines=_baselines(search, found, ours) if rested is None else stopping_baselines(asked, rested, ours),
+        baselines=_baselines(search, found, ours)
+        if rested is None
+        else stopping_baselines(asked, rested, ours),
         complete=complete,
         wall_time=0.0,
         objective=asked.objective,
@@ -209,8 +242,8 @@ def _best_of(search: CycleSearch) -> _Found:
 
 
 def _in_time(search: CycleSearch, duration: float, chains: Sequence[list[int]]) -> _Found:
-    """The best cycle found in a duration [s], from the first of the `chains` whose motions are known, or from the
-    fastest one; never one that needs more than a simple cycle in hand."""
+    """The best cycle found in a duration [s], from the first of the `chains` whose motions are
+    known, or from the fastest one; never one that needs more than a simple cycle in hand."""
     timing, timed, best = TimedSearch(search, duration), None, None
     failure: JoulepathError = NoTrajectory([])
     try:
@@ -219,7 +252,9 @@ def _in_time(search: CycleSearch, duration: float, chains: Sequence[list[int]]) 
     except (NoTrajectory, DeadlineExceeded) as error:
         failure = error
     chains = [*chains, *([timed.nodes] if timed is not None and timed.nodes not in chains else [])]
-    simple = simple_cycles(timing, chains, best is None or (search.asked.compared and not search.asked.passes))
+    simple = simple_cycles(
+        timing, chains, best is None or (search.asked.compared and not search.asked.passes)
+    )
     found = least_certified([*([] if best is None else [best]), *simple])
     if found is None:
         raise failure
@@ -252,7 +287,11 @@ def _baselines(search: CycleSearch, found: _Found, ours: Needed) -> list[CycleBa
         None if found.greedy is None else of_chain(search, found.greedy, "move_by_move", ours),
         controller_default(search, found.nodes[0], ours),
         # moves slowed alike are those of our chain
-        *(each.baseline(ours) for each in found.simple if each.name != "same_factor" or each.nodes == found.nodes),
+        *(
+            each.baseline(ours)
+            for each in found.simple
+            if each.name != "same_factor" or each.nodes == found.nodes
+        ),
     ]
     return [each for each in compared if each is not None]
 

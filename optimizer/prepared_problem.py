@@ -1,4 +1,5 @@
-"""A problem with its models, ready to compute with: torques, energy and constraints of its motions."""
+"""A problem with its models, ready to compute with: torques, energy and constraints of its
+motions."""
 
 from __future__ import annotations
 
@@ -34,12 +35,16 @@ TIME_WEIGHT = 1e4
 # rounding of a constraint ratio
 RATIO_ROUNDING = 1e-6
 # what is built for an arm, whatever the problem
-_OF_THE_ARM = frozenset(("kernel", "model", "_data", "electrical_parameters", "surroundings", "path"))
+_OF_THE_ARM = frozenset(
+    ("kernel", "model", "_data", "electrical_parameters", "surroundings", "path")
+)
 
 
 @dataclass(frozen=True)
 class PreparedProblem(Plant):
-    """A problem with everything that its candidates share: kernel, rigid-body model, path constraints, surroundings."""
+    """A problem with everything that its candidates share: kernel, rigid-body model, path
+    constraints, surroundings.
+    """
 
     problem: Problem
 
@@ -52,7 +57,9 @@ class PreparedProblem(Plant):
         """Another problem of the same arm, with those models of the arm that are built."""
         assert problem.arm is self.arm
         other = PreparedProblem.of(problem)
-        vars(other).update({name: value for name, value in vars(self).items() if name in _OF_THE_ARM})
+        vars(other).update(
+            {name: value for name, value in vars(self).items() if name in _OF_THE_ARM}
+        )
         return other
 
     @cached_property
@@ -74,7 +81,9 @@ class PreparedProblem(Plant):
         return ToolCourse.of(path, self._pose(start), self._pose(goal))
 
     def _pose(self, end: Target) -> Array | ConeOrientedPose:
-        """T_base_tcp (4, 4) at an end that is a pose or joint positions; the end itself if a rotation is free there."""
+        """T_base_tcp (4, 4) at an end that is a pose or joint positions; the end itself if a
+        rotation is free there.
+        """
         if isinstance(end, ConeOrientedPose):
             return end
         return end.T if isinstance(end, Pose) else tcp_pose(self.arm, np.asarray(end))
@@ -90,11 +99,11 @@ class PreparedProblem(Plant):
         return 0.0 if self.course is None else least_time(self.arm, self.course)
 
     def freed(self, start: Target | None = None, goal: Target | None = None) -> Problem:
-        """The problem without its tool path, of motions that last as long as those along it: their bounds hold for
-        these.
+        """The problem without its tool path, of motions that last as long as those along it: their
+        bounds hold for these.
 
-        It is between `start` and `goal`, or the problem's own ends. Only along a path may a start leave its
-        orientation free: such a problem needs another start.
+        It is between `start` and `goal`, or the problem's own ends. Only along a path may a start
+        leave its orientation free: such a problem needs another start.
         """
         problem, least = self.problem, self.least_time
         shortest = min(max(problem.duration_min or 0.0, least), problem.duration_max or np.inf)
@@ -113,8 +122,8 @@ class PreparedProblem(Plant):
 
     @cached_property
     def even_motions(self) -> dict[tuple[bytes, float, float], tuple[Spline | None, bool]]:
-        """Motions at the tool path's fixed speed, and whether they are within the limits, by the joints' path and the
-        times [s] of both ramps."""
+        """Motions at the tool path's fixed speed, and whether they are within the limits, by the
+        joints' path and the times [s] of both ramps."""
         return {}
 
     @cached_property
@@ -122,14 +131,18 @@ class PreparedProblem(Plant):
         return {}
 
     def joint_path(self, q_start: Array) -> Spline | None:
-        """The joints' path over [0, 1] along the tool path, from q_start (nq,) [rad]; None if they cannot follow it."""
+        """The joints' path over [0, 1] along the tool path, from q_start (nq,) [rad]; None if they
+        cannot follow it.
+        """
         assert self.course is not None
         key = q_start.tobytes()
         if key not in self._joint_paths:
             if key not in self.traces:
                 (self.traces[key],) = traces(self.arm, self.course, q_start[None])
             trace = self.traces[key]
-            self._joint_paths[key] = joint_path(self.arm, self.course, trace) if trace.obstacle is None else None
+            self._joint_paths[key] = (
+                joint_path(self.arm, self.course, trace) if trace.obstacle is None else None
+            )
         return self._joint_paths[key]
 
     @cached_property
@@ -140,16 +153,20 @@ class PreparedProblem(Plant):
         """Whether other turnings of the tool have been looked for from q_start (nq,) [rad] on."""
         return q_start.tobytes() in self._chosen
 
-    def choose(self, q_start: Array, trace: Trace | None = None, path: Spline | None = None) -> None:
-        """Note that turnings have been looked for from q_start (nq,) [rad] on; the joints follow that of a trace, by
-        `path`, from now on."""
+    def choose(
+        self, q_start: Array, trace: Trace | None = None, path: Spline | None = None
+    ) -> None:
+        """Note that turnings have been looked for from q_start (nq,) [rad] on; the joints follow
+        that of a trace, by `path`, from now on."""
         key = q_start.tobytes()
         self._chosen.add(key)
         if trace is not None:
             self.traces[key], self._joint_paths[key] = trace, path
 
     def broken_on_the_way(self, q: Sequence[Array], v: Sequence[Array]) -> list[list[str]]:
-        """What samples q [rad], v [rad/s] (k, nq) of each motion break, in words: path constraints, a margin."""
+        """What samples q [rad], v [rad/s] (k, nq) of each motion break, in words: path constraints,
+        a margin.
+        """
         collisions = self.surroundings.worst_collisions(q)
         return [self._broken(*each) for each in zip(q, v, collisions, strict=True)]
 
@@ -157,21 +174,32 @@ class PreparedProblem(Plant):
         broken = []
         if self.path is not None:
             worst = self.path.ratios(q, v).max(axis=0)
-            ratios = dict(sorted(zip(self.path.names, worst, strict=True), key=lambda each: each[1]))
-            broken = [too_much(name, ratio) for name, ratio in ratios.items() if ratio > 1 + RATIO_ROUNDING]
+            ratios = dict(
+                sorted(zip(self.path.names, worst, strict=True), key=lambda each: each[1])
+            )
+            broken = [
+                too_much(name, ratio)
+                for name, ratio in ratios.items()
+                if ratio > 1 + RATIO_ROUNDING
+            ]
         slowest = np.inf if self.least_speed is None else self.least_speed.reached(q, v)
         if slowest < 1 - RATIO_ROUNDING:
             broken.append(f"path speed {(1 - slowest) * 100:.3g} % below its least one")
         if collision is not None:
             first, second = collision.pair
-            broken.append(f"{first} and {second} are {-collision.distance * 1e3:.3g} mm closer than allowed")
+            broken.append(
+                f"{first} and {second} are {-collision.distance * 1e3:.3g} mm closer than allowed"
+            )
         return broken
 
     def holding_power(self, q: Array) -> Array:
-        """Power drawn (...) [W] while the motors hold the arm at standstill at q (..., nq) [rad]."""
+        """Power drawn (...) [W] while the motors hold the arm at standstill at q (..., nq)
+        [rad]."""
         configurations = q.reshape(-1, q.shape[-1])
         standstill = np.zeros_like(configurations)
-        return holding_power(self.arm, self.torques(configurations, standstill, standstill)).reshape(q.shape[:-1])
+        return holding_power(
+            self.arm, self.torques(configurations, standstill, standstill)
+        ).reshape(q.shape[:-1])
 
     def energy(self, spline: Spline) -> Energy:
         """Energy of a motion and of waiting after it, exact except for quadrature."""
@@ -182,7 +210,9 @@ class PreparedProblem(Plant):
         return energy.with_dwell(dwell_energy(dwell, self.arm, hold, spline.duration))
 
     def sensitivity(self, spline: Spline) -> Sensitivity:
-        """How the electrical energy of a motion, and of waiting after it, hangs on the arm's figures."""
+        """How the electrical energy of a motion, and of waiting after it, hangs on the arm's
+        figures.
+        """
         moving, dwell = super().sensitivity(spline), self.problem.dwell
         if dwell is None:
             return moving
@@ -190,7 +220,9 @@ class PreparedProblem(Plant):
         q_end = spline.control_points[-1]
         held = self.torques(q_end[None], still, still)[0]
         times = waits(dwell, spline.duration)
-        return moving + waiting_sensitivity(self.arm, q_end, held, *times, dwell, arm_spread(self.arm))
+        return moving + waiting_sensitivity(
+            self.arm, q_end, held, *times, dwell, arm_spread(self.arm)
+        )
 
     @cached_property
     def objective_parameters(self) -> Array:
@@ -199,7 +231,9 @@ class PreparedProblem(Plant):
 
     @cached_property
     def fastest_parameters(self) -> Array:
-        """Kernel parameters that minimise the duration; a little energy beside it conditions the NLP."""
+        """Kernel parameters that minimise the duration; a little energy beside it conditions the
+        NLP.
+        """
         return self.parameters(electrical=1.0, time=TIME_WEIGHT)
 
     def objective_of(self, energy: Energy) -> float:

@@ -1,4 +1,6 @@
-"""What a search tells while it runs: the number of its candidates, what became of those it tried, the best so far."""
+"""What a search tells while it runs: the number of its candidates, what became of those it tried,
+the best so far.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +22,8 @@ class CandidatesFound:
 class CandidateTried:
     """What became of the candidate of this index: the `energy` [J] of its motion, None without one.
 
-    `pruned`: it was given up, since it comes to no less energy than the best motion. `bound` [J] is its proven lower
-    bound, None if none is known.
+    `pruned`: it was given up, since it comes to no less energy than the best motion. `bound` [J] is
+    its proven lower bound, None if none is known.
     """
 
     index: int
@@ -32,9 +34,11 @@ class CandidateTried:
 
 @dataclass(frozen=True, eq=False)
 class Improved:
-    """The best answer so far: its `energy` [J], its `duration` [s], and `q_goal` (nq,) [rad] in which it ends.
+    """The best answer so far: its `energy` [J], its `duration` [s], and `q_goal` (nq,) [rad] in
+    which it ends.
 
-    No answer needs less than `bound` [J]. None stands for what is not known yet, or what the answer does not have.
+    No answer needs less than `bound` [J]. None stands for what is not known yet, or what the answer
+    does not have.
     """
 
     energy: float
@@ -84,7 +88,9 @@ def forward(tell: Tell) -> Tell:
 
 
 def only_improved(tell: Tell) -> Tell:
-    """What passes on to `tell` the best answers alone, of a search whose bound does not hold for all of them."""
+    """What passes on to `tell` the best answers alone, of a search whose bound does not hold for
+    all of them.
+    """
 
     def passed(event: Event) -> None:
         if isinstance(event, Improved):

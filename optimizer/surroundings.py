@@ -1,4 +1,6 @@
-"""Collisions of an arm with itself and its scene: clearance of motions, clearance constraints, collision-free paths."""
+"""Collisions of an arm with itself and its scene: clearance of motions, clearance constraints,
+collision-free paths.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,13 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.collision.clearance_proof import is_proven_clear, proven_clearance
 from joulepath.optimizer.collision.model import ClosestPair, CollisionModel, collision_model
-from joulepath.optimizer.collision.path_planner import USUAL, Effort, PlannedPaths, PlanningEnd, plan_paths
+from joulepath.optimizer.collision.path_planner import (
+    USUAL,
+    Effort,
+    PlannedPaths,
+    PlanningEnd,
+    plan_paths,
+)
 from joulepath.optimizer.collision.stand_ins import StandIns
 from joulepath.optimizer.collision.state_validity import ValidityCheckers
 from joulepath.optimizer.deadline import Deadline
@@ -33,7 +41,8 @@ NEAR_CONTACT = 5e-3
 
 @dataclass(frozen=True)
 class Surroundings:
-    """The collision side of a problem's arm, shared by all candidates. If `arm.collisions` is false, nothing collides.
+    """The collision side of a problem's arm, shared by all candidates. If `arm.collisions` is
+    false, nothing collides.
 
     All distances [m] have the margins of the obstacles subtracted.
     """
@@ -50,10 +59,14 @@ class Surroundings:
         return StandIns.of(self.arm)
 
     def unmodelled_contacts(self, spline: Spline) -> list[Clearance]:
-        """What would touch in a motion, by samples, if stand-ins took the place of a tool and payload without shape."""
+        """What would touch in a motion, by samples, if stand-ins took the place of a tool and
+        payload without shape.
+        """
         if self._stand_ins is None:
             return []
-        return self._stand_ins.contacts(np.linspace(0.0, spline.duration, CONTACT_SAMPLES), self._samples(spline))
+        return self._stand_ins.contacts(
+            np.linspace(0.0, spline.duration, CONTACT_SAMPLES), self._samples(spline)
+        )
 
     def worst_violation(self, spline: Spline) -> Clearance | None:
         """Clearance of a motion whose margins are violated or not proven: distance, pair and time.
@@ -74,13 +87,16 @@ class Surroundings:
         return found if found is not None and found.min_clearance < 0 else None
 
     def is_collision_free(self, q: Array) -> bool:
-        """Whether samples q (k, nq) [rad] of a motion keep all margins. About CONTACT_SAMPLES of them are checked."""
+        """Whether samples q (k, nq) [rad] of a motion keep all margins. About CONTACT_SAMPLES of
+        them are checked.
+        """
         if not self.arm.collisions:
             return True
         return self._least_distance(q, 0.0) >= 0
 
     def worst_collisions(self, motions: Sequence[Array]) -> list[ClosestPair | None]:
-        """The pair that violates its margin most over the samples q (k, nq) [rad] of each motion; None if none does.
+        """The pair that violates its margin most over the samples q (k, nq) [rad] of each motion;
+        None if none does.
 
         About CONTACT_SAMPLES of the samples are checked, those of motions along the same path once.
         """
@@ -106,11 +122,17 @@ class Surroundings:
         return self.arm.collisions and self._least_distance(q, NEAR_CONTACT) < NEAR_CONTACT
 
     def active_pairs(self, spline: Spline) -> Indices:
-        """Indices (k,) of the pairs that need a clearance constraint: closer than ACTIVE at a sample of the motion."""
-        return np.flatnonzero(self.model.pairs_within(self.model.frames(self._samples(spline)), ACTIVE))
+        """Indices (k,) of the pairs that need a clearance constraint: closer than ACTIVE at a
+        sample of the motion.
+        """
+        return np.flatnonzero(
+            self.model.pairs_within(self.model.frames(self._samples(spline)), ACTIVE)
+        )
 
     def with_clearance(self, pairs: Indices) -> PathConstraints:
-        """The path constraints of the arm, and the clearance of `pairs` (k,) of the collision model."""
+        """The path constraints of the arm, and the clearance of `pairs` (k,) of the collision
+        model.
+        """
         constraints = [*path_constraint_list(self.arm), ClearanceConstraint(self.model, pairs)]
         return PathConstraints(joint_placements(self.arm.robot.model), constraints)
 
@@ -122,19 +144,28 @@ class Surroundings:
         other_goals: Sequence[Array] = (),
         effort: Effort = USUAL,
     ) -> PlannedPaths:
-        """Collision-free joint paths from q_start to q_goal or one of the others, (nq,) [rad]; see `plan_paths`.
+        """Collision-free joint paths from q_start to q_goal or one of the others, (nq,) [rad]; see
+        `plan_paths`.
 
-        Paths found are kept: a later call for the goal that they lead to returns them, and the first one for a goal
-        that differs by full turns follows the shortest of them. A planning without a path is kept, for all goals that
-        differ by full turns, only until more states are allowed, and not at all if the deadline ended it.
+        Paths found are kept: a later call for the goal that they lead to returns them, and the
+        first one for a goal that differs by full turns follows the shortest of them. A planning
+        without a path is kept, for all goals that differ by full turns, only until more states are
+        allowed, and not at all if the deadline ended it.
         """
-        known, turned = self._planned.get(_key(q_start, q_goal)), self._turned.get(_turned_key(q_start, q_goal))
+        known, turned = (
+            self._planned.get(_key(q_start, q_goal)),
+            self._turned.get(_turned_key(q_start, q_goal)),
+        )
         for earlier in (known, turned if turned is not None and not turned.paths else None):
-            if earlier is not None and (earlier.paths or earlier.checked_states >= effort.most_states):
+            if earlier is not None and (
+                earlier.paths or earlier.checked_states >= effort.most_states
+            ):
                 return earlier
         like = turned.paths[0] if known is None and turned is not None and turned.paths else None
         goals = q_goal[None] if like is not None else np.vstack([q_goal, *other_goals])
-        planned = plan_paths(self.arm, q_start, goals, deadline, effort, checkers=self._checkers, like=like)
+        planned = plan_paths(
+            self.arm, q_start, goals, deadline, effort, checkers=self._checkers, like=like
+        )
         for goal in {path[-1].tobytes(): path[-1] for path in planned.paths}.values():
             self._keep(q_start, goal, replace(planned, paths=planned.leading_to(goal)))
         if planned.end is PlanningEnd.EXHAUSTED:
@@ -154,7 +185,9 @@ class Surroundings:
         return known is not None and bool(known.paths)
 
     def seems_enclosed(self, q_start: Array, q_goal: Array) -> bool:
-        """Whether plannings to q_goal (nq,) [rad], and to what differs from it by full turns, have found no path."""
+        """Whether plannings to q_goal (nq,) [rad], and to what differs from it by full turns, have
+        found no path.
+        """
         known = self._turned.get(_turned_key(q_start, q_goal))
         return known is not None and not known.paths
 
@@ -168,12 +201,14 @@ class Surroundings:
 
     @cached_property
     def _turned(self) -> dict[bytes, PlannedPaths]:
-        """The first paths that were found, else the last planning, for all goals that differ by full turns."""
+        """The first paths that were found, else the last planning, for all goals that differ by
+        full turns.
+        """
         return {}
 
     def _least_distance(self, q: Array, within: float) -> float:
-        """The least signed distance [m] over some of the samples q (k, nq) of a motion; if above `within` [m], a lower
-        bound above it."""
+        """The least signed distance [m] over some of the samples q (k, nq) of a motion; if above
+        `within` [m], a lower bound above it."""
         return float(self.model.along(_thinned(q), within).min(initial=np.inf))
 
     def _samples(self, spline: Spline) -> Array:

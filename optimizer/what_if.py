@@ -1,7 +1,8 @@
 """Public entry point: `what_if(solution, problem)` compares a motion with that of another arm.
 
-The change may be lighter links, another payload or other drives. It has two effects, reported apart: the energy of the
-same motion on the changed arm (`same_motion`), and the energy of a motion optimised for it (`reoptimised`).
+The change may be lighter links, another payload or other drives. It has two effects, reported
+apart: the energy of the same motion on the changed arm (`same_motion`), and the energy of a motion
+optimised for it (`reoptimised`).
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ from joulepath.optimizer.search.incumbent import SLACK
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.trajectories.spline import Spline
 
-# least deadline of a search [s]; shares of the time that the first search leaves to the known motion, and of what is
-# left then for a search from it
+# least deadline of a search [s]; shares of the time that the first search leaves to the known
+# motion, and of what is left then for a search from it
 LEAST_TIME, KEPT, SOLVED = 1e-3, 0.05, 0.8
 
 
@@ -34,8 +35,9 @@ LEAST_TIME, KEPT, SOLVED = 1e-3, 0.05, 0.8
 class WhatIf:
     """Result of a change.
 
-    `same_motion` is the energy [J] of the known motion on the changed arm, `certificate` says whether it is feasible
-    there. `reoptimised` is the best motion of the changed arm; None, with the `error`, if none was found.
+    `same_motion` is the energy [J] of the known motion on the changed arm, `certificate` says
+    whether it is feasible there. `reoptimised` is the best motion of the changed arm; None, with
+    the `error`, if none was found.
     """
 
     same_motion: Energy
@@ -55,7 +57,8 @@ def what_if(solution: Solution, problem: Problem, clock: Clock = time.perf_count
 
     Args:
         solution: solution of the problem without the change.
-        problem: the same problem with the change, as by `dataclasses.replace(problem, arm=…)`, of an
+        problem: the same problem with the change, as by `dataclasses.replace(problem, arm=…)`, of
+            an
             arm with as many joints. Its `deadline` holds for the whole comparison.
         clock: function that returns the time [s].
 
@@ -72,17 +75,26 @@ def what_if(solution: Solution, problem: Problem, clock: Clock = time.perf_count
         with watch(deadline):
             energy = prepared.energy(spline)
             certificate = certify(asked, spline, solution.start.q, solution.goal.q, energy)
-            energy = with_interval(energy, prepared.sensitivity(spline), spline.duration, problem.arm)
+            energy = with_interval(
+                energy, prepared.sensitivity(spline), spline.duration, problem.arm
+            )
     except DeadlinePassed:
         raise DeadlineExceeded([]) from None
     found: Solution | None = None
     failure: JoulepathError | None = None
     try:
-        found = optimize(replace(problem, deadline=max(deadline.left - KEPT * problem.deadline, LEAST_TIME)), clock)
+        found = optimize(
+            replace(problem, deadline=max(deadline.left - KEPT * problem.deadline, LEAST_TIME)),
+            clock,
+        )
     except JoulepathError as error:
         failure = error
     same, objective = energy.of(problem.objective), problem.objective
-    if certificate.valid and not deadline.passed and (found is None or same < found.energy.of(objective) * (1 - SLACK)):
+    if (
+        certificate.valid
+        and not deadline.passed
+        and (found is None or same < found.energy.of(objective) * (1 - SLACK))
+    ):
         again = _from_known(problem, spline, deadline)
         known = [each for each in (found, again) if each is not None]
         found = min(known, key=lambda each: each.energy.of(objective), default=None)
@@ -90,10 +102,14 @@ def what_if(solution: Solution, problem: Problem, clock: Clock = time.perf_count
 
 
 def _from_known(problem: Problem, spline: Spline, deadline: Deadline) -> Solution | None:
-    """The solution from a feasible motion on, or this motion as it is; None if there is no time for that either."""
+    """The solution from a feasible motion on, or this motion as it is; None if there is no time for
+    that either.
+    """
 
     def run(share: float, known: list[Spline]) -> Run:
-        return Run(replace(problem, deadline=max(share * deadline.left, LEAST_TIME)), known, deadline.clock)
+        return Run(
+            replace(problem, deadline=max(share * deadline.left, LEAST_TIME)), known, deadline.clock
+        )
 
     with suppress(JoulepathError):
         return run(SOLVED, [spline]).solution()

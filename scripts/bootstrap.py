@@ -1,7 +1,8 @@
 """Creates a virtual environment with pip in it, with nothing but the standard library.
 
-Debian splits pip and ensurepip off its python3. Where they are missing, pip's wheel is fetched from the package index
-(pip's own settings for index and certificates hold) and checked against the digest pinned below.
+Debian splits pip and ensurepip off its python3. Where they are missing, pip's wheel is fetched from
+the package index (pip's own settings for index and certificates hold) and checked against the
+digest pinned below.
 """
 
 from __future__ import annotations
@@ -26,12 +27,19 @@ OLDEST_PYTHON = (3, 11)
 
 
 def pip_setting(name: str) -> str | None:
-    """A setting as pip would find it: environment, then the user's and the machine's configuration file."""
+    """A setting as pip would find it: environment, then the user's and the machine's configuration
+    file.
+    """
     from_environment = os.environ.get("PIP_" + name.upper().replace("-", "_"))
     if from_environment:
         return from_environment
     user = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config")
-    files = [os.environ.get("PIP_CONFIG_FILE"), user / "pip/pip.conf", Path.home() / ".pip/pip.conf", "/etc/pip.conf"]
+    files = [
+        os.environ.get("PIP_CONFIG_FILE"),
+        user / "pip/pip.conf",
+        Path.home() / ".pip/pip.conf",
+        "/etc/pip.conf",
+    ]
     for file in filter(None, files):
         parser = configparser.RawConfigParser()
         parser.read(str(file))
@@ -48,7 +56,9 @@ def read(url: str) -> bytes:
     ]
     if parts.username:
         passwords = urllib.request.HTTPPasswordMgrWithPriorAuth()
-        user, password = (urllib.parse.unquote(part or "") for part in (parts.username, parts.password))
+        user, password = (
+            urllib.parse.unquote(part or "") for part in (parts.username, parts.password)
+        )
         parts = parts._replace(netloc=parts.netloc.rpartition("@")[2])
         passwords.add_password(None, parts.geturl(), user, password, is_authenticated=True)
         handlers.append(urllib.request.HTTPBasicAuthHandler(passwords))
@@ -58,7 +68,9 @@ def read(url: str) -> bytes:
 
 
 def fetch_pip(folder: Path) -> Path:
-    """Download the pinned wheel of pip into a folder; raises ValueError where the index lacks that very file."""
+    """Download the pinned wheel of pip into a folder; raises ValueError where the index lacks that
+    very file.
+    """
     index = (pip_setting("index-url") or "https://pypi.org/simple").rstrip("/") + "/pip/"
     page = read(index).decode()
     link = re.search(r'href="([^"]*/)?' + re.escape(PIP_WHEEL) + r'[^"]*"', page)
@@ -93,13 +105,19 @@ def main() -> int:
     parser.add_argument("environment", type=Path)
     environment: Path = parser.parse_args().environment
     if sys.version_info < OLDEST_PYTHON:
-        print(f"Python {sys.version.split()[0]} is too old: install 3.11 or newer, or name one: make PYTHON=python3.11")
+        print(
+            f"Python {sys.version.split()[0]} is too old: install 3.11 or newer, or name one: make "
+            "PYTHON=python3.11"
+        )
         return 1
     try:
         create(environment)
     except (OSError, ValueError, subprocess.CalledProcessError) as error:
         shutil.rmtree(environment, ignore_errors=True)
-        print(f"No virtual environment could be made ({error}): install python3-venv and try again.", file=sys.stderr)
+        print(
+            f"No virtual environment could be made ({error}): install python3-venv and try again.",
+            file=sys.stderr,
+        )
         return 1
     return 0
 

@@ -1,7 +1,8 @@
-"""Build hook of hatchling: compiles the C library for a wheel, and fetches the libraries of the studio page.
+"""Build hook of hatchling: compiles the C library for a wheel, and fetches the libraries of the
+studio page.
 
-The repository holds neither. Without the C library the package cannot be imported; without the others the
-studio page cannot be shown.
+The repository holds neither. Without the C library the package cannot be imported; without the
+others the studio page cannot be shown.
 """
 
 from __future__ import annotations
@@ -23,12 +24,14 @@ NATIVE = runpy.run_path(str(ROOT / "joulepath" / "optimizer" / "native" / "build
 class BuildHook(BuildHookInterface[Any]):
     """Compiles and fetches what is missing, or fails the build.
 
-    A wheel is for one platform and every Python version on it, because the C library does not use Python's headers. The
-    source archive holds the C sources only.
+    A wheel is for one platform and every Python version on it, because the C library does not use
+    Python's headers. The source archive holds the C sources only.
     """
 
     def dependencies(self) -> list[str]:
-        """Python packages of a C compiler and of npm, where the build needs them and the machine has none."""
+        """Python packages of a C compiler and of npm, where the build needs them and the machine
+        has none.
+        """
         needed = []
         if self.target_name == "wheel" and NATIVE["compiler"]() is None:
             needed.append(pinned("ziglang", "requirements-compiler.lock"))

@@ -1,4 +1,5 @@
-"""Imports every module of the project: what is missing shows, and the bytecode stays. The container image runs it.
+"""Imports every module of the project: what is missing shows, and the bytecode stays. The container
+image runs it.
 
 python scripts/import_all.py
 """

@@ -12,11 +12,31 @@ import sys
 import sysconfig
 from pathlib import Path
 
-PIP = [sys.executable, "-m", "pip", "install", "--disable-pip-version-check", "--require-hashes", "--no-deps"]
+PIP = [
+    sys.executable,
+    "-m",
+    "pip",
+    "install",
+    "--disable-pip-version-check",
+    "--require-hashes",
+    "--no-deps",
+]
 PIP += ["--progress-bar", "off", "--no-compile"]
-# Bytecode is made here, on all cores, where pip uses one. Not at the first import: a process that may write none would
-# compile every library again, and where warnings are errors, one in a library's source would count as ours.
-COMPILE = [sys.executable, "-W", "ignore", "-m", "compileall", "-qq", "-j", "0", "-x", r"[/\\](tests|pip)[/\\]"]
+# Bytecode is made here, on all cores, where pip uses one. Not at the first import: a process that
+# may write none would compile every library again, and where warnings are errors, one in a
+# library's source would count as ours.
+COMPILE = [
+    sys.executable,
+    "-W",
+    "ignore",
+    "-m",
+    "compileall",
+    "-qq",
+    "-j",
+    "0",
+    "-x",
+    r"[/\\](tests|pip)[/\\]",
+]
 # so many lines of pip tell what went wrong
 LAST = 20
 
@@ -25,7 +45,10 @@ def install(lockfile: Path) -> int:
     """Exit code of pip, with one line for every package that it takes."""
     count, seen = 0, list[str]()
     process = subprocess.Popen(
-        [*PIP, "-r", str(lockfile)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8"
+        [*PIP, "-r", str(lockfile)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        encoding="utf-8",
     )
     assert process.stdout is not None
     for line in process.stdout:

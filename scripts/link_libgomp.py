@@ -1,7 +1,8 @@
 """Gives Pinocchio the OpenMP runtime that its wheel takes for granted.
 
-Pinocchio's wheel expects the system's libgomp.so.1, which a Debian without a compiler does not have. CasADi's wheel
-brings a copy under a name of its own: where the system has none, a link lets Pinocchio find that one.
+Pinocchio's wheel expects the system's libgomp.so.1, which a Debian without a compiler does not
+have. CasADi's wheel brings a copy under a name of its own: where the system has none, a link lets
+Pinocchio find that one.
 """
 
 from __future__ import annotations

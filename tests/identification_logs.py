@@ -1,4 +1,5 @@
-"""Logs of simulated motions whose true figures are known, with noise, as arrays, as `Log` and as CSV.
+"""Logs of simulated motions whose true figures are known, with noise, as arrays, as `Log` and as
+CSV.
 
 Torques come from Pinocchio's recursion and the formulas below, not from the code under test.
 """
@@ -21,7 +22,8 @@ GRAVITY = np.array([0.0, 0.0, -9.81])
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations of the sensors: positions [rad], speeds [rad/s], currents [A], power [W]."""
+    """Standard deviations of the sensors: positions [rad], speeds [rad/s], currents [A], power
+    [W]."""
 
     q: float = 2e-6
     v: float = 1e-3
@@ -36,8 +38,9 @@ SILENT = Noise(0.0, 0.0, 0.0, 0.0)
 class Truth:
     """The arm as it is, arrays (nq,):
 
-    tau_f = (coulomb + load·|tau_rigid|)·v/sqrt(v² + knee²) + viscous·v + offset, i = (tau_rigid + rotor·a + tau_f) /
-    torque_constant, power = max(0, idle + Σ (tau·v + copper·i² + inverter_linear·|i|)).
+    tau_f = (coulomb + load·|tau_rigid|)·v/sqrt(v² + knee²) + viscous·v + offset, i = (tau_rigid +
+    rotor·a + tau_f) / torque_constant, power = max(0, idle + Σ (tau·v + copper·i² +
+    inverter_linear·|i|)).
     """
 
     coulomb: Array
@@ -54,7 +57,9 @@ class Truth:
 
 
 def truth_of(robot: Robot, seed: int = 0, payload: Payload | None = None) -> Truth:
-    """A unit of the robot whose figures differ from the robot's own by some ten per cent, and has load friction."""
+    """A unit of the robot whose figures differ from the robot's own by some ten per cent, and has
+    load friction.
+    """
     random = np.random.default_rng(seed)
     drives, law, nq = robot.drives, robot.friction, robot.nq
 
@@ -79,8 +84,9 @@ def truth_of(robot: Robot, seed: int = 0, payload: Payload | None = None) -> Tru
 
 @dataclass(frozen=True)
 class Recording:
-    """What a controller records: times (n,) [s], q, v, a, current, torque, temperature (n, nq), power (n,), and the row
-    ranges of its moves. v, current and power have noise, `exact_*` has none."""
+    """What a controller records: times (n,) [s], q, v, a, current, torque, temperature (n, nq),
+    power (n,), and the row ranges of its moves. v, current and power have noise, `exact_*` has
+    none."""
 
     robot: Robot
     rate: float
@@ -125,14 +131,16 @@ def recorded(
     noise: Noise | None = None,
     closed: bool = False,
 ) -> Recording:
-    """Random motions from rest to rest, half a second of rest before, between and after them. The first two lead from
-    one end to another and back: the same motion twice, in both directions. If `closed`, the last one ends where the
-    first one began."""
+    """Random motions from rest to rest, half a second of rest before, between and after them. The
+    first two lead from one end to another and back: the same motion twice, in both directions. If
+    `closed`, the last one ends where the first one began."""
     random = np.random.default_rng(seed)
     q, v, a, ranges = _motions(robot, moves, rate, random, closed)
     tau_rigid = rigid_torques(robot, truth, q, v, a)
     sign = v / np.sqrt(v * v + truth.knee**2)
-    friction = (truth.coulomb + truth.load * np.abs(tau_rigid)) * sign + truth.viscous * v + truth.offset
+    friction = (
+        (truth.coulomb + truth.load * np.abs(tau_rigid)) * sign + truth.viscous * v + truth.offset
+    )
     torque = tau_rigid + truth.rotor_inertia * a + friction
     current = torque / truth.torque_constant
     parts = torque * v + truth.copper * current**2 + truth.inverter_linear * np.abs(current)
@@ -163,7 +171,9 @@ def recorded(
 
 def rigid_torques(robot: Robot, truth: Truth, q: Array, v: Array, a: Array) -> Array:
     """Torques (n, nq) [N·m] of links and payload, without rotors, by Pinocchio."""
-    model = robot.loaded_model(truth.payload.mass, truth.payload.com, truth.payload.inertia, GRAVITY)
+    model = robot.loaded_model(
+        truth.payload.mass, truth.payload.com, truth.payload.inertia, GRAVITY
+    )
     model.armature = np.zeros(model.nv)
     data = model.createData()
     return np.array([pin.rnea(model, data, *row) for row in zip(q, v, a, strict=True)])
@@ -184,17 +194,27 @@ def _motions(
     parts: list[tuple[Array, Array, Array]] = [_still(ends[0], rest)]
     ranges, row = [LogMove(0, rest, True)], rest
     for begin, end in pairwise(ends):
-        # 60 % of the limits in speed, of 15/8 Δq/T and 5.774 Δq/T²; the nearest whole number of steps
+        # 60 % of the limits in speed, of 15/8 Δq/T and 5.774 Δq/T²; the nearest whole number of
+        # steps
         span = np.abs(end - begin)
-        needed = max((1.875 * span / limits.v_max).max(), np.sqrt((5.774 * span / limits.a_max).max())) / 0.6
+        needed = (
+            max((1.875 * span / limits.v_max).max(), np.sqrt((5.774 * span / limits.a_max).max()))
+            / 0.6
+        )
         steps = round(needed * rate)
         x = np.arange(1, steps) / steps
         s = x**3 * (10 - 15 * x + 6 * x**2)
         ds = 30 * x**2 * (1 - x) ** 2 * rate / steps
         dds = 60 * x * (1 - 3 * x + 2 * x**2) * (rate / steps) ** 2
         move = end - begin
-        parts += [(begin + np.outer(s, move), np.outer(ds, move), np.outer(dds, move)), _still(end, rest)]
-        ranges += [LogMove(row, row + steps - 1, False), LogMove(row + steps - 1, row + steps - 1 + rest, True)]
+        parts += [
+            (begin + np.outer(s, move), np.outer(ds, move), np.outer(dds, move)),
+            _still(end, rest),
+        ]
+        ranges += [
+            LogMove(row, row + steps - 1, False),
+            LogMove(row + steps - 1, row + steps - 1 + rest, True),
+        ]
         row += steps - 1 + rest
     q, v, a = (np.concatenate(each) for each in zip(*parts, strict=True))
     assert q.shape == (row, nq)
@@ -221,13 +241,20 @@ def csv_of(
     units: Literal["rad", "deg"] = "rad",
     first: int = 0,
 ) -> bytes:
-    """The recording as a CSV file of one of the three forms. `without`: groups that are left out, some of `v`, `a`,
-    `i`, `P`, `T`. `time` replaces the times; `first` is the number of the first joint of an RTDE header."""
+    """The recording as a CSV file of one of the three forms. `without`: groups that are left out,
+    some of `v`, `a`, `i`, `P`, `T`. `time` replaces the times; `first` is the number of the first
+    joint of an RTDE header."""
     nq, scale = recording.robot.nq, 180 / np.pi if units == "deg" else 1.0
     stamps = recording.time if time is None else time
     numbers = range(first, nq + first) if form == "rtde" else range(1, nq + 1)
     forms: dict[str, dict[str, str | None]] = {
-        "own": {"q": "q{}", "v": "v{}", "a": "a{}", "i": "i{}" if effort == "current" else "tau{}", "T": None},
+        "own": {
+            "q": "q{}",
+            "v": "v{}",
+            "a": "a{}",
+            "i": "i{}" if effort == "current" else "tau{}",
+            "T": None,
+        },
         "rtde": {
             "q": "actual_q_{}",
             "v": "actual_qd_{}",
@@ -239,7 +266,12 @@ def csv_of(
     }
     names = forms[form]
     efforts = recording.current if effort == "current" else recording.torque
-    values = {"q": recording.q * scale, "v": recording.v * scale, "a": recording.a * scale, "i": efforts}
+    values = {
+        "q": recording.q * scale,
+        "v": recording.v * scale,
+        "a": recording.a * scale,
+        "i": efforts,
+    }
     values["T"] = recording.temperature
     header, columns = [{"own": "t", "rtde": "timestamp", "ros": "time"}[form]], [stamps[:, None]]
     for group, pattern in names.items():
@@ -259,11 +291,15 @@ def csv_of(
 
 def with_current(recording: Recording, current: Array) -> Recording:
     """The recording with other currents (n, nq) [A]."""
-    return replace(recording, current=current, torque=current * recording.robot.drives.torque_constant)
+    return replace(
+        recording, current=current, torque=current * recording.robot.drives.torque_constant
+    )
 
 
 def off_the_model(log: Log, effect: float, seed: int) -> Log:
-    """The log with a power of its own in each move: normal, with a standard deviation of `effect` [W]."""
+    """The log with a power of its own in each move: normal, with a standard deviation of `effect`
+    [W].
+    """
     random, power = np.random.default_rng([seed, 1]), np.array(log.power)
     for move in log.moves:
         if not move.at_rest:

@@ -1,9 +1,10 @@
-"""Where the meshes of the robots are: in a package that tests install, or in a folder that the environment names.
+"""Where the meshes of the robots are: in a package that tests install, or in a folder that the
+environment names.
 
-The package `airo-models` ships those of UR3e and UR5e. No package ships those of UR10e and UR16e: tests of theirs run
-where ROBOT_MESHES names a folder with `ur10e` and `ur16e`, each as in `joulepath.models.meshes`: the maker's files,
-as OBJ. Parts
-that a UR16e shares with the UR10e are in both.
+The package `airo-models` ships those of UR3e and UR5e. No package ships those of UR10e and UR16e:
+tests of theirs run where ROBOT_MESHES names a folder with `ur10e` and `ur16e`, each as in
+`joulepath.models.meshes`: the maker's files, as OBJ. Parts that a UR16e shares with the UR10e are
+in both.
 """
 
 from __future__ import annotations

@@ -9,7 +9,9 @@ import pytest
 
 
 def long_but(quick: Collection[Any], values: Iterable[Any]) -> list[Any]:
-    """The values, or tuples of values, as parameters of a test: those in `quick` as they are, the others `long`."""
+    """The values, or tuples of values, as parameters of a test: those in `quick` as they are, the
+    others `long`.
+    """
     found = list(values)
     assert all(each in found for each in quick), "a quick parameter is none of the test's"
     return [each if each in quick else _long(each) for each in found]

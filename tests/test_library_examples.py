@@ -57,14 +57,17 @@ def test_several_targets(printed: str) -> None:
 @pytest.mark.parametrize("printed", ["recording_and_lighter_links"], indirect=True)
 def test_recording_and_lighter_links(printed: str) -> None:
     recorded, optimised, same, again = (
-        number(rf"{title}[^:]*: (\S+) J", printed) for title in ("recorded", "optimised", "the same", "re-optimised")
+        number(rf"{title}[^:]*: (\S+) J", printed)
+        for title in ("recorded", "optimised", "the same", "re-optimised")
     )
     assert again <= same < optimised < recorded
     assert "limits that it violates: none" in printed
 
 
 @pytest.mark.long
-def test_pareto_front(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_pareto_front(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     picture = tmp_path / "front.png"
     monkeypatch.setattr(sys, "argv", ["pareto_front", str(picture)])
     runpy.run_path(str(FOLDER / "pareto_front.py"), run_name="__main__")
@@ -82,7 +85,10 @@ def test_many_moves() -> None:
     """As a user runs it: the processes that it starts import the script."""
     name = "many_moves"
     told = subprocess.run(
-        [sys.executable, "-m", f"examples.library.{name}"], capture_output=True, text=True, cwd=FOLDER.parents[1]
+        [sys.executable, "-m", f"examples.library.{name}"],
+        capture_output=True,
+        text=True,
+        cwd=FOLDER.parents[1],
     )
     assert told.returncode == 0, told.stderr
     assert len(re.findall(r"^\d of 6: \d+\.\d J$", told.stdout, re.MULTILINE)) == 6

@@ -38,7 +38,9 @@ def cycle_solution() -> joulepath.CycleSolution:
         joulepath.Stop(name="place", target=START + 0.3, payload=joulepath.Payload()),
     ]
     arm = joulepath.Arm(robot=joulepath.load_robot("ur5e"))
-    return joulepath.plan_cycle(joulepath.Cycle(arm=arm, start=START, stops=stops, windings=False, deadline=100.0))
+    return joulepath.plan_cycle(
+        joulepath.Cycle(arm=arm, start=START, stops=stops, windings=False, deadline=100.0)
+    )
 
 
 def electrical(energy: joulepath.Energy) -> float:
@@ -60,9 +62,12 @@ def test_optimize_many() -> None:
     far = joulepath.Pose.from_rotvec([3.0, 0.0, 0.0], [np.pi, 0.0, 0.0])
     with ThreadPoolExecutor(1) as executor:
         found = {
-            each.index: each for each in joulepath.optimize_many([problem(), replace(problem(), goal=far)], executor)
+            each.index: each
+            for each in joulepath.optimize_many([problem(), replace(problem(), goal=far)], executor)
         }
-    assert electrical(found[0].result().energy) == pytest.approx(electrical(solution().energy), rel=1e-4)
+    assert electrical(found[0].result().energy) == pytest.approx(
+        electrical(solution().energy), rel=1e-4
+    )
     with pytest.raises(joulepath.UnreachablePose):
         found[1].result()
 
@@ -74,12 +79,18 @@ def test_evaluate_takes_a_solution() -> None:
     assert all(report.held for report in found.limits) and found.speed_jumps == 0
     assert found.samples is not None and found.samples.q[-1] == pytest.approx(GOAL)
     # the spline, its samples as a recording, and the motion of another arm
-    sampled = joulepath.Recording.of(found.samples.t, found.samples.q, found.samples.v, found.samples.a)
+    sampled = joulepath.Recording.of(
+        found.samples.t, found.samples.q, found.samples.v, found.samples.a
+    )
     for motion in (solution().trajectory.spline, sampled):
         again = joulepath.evaluate(problem().arm, motion)
-        assert electrical(again.total.energy) == pytest.approx(electrical(found.total.energy), rel=1e-3)
+        assert electrical(again.total.energy) == pytest.approx(
+            electrical(found.total.energy), rel=1e-3
+        )
     heavier = replace(problem().arm, payload=joulepath.Payload(mass=3.0))
-    assert electrical(joulepath.evaluate(heavier, solution()).total.energy) > electrical(found.total.energy)
+    assert electrical(joulepath.evaluate(heavier, solution()).total.energy) > electrical(
+        found.total.energy
+    )
 
 
 def test_evaluate_refuses_a_solution_of_another_robot() -> None:
@@ -115,7 +126,9 @@ def test_compare_refuses_methods_that_are_none(methods: list[typing.Any]) -> Non
 
 def test_pareto() -> None:
     front = joulepath.pareto(replace(problem(), objective="mechanical", duration_max=2.0), 2)
-    durations, energies = zip(*((each.duration, each.energy.mechanical.total) for each in front.points), strict=True)
+    durations, energies = zip(
+        *((each.duration, each.energy.mechanical.total) for each in front.points), strict=True
+    )
     assert len(front.points) == 2
     assert durations[0] == pytest.approx(front.shortest) and durations[0] < durations[1]
     assert energies[0] > energies[1]
@@ -152,7 +165,9 @@ def test_inverse_kinematics() -> None:
     T = np.eye(4)
     T[:3, 3] = 0.4, -0.2, 0.3
     ball = joulepath.Obstacle("ball", joulepath.Sphere(0.05), T)
-    among = joulepath.inverse_kinematics(replace(arm, scene=joulepath.Scene([ball])), pose, windings=False)
+    among = joulepath.inverse_kinematics(
+        replace(arm, scene=joulepath.Scene([ball])), pose, windings=False
+    )
     assert all(each.collides for each in among)
     assert any(not each.collides for each in branches)
     unchecked = joulepath.inverse_kinematics(replace(arm, collisions=False), pose, windings=False)
@@ -161,7 +176,9 @@ def test_inverse_kinematics() -> None:
 
 def test_inverse_kinematics_of_seven_joints_names_the_free_ones() -> None:
     robot = joulepath.load_robot("iiwa14")
-    found = joulepath.inverse_kinematics(robot, joulepath.Pose.from_rotvec([0.5, 0.1, 0.4], [np.pi, 0.0, 0.0]))
+    found = joulepath.inverse_kinematics(
+        robot, joulepath.Pose.from_rotvec([0.5, 0.1, 0.4], [np.pi, 0.0, 0.0])
+    )
     assert found and all(each.free for each in found)
     assert {joint for each in found for joint in each.free} <= set(robot.joint_names)
 
@@ -183,12 +200,16 @@ def test_what_is_too_late_says_so() -> None:
 def test_inverse_kinematics_says_what_is_out_of_reach() -> None:
     robot = joulepath.load_robot("ur5e")
     with pytest.raises(joulepath.UnreachablePose) as caught:
-        joulepath.inverse_kinematics(robot, joulepath.Pose.from_rotvec([3.0, 0.0, 0.0], [0.0, 0.0, 0.0]))
+        joulepath.inverse_kinematics(
+            robot, joulepath.Pose.from_rotvec([3.0, 0.0, 0.0], [0.0, 0.0, 0.0])
+        )
     assert caught.value.distance is not None and caught.value.distance > 1
 
 
 def test_replay() -> None:
-    found = joulepath.replay(solution(), ("feed_forward",), 1e-3, {"friction": 0.3}, problem=problem())
+    found = joulepath.replay(
+        solution(), ("feed_forward",), 1e-3, {"friction": 0.3}, problem=problem()
+    )
     assert found.torque_error is not None and found.torque_error < 1e-9
     run = found.under("feed_forward")
     assert electrical(run.energy) == pytest.approx(electrical(solution().energy), rel=5e-3)
@@ -232,8 +253,12 @@ FILES: dict[str, tuple[str, str, typing.Any]] = {
 def test_export(format: typing.Any) -> None:
     extension, content, options = FILES[format]
     file = joulepath.export(solution(), format, options, problem=problem())
-    assert file.name == f"joulepath-ur5e.{extension}" and content in file.content.decode(errors="replace")
-    assert file.worst_ratio == pytest.approx(max(solution().certificate.worst_ratio.values()), rel=1e-6)
+    assert file.name == f"joulepath-ur5e.{extension}" and content in file.content.decode(
+        errors="replace"
+    )
+    assert file.worst_ratio == pytest.approx(
+        max(solution().certificate.worst_ratio.values()), rel=1e-6
+    )
     assert "Not run on hardware" in file.notes[-1]
 
 
@@ -254,7 +279,9 @@ def test_export_of_a_cycle_slowed_down_and_a_program() -> None:
     assert file.speed_scale == content["speed_scale"] == 0.5 and "speed-0.5" in file.name
     moving = sum(move.solution.duration for move in cycle_solution().moves)
     assert content["duration"] == pytest.approx(2 * moving + 0.2)
-    program = joulepath.Program((joulepath.Move(solution().trajectory.spline, problem().arm), joulepath.Rest(1.0)))
+    program = joulepath.Program(
+        (joulepath.Move(solution().trajectory.spline, problem().arm), joulepath.Rest(1.0))
+    )
     content = json.loads(joulepath.export(program, "json").content)
     assert [step["kind"] for step in content["steps"]] == ["move", "rest"]
 
@@ -277,7 +304,9 @@ def test_a_log_is_read_evaluated_and_identified(tmp_path: Path) -> None:
     truth = truth_of(robot)
     path = tmp_path / "monday.csv"
     path.write_bytes(csv_of(recorded(robot, truth, moves=8)))
-    reading = joulepath.read_log(path, robot, joulepath.LogOptions(payload=joulepath.Payload(), name="monday"))
+    reading = joulepath.read_log(
+        path, robot, joulepath.LogOptions(payload=joulepath.Payload(), name="monday")
+    )
     log = reading.log
     assert log.effort_meaning == "current" and reading.report.rows == len(log.time)
     found = joulepath.identify(robot, [log], joulepath.IdentificationOptions(held_out=0.0))
@@ -289,7 +318,8 @@ def test_a_log_is_read_evaluated_and_identified(tmp_path: Path) -> None:
     own = joulepath.load_robot("ur10e", figures=found.document("2026-01-31"))
     measured = float(np.trapezoid(log.power, log.time))
     before, after = (
-        electrical(joulepath.evaluate(joulepath.Arm(robot=each), log.recording()).total.energy) for each in (robot, own)
+        electrical(joulepath.evaluate(joulepath.Arm(robot=each), log.recording()).total.energy)
+        for each in (robot, own)
     )
     assert abs(after - measured) < abs(before - measured)
 

@@ -20,41 +20,168 @@ import joulepath
 import joulepath.optimizer
 
 ROOT = Path(__file__).parents[1]
-# fmt: off
 FUNCTIONS = {
-    "capsule_between", "compare", "evaluate", "export", "identify", "inverse_kinematics",
-    "load_robot", "optimize", "optimize_many", "pareto", "plan_cycle", "read_log", "replay",
-    "robot_names", "what_if",
+    "capsule_between",
+    "compare",
+    "evaluate",
+    "export",
+    "identify",
+    "inverse_kinematics",
+    "load_robot",
+    "optimize",
+    "optimize_many",
+    "pareto",
+    "plan_cycle",
+    "read_log",
+    "replay",
+    "robot_names",
+    "what_if",
 }
 ERRORS = {
-    "ContradictoryOrder", "CycleTooShort", "DeadlineExceeded", "DurationTooShort",
-    "EffortNotUsable", "ExcitationInfeasible", "FormatUnsuitable", "GoalInCollision",
-    "InCollision", "InvalidArm", "InvalidFigures", "InvalidProblem", "InvalidTable",
-    "JoulepathError", "LogTooLarge", "MethodNotApplicable", "NoCollisionFreeTrajectory", "NoPowerChannel",
-    "UnreachableTargets", "NoSequence", "NoTrajectory", "NotCertified", "NotExcited",
-    "NothingHeldOut", "OutsideLimits", "PathInfeasible", "PayloadUnknown", "SingularPose",
-    "StartInCollision", "StopInCollision", "TorqueInfeasible", "UnknownRobot",
+    "ContradictoryOrder",
+    "CycleTooShort",
+    "DeadlineExceeded",
+    "DurationTooShort",
+    "EffortNotUsable",
+    "ExcitationInfeasible",
+    "FormatUnsuitable",
+    "GoalInCollision",
+    "InCollision",
+    "InvalidArm",
+    "InvalidFigures",
+    "InvalidProblem",
+    "InvalidTable",
+    "JoulepathError",
+    "LogTooLarge",
+    "MethodNotApplicable",
+    "NoCollisionFreeTrajectory",
+    "NoPowerChannel",
+    "UnreachableTargets",
+    "NoSequence",
+    "NoTrajectory",
+    "NotCertified",
+    "NotExcited",
+    "NothingHeldOut",
+    "OutsideLimits",
+    "PathInfeasible",
+    "PayloadUnknown",
+    "SingularPose",
+    "StartInCollision",
+    "StopInCollision",
+    "TorqueInfeasible",
+    "UnknownRobot",
     "UnreachablePose",
 }
 TYPES = {
-    "Advice", "AnyOf", "Arm", "AsPlanned", "Attachment", "Baseline", "Box", "BranchFilter", "Bus",
-    "CandidateReport", "CandidateStatus", "CandidateTried", "CandidatesFound", "Capsule",
-    "Certificate", "Clearance", "ClosestPair", "Compared", "Comparison", "ConeOrientedPose", "Configuration",
-    "Contact", "Coupling", "Cycle", "CycleBaseline", "CycleMove", "CycleSolution", "Cylinder",
-    "Dropped", "Dwell", "ElectricalEnergy", "Energy", "EnergyInterval", "Evaluation",
-    "ExportedFile", "FrankaOptions", "FreeOrder", "Front", "FrontSolver", "HalfSpace", "IKSolution",
-    "IKSolutions", "Identification", "IdentificationOptions", "Improved", "IntervalEnergy",
-    "Inverter", "JointEnergy", "KrlOptions", "LeastClearance", "LimitReport", "Limits",
-    "LimitsInForce", "Line", "Log", "LogMove", "LogOptions", "LogReading", "LogReport",
-    "MechanicalEnergy", "Mesh", "Move", "MoveitOptions", "Obstacle", "Optimized", "Outcome",
-    "Parameter", "Payload", "PlannedBaseline", "PlannedMotion", "PlannedTorques", "Points",
-    "Pose", "PosesAround", "Problem", "Program", "RapidOptions", "RecordedRows", "Recording",
-    "Replay", "ReplayedChange", "ReplayedRun", "Rest", "Robot", "Ros2Options", "Samples", "SavingInterval",
-    "SavingRange", "Scene", "SimulatedSaving", "Solution", "SolverReport", "Sphere", "Spline", "Stop", "StopPath",
-    "StorageUse", "TableOptions", "ToolCone", "ToolPath", "Trajectory", "TriangleMesh",
-    "UnreachableTarget", "UrscriptOptions", "Validation", "Voxels", "Waypoints", "WhatIf",
+    "Advice",
+    "AnyOf",
+    "Arm",
+    "AsPlanned",
+    "Attachment",
+    "Baseline",
+    "Box",
+    "BranchFilter",
+    "Bus",
+    "CandidateReport",
+    "CandidateStatus",
+    "CandidateTried",
+    "CandidatesFound",
+    "Capsule",
+    "Certificate",
+    "Clearance",
+    "ClosestPair",
+    "Compared",
+    "Comparison",
+    "ConeOrientedPose",
+    "Configuration",
+    "Contact",
+    "Coupling",
+    "Cycle",
+    "CycleBaseline",
+    "CycleMove",
+    "CycleSolution",
+    "Cylinder",
+    "Dropped",
+    "Dwell",
+    "ElectricalEnergy",
+    "Energy",
+    "EnergyInterval",
+    "Evaluation",
+    "ExportedFile",
+    "FrankaOptions",
+    "FreeOrder",
+    "Front",
+    "FrontSolver",
+    "HalfSpace",
+    "IKSolution",
+    "IKSolutions",
+    "Identification",
+    "IdentificationOptions",
+    "Improved",
+    "IntervalEnergy",
+    "Inverter",
+    "JointEnergy",
+    "KrlOptions",
+    "LeastClearance",
+    "LimitReport",
+    "Limits",
+    "LimitsInForce",
+    "Line",
+    "Log",
+    "LogMove",
+    "LogOptions",
+    "LogReading",
+    "LogReport",
+    "MechanicalEnergy",
+    "Mesh",
+    "Move",
+    "MoveitOptions",
+    "Obstacle",
+    "Optimized",
+    "Outcome",
+    "Parameter",
+    "Payload",
+    "PlannedBaseline",
+    "PlannedMotion",
+    "PlannedTorques",
+    "Points",
+    "Pose",
+    "PosesAround",
+    "Problem",
+    "Program",
+    "RapidOptions",
+    "RecordedRows",
+    "Recording",
+    "Replay",
+    "ReplayedChange",
+    "ReplayedRun",
+    "Rest",
+    "Robot",
+    "Ros2Options",
+    "Samples",
+    "SavingInterval",
+    "SavingRange",
+    "Scene",
+    "SimulatedSaving",
+    "Solution",
+    "SolverReport",
+    "Sphere",
+    "Spline",
+    "Stop",
+    "StopPath",
+    "StorageUse",
+    "TableOptions",
+    "ToolCone",
+    "ToolPath",
+    "Trajectory",
+    "TriangleMesh",
+    "UnreachableTarget",
+    "UrscriptOptions",
+    "Validation",
+    "Voxels",
+    "Waypoints",
+    "WhatIf",
 }
-# fmt: on
 
 
 def test_the_public_names_are_a_promise() -> None:
@@ -86,7 +213,9 @@ def test_every_function_says_what_it_takes_returns_and_raises(name: str) -> None
     assert "Returns:" in text or "Yields:" in text
     assert "Raises:" in text or not parameters
     arguments = text.partition("Args:\n")[2].partition("\n\n")[0]
-    documented = [line.split(":")[0].strip() for line in arguments.splitlines() if line[4:5] not in ("", " ")]
+    documented = [
+        line.split(":")[0].strip() for line in arguments.splitlines() if line[4:5] not in ("", " ")
+    ]
     assert documented == list(parameters)
 
 
@@ -99,7 +228,9 @@ def test_one_except_clause_catches_every_error() -> None:
     for module in pkgutil.walk_packages(joulepath.optimizer.__path__, "joulepath.optimizer."):
         importlib.import_module(module.name)
     assert {
-        each.__name__ for each in subclasses(joulepath.JoulepathError) if not each.__name__.startswith("_")
+        each.__name__
+        for each in subclasses(joulepath.JoulepathError)
+        if not each.__name__.startswith("_")
     } <= ERRORS
 
 
@@ -124,7 +255,9 @@ def test_the_types_of_arguments_are_public() -> None:
         seen.add(each)
         assert each in known or each.__name__ in internal, each
         if dataclasses.is_dataclass(each) and each not in made:
-            todo += [part for hint in typing.get_type_hints(each).values() for part in own_types(hint)]
+            todo += [
+                part for hint in typing.get_type_hints(each).values() for part in own_types(hint)
+            ]
 
 
 def argument_types(function: object) -> Iterator[type]:
@@ -162,7 +295,11 @@ def python_of(page: Path) -> list[str]:
 
 
 def test_pages_and_examples_use_the_public_names() -> None:
-    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "examples" / "library").glob("*.py")]
+    pages = [
+        ROOT / "README.md",
+        *(ROOT / "docs").glob("*.md"),
+        *(ROOT / "examples" / "library").glob("*.py"),
+    ]
     imports = [
         (page.name, each.module, alias.name)
         for page in pages
@@ -172,11 +309,22 @@ def test_pages_and_examples_use_the_public_names() -> None:
         for alias in each.names
     ]
     assert len(imports) > 50
-    assert [each for each in imports if each[1] != "joulepath" or each[2] not in joulepath.__all__] == []
+    assert [
+        each for each in imports if each[1] != "joulepath" or each[2] not in joulepath.__all__
+    ] == []
 
 
 def test_the_import_loads_nothing() -> None:
-    heavy = ("casadi", "fastapi", "mujoco", "numpy", "pinocchio", "pydantic", "scipy", "joulepath.optimizer")
+    heavy = (
+        "casadi",
+        "fastapi",
+        "mujoco",
+        "numpy",
+        "pinocchio",
+        "pydantic",
+        "scipy",
+        "joulepath.optimizer",
+    )
     code = f"import sys, joulepath; print([each for each in {heavy} if each in sys.modules])"
     assert in_a_process(code, ROOT) == "[]"
 
@@ -186,7 +334,8 @@ def test_the_library_needs_no_web_framework() -> None:
     heavy = ("fastapi", "pydantic", "sqlalchemy", "starlette", "uvicorn", "joulepath.app")
     code = (
         "import sys, joulepath; names = [n for n in joulepath.__all__ if n != 'InvalidArm'];"
-        f"[getattr(joulepath, n) for n in names]; print([each for each in {heavy} if each in sys.modules])"
+        f"[getattr(joulepath, n) for n in names]; print([each for each in {heavy} if each in "
+        "sys.modules])"
     )
     assert in_a_process(code, ROOT) == "[]"
 

@@ -26,7 +26,9 @@ def test_from_the_file_to_the_answer(tmp_path: Path) -> None:
     shutil.copy(arm_folder("ur5e") / "ur5e.urdf", tmp_path)
     (tmp_path / "cell_arm.yaml").write_text(block("yaml"))
     code = f"import sys; sys.path.insert(0, {str(ROOT)!r})\n{block('python')}"
-    run = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+    run = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
     (printed,) = re.findall(r"It prints\n\n```\n(.*?)```", PAGE, re.DOTALL)
     assert run.stdout == printed
 
@@ -39,5 +41,9 @@ def test_every_field_is_on_the_page() -> None:
         (Collision, "collision."),
     ):
         for name in kind.__dataclass_fields__:
-            known = f"`{place}{name}`" in PAGE or f"`.{name}`" in PAGE or name in ("drives", "electronics", "collision")
+            known = (
+                f"`{place}{name}`" in PAGE
+                or f"`.{name}`" in PAGE
+                or name in ("drives", "electronics", "collision")
+            )
             assert known, name

@@ -1,4 +1,6 @@
-"""The wheel in an environment of its own: it holds everything that runs, and works from any directory."""
+"""The wheel in an environment of its own: it holds everything that runs, and works from any
+directory.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +52,9 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def environment(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The `bin` of an empty environment with the wheel; its dependencies are those of this interpreter."""
+    """The `bin` of an empty environment with the wheel; its dependencies are those of this
+    interpreter.
+    """
     folder = tmp_path_factory.mktemp("installed") / "venv"
     venv.create(folder)
     python = folder / "bin" / "python"
@@ -97,12 +101,24 @@ def clean(variables: os._Environ[str] | dict[str, str]) -> dict[str, str]:
 
 
 def test_the_wheel_holds_all_that_runs(wheel: Path) -> None:
-    """Every tracked file of the three packages, the C library, the libraries of the page, the examples, and nothing
-    else beside the metadata."""
+    """Every tracked file of the three packages, the C library, the libraries of the page, the
+    examples, and nothing else beside the metadata."""
     tracked = subprocess.run(
-        ["git", "ls-files", "--cached", "--others", "--exclude-standard", "joulepath", *PACKAGES, "examples"],
-        cwd=ROOT, capture_output=True, text=True, check=True,
-    ).stdout.split()  # fmt: skip
+        [
+            "git",
+            "ls-files",
+            "--cached",
+            "--others",
+            "--exclude-standard",
+            "joulepath",
+            *PACKAGES,
+            "examples",
+        ],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.split()
     vendor = (ROOT / "app" / "static" / "studio" / "vendor").rglob("*")
     present = {name for name in tracked if (ROOT / name).is_file()}
     present |= {str(each.relative_to(ROOT)) for each in (LIBRARY, *vendor) if each.is_file()}
@@ -124,7 +140,9 @@ def test_the_wheel_serves_every_python_of_one_platform(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         (metadata,) = (name for name in archive.namelist() if name.endswith(".dist-info/WHEEL"))
         assert "Root-Is-Purelib: false" in archive.read(metadata).decode().splitlines()
-        code = next(archive.read(name) for name in archive.namelist() if name.endswith(LIBRARY.name))
+        code = next(
+            archive.read(name) for name in archive.namelist() if name.endswith(LIBRARY.name)
+        )
     assert b"Py_" not in code and b"PyObject" not in code
 
 
@@ -148,7 +166,9 @@ def test_the_console_command_works_from_anywhere(run: Run) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("command", [("python", "-m", "joulepath.app"), ("joulepath", "serve")])
-def test_the_service_starts_from_anywhere(environment: Path, tmp_path: Path, command: tuple[str, ...]) -> None:
+def test_the_service_starts_from_anywhere(
+    environment: Path, tmp_path: Path, command: tuple[str, ...]
+) -> None:
     """Ready, with a database that its migrations have made, and ended by SIGTERM."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
@@ -163,8 +183,11 @@ def test_the_service_starts_from_anywhere(environment: Path, tmp_path: Path, com
     with log.open("wb") as output:
         process = subprocess.Popen(
             [environment / command[0], *command[1:]],
-            cwd=tmp_path, env=clean(os.environ) | settings, stdout=output, stderr=output,
-        )  # fmt: skip
+            cwd=tmp_path,
+            env=clean(os.environ) | settings,
+            stdout=output,
+            stderr=output,
+        )
     try:
         wait_until_ready(process, f"http://127.0.0.1:{port}/readyz", log)
         with urllib.request.urlopen(f"http://127.0.0.1:{port}/studies", timeout=START) as studies:

@@ -15,7 +15,9 @@ _IPV6_PREFIX = 64
 
 @dataclass(frozen=True)
 class Client:
-    """Who sent a request. `address`: of its sender, behind trusted proxies the one that they report."""
+    """Who sent a request. `address`: of its sender, behind trusted proxies the one that they
+    report.
+    """
 
     address: str
     key: str | None = None
@@ -25,7 +27,9 @@ class Client:
 
     @property
     def name(self) -> str:
-        """By what fair shares and limits count: the key, without one the address, of IPv6 its /64 network."""
+        """By what fair shares and limits count: the key, without one the address, of IPv6 its /64
+        network.
+        """
         return f"key {self.key}" if self.key is not None else _network(self.address)
 
     @property
@@ -39,7 +43,9 @@ OPERATOR = Client("console")
 
 
 def address_of(text: str) -> Address | None:
-    """The IP address in a text, None if it is something else. IPv4 that is mapped into IPv6 is IPv4."""
+    """The IP address in a text, None if it is something else. IPv4 that is mapped into IPv6 is
+    IPv4.
+    """
     try:
         parsed = ip_address(text)
     except ValueError:

@@ -1,4 +1,6 @@
-"""The file of API keys: one entry per key, with its name, role and hash. No key can be read from it."""
+"""The file of API keys: one entry per key, with its name, role and hash. No key can be read from
+it.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,10 @@ from joulepath.app.exceptions.access import Role
 
 _NAME_LENGTH = 64
 """Of a name, at most: the database keeps it as the owner of what the client created."""
-_HEAD = "# API keys of joulepath, written by `joulepath keys`. Only hashes: no key can be read from this file.\n"
+_HEAD = (
+    "# API keys of joulepath, written by `joulepath keys`. Only hashes: no key can be read "
+    "from this file.\n"
+)
 _PREFIX = "joulepath_"
 """Of every key, so that scanners of source code find one that was committed."""
 _SECRET_BYTES = 32
@@ -34,7 +39,9 @@ class WrongKeyFile(Exception):
 
 
 class ApiKey(BaseModel):
-    """One key. Several keys may have one name: they are the same client, so that a key can be replaced at leisure."""
+    """One key. Several keys may have one name: they are the same client, so that a key can be
+    replaced at leisure.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -60,7 +67,12 @@ def hash_of(secret: str) -> str:
 def new_key(name: str, role: Role) -> tuple[str, ApiKey]:
     """A new random key, and its entry. Raises ValidationError for a name that is none."""
     secret = _PREFIX + secrets.token_urlsafe(_SECRET_BYTES)
-    entry = ApiKey(name=name, role=role, sha256=hash_of(secret), created=datetime.now(UTC).replace(microsecond=0))
+    entry = ApiKey(
+        name=name,
+        role=role,
+        sha256=hash_of(secret),
+        created=datetime.now(UTC).replace(microsecond=0),
+    )
     return secret, entry
 
 
@@ -70,7 +82,8 @@ def read_keys(file: Path) -> list[ApiKey]:
         return _ENTRIES.validate_python(yaml.load(file.read_bytes(), yaml.CSafeLoader) or [])
     except OSError as error:
         raise WrongKeyFile(
-            f"{file} cannot be read ({error.strerror}): name another file, or make it by `joulepath keys add`."
+            f"{file} cannot be read ({error.strerror}): name another file, or make it by "
+            "`joulepath keys add`."
         ) from None
     except yaml.YAMLError as error:
         where = f", line {mark.line + 1}" if (mark := getattr(error, "problem_mark", None)) else ""
@@ -78,12 +91,15 @@ def read_keys(file: Path) -> list[ApiKey]:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"])) or "the document"
-        raise WrongKeyFile(f"{file}: {where}: {first['msg']}: write it by `joulepath keys`.") from None
+        raise WrongKeyFile(
+            f"{file}: {where}: {first['msg']}: write it by `joulepath keys`."
+        ) from None
 
 
 @contextlib.contextmanager
 def changing(file: Path) -> Iterator[list[ApiKey]]:
-    """The entries, to be changed in place; they are on the disk when the context is left. Another change waits.
+    """The entries, to be changed in place; they are on the disk when the context is left. Another
+    change waits.
 
     Raises WrongKeyFile; OSError if the file cannot be written.
     """
@@ -102,14 +118,18 @@ def changing(file: Path) -> Iterator[list[ApiKey]]:
 def _replace(file: Path, entries: Sequence[ApiKey]) -> None:
     """A service that reads meanwhile sees the old file or the new one, never a part."""
     text = _HEAD + yaml.safe_dump(_ENTRIES.dump_python(list(entries)), sort_keys=False)
-    with NamedTemporaryFile("w", encoding="utf-8", dir=file.parent, prefix=f".{file.name}.", delete=False) as new:
+    with NamedTemporaryFile(
+        "w", encoding="utf-8", dir=file.parent, prefix=f".{file.name}.", delete=False
+    ) as new:
         try:
             new.write(text)
             new.flush()
             os.fsync(new.fileno())
             known = file.stat() if file.exists() else None
             os.fchmod(new.fileno(), _PRIVATE if known is None else known.st_mode & 0o777)
-            if known is not None and os.geteuid() == 0:  # it stays readable to the user of the service
+            if (
+                known is not None and os.geteuid() == 0
+            ):  # it stays readable to the user of the service
                 os.fchown(new.fileno(), known.st_uid, known.st_gid)
             Path(new.name).replace(file)
         except BaseException:

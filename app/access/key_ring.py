@@ -25,14 +25,17 @@ class KeyRing:
         """The entry of a key; None if it is not valid."""
         self._refresh()
         found, digest = None, hash_of(secret)
-        # every entry is compared, in constant time: how long it takes says nothing of where it matched
+        # every entry is compared, in constant time: how long it takes says nothing of where it
+        # matched
         for key in self._keys:
             if hmac.compare_digest(key.sha256, digest):
                 found = key
         return found
 
     def _refresh(self) -> None:
-        """Reads a file that changed. Without a file nobody gets in; one that makes no sense changes nothing."""
+        """Reads a file that changed. Without a file nobody gets in; one that makes no sense changes
+        nothing.
+        """
         stamp = _stamp(self._file)
         if stamp == self._stamp:
             return

@@ -23,12 +23,16 @@ def key_ring(settings: Settings) -> KeyRing | None:
 
 
 def check_access(settings: Settings) -> None:
-    """Raises WrongSettings if other machines could reach a service without API keys that was not told to be open."""
+    """Raises WrongSettings if other machines could reach a service without API keys that was not
+    told to be open.
+    """
     if key_ring(settings) is None and not settings.open and not is_loopback(settings.host):
         raise WrongSettings(
-            f"JOULEPATH_HOST={settings.host!r} is reached from other machines, and there are no API keys: anyone "
+            f"JOULEPATH_HOST={settings.host!r} is reached from other machines, and there are no "
+            "API keys: anyone "
             "there could read, change and delete everything.\n"
-            "Either make a key by `joulepath keys add NAME --file FILE` and set JOULEPATH_API_KEYS_FILE=FILE,\n"
+            "Either make a key by `joulepath keys add NAME --file FILE` and set "
+            "JOULEPATH_API_KEYS_FILE=FILE,\n"
             "or set JOULEPATH_OPEN=1 if only clients that you trust can reach this address."
         )
 

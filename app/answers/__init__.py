@@ -1,1 +1,3 @@
-"""Answers that the dataclasses of the library declare: JSON, schemas, and the fields of every answer."""
+"""Answers that the dataclasses of the library declare: JSON, schemas, and the fields of every
+answer.
+"""

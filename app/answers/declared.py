@@ -1,7 +1,8 @@
 """Answers from what classes declare: their JSON for orjson, their pydantic models for OpenAPI.
 
-A declared class is a dataclass, a NamedTuple or a TypedDict. Its fields have types with the markers of
-`joulepath.optimizer.declared`, and their meaning as the text below them. Nothing else reads these markers.
+A declared class is a dataclass, a NamedTuple or a TypedDict. Its fields have types with the markers
+of `joulepath.optimizer.declared`, and their meaning as the text below them. Nothing else reads
+these markers.
 """
 
 from __future__ import annotations
@@ -16,7 +17,17 @@ from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cache
 from operator import attrgetter
-from typing import Annotated, Any, Literal, NotRequired, Union, get_args, get_origin, get_type_hints, is_typeddict
+from typing import (
+    Annotated,
+    Any,
+    Literal,
+    NotRequired,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+    is_typeddict,
+)
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, create_model
@@ -55,7 +66,9 @@ def shown_fields(kind: type) -> tuple[str, ...]:
 
 @cache
 def model_of(kind: type) -> type[BaseModel]:
-    """The pydantic model of a declared class: its schema, and the check of a JSON document in tests."""
+    """The pydantic model of a declared class: its schema, and the check of a JSON document in
+    tests.
+    """
     hints, texts = _hints(kind), texts_of(kind)
     own: dict[str, Any] = {}
     for name in shown_fields(kind):
@@ -66,13 +79,15 @@ def model_of(kind: type) -> type[BaseModel]:
 
 
 def with_unit(text: str, unit: str | None) -> str:
-    """A description with its unit after the noun: at the end of the first clause. None: no unit, "1": a plain
-    number."""
+    """A description with its unit after the noun: at the end of the first clause. None: no unit,
+    "1": a plain number."""
     return text if unit in (None, "1") else re.sub(r"(?=[.;:](\s|$))", f" [{unit}]", text, count=1)
 
 
 def texts_of(kind: type) -> dict[str, str]:
-    """The meaning of every field of a class: the text below it, in the class itself or in one that it extends."""
+    """The meaning of every field of a class: the text below it, in the class itself or in one that
+    it extends.
+    """
     found: dict[str, str] = {}
     for each in reversed(kind.__mro__):
         found |= _texts(each.__module__).get(each.__qualname__, {})
@@ -86,18 +101,24 @@ def _texts(module: str) -> dict[str, dict[str, str]]:
         tree = ast.parse(inspect.getsource(sys.modules[module]))
     except (OSError, TypeError):
         return {}
-    return {node.name: dict(_below_fields(node)) for node in tree.body if isinstance(node, ast.ClassDef)}
+    return {
+        node.name: dict(_below_fields(node)) for node in tree.body if isinstance(node, ast.ClassDef)
+    }
 
 
 def _below_fields(node: ast.ClassDef) -> Iterator[tuple[str, str]]:
     for field, text in zip(node.body, node.body[1:], strict=False):
         match field, text:
-            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(words))):
+            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(
+                value=ast.Constant(value=str(words))
+            ):
                 yield name, " ".join(words.split())
 
 
 def _is_declared(kind: Any) -> bool:
-    return isinstance(kind, type) and (is_dataclass(kind) or hasattr(kind, "_fields") or is_typeddict(kind))
+    return isinstance(kind, type) and (
+        is_dataclass(kind) or hasattr(kind, "_fields") or is_typeddict(kind)
+    )
 
 
 def _names(kind: Any) -> tuple[str, ...]:

@@ -15,7 +15,9 @@ router = APIRouter(tags=["health"])
 class Machine(Response):
     """One machine of a cluster."""
 
-    address: str = described("Address at which the scheduler reaches it.", None, "tcp://10.0.0.7:41555")
+    address: str = described(
+        "Address at which the scheduler reaches it.", None, "tcp://10.0.0.7:41555"
+    )
     workers: int = described("Requests that it computes at the same time.", "1", 8)
 
 
@@ -23,7 +25,9 @@ class ClusterState(Response):
     """The cluster that works on jobs."""
 
     scheduler: str | None = described(
-        "Address of the scheduler; null if the service's own workers work on jobs.", None, "tcp://scheduler:8786"
+        "Address of the scheduler; null if the service's own workers work on jobs.",
+        None,
+        "tcp://scheduler:8786",
     )
     machines: list[Machine] = part("The machines that are there now.")
 
@@ -35,9 +39,12 @@ class ClusterState(Response):
     responses=problem_responses(ClusterUnavailable),
 )
 async def show(cluster: ServiceCluster) -> ClusterState:
-    """The machines of the cluster that this service sends the requests of jobs to. Without a cluster, the service's own
-    workers compute them."""
+    """The machines of the cluster that this service sends the requests of jobs to. Without a
+    cluster, the service's own workers compute them."""
     if cluster is None:
         return ClusterState(scheduler=None, machines=[])
-    machines = [Machine(address=address, workers=count) for address, count in sorted(cluster.workers.items())]
+    machines = [
+        Machine(address=address, workers=count)
+        for address, count in sorted(cluster.workers.items())
+    ]
     return ClusterState(scheduler=cluster.address, machines=machines)

@@ -67,7 +67,9 @@ def asset(name: str) -> Response:
     """A script or style sheet of the two pages."""
     if name not in _ASSETS:
         raise NotFound
-    return Response(_read(name), media_type=_ASSETS[name], headers={"Cache-Control": "max-age=86400"})
+    return Response(
+        _read(name), media_type=_ASSETS[name], headers={"Cache-Control": "max-age=86400"}
+    )
 
 
 @cache

@@ -22,13 +22,16 @@ class Alive(Response):
 
 
 class Ready(Response):
-    """All workers are warm: started, with the kernel loaded. The database can be read and written."""
+    """All workers are warm: started, with the kernel loaded. The database can be read and
+    written."""
 
     status: Literal["ready"] = described("Always `ready`.", None, "ready")
     workers: int = described("Number of warm workers.", "1", 2)
 
 
-@router.get("/healthz", summary="Is the process alive?", response_model=Alive, responses=problem_responses())
+@router.get(
+    "/healthz", summary="Is the process alive?", response_model=Alive, responses=problem_responses()
+)
 async def healthz() -> Alive:
     """Answers at once, also while the workers are busy."""
     return Alive(status="alive")
@@ -41,8 +44,8 @@ async def healthz() -> Alive:
     responses=problem_responses(NotReady, StoreUnavailable),
 )
 async def readyz(engine: ServiceEngine, store: ServiceStore) -> Ready:
-    """200 from the time when all workers are warm until the service stops, while the database can be read and written,
-    and unless requests wait and no worker is at work."""
+    """200 from the time when all workers are warm until the service stops, while the database can
+    be read and written, and unless requests wait and no worker is at work."""
     if not engine.ready:
         raise NotReady
     if store.fault is not None:

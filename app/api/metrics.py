@@ -21,12 +21,19 @@ _PATIENCE = 2.0
     "/metrics",
     summary="Measurements for Prometheus",
     response_class=Response,
-    responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}, **problem_responses()},
+    responses={
+        200: {"content": {"text/plain": {"schema": {"type": "string"}}}},
+        **problem_responses(),
+    },
 )
-async def metrics(request: Request, measured: ServiceMetrics, engine: ServiceEngine, store: ServiceStore) -> Response:
-    """Requests, durations, problems, the queue, the workers, the database and the process, in the text format of
-    Prometheus."""
-    document, media_type = measured.document(request.headers.get("accept", ""), engine, await _answers(store))
+async def metrics(
+    request: Request, measured: ServiceMetrics, engine: ServiceEngine, store: ServiceStore
+) -> Response:
+    """Requests, durations, problems, the queue, the workers, the database and the process, in the
+    text format of Prometheus."""
+    document, media_type = measured.document(
+        request.headers.get("accept", ""), engine, await _answers(store)
+    )
     return Response(document, media_type=media_type)
 
 

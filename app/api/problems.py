@@ -22,7 +22,8 @@ from joulepath.optimizer.exceptions import DeclaredError
 router = APIRouter(prefix="/problems", tags=["problems"])
 
 _STYLE = (
-    "body{font:1rem/1.5 sans-serif;max-width:42rem;margin:3rem auto;padding:0 1rem}dt{margin-top:.5rem}"
+    "body{font:1rem/1.5 sans-serif;max-width:42rem;margin:3rem auto;padding:0 "
+    "1rem}dt{margin-top:.5rem}"
     "pre{overflow:auto;background:#eee;padding:.5rem}"
 )
 
@@ -34,7 +35,9 @@ _STYLE = (
     responses=problem_responses(NotFound),
 )
 async def explain(
-    slug: Annotated[str, Path(description="Last part of the `type` of a problem.", examples=["invalid-request"])],
+    slug: Annotated[
+        str, Path(description="Last part of the `type` of a problem.", examples=["invalid-request"])
+    ],
 ) -> HTMLResponse:
     """A page that explains a type of problem."""
     if slug not in _types():
@@ -51,7 +54,8 @@ def _types() -> dict[str, type[DeclaredError]]:
 def _page(slug: str) -> str:
     kind = _types()[slug]
     fields = "".join(
-        f"<dt><code>{name}</code></dt><dd>{_text(meaning)}</dd>" for name, meaning in own_fields(kind).items()
+        f"<dt><code>{name}</code></dt><dd>{_text(meaning)}</dd>"
+        for name, meaning in own_fields(kind).items()
     )
     document = json_document(problem_of(example_of(kind), REQUEST_ID))
     example = orjson.dumps(orjson.loads(document), option=orjson.OPT_INDENT_2).decode()

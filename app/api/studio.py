@@ -72,11 +72,16 @@ def _answer(request: Request, path: str) -> Response:
 
 @cache
 def _policy() -> str:
-    """Everything from this service, nothing inline but the import map, which the policy names by its digest."""
+    """Everything from this service, nothing inline but the import map, which the policy names by
+    its digest.
+    """
     inline = _INLINE.findall(_files()[PAGE].content)
-    digests = " ".join(f"'sha256-{b64encode(hashlib.sha256(script).digest()).decode()}'" for script in inline)
+    digests = " ".join(
+        f"'sha256-{b64encode(hashlib.sha256(script).digest()).decode()}'" for script in inline
+    )
     return (
-        f"default-src 'none'; script-src 'self' {digests}; style-src 'self'; img-src 'self' data: blob:; "
+        f"default-src 'none'; script-src 'self' {digests}; style-src 'self'; img-src 'self' data: "
+        "blob:; "
         "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     )
 

@@ -1,4 +1,6 @@
-"""`python -m joulepath.app.cli`: the console command where the package is not installed, as in the container image."""
+"""`python -m joulepath.app.cli`: the console command where the package is not installed, as in the
+container image.
+"""
 
 from __future__ import annotations
 

@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 
 M = TypeVar("M", bound="Request")
 
-FILE: Callable[[Any], Any] = click.argument("file", type=click.Path(exists=True, dir_okay=False, allow_dash=True))
+FILE: Callable[[Any], Any] = click.argument(
+    "file", type=click.Path(exists=True, dir_okay=False, allow_dash=True)
+)
 OUTPUT: Callable[[Any], Any] = click.option(
     "--output",
     "-o",
@@ -32,7 +34,9 @@ OUTPUT: Callable[[Any], Any] = click.option(
 
 
 class Refused(Exception):
-    """The request is answered with a problem: its JSON (RFC 9457), and the exit code of the command."""
+    """The request is answered with a problem: its JSON (RFC 9457), and the exit code of the
+    command.
+    """
 
     def __init__(self, problem: bytes, exit_code: int) -> None:
         super().__init__(problem)
@@ -91,9 +95,11 @@ def refused(error: Exception, request_id: str | None = None) -> Refused:
 
 
 def compile_kernel_of(robot_name: str) -> None:
-    """Compiles the robot's kernel if the cache does not have it: a process that ends earlier would leave none.
+    """Compiles the robot's kernel if the cache does not have it: a process that ends earlier would
+    leave none.
 
-    Without a C compiler, and for a robot that nobody knows, nothing happens. One that hangs is told and given up.
+    Without a C compiler, and for a robot that nobody knows, nothing happens. One that hangs is told
+    and given up.
     """
     from joulepath.app.cli.store import robot_named
     from joulepath.app.exceptions.stored import StoreUnavailable
@@ -102,12 +108,16 @@ def compile_kernel_of(robot_name: str) -> None:
     from joulepath.optimizer.native.library_cache import PATIENCE, CompilerHangs
 
     try:
-        compile_kernel(robot_named(robot_name), patience=replace(PATIENCE, compiler=PATIENCE.command))
+        compile_kernel(
+            robot_named(robot_name), patience=replace(PATIENCE, compiler=PATIENCE.command)
+        )
     except (UnknownRobot, StoreUnavailable):
         return  # the answer says so
     except CompilerHangs as error:
         click.echo(
-            f"Without a compiled kernel, the computation takes longer: {error}. Name another one by CC.", err=True
+            f"Without a compiled kernel, the computation takes longer: {error}. Name another one "
+            "by CC.",
+            err=True,
         )
     except (RuntimeError, OSError):
         return  # CasADi's virtual machine evaluates the same expressions
@@ -116,8 +126,8 @@ def compile_kernel_of(robot_name: str) -> None:
 def write(answer: bytes, output: Path | None) -> None:
     """Writes an answer to a file, or to standard output. Raises click.FileError."""
     if output is None:
-        # a reader that ends first ends this process silently, as it does with the shell's own tools; a connection that
-        # breaks at another time is an error like any other
+        # a reader that ends first ends this process silently, as it does with the shell's own
+        # tools; a connection that breaks at another time is an error like any other
         before = signal.signal(signal.SIGPIPE, signal.SIG_DFL)
         try:
             sys.stdout.buffer.write(answer if answer.endswith(b"\n") else answer + b"\n")

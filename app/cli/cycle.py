@@ -21,8 +21,8 @@ Example:
 def cycle(file: str, output: Path | None) -> None:
     """Finds the cycle of stops with least energy.
 
-    FILE is the JSON of `POST /cycle`, or - for standard input. The answer is JSON, too. If standard error is a
-    terminal, a summary follows: energy, duration, status, lower bound, gap and savings.
+    FILE is the JSON of `POST /cycle`, or - for standard input. The answer is JSON, too. If standard
+    error is a terminal, a summary follows: energy, duration, status, lower bound, gap and savings.
     """
     from joulepath.app.api.cycle.request import CycleRequest
     from joulepath.app.api.cycle.task import CycleTask
@@ -35,5 +35,7 @@ def summary_of(answer: dict[str, Any]) -> dict[str, str]:
     return {
         "energy": f"{answer['energy'][answer['objective']]['total']:.4g} J {answer['objective']}",
         **proof(answer),
-        **{f"saved against {each['name']}": f"{each['saving']:.1%}" for each in answer["baselines"]},
+        **{
+            f"saved against {each['name']}": f"{each['saving']:.1%}" for each in answer["baselines"]
+        },
     }

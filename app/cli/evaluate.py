@@ -23,23 +23,48 @@ Examples:
 )
 @FILE
 @OUTPUT
-@click.option("--input", "given", type=click.Choice(["json", "csv"]), help="Kind of FILE. Default: by its name, json.")
-@click.option("--format", "wanted", type=click.Choice(["json", "csv"]), default="json", help="Kind of the answer.")
+@click.option(
+    "--input",
+    "given",
+    type=click.Choice(["json", "csv"]),
+    help="Kind of FILE. Default: by its name, json.",
+)
+@click.option(
+    "--format",
+    "wanted",
+    type=click.Choice(["json", "csv"]),
+    default="json",
+    help="Kind of the answer.",
+)
 @click.option(
     "--settings",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="JSON file with the fields of the request that accompany a CSV: robot, payload, time_per_segment, ...",
+    help="JSON file with the fields of the request that accompany a CSV: robot, payload, "
+    "time_per_segment, ...",
 )
 @click.option("--robot", help="With a CSV: name of the robot.")
-@click.option("--units", type=click.Choice(["rad", "deg"]), help="With a CSV: units of all joint columns.")
-@click.option("--time-per-segment", type=float, help="With a CSV without a column t: time between two rows [s].")
+@click.option(
+    "--units", type=click.Choice(["rad", "deg"]), help="With a CSV: units of all joint columns."
+)
+@click.option(
+    "--time-per-segment",
+    type=float,
+    help="With a CSV without a column t: time between two rows [s].",
+)
 @click.option(
     "--interpolation",
     type=click.Choice(["linear", "trapezoid", "quintic", "spline"]),
     help="With a CSV without a column t: motion between two rows.",
 )
-@click.option("--sample-period", type=float, help="With a CSV: time between the samples to return [s].")
-@click.option("--deadline", type=click.FloatRange(0, min_open=True), default=120.0, help="Longest wall time [s].")
+@click.option(
+    "--sample-period", type=float, help="With a CSV: time between the samples to return [s]."
+)
+@click.option(
+    "--deadline",
+    type=click.FloatRange(0, min_open=True),
+    default=120.0,
+    help="Longest wall time [s].",
+)
 def evaluate(
     file: str,
     output: Path | None,
@@ -51,8 +76,9 @@ def evaluate(
 ) -> None:
     """Computes the energy of a given motion, and the limits that it violates.
 
-    FILE is the JSON of `POST /evaluate`, a CSV with one column per joint and optionally a column t, a log as
-    `POST /logs` takes it, or - for standard input. Options win over the fields of `--settings`.
+    FILE is the JSON of `POST /evaluate`, a CSV with one column per joint and optionally a column t,
+    a log as `POST /logs` takes it, or - for standard input. Options win over the fields of
+    `--settings`.
     """
     kind = given or ("csv" if file.lower().endswith(".csv") else "json")
     query = {name: value for name, value in options.items() if value is not None}
@@ -76,7 +102,9 @@ def _answer(file: str, kind: Kind, fields: dict[str, Any], wanted: Kind, deadlin
     query = {name: orjson.dumps(value).decode() for name, value in fields.items()}
     request_id = new_id()
     with terminal.progress(f"Evaluating for at most {deadline:g} s"):
-        return answered(EvaluateTask(file, kind, query, wanted, request_id, deadline), deadline, request_id)
+        return answered(
+            EvaluateTask(file, kind, query, wanted, request_id, deadline), deadline, request_id
+        )
 
 
 def _settings_in(file: Path) -> dict[str, Any]:
@@ -96,7 +124,8 @@ def summary_of(answer: dict[str, Any]) -> dict[str, str]:
     violated = [check["limit"] for check in answer["limits"] if not check["held"]]
     nearest = answer["nearest"]
     return {
-        "energy": f"{energy['electrical']['total']:.4g} J electrical, {energy['mechanical']['total']:.4g} J mechanical",
+        "energy": f"{energy['electrical']['total']:.4g} J electrical, "
+        f"{energy['mechanical']['total']:.4g} J mechanical",
         "duration": f"{answer['duration']:.4g} s",
         "violated limits": ", ".join(violated) or "none",
         "least distance": "not checked"

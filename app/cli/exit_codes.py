@@ -12,4 +12,8 @@ def of_error(error: Exception) -> int:
     from joulepath.app.exceptions.base import InvalidRequest
     from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable, UnknownRobot
 
-    return INVALID if isinstance(error, InvalidRequest | InvalidProblem | InvalidTable | UnknownRobot) else PROBLEM
+    return (
+        INVALID
+        if isinstance(error, InvalidRequest | InvalidProblem | InvalidTable | UnknownRobot)
+        else PROBLEM
+    )

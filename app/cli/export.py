@@ -26,14 +26,27 @@ Examples:
 @click.argument("format", type=click.Choice(FORMAT_NAMES))
 @FILE
 @OUTPUT
-@click.option("--speed-scale", type=float, default=1.0, help="Fraction of the speed, certified again. Default: 1.")
-@click.option("--set", "options", multiple=True, metavar="NAME=VALUE", help="An option of the format, JSON or a word.")
-def export(format: FormatName, file: str, output: Path | None, speed_scale: float, options: tuple[str, ...]) -> None:
+@click.option(
+    "--speed-scale",
+    type=float,
+    default=1.0,
+    help="Fraction of the speed, certified again. Default: 1.",
+)
+@click.option(
+    "--set",
+    "options",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="An option of the format, JSON or a word.",
+)
+def export(
+    format: FormatName, file: str, output: Path | None, speed_scale: float, options: tuple[str, ...]
+) -> None:
     """Writes the motion of an answer as a file for a robot controller.
 
-    FILE is the JSON answer of `optimize`, of `evaluate` with a sample period, or of `POST /cycle`, whose moves must be
-    in the database; or - for standard input. If standard error is a terminal, a summary follows: how far the file
-    deviates, and what it leaves out.
+    FILE is the JSON answer of `optimize`, of `evaluate` with a sample period, or of `POST /cycle`,
+    whose moves must be in the database; or - for standard input. If standard error is a terminal, a
+    summary follows: how far the file deviates, and what it leaves out.
     """
     from joulepath.app.api.export.request import ExportRequest, option_field
     from joulepath.app.api.export.task import ExportResult, ExportTask
@@ -45,7 +58,9 @@ def export(format: FormatName, file: str, output: Path | None, speed_scale: floa
     body = b'{"answer":%b,"speed_scale":%b%b}' % (
         content_of(file).strip() or b"null",
         orjson.dumps(speed_scale),
-        b"".join(b",%b:%b" % (orjson.dumps(name), orjson.dumps(value)) for name, value in beside.items()),
+        b"".join(
+            b",%b:%b" % (orjson.dumps(name), orjson.dumps(value)) for name, value in beside.items()
+        ),
     )
     request = validated(ExportRequest, body, request_id)
     with terminal.progress("Certifying the motion"):

@@ -27,7 +27,8 @@ OTHERS = click.option(
     "others",
     multiple=True,
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="A log that validates the figures, and that no fit sees. May be repeated. Default: a third of the motions.",
+    help="A log that validates the figures, and that no fit sees. May be repeated. Default: a "
+    "third of the motions.",
 )
 FIT = click.option(
     "--fit",
@@ -35,7 +36,8 @@ FIT = click.option(
     type=click.Choice(get_args(Target)),
     default=("friction", "rotor"),
     show_default=True,
-    help="What is found. May be repeated. Power is added where the logs have it; payload is that of the last log.",
+    help="What is found. May be repeated. Power is added where the logs have it; payload is that "
+    "of the last log.",
 )
 METHOD = click.option(
     "--method",
@@ -45,7 +47,9 @@ METHOD = click.option(
     help="How it is found; docs/identification.md says what each method needs.",
 )
 PERIOD = click.option(
-    "--period", type=click.FloatRange(0.1, 1e4), help="Period of the motion [s], for --method periodic."
+    "--period",
+    type=click.FloatRange(0.1, 1e4),
+    help="Period of the motion [s], for --method periodic.",
 )
 TERMS = click.option(
     "--term",
@@ -66,7 +70,9 @@ Examples:
   joulepath identify empty.csv loaded.csv --fit payload
   joulepath identify excitation.csv --method periodic --period 10 --validate friday.csv"""
 )
-@click.argument("logs", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument(
+    "logs", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path)
+)
 @OUTPUT
 @click.option("--robot", default="ur5e", show_default=True, help="Name of the robot.")
 @OTHERS
@@ -75,11 +81,29 @@ Examples:
 @PERIOD
 @TERMS
 @click.option("--refit", is_flag=True, help="Find the links' inertials, too.")
-@click.option("--estimator", type=click.Choice(get_args(Estimator)), default="wls", help="irls: against outliers.")
-@click.option("--payload", type=click.FloatRange(0), help="Mass at the flange [kg]. Default: what the logs say.")
-@click.option("--com", type=(float, float, float), default=(0.0, 0.0, 0.0), help="Its centre of mass [m].")
-@click.option("--units", type=click.Choice(["rad", "deg"]), default="rad", help="Units of all joint columns.")
-@click.option("--effort", type=click.Choice(["auto", "current", "torque"]), default="auto", help="What efforts are.")
+@click.option(
+    "--estimator",
+    type=click.Choice(get_args(Estimator)),
+    default="wls",
+    help="irls: against outliers.",
+)
+@click.option(
+    "--payload",
+    type=click.FloatRange(0),
+    help="Mass at the flange [kg]. Default: what the logs say.",
+)
+@click.option(
+    "--com", type=(float, float, float), default=(0.0, 0.0, 0.0), help="Its centre of mass [m]."
+)
+@click.option(
+    "--units", type=click.Choice(["rad", "deg"]), default="rad", help="Units of all joint columns."
+)
+@click.option(
+    "--effort",
+    type=click.Choice(["auto", "current", "torque"]),
+    default="auto",
+    help="What efforts are.",
+)
 def identify(
     logs: tuple[Path, ...],
     output: Path | None,
@@ -98,17 +122,27 @@ def identify(
 ) -> None:
     """Finds the figures of one arm from its LOGS, with their standard deviations.
 
-    LOGS are CSV files of RTDE, of ROS `JointState` or of the service's own form, plain or packed with gzip. The answer
-    is the `result` of `GET /identifications/{id}`; its `document` can be sent to `PUT /figures`.
+    LOGS are CSV files of RTDE, of ROS `JointState` or of the service's own form, plain or packed
+    with gzip. The answer is the `result` of `GET /identifications/{id}`; its `document` can be sent
+    to `PUT /figures`.
     """
     from joulepath.app.api.identifications.request import IdentifyRequest
     from joulepath.app.api.logs.request import LogSettings
 
     request_id = new_id()
     carried = None if payload is None else {"mass": payload, "com": list(com)}
-    settings: dict[str, Any] = {"robot": robot, "payload": carried, "units": units, "effort": effort}
+    settings: dict[str, Any] = {
+        "robot": robot,
+        "payload": carried,
+        "units": units,
+        "effort": effort,
+    }
     read = tuple(_read(LogSettings, settings, file, request_id) for file in (*logs, *others))
-    body: dict[str, Any] = {"logs": [_FILE_ID] * len(logs), "estimator": estimator, "fit": list(fit)}
+    body: dict[str, Any] = {
+        "logs": [_FILE_ID] * len(logs),
+        "estimator": estimator,
+        "fit": list(fit),
+    }
     body |= {"method": method, "period": period, "inertials": "refit" if refit else "keep"}
     body |= {"friction": {"terms": list(terms)}}
     body |= {"validate": [_FILE_ID] * len(others)} if others else {}
@@ -130,7 +164,9 @@ def _read(model: Any, fields: dict[str, Any], file: Path, request_id: str) -> Gi
     from joulepath.app.convert.recorded import GivenLog
 
     named = _json(fields | {"name": file.stem[:80]})
-    return GivenLog(_FILE_ID, validated(model, named, request_id).model_dump(mode="json"), _packed(file))
+    return GivenLog(
+        _FILE_ID, validated(model, named, request_id).model_dump(mode="json"), _packed(file)
+    )
 
 
 def _json(content: dict[str, Any]) -> bytes:
@@ -159,12 +195,19 @@ def summary_of(result: dict[str, Any]) -> dict[str, str]:
     lines["validated on"] = f"{result['validation']['moves']} moves that no fit has seen"
     if result["payload"] is not None:
         carried = result["payload"]
-        lines["payload"] = carried["why"] or f"{carried['mass']:.3g} kg, standard deviation {carried['mass_sd']:.2g} kg"
+        lines["payload"] = (
+            carried["why"]
+            or f"{carried['mass']:.3g} kg, standard deviation {carried['mass_sd']:.2g} kg"
+        )
     if fitted["torque"] is not None:
-        lines["torque"] = f"{_percent(fitted['torque'])} error, {_percent(own['torque'])} with the robot's own figures"
+        lines["torque"] = (
+            f"{_percent(fitted['torque'])} error, {_percent(own['torque'])} with the robot's own "
+            "figures"
+        )
     if fitted["power"] is not None:
         lines["energy of a move"] = (
-            f"{fitted['power']['energy_mean']:.2g} % error, {own['power']['energy_mean']:.2g} % with the robot's own"
+            f"{fitted['power']['energy_mean']:.2g} % error, {own['power']['energy_mean']:.2g} % "
+            "with the robot's own"
         )
     return lines
 

@@ -34,8 +34,8 @@ Examples:
 def keys() -> None:
     """API keys of the HTTP service: makes, lists and removes them.
 
-    A service with JOULEPATH_API_KEYS_FILE=FILE answers requests with a key of this file only. A running service applies
-    a change from its next request on.
+    A service with JOULEPATH_API_KEYS_FILE=FILE answers requests with a key of this file only. A
+    running service applies a change from its next request on.
     """
 
 
@@ -50,14 +50,16 @@ Example:
     type=click.Choice(["read", "compute", "admin"]),
     default="compute",
     show_default=True,
-    help="read: look at everything. compute: also compute and create, and change what it created. admin: change all.",
+    help="read: look at everything. compute: also compute and create, and change what it created. "
+    "admin: change all.",
 )
 @_FILE
 def add(name: str, role: str, file: Path) -> None:
-    """Makes a key for the client NAME and writes it to standard output, the only time that it is shown.
+    """Makes a key for the client NAME and writes it to standard output, the only time that it is
+    shown.
 
-    The file holds its hash. Further keys of the same name are the same client: to replace a key, add another one, give
-    it to the client, and remove the old one by its id.
+    The file holds its hash. Further keys of the same name are the same client: to replace a key,
+    add another one, give it to the client, and remove the old one by its id.
     """
     from pydantic import ValidationError
 
@@ -67,7 +69,8 @@ def add(name: str, role: str, file: Path) -> None:
         secret, entry = new_key(name, role)  # type: ignore[arg-type]
     except ValidationError:
         raise click.UsageError(
-            "NAME must have at most 64 letters, digits, '.', '_' and '-', and begin with a letter or digit."
+            "NAME must have at most 64 letters, digits, '.', '_' and '-', and begin with a letter "
+            "or digit."
         ) from None
     with _changing(file) as entries:
         entries.append(entry)
@@ -106,7 +109,9 @@ def remove(name_or_id: str, file: Path) -> None:
     with _changing(file) as entries:
         left = [entry for entry in entries if name_or_id not in (entry.name, entry.id)]
         if len(left) == len(entries):
-            raise click.UsageError(f"{file} has no key of the name or id {name_or_id!r}: see `joulepath keys list`.")
+            raise click.UsageError(
+                f"{file} has no key of the name or id {name_or_id!r}: see `joulepath keys list`."
+            )
         entries[:] = left
 
 

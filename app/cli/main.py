@@ -40,12 +40,23 @@ Example:
 def joulepath() -> None:
     """Finds the motion of least energy of a robot arm, with its energy breakdown and a certificate.
 
-    Requests and answers are those of the HTTP service. SI units throughout: m, rad, s, kg, N·m, W, J. A request that
-    fails writes its problem (RFC 9457) to standard error.
+    Requests and answers are those of the HTTP service. SI units throughout: m, rad, s, kg, N·m, W,
+    J. A request that fails writes its problem (RFC 9457) to standard error.
     """
 
 
-for command in (serve, optimize, cycle, evaluate, export, identify, replay, robots, keys, cluster_worker):
+for command in (
+    serve,
+    optimize,
+    cycle,
+    evaluate,
+    export,
+    identify,
+    replay,
+    robots,
+    keys,
+    cluster_worker,
+):
     joulepath.add_command(command)
 
 

@@ -23,8 +23,8 @@ Examples:
 def optimize(file: str, output: Path | None) -> None:
     """Finds the motion of least energy.
 
-    FILE is the JSON of `POST /optimize`, or - for standard input. The answer is JSON, too. If standard error is a
-    terminal, a summary follows: energy, duration, status, lower bound and gap.
+    FILE is the JSON of `POST /optimize`, or - for standard input. The answer is JSON, too. If
+    standard error is a terminal, a summary follows: energy, duration, status, lower bound and gap.
     """
     from joulepath.app.api.optimize.task import OptimizeTask
     from joulepath.app.schemas.request import OptimizeRequest

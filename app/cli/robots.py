@@ -28,9 +28,10 @@ Examples:
 def robots(context: click.Context) -> None:
     """Lists the robots that a request can name; adds and removes robots of your own.
 
-    The columns are the name, the title, the number of joints, the rated payload [kg], and the trust letters of the
-    parameters that energies depend on. A: published by the manufacturer, B: fitted to measured data, C: second-hand
-    from a paper or another's file, T: transferred from a sister robot, E: engineering default without a source.
+    The columns are the name, the title, the number of joints, the rated payload [kg], and the trust
+    letters of the parameters that energies depend on. A: published by the manufacturer, B: fitted
+    to measured data, C: second-hand from a paper or another's file, T: transferred from a sister
+    robot, E: engineering default without a source.
     """
     if context.invoked_subcommand is None:
         write(_table().encode(), None)
@@ -63,7 +64,9 @@ def add(file: Path, name: str | None, replace: bool) -> None:
 
     name = file.stem if name is None else name
     if not NAME_PATTERN.fullmatch(name):
-        raise click.UsageError("The name must have small letters, digits, - and _ only: give another one by --name.")
+        raise click.UsageError(
+            "The name must have small letters, digits, - and _ only: give another one by --name."
+        )
     try:
         stored.check_own(name)
         figures, warnings = own_figures(name, read_description(file))
@@ -78,7 +81,9 @@ def add(file: Path, name: str | None, replace: bool) -> None:
     except ServiceError as error:
         raise refused(error) from None
     joints = len(figures["kinematics"]["joint_names"]["value"])
-    write("\n".join([f"{name}: {joints} joints. {energy_trust(figures)}", *warnings]).encode(), None)
+    write(
+        "\n".join([f"{name}: {joints} joints. {energy_trust(figures)}", *warnings]).encode(), None
+    )
 
 
 @robots.command(
@@ -101,7 +106,8 @@ def remove(name: str) -> None:
 
 
 def _table() -> str:
-    """Bundled robots, then those in the database; without these where the database does not answer."""
+    """Bundled robots, then those in the database; without these where the database does not
+    answer."""
     from joulepath.app.exceptions.stored import StoreUnavailable
     from joulepath.app.store import robots as stored
     from joulepath.models.registry import load_robot, robot_names
@@ -116,12 +122,17 @@ def _table() -> str:
     )
     found = {name: load_robot(name).figures for name in robot_names()}
     try:
-        found |= {each.name: each.figures for each in in_store(lambda store: store.read(stored.all_of))}
+        found |= {
+            each.name: each.figures for each in in_store(lambda store: store.read(stored.all_of))
+        }
     except StoreUnavailable:
         click.echo("The database does not answer: robots that were added are not listed.", err=True)
     rows = [head]
     for name, figures in found.items():
         letters = (" ".join(sorted(trust_letters(figures[part]))) for part in ENERGY_SECTIONS)
-        joints, payload = figures["kinematics"]["joint_names"]["value"], figures["limits"]["rated_payload"]["value"]
+        joints, payload = (
+            figures["kinematics"]["joint_names"]["value"],
+            figures["limits"]["rated_payload"]["value"],
+        )
         rows.append((name, figures["title"], str(len(joints)), f"{payload:g}", *letters))
     return table(rows)

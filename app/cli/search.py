@@ -1,4 +1,6 @@
-"""What the commands that search have in common: from a file to the answer, and the lines of its summary."""
+"""What the commands that search have in common: from a file to the answer, and the lines of its
+summary.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from joulepath.app.cli import terminal
-from joulepath.app.cli.answer import answered, compile_kernel_of, content_of, new_id, parsed, validated, write
+from joulepath.app.cli.answer import (
+    answered,
+    compile_kernel_of,
+    content_of,
+    new_id,
+    parsed,
+    validated,
+    write,
+)
 
 if TYPE_CHECKING:
     from joulepath.app.api.cycle.request import CycleRequest
@@ -24,7 +34,9 @@ def search(
     output: Path | None,
     summary_of: Summary,
 ) -> None:
-    """Writes the answer of a `task` for the request in a file, and its summary to a terminal. Raises Refused."""
+    """Writes the answer of a `task` for the request in a file, and its summary to a terminal.
+    Raises Refused.
+    """
     request_id = new_id()
     request = validated(model, content_of(file), request_id)
     with terminal.progress("Loading the compiled kernel of the robot"):
@@ -36,7 +48,8 @@ def search(
 
 
 def proof(answer: dict[str, Any]) -> dict[str, str]:
-    """The lines on the duration of a motion or round, and on how near its energy is to the least."""
+    """The lines on the duration of a motion or round, and on how near its energy is to the
+    least."""
     energy = answer["energy"]
     return {
         "duration": f"{answer['duration']:.4g} s",

@@ -19,8 +19,14 @@ Exit codes:
 Example:
   joulepath serve --port 8080"""
 )
-@click.option("--host", help="Address to listen on. Default: JOULEPATH_HOST, or 127.0.0.1: this machine only.")
-@click.option("--port", type=click.IntRange(0, 65535), help="TCP port. Default: JOULEPATH_PORT or PORT, or 8000.")
+@click.option(
+    "--host", help="Address to listen on. Default: JOULEPATH_HOST, or 127.0.0.1: this machine only."
+)
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    help="TCP port. Default: JOULEPATH_PORT or PORT, or 8000.",
+)
 def serve(host: str | None, port: int | None) -> None:
     """Starts the HTTP service, as `python -m joulepath.app` does.
 

@@ -16,7 +16,8 @@ T = TypeVar("T")
 
 
 def run_with_store(task: Task, deadline: float) -> TaskResult:
-    """The result of a task, with the log, the robot, the figures and the answers that it takes from the database.
+    """The result of a task, with the log, the robot, the figures and the answers that it takes from
+    the database.
 
     Raises what the task raises; StoreUnavailable if the database is needed.
     """
@@ -41,7 +42,9 @@ def robot_named(name: str) -> Robot:
     from joulepath.app.tasks.arm_engine import robot_in
     from joulepath.models.registry import load_robot, robot_names
 
-    return load_robot(name) if name in robot_names() else in_store(lambda store: robot_in(store, name))
+    return (
+        load_robot(name) if name in robot_names() else in_store(lambda store: robot_in(store, name))
+    )
 
 
 def in_store(work: Callable[[Store], Any]) -> Any:

@@ -9,7 +9,8 @@ from contextlib import contextmanager
 
 @contextmanager
 def progress(description: str) -> Iterator[None]:
-    """Shows a spinner with the elapsed time while the body runs, if standard error is a terminal."""
+    """Shows a spinner with the elapsed time while the body runs, if standard error is a
+    terminal."""
     if not sys.stderr.isatty():
         yield
         return

@@ -1,4 +1,6 @@
-"""A machine of a cluster as a process of its own: a Dask worker that comes back when its scheduler does."""
+"""A machine of a cluster as a process of its own: a Dask worker that comes back when its scheduler
+does.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,9 @@ _PAUSE = 2.0
 
 
 async def serve(address: str, settings: Settings) -> None:
-    """Works for the scheduler at `address` until SIGTERM or Ctrl-C. What it is at work on then is done elsewhere."""
+    """Works for the scheduler at `address` until SIGTERM or Ctrl-C. What it is at work on then is
+    done elsewhere.
+    """
     from distributed import Worker
 
     stopped, loop = asyncio.Event(), asyncio.get_running_loop()
@@ -25,14 +29,21 @@ async def serve(address: str, settings: Settings) -> None:
     while not stopped.is_set():
         # the processes that compute are none of Dask's: it is not to watch their memory
         worker = Worker(
-            address, nthreads=settings.workers, memory_limit=0, preload=["joulepath.app.cluster"], dashboard=False
+            address,
+            nthreads=settings.workers,
+            memory_limit=0,
+            preload=["joulepath.app.cluster"],
+            dashboard=False,
         )
         working = asyncio.ensure_future(_until_closed(worker))
         await asyncio.wait({working, stopping}, return_when=asyncio.FIRST_COMPLETED)
         if stopped.is_set():
             await worker.close(reason="stopped")
         elif error := working.exception():
-            logger.error("the scheduler cannot be reached", extra={"scheduler": address, "reason": str(error)})
+            logger.error(
+                "the scheduler cannot be reached",
+                extra={"scheduler": address, "reason": str(error)},
+            )
         working.cancel()
         await asyncio.gather(working, return_exceptions=True)
         await asyncio.wait({stopping}, timeout=_PAUSE)

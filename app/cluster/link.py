@@ -69,11 +69,11 @@ class Cluster:
             await asyncio.gather(self._keeper, *self._releasing, return_exceptions=True)
 
     async def run(self, take: Take) -> None:
-        """Runs works on some machine, one after another: several short ones as one task of Dask, which costs more than
-        each of them.
+        """Runs works on some machine, one after another: several short ones as one task of Dask,
+        which costs more than each of them.
 
-        Each ends with what it raises if it fails, DeadlineExceeded, or WorkerLost. If cancelled, the work is stopped.
-        Raises ClusterUnavailable.
+        Each ends with what it raises if it fails, DeadlineExceeded, or WorkerLost. If cancelled,
+        the work is stopped. Raises ClusterUnavailable.
         """
         works, expected = list[Work](), 0.0
         while expected < TOGETHER and (work := take()) is not None:
@@ -94,14 +94,18 @@ class Cluster:
         # short ones share a process with others, which are at the machine when it has ended these
         is_long = len(works) == 1 and expected >= TOGETHER
         use = {resource(): 1.0 if is_long else 1.0 / PER_PROCESS}
-        future = client.submit(compute, asked, key, self._topic, key=key, pure=False, retries=0, resources=use)
+        future = client.submit(
+            compute, asked, key, self._topic, key=key, pure=False, retries=0, resources=use
+        )
         try:
             ended: list[Ended] = await future.result()
         except KilledWorker:
             ended = [WorkerLost()]
         except (Cancelled, OSError) as error:
             ids = [work.task.request_id for work in works]
-            logger.warning("the cluster lost tasks", extra={"request_ids": ids, "reason": str(error)})
+            logger.warning(
+                "the cluster lost tasks", extra={"request_ids": ids, "reason": str(error)}
+            )
             raise ClusterUnavailable from None
         finally:
             del self._works[key]
@@ -135,7 +139,9 @@ class Cluster:
         told: str | None = None
         while True:
             try:
-                async with Client(self.address, asynchronous=True, timeout=_PATIENCE, set_as_default=False) as client:
+                async with Client(
+                    self.address, asynchronous=True, timeout=_PATIENCE, set_as_default=False
+                ) as client:
                     await self._check(client)
                     client.subscribe_topic(self._topic, self._heard)
                     logger.info("cluster reached", extra={"scheduler": self.address})
@@ -165,16 +171,20 @@ class Cluster:
             raise
         except Exception as error:
             raise _Unsuitable(
-                f"the scheduler cannot import this package: install joulepath[cluster] there ({error!r})"
+                "the scheduler cannot import this package: install joulepath[cluster] there "
+                f"({error!r})"
             ) from None
         if found != version():
             raise _Unsuitable(
-                "the scheduler has another version of this package: install the same one on all machines "
+                "the scheduler has another version of this package: install the same one on all "
+                "machines "
                 f"(there {found}, here {version()})"
             )
 
     async def _watch(self, client: Client) -> None:
-        """Until the connection is lost. Raises OSError or TimeoutError if the scheduler does not answer."""
+        """Until the connection is lost. Raises OSError or TimeoutError if the scheduler does not
+        answer.
+        """
         scheduler = client.scheduler
         assert scheduler is not None
         try:
@@ -184,7 +194,13 @@ class Cluster:
                 has = {name: each["resources"] for name, each in known["workers"].items()}
                 found = {name: int(each.get(resource(), 0)) for name, each in has.items()}
                 self._workers = {name: count for name, count in found.items() if count}
-                self._tell_others({name for name, each in has.items() if any(map(_is_ours, each)) and not found[name]})
+                self._tell_others(
+                    {
+                        name
+                        for name, each in has.items()
+                        if any(map(_is_ours, each)) and not found[name]
+                    }
+                )
                 self._client = client
                 await asyncio.sleep(LOOK)
         finally:

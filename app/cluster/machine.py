@@ -1,7 +1,9 @@
-"""One machine of a cluster: an engine inside a Dask worker, as `dask worker --preload joulepath.app.cluster` starts it.
+"""One machine of a cluster: an engine inside a Dask worker, as `dask worker --preload
+joulepath.app.cluster` starts it.
 
-Dask carries tasks. It does not compute them: cancelling one of its futures stops no computation. A task is a coroutine
-here, which has it computed by a process of the engine, and kills that process once Dask no longer wants the result.
+Dask carries tasks. It does not compute them: cancelling one of its futures stops no computation. A
+task is a coroutine here, which has it computed by a process of the engine, and kills that process
+once Dask no longer wants the result.
 """
 
 from __future__ import annotations
@@ -39,7 +41,9 @@ _CODE = ("*.py", "*.c", "*.yaml")
 
 @cache
 def version() -> str:
-    """A digest of the code and the figures of this installation: objects that travel are read by the same ones only."""
+    """A digest of the code and the figures of this installation: objects that travel are read by
+    the same ones only.
+    """
     digest = hashlib.sha256()
     package = Path(joulepath.__file__).parent
     for folder in sorted(each for each in package.iterdir() if each.is_dir()):
@@ -77,9 +81,11 @@ async def dask_teardown(worker: Worker) -> None:
 
 
 async def compute(asked: list[Asked], key: str, topic: str) -> list[Ended]:
-    """How each of several tasks ended, as `SpareWorkers.run` has it. Runs in a Dask worker, as its task `key`.
+    """How each of several tasks ended, as `SpareWorkers.run` has it. Runs in a Dask worker, as its
+    task `key`.
 
-    One worker computes them, one after another. What a task finds goes to those who subscribed to `topic`.
+    One worker computes them, one after another. What a task finds goes to those who subscribed to
+    `topic`.
     """
     from distributed import Reschedule, get_worker
 
@@ -104,7 +110,9 @@ async def compute(asked: list[Asked], key: str, topic: str) -> list[Ended]:
         await asyncio.gather(working, return_exceptions=True)
 
 
-def _work(index: int, asked: Asked, found: list[tuple[int, Event]], ended: dict[int, Ended]) -> Work:
+def _work(
+    index: int, asked: Asked, found: list[tuple[int, Event]], ended: dict[int, Ended]
+) -> Work:
     task, deadline, is_heard = asked
     tell = (lambda event: found.append((index, event))) if is_heard else nobody
     return Work(task, deadline, partial(ended.__setitem__, index), stoppable=False, tell=tell)

@@ -44,7 +44,9 @@ def to_arm(request: asked.ArmRequest) -> Arm:
         gravity=np.array(request.gravity),
         limits=to_limits(request.limits, robot),
         friction=request.friction,
-        inverter=Inverter(**{name: getattr(request.drives.inverter, name) for name in INVERTER_PARTS}),
+        inverter=Inverter(
+            **{name: getattr(request.drives.inverter, name) for name in INVERTER_PARTS}
+        ),
         bus=_to_bus(request.bus),
         link_mass_scale=np.array(request.link_mass_scale),
         tool=to_tool(request.tool),
@@ -83,9 +85,12 @@ def to_payload(payload: asked.Payload | None) -> Payload:
 
 
 def to_limits(limits: asked.MoveLimits, robot: Robot) -> Limits:
-    """The limits of the library: those of the robot, with the given ones in their place. Raises InvalidProblem."""
+    """The limits of the library: those of the robot, with the given ones in their place. Raises
+    InvalidProblem.
+    """
     tighter = {
-        name: _per_joint(f"limits.{public}", getattr(limits, public), robot.nq) for public, name in LIMIT_NAMES.items()
+        name: _per_joint(f"limits.{public}", getattr(limits, public), robot.nq)
+        for public, name in LIMIT_NAMES.items()
     }
     if isinstance(limits, asked.Limits) and limits.position is not None:
         tighter["q_min"] = _per_joint("limits.position.lower", limits.position.lower, robot.nq)

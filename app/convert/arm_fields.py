@@ -14,7 +14,11 @@ _NAMES = set(ArmRequest.model_fields) - {"robot"}
 
 
 def arm_fields(request: ArmRequest, **instead: Any) -> dict[str, Any] | None:
-    """The fields of the arm that the request sets, without its robot; None if they are large. `instead` replaces
-    some."""
+    """The fields of the arm that the request sets, without its robot; None if they are large.
+    `instead` replaces some."""
     content = request.model_dump(mode="json", exclude_unset=True, include=_NAMES) | instead
-    return content if len(orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)) <= LARGEST else None
+    return (
+        content
+        if len(orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)) <= LARGEST
+        else None
+    )

@@ -1,4 +1,6 @@
-"""What a request needs of the database comes along with its task, in variables of the context in which it runs."""
+"""What a request needs of the database comes along with its task, in variables of the context in
+which it runs.
+"""
 
 from __future__ import annotations
 

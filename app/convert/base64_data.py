@@ -13,5 +13,7 @@ def decoded(data: str, field: str) -> bytes:
         return base64.b64decode(data, validate=True)
     except ValueError:
         raise InvalidProblem(
-            field, f"{field} is not valid base64: use its alphabet only, and fill it to a multiple of 4 characters."
+            field,
+            f"{field} is not valid base64: use its alphabet only, and fill it to a multiple of 4 "
+            "characters.",
         ) from None

@@ -1,4 +1,6 @@
-"""From an answer that comes back in a request to the program of its motions: for exports and replays."""
+"""From an answer that comes back in a request to the program of its motions: for exports and
+replays.
+"""
 
 from __future__ import annotations
 
@@ -94,36 +96,46 @@ class _Cycle(Part):
 
 
 _A_FRONT = "points"
-_MOTION = "answer must be one of POST /optimize, of POST /cycle, or of POST /evaluate with sample_period"
+_MOTION = (
+    "answer must be one of POST /optimize, of POST /cycle, or of POST /evaluate with sample_period"
+)
 
 
-def to_program(answer: dict[str, Any], arm: ArmRequest | None, kept: Callable[[list[str]], list[Any]]) -> Program:
+def to_program(
+    answer: dict[str, Any], arm: ArmRequest | None, kept: Callable[[list[str]], list[Any]]
+) -> Program:
     """The motion of an answer at full speed, its samples checked.
 
-    `kept` gives the kept answers of paths: those of the moves of a cycle. Raises ValidationError (of pydantic),
-    InvalidRequest, InvalidProblem, NotCertified or UnknownRobot.
+    `kept` gives the kept answers of paths: those of the moves of a cycle. Raises ValidationError
+    (of pydantic), InvalidRequest, InvalidProblem, NotCertified or UnknownRobot.
     """
     if "legs" in answer:
         return _cycle(_Cycle.model_validate(answer), arm, kept)
     if "trajectory" in answer or "samples" in answer:
         return Program((_move(answer, arm, "move"),))
     if _A_FRONT in answer:
-        raise InvalidProblem("answer", "The answer is a front: export one of its points, by its `answer`.")
+        raise InvalidProblem(
+            "answer", "The answer is a front: export one of its points, by its `answer`."
+        )
     raise InvalidProblem("answer", f"{_MOTION}: it has no `trajectory`, `legs` or `samples`.")
 
 
 def paths_of_moves(answer: dict[str, Any]) -> list[str]:
-    """The paths of the answers of a cycle's moves; empty for another answer. Raises ValidationError or
-    InvalidProblem."""
+    """The paths of the answers of a cycle's moves; empty for another answer. Raises ValidationError
+    or InvalidProblem."""
     if "legs" not in answer:
         return []
     legs = [leg for leg in _Cycle.model_validate(answer).legs if leg.kind in MOVING]
     if any(leg.answer is None for leg in legs):
-        raise InvalidProblem("answer", "The moves of the cycle are not kept: send the cycle to POST /cycle again.")
+        raise InvalidProblem(
+            "answer", "The moves of the cycle are not kept: send the cycle to POST /cycle again."
+        )
     return [leg.answer for leg in legs if leg.answer is not None]
 
 
-def _cycle(found: _Cycle, arm: ArmRequest | None, kept: Callable[[list[str]], list[Any]]) -> Program:
+def _cycle(
+    found: _Cycle, arm: ArmRequest | None, kept: Callable[[list[str]], list[Any]]
+) -> Program:
     if arm is not None:
         raise InvalidProblem("arm", "The moves of a cycle have arms of their own: leave `arm` out.")
     moves = iter(kept([leg.answer for leg in found.legs if leg.answer is not None]))
@@ -140,10 +152,14 @@ def _move(answer: dict[str, Any], arm: ArmRequest | None, label: str) -> Move:
     if "trajectory" in answer:
         planned = _Planned.model_validate(answer)
         made = _arm(planned.robot, planned.arm, arm)
-        return _checked(Move(_spline(planned.trajectory.spline, made.robot.nq), made, label), planned.trajectory)
+        return _checked(
+            Move(_spline(planned.trajectory.spline, made.robot.nq), made, label), planned.trajectory
+        )
     given = _Given.model_validate(answer)
     if given.samples is None:
-        raise InvalidProblem("answer", "The answer has no samples: ask POST /evaluate for them by sample_period.")
+        raise InvalidProblem(
+            "answer", "The answer has no samples: ask POST /evaluate for them by sample_period."
+        )
     made = _arm(given.robot, given.arm, arm)
     return _checked(Move(_through(given.samples, made.robot.nq), made, label), given.samples)
 
@@ -157,31 +173,50 @@ def _checked(move: Move, samples: _Samples) -> Move:
 def _arm(robot: str, own: dict[str, Any] | None, instead: ArmRequest | None) -> Arm:
     if instead is not None:
         if "robot" in instead.model_fields_set and instead.robot != robot:
-            raise InvalidProblem("arm.robot", f"The answer is of the robot {robot}: leave arm.robot out.")
+            raise InvalidProblem(
+                "arm.robot", f"The answer is of the robot {robot}: leave arm.robot out."
+            )
         return to_arm(instead.model_copy(update={"robot": robot}))
     if own is None:
-        raise InvalidProblem("arm", "The answer does not say which arm it is of: give `arm`, as in its request.")
+        raise InvalidProblem(
+            "arm", "The answer does not say which arm it is of: give `arm`, as in its request."
+        )
     return to_arm(ArmRequest.model_validate({**own, "robot": robot}))
 
 
 def _spline(given: _Spline, nq: int) -> Spline:
     """Raises InvalidRequest unless it is a clamped B-spline of the robot's joints."""
-    knots, points, ends = np.array(given.knots), _array(given.control_points, "control_points"), given.degree + 1
+    knots, points, ends = (
+        np.array(given.knots),
+        _array(given.control_points, "control_points"),
+        given.degree + 1,
+    )
     if points.shape[1] != nq:
-        raise _wrong("control_points", f"Every row must have {nq} numbers, one per joint of the robot")
+        raise _wrong(
+            "control_points", f"Every row must have {nq} numbers, one per joint of the robot"
+        )
     if len(knots) != len(points) + ends or len(points) < ends:
         raise _wrong("knots", "There must be degree + 1 more knots than control points")
     inner = knots[ends:-ends]
     clamped = (knots[:ends] == 0).all() and (knots[-ends:] == knots[-1]).all()
     if not clamped or (np.diff(knots) < 0).any() or ((inner <= 0) | (inner >= knots[-1])).any():
-        raise _wrong("knots", "The knots must increase from degree + 1 zeros to degree + 1 times the duration")
+        raise _wrong(
+            "knots",
+            "The knots must increase from degree + 1 zeros to degree + 1 times the duration",
+        )
     return Spline(given.degree, knots, points)
 
 
 def _through(samples: _Samples, nq: int) -> Spline:
     t, (q, v, a, _) = np.array(samples.t), samples.arrays()
-    if any(rows.shape != (len(t), nq) for rows in (q, v, a)) or t[0] != 0 or (np.diff(t) < 1e-6).any():
-        raise InvalidProblem("answer", f"samples must have {nq} joints, as many rows as times, and times from 0 on.")
+    if (
+        any(rows.shape != (len(t), nq) for rows in (q, v, a))
+        or t[0] != 0
+        or (np.diff(t) < 1e-6).any()
+    ):
+        raise InvalidProblem(
+            "answer", f"samples must have {nq} joints, as many rows as times, and times from 0 on."
+        )
     return spline_through(t, q, v, a)
 
 

@@ -13,12 +13,17 @@ from joulepath.optimizer.exceptions import InvalidProblem
 
 def own_times() -> InvalidProblem:
     """The error for times that are given beside a log."""
-    message = "A CSV file with a column of times has its own times: leave out time_per_segment and interpolation."
+    message = (
+        "A CSV file with a column of times has its own times: leave out time_per_segment "
+        "and interpolation."
+    )
     return InvalidProblem("time_per_segment", message)
 
 
 def to_motion(request: EvaluateRequest) -> Waypoints | Recording:
-    """The motion in a JSON request. Raises InvalidProblem, and UnknownLog for a log that it did not bring."""
+    """The motion in a JSON request. Raises InvalidProblem, and UnknownLog for a log that it did not
+    bring.
+    """
     if request.log is not None:
         return reading_of(request.log).log.recording()
     if request.trajectory is not None:
@@ -28,12 +33,16 @@ def to_motion(request: EvaluateRequest) -> Waypoints | Recording:
     assert request.configurations is not None  # the schema requires one of them
     q = request.configurations
     if any(len(row) != len(q[0]) for row in q):
-        raise InvalidProblem("configurations", "Every row of configurations must have one number per joint.")
+        raise InvalidProblem(
+            "configurations", "Every row of configurations must have one number per joint."
+        )
     return to_waypoints(request, np.array(q), 0)
 
 
 def to_waypoints(settings: EvaluateSettings, q: Array, first_row: int) -> Waypoints:
-    """Configurations q (n, nq) [rad] with times. Raises InvalidProblem; `first_row` is that of the file."""
+    """Configurations q (n, nq) [rad] with times. Raises InvalidProblem; `first_row` is that of the
+    file.
+    """
     if settings.time_per_segment is None:
         raise InvalidProblem("time_per_segment", "Configurations require time_per_segment.")
     return Waypoints(q, np.array(settings.time_per_segment), settings.interpolation, first_row)

@@ -35,16 +35,20 @@ def identified_as(figures: Identified) -> AbstractContextManager[None]:
 def with_figures(robot: Robot, id: str) -> Robot:
     """The robot with the figures of this id: the same object for the same content.
 
-    Raises UnknownFigures if the request did not bring them, and InvalidProblem if they are of another robot.
+    Raises UnknownFigures if the request did not bring them, and InvalidProblem if they are of
+    another robot.
     """
     figures = _FIGURES.get()
     if figures is None or figures.id != id:
         raise UnknownFigures(id)
     if figures.robot != robot.name:
-        raise InvalidProblem("figures", f"These figures are of the robot {figures.robot}: use this robot, or others.")
+        raise InvalidProblem(
+            "figures", f"These figures are of the robot {figures.robot}: use this robot, or others."
+        )
     try:
         return own_robot(robot.name, merged(robot.figures, figures.content))
     except (ValueError, KeyError):
         raise InvalidProblem(
-            "figures", "These figures no longer fit the robot, which was replaced: identify them again."
+            "figures",
+            "These figures no longer fit the robot, which was replaced: identify them again.",
         ) from None

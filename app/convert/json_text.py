@@ -1,4 +1,6 @@
-"""Reads JSON that a client sent: errors say line and column, and no name may be given twice in one object."""
+"""Reads JSON that a client sent: errors say line and column, and no name may be given twice in one
+object.
+"""
 
 from __future__ import annotations
 
@@ -14,22 +16,27 @@ _REPEATED = re.compile(r'(?s)Detected duplicate key "(.*)"')
 PLAIN_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
 """A name that an answer may repeat: nothing but letters, digits, `_` and `-`."""
 _VALUE = (
-    "a value is expected here: a number, a text in double quotes, or true, false or null in small letters. JSON has no "
+    "a value is expected here: a number, a text in double quotes, or true, false or null in small "
+    "letters. JSON has no "
     "comments"
 )
 _REMEDIES = {
     "trailing comma": "delete the comma before the closing bracket",
-    "key must be a string": "a field's name in double quotes is expected here. Numbers have a decimal point, no comma",
+    "key must be a string": "a field's name in double quotes is expected here. Numbers have a "
+    "decimal point, no comma",
     "expected value": _VALUE,
     "expected ident": _VALUE,
     "expected `:`": "a colon is expected after a field's name",
     "trailing characters": "nothing may follow the JSON document",
-    "invalid number": "write the number without leading zeros, and with digits on both sides of the decimal point",
+    "invalid number": "write the number without leading zeros, and with digits on both sides of "
+    "the decimal point",
     "number out of range": "the number has too many digits",
     "recursion limit exceeded": "it is nested too deep",
     "invalid unicode code point": "this is not UTF-8: encode it so",
-    "lone leading surrogate": "the second half of a character is missing: write \\u escapes in pairs",
-    "unexpected end of hex escape": "the second half of a character is missing: write \\u escapes in pairs",
+    "lone leading surrogate": "the second half of a character is missing: write \\u escapes in "
+    "pairs",
+    "unexpected end of hex escape": "the second half of a character is missing: write \\u escapes "
+    "in pairs",
     "invalid escape": "write a backslash in a text as \\\\",
     "control character": "write line breaks and tabs in a text as \\n and \\t",
     "EOF while parsing": "it ends too soon: a quote or a closing bracket is missing",
@@ -53,7 +60,9 @@ def parsed_json(body: bytes) -> Any:
 
 def _message(said: str) -> str:
     found = _PLACE.fullmatch(said)
-    what, place = (said, "") if found is None else (found[1], f" at line {found[2]}, column {found[3]}")
+    what, place = (
+        (said, "") if found is None else (found[1], f" at line {found[2]}, column {found[3]}")
+    )
     repeated = _REPEATED.fullmatch(what)
     if repeated is not None:
         name = f" `{repeated[1]}`" if PLAIN_NAME.fullmatch(repeated[1]) else ""

@@ -16,7 +16,9 @@ _SPLINE = ("degree", "knots", "control_points")
 
 def to_known_motions(kept: Mapping[str, bytes]) -> KnownMotions:
     """Known motions from kept ones."""
-    return KnownMotions({key: _to_motion(orjson.loads(unpacked(body))) for key, body in kept.items()})
+    return KnownMotions(
+        {key: _to_motion(orjson.loads(unpacked(body))) for key, body in kept.items()}
+    )
 
 
 def to_kept(motions: KnownMotions) -> dict[str, bytes]:

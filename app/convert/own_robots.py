@@ -1,4 +1,6 @@
-"""The robot of a user's own that a request is about: its figures come along with the task, from the database."""
+"""The robot of a user's own that a request is about: its figures come along with the task, from the
+database.
+"""
 
 from __future__ import annotations
 
@@ -27,8 +29,12 @@ def own_figures_of(name: str) -> dict[str, Any] | None:
 
 
 def own_robot_of(name: str, figures: dict[str, Any]) -> Robot:
-    """The robot of these figures. Raises InvalidProblem for one that was added when its shapes were not yet checked."""
+    """The robot of these figures. Raises InvalidProblem for one that was added when its shapes were
+    not yet checked.
+    """
     try:
         return own_robot(name, figures)
     except WrongSize as error:
-        raise InvalidProblem("robot", f"The robot {name} cannot be used: {error} Add it again.") from None
+        raise InvalidProblem(
+            "robot", f"The robot {name} cannot be used: {error} Add it again."
+        ) from None

@@ -11,8 +11,12 @@ from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.problem.pose import Pose
 
 
-def to_pose(position: Sequence[float], orientation: asked.WithQuaternion | asked.WithRpy | asked.WithRotvec) -> Pose:
-    """The pose at `position` [m] with an orientation given as one of `quaternion`, `rpy` and `rotvec`."""
+def to_pose(
+    position: Sequence[float], orientation: asked.WithQuaternion | asked.WithRpy | asked.WithRotvec
+) -> Pose:
+    """The pose at `position` [m] with an orientation given as one of `quaternion`, `rpy` and
+    `rotvec`.
+    """
     if isinstance(orientation, asked.WithQuaternion):
         return Pose.from_quaternion(position, orientation.quaternion)
     if isinstance(orientation, asked.WithRpy):

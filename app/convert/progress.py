@@ -16,4 +16,8 @@ def to_event(event: Event) -> tuple[str, dict[str, Any]]:
     if isinstance(event, CandidateTried):
         return "candidate", fields(event, "index", "status", "bound", "energy")
     gap = None if event.bound is None else optimality_gap(event.bound, event.energy)
-    return "incumbent", {**fields(event, "energy", "duration", "bound"), "gap": gap, **fields(event, "q_goal")}
+    return "incumbent", {
+        **fields(event, "energy", "duration", "bound"),
+        "gap": gap,
+        **fields(event, "q_goal"),
+    }

@@ -25,7 +25,9 @@ S = TypeVar("S", bound=EvaluateSettings)
 
 
 def to_log_options(settings: LogSettings, most_bytes: int) -> LogOptions:
-    """The options of the library for a file of at most `most_bytes` after unpacking. Raises InvalidProblem."""
+    """The options of the library for a file of at most `most_bytes` after unpacking. Raises
+    InvalidProblem.
+    """
     columns = settings.columns
     return LogOptions(
         payload=None if settings.payload is None else to_payload(settings.payload),
@@ -53,7 +55,9 @@ class GivenLog:
         """The log. Raises UnknownRobot if its robot is gone."""
         settings = LogSettings.model_validate(self.settings)
         # its size was checked when it was added
-        return read_log(self.body, robot_named(settings.robot), to_log_options(settings, LogOptions.most_bytes))
+        return read_log(
+            self.body, robot_named(settings.robot), to_log_options(settings, LogOptions.most_bytes)
+        )
 
 
 _LOG: ContextVar[GivenLog | None] = ContextVar("stored log", default=None)
@@ -78,10 +82,11 @@ def as_logged(asked: EvaluateRequest) -> EvaluateRequest:
 
 
 def read_csv(file: Path, asked: EvaluateCsvSettings, otherwise: InvalidTable) -> LogReading:
-    """The log in a CSV file, whose header is wrong for a motion because of `otherwise`. Efforts that are not usable are
-    not read: the energy needs none, and a remark says so.
+    """The log in a CSV file, whose header is wrong for a motion because of `otherwise`. Efforts
+    that are not usable are not read: the energy needs none, and a remark says so.
 
-    Raises LogTooLarge, InvalidProblem, or InvalidTable: `otherwise` where the header has a motion's columns, or none.
+    Raises LogTooLarge, InvalidProblem, or InvalidTable: `otherwise` where the header has a motion's
+    columns, or none.
     """
     options = LogOptions(
         payload=to_payload(asked.payload) if "payload" in asked.model_fields_set else None,
@@ -100,16 +105,22 @@ def read_csv(file: Path, asked: EvaluateCsvSettings, otherwise: InvalidTable) ->
         return read_log(file, robot, options)
     except EffortNotUsable as error:
         reading = read_log(file, robot, replace(options, effort=None))
-        return replace(reading, report=replace(reading.report, warnings=(*reading.report.warnings, str(error))))
+        return replace(
+            reading, report=replace(reading.report, warnings=(*reading.report.warnings, str(error)))
+        )
 
 
 def told_by(log: Log, asked: S) -> S:
-    """The request, with robot, payload and gravity of the log where it leaves them out. Raises InvalidProblem."""
+    """The request, with robot, payload and gravity of the log where it leaves them out. Raises
+    InvalidProblem.
+    """
     given = asked.model_fields_set
     if "robot" in given and asked.robot != log.robot:
         raise InvalidProblem("robot", f"The log is of the robot {log.robot}: leave robot out.")
     own = {"robot": log.robot, "payload": _payload(log.payload), "gravity": log.gravity.tolist()}
-    return asked.model_copy(update={name: value for name, value in own.items() if name not in given})
+    return asked.model_copy(
+        update={name: value for name, value in own.items() if name not in given}
+    )
 
 
 def _payload(payload: library.Payload) -> Payload | None:
@@ -117,4 +128,6 @@ def _payload(payload: library.Payload) -> Payload | None:
         return None
     inertia = payload.inertia
     rows = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-    return Payload(mass=payload.mass, com=payload.com.tolist(), inertia=[float(inertia[at]) for at in rows])
+    return Payload(
+        mass=payload.mass, com=payload.com.tolist(), inertia=[float(inertia[at]) for at in rows]
+    )

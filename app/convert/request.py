@@ -110,8 +110,8 @@ def _cone_oriented(pose: ConeOrientedPoseSchema, T_base_frame: Array) -> ConeOri
 
 
 def _duration_bounds(request: asked.MotionRequest) -> tuple[float | None, float | None]:
-    """Smallest and largest duration [s]. If an electrical request has no largest one, the service's limits
-    apply."""
+    """Smallest and largest duration [s]. If an electrical request has no largest one, the service's
+    limits apply."""
     if isinstance(request.duration, float | int):
         return request.duration, request.duration
     given = request.duration or asked.DurationRange()

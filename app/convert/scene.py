@@ -35,21 +35,30 @@ Made = TypeVar("Made")
 def to_scene(scene: asked.Scene, robot: Robot) -> Scene:
     """The scene of the library. Raises InvalidProblem."""
     place = partial(_to_obstacle, T_base_frame=to_base(scene.frame, robot))
-    return Scene([_named(f"scene.obstacles.{k}", partial(place, o)) for k, o in enumerate(scene.obstacles)])
+    return Scene(
+        [_named(f"scene.obstacles.{k}", partial(place, o)) for k, o in enumerate(scene.obstacles)]
+    )
 
 
 def to_tool(tool: asked.Tool) -> list[Attachment]:
     """The capsules of a tool, in the flange frame."""
-    return [capsule_between(np.array(c.start), np.array(c.end), c.radius, c.touches) for c in tool.capsules]
+    return [
+        capsule_between(np.array(c.start), np.array(c.end), c.radius, c.touches)
+        for c in tool.capsules
+    ]
 
 
 def to_attachment(shape: asked.CarriedShape, touches: list[str] | None) -> Attachment:
     """The shape of a payload, fixed to the flange. Raises InvalidProblem."""
-    return _named("payload.shape", lambda: Attachment(_to_shape(shape), to_matrix(shape.pose), touches))
+    return _named(
+        "payload.shape", lambda: Attachment(_to_shape(shape), to_matrix(shape.pose), touches)
+    )
 
 
 def _to_obstacle(given: asked.Obstacle, T_base_frame: Array) -> Obstacle:
-    return Obstacle(given.name, _to_shape(given), T_base_frame @ to_matrix(given.pose), given.margin)
+    return Obstacle(
+        given.name, _to_shape(given), T_base_frame @ to_matrix(given.pose), given.margin
+    )
 
 
 def _to_shape(given: asked.CarriedShape | asked.Obstacle) -> Shape:

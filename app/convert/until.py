@@ -1,4 +1,5 @@
-"""The deadline of what is read from a request before anything is computed: mesh files, URDFs, logs."""
+"""The deadline of what is read from a request before anything is computed: mesh files, URDFs,
+logs."""
 
 from __future__ import annotations
 
@@ -9,12 +10,16 @@ from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
 from joulepath.optimizer.exceptions import DeadlineExceeded
 
 _LEAST_TIME = 1e-3
-"""Shortest time of a computation [s]: one whose time was used up by the reading still says so by itself."""
+"""Shortest time of a computation [s]: one whose time was used up by the reading still says so by
+itself.
+"""
 
 
 @contextmanager
 def until(end: Deadline) -> Iterator[None]:
-    """Within the context, `checkpoint` ends what is read once `end` has passed. Raises DeadlineExceeded then."""
+    """Within the context, `checkpoint` ends what is read once `end` has passed. Raises
+    DeadlineExceeded then.
+    """
     try:
         with watch(end):
             yield

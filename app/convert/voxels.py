@@ -21,14 +21,18 @@ def _from_bits(bits: VoxelBits) -> npt.NDArray[np.int64]:
     count = int(np.prod(bits.dimensions))
     if count > MOST_CELLS:
         raise InvalidProblem(
-            "bits.dimensions", f"bits.dimensions must make at most {MOST_CELLS} cells: use larger ones."
+            "bits.dimensions",
+            f"bits.dimensions must make at most {MOST_CELLS} cells: use larger ones.",
         )
     data = decoded(bits.data, "bits.data")
     if len(data) != -(-count // 8):
         raise InvalidProblem(
             "bits.data",
-            f"bits.data holds {len(data)} bytes, but {count} cells need {-(-count // 8)}: one bit per cell, eight to a "
+            f"bits.data holds {len(data)} bytes, but {count} cells need {-(-count // 8)}: one bit "
+            "per cell, eight to a "
             "byte.",
         )
-    numbers = np.flatnonzero(np.unpackbits(np.frombuffer(data, dtype=np.uint8), count=count, bitorder="little"))
+    numbers = np.flatnonzero(
+        np.unpackbits(np.frombuffer(data, dtype=np.uint8), count=count, bitorder="little")
+    )
     return np.stack(np.unravel_index(numbers, bits.dimensions, order="F"), axis=1).astype(np.int64)

@@ -19,20 +19,25 @@ ADVICE = "Make sure that the arm and its cell are known as accurately, or ask fo
 LITTLE_LEFT = 0.9
 """Part of a torque limit above which a plan leaves a controller too little."""
 MISSED = (
-    "The inverse kinematics of this arm may have missed arm configurations: the answer is the best of those found, its "
+    "The inverse kinematics of this arm may have missed arm configurations: the answer is the best "
+    "of those found, its "
     "status is not `optimal`, and its lower bound covers those that may be missing."
 )
 DIVIDED = (
-    "{} is where the path is divided, at {:.1%} of its length: no arm configuration follows it whole. `status` and "
+    "{} is where the path is divided, at {:.1%} of its length: no arm configuration follows it "
+    "whole. `status` and "
     "`lower_bound` are for this division."
 )
 STAND_INS = {
     TOOL: f"a rod of {1e3 * StandInSettings.tool_radius:g} mm radius from the flange to the TCP",
-    PAYLOAD: f"a ball of its mass at {StandInSettings.payload_density:g} kg/m³ about its centre of mass",
+    PAYLOAD: f"a ball of its mass at {StandInSettings.payload_density:g} kg/m³ about its centre of "
+    "mass",
 }
 """What stands in for a body of the arm that has no shape."""
 SHAPES = {TOOL: "tool.capsules", PAYLOAD: "payload.shape"}
-NO_DEFAULT_MOTION = "No default motion of the robot's controller is known: `controller_default` is left out."
+NO_DEFAULT_MOTION = (
+    "No default motion of the robot's controller is known: `controller_default` is left out."
+)
 
 
 def certified_warnings(solution: Solution) -> list[str]:
@@ -58,7 +63,8 @@ def replay_warnings(planned: PlannedMotion, found: Replay) -> list[str]:
     """The warnings of a replayed motion."""
     arm = planned.arm
     said = [
-        f"{name} has many parts and is not simulated: contacts with it are not found. The certificate counts it."
+        f"{name} has many parts and is not simulated: contacts with it are not found. The "
+        "certificate counts it."
         for name in unsimulated(arm)
     ]
     for run in found.runs:
@@ -70,7 +76,9 @@ def replay_warnings(planned: PlannedMotion, found: Replay) -> list[str]:
 
 def _of_run(what: str, planned: PlannedMotion, found: Replay, run: Outcome) -> list[str]:
     said = []
-    for joint, time, ratio in zip(planned.arm.robot.joint_names, run.saturated, found.planned.limit_ratio, strict=True):
+    for joint, time, ratio in zip(
+        planned.arm.robot.joint_names, run.saturated, found.planned.limit_ratio, strict=True
+    ):
         if time > 0:
             advice = ": plan with a tighter limits.torque." if ratio > LITTLE_LEFT else "."
             said.append(
@@ -80,7 +88,8 @@ def _of_run(what: str, planned: PlannedMotion, found: Replay, run: Outcome) -> l
     if run.collides and run.contact is not None:
         first, second = run.contact.pair
         said.append(
-            f"{what}, {first} and {second} touch: {_mm(run.contact.depth)} mm deep at {run.contact.time:.3f} s."
+            f"{what}, {first} and {second} touch: {_mm(run.contact.depth)} mm deep at "
+            f"{run.contact.time:.3f} s."
         )
     return said
 
@@ -89,14 +98,19 @@ def _close(pair: tuple[str, str], distance: float, time: float, proven: str) -> 
     first, second = pair
     # the proven distance may be below CLOSE, and the sampled one a little above it
     how = f"{_mm(distance)} mm apart" if distance > 0 else f"overlapping by {_mm(-distance)} mm"
-    return f"Closer than {CLOSE * 1e3:g} mm: {first} and {second} are {how} at {time:.3f} s{proven}. {ADVICE}"
+    return (
+        f"Closer than {CLOSE * 1e3:g} mm: {first} and {second} are {how} at {time:.3f} "
+        f"s{proven}. {ADVICE}"
+    )
 
 
 def _unmodelled(contact: Clearance) -> str:
     obstacle, carried = contact.pair
     return (
-        f"The {carried} has no shape, and nothing keeps it out of the obstacles: {STAND_INS[carried]} would be "
-        f"{-1e3 * contact.sampled:.0f} mm deep in {obstacle} at {contact.time:.3f} s. Give its shape in "
+        f"The {carried} has no shape, and nothing keeps it out of the obstacles: "
+        f"{STAND_INS[carried]} would be "
+        f"{-1e3 * contact.sampled:.0f} mm deep in {obstacle} at {contact.time:.3f} s. Give its "
+        "shape in "
         f"`{SHAPES[carried]}`."
     )
 

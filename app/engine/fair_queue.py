@@ -13,7 +13,8 @@ from joulepath.app.engine.worker import Worker
 from joulepath.app.exceptions.queue import Busy, TooManyRequests
 
 PATIENCE = 2.0
-"""Time [s] that a client without a worker waits, before a client that has several gives one back."""
+"""Time [s] that a client without a worker waits, before a client that has several gives one
+back."""
 
 
 class State(Enum):
@@ -40,21 +41,28 @@ class Place:
         self.since = 0.0
         """When it began to wait, by the monotonic clock [s]."""
         self.gave_back = False
-        """Whether it had to give its worker back. Then it waits until its client has no other worker."""
+        """Whether it had to give its worker back. Then it waits until its client has no other
+        worker.
+        """
         self.begins_again = False
-        """Whether its worker was taken or has died. Then it comes before the others of its client."""
+        """Whether its worker was taken or has died. Then it comes before the others of its
+        client."""
         self.give_back: Callable[[], object] | None = None
         """Has the task end soon. Set while it is in a worker and may be stopped."""
         self.granted: asyncio.Future[Loan] | None = None
 
     @property
     def waits(self) -> bool:
-        """Whether a worker may be lent to it. One whose request has just left or timed out waits no more."""
+        """Whether a worker may be lent to it. One whose request has just left or timed out waits no
+        more.
+        """
         return self.state is State.WAITING and self.granted is not None and not self.granted.done()
 
 
 class Loan:
-    """A worker that is lent to a place, or to work that can wait (None), until it is given back and at no task."""
+    """A worker that is lent to a place, or to work that can wait (None), until it is given back and
+    at no task.
+    """
 
     def __init__(self, worker: Worker, place: Place | None) -> None:
         self.worker, self.place = worker, place
@@ -64,12 +72,14 @@ class Loan:
 
 
 class FairQueue:
-    """Hands workers to those who wait: first to the client that has the fewest, among equals in turn.
+    """Hands workers to those who wait: first to the client that has the fewest, among equals in
+    turn.
 
     `capacity`: most requests in workers and waiting. `share`: most of one client.
 
-    Every worker is in `_loans` from `put` until its end is seen: with None while it is idle, with its loan otherwise.
-    So it is in one state at every time, and what depends on the states is counted from them.
+    Every worker is in `_loans` from `put` until its end is seen: with None while it is idle, with
+    its loan otherwise. So it is in one state at every time, and what depends on the states is
+    counted from them.
     """
 
     def __init__(self, capacity: int, share: int) -> None:
@@ -157,10 +167,12 @@ class FairQueue:
         self._loans.pop(worker, None)
 
     def mend(self, workers: set[Worker]) -> list[str]:
-        """Puts right what can only be wrong by a defect of the queue, and tells it: `workers` are all that are alive.
+        """Puts right what can only be wrong by a defect of the queue, and tells it: `workers` are
+        all that are alive.
 
-        A worker that the queue does not know is new to it; one that is lent to nobody is idle; one that is idle while a
-        place waits is lent. What was not so at the last call, too, may be under way in this turn of the event loop.
+        A worker that the queue does not know is new to it; one that is lent to nobody is idle; one
+        that is idle while a place waits is lent. What was not so at the last call, too, may be
+        under way in this turn of the event loop.
         """
         before, self._suspects = self._suspects, self._wrong(workers)
         found = [fault for what, fault in self._suspects.items() if before.get(what) == fault]
@@ -178,7 +190,9 @@ class FairQueue:
         wrong: dict[Worker | Loan | Place, str] = {}
         wrong |= dict.fromkeys(workers - self._loans.keys(), "a worker was neither idle nor lent")
         for loan in [each for each in self._loans.values() if each is not None]:
-            is_over = loan.is_returned or (loan.place is not None and loan.place.state is State.IDLE)
+            is_over = loan.is_returned or (
+                loan.place is not None and loan.place.state is State.IDLE
+            )
             if is_over and loan.worker.alive and loan.worker.is_free:
                 wrong[loan] = "a worker was lent to nobody"
         if (place := self._next()) is not None and self._idle_worker() is not None:
@@ -187,7 +201,11 @@ class FairQueue:
 
     async def _turn(self, place: Place) -> Loan:
         loop = asyncio.get_running_loop()
-        place.granted, place.state, place.since = loop.create_future(), State.WAITING, time.monotonic()
+        place.granted, place.state, place.since = (
+            loop.create_future(),
+            State.WAITING,
+            time.monotonic(),
+        )
         line = self._waiting.setdefault(place.client, deque())
         line.insert(0 if place.begins_again else len(line), place)
         self._serve()
@@ -205,10 +223,14 @@ class FairQueue:
             claim.cancel()
 
     def _serve(self) -> None:
-        """Lends idle workers to those whose turn it is. It raises nothing: it runs within other requests."""
+        """Lends idle workers to those whose turn it is. It raises nothing: it runs within other
+        requests.
+        """
         while (place := self._next()) and (worker := self._idle_worker()):
             self._leave(place)
-            if place.client in self._waiting:  # the others of its client come after all other clients
+            if (
+                place.client in self._waiting
+            ):  # the others of its client come after all other clients
                 self._waiting[place.client] = self._waiting.pop(place.client)
             place.state = State.GRANTED
             assert place.granted is not None
@@ -231,18 +253,28 @@ class FairQueue:
             self.put(loan.worker)
 
     def _idle_worker(self) -> Worker | None:
-        return next((worker for worker, loan in self._loans.items() if loan is None and worker.alive), None)
+        return next(
+            (worker for worker, loan in self._loans.items() if loan is None and worker.alive), None
+        )
 
     def _working(self) -> Counter[str]:
         """Number of workers that each client has."""
-        loans = [loan for loan in self._loans.values() if loan is not None and loan.counts and loan.worker.alive]
+        loans = [
+            loan
+            for loan in self._loans.values()
+            if loan is not None and loan.counts and loan.worker.alive
+        ]
         return Counter(loan.place.client for loan in loans if loan.place is not None)
 
     def _next(self) -> Place | None:
         """Whose turn it is. The order of `_waiting` is that of the turns."""
         working = self._working()
-        heads = [next((place for place in line if place.waits), None) for line in self._waiting.values()]
-        allowed = [place for place in heads if place and not (place.gave_back and working[place.client])]
+        heads = [
+            next((place for place in line if place.waits), None) for line in self._waiting.values()
+        ]
+        allowed = [
+            place for place in heads if place and not (place.gave_back and working[place.client])
+        ]
         return min(allowed, key=lambda place: working[place.client], default=None)
 
     def _leave(self, place: Place) -> None:
@@ -254,14 +286,26 @@ class FairQueue:
         self._changed.set()
 
     def _claim(self, place: Place) -> None:
-        """Lets the client with the most workers give one back, if it has several and the place's client has none."""
+        """Lets the client with the most workers give one back, if it has several and the place's
+        client has none.
+        """
         working = self._working()
         if working[place.client] or not place.waits:
             return
-        lent = [(loan, loan.place) for loan in self._loans.values() if loan and loan.place and loan.counts]
-        stoppable = [(loan, holder) for loan, holder in lent if holder.give_back and working[holder.client] > 1]
+        lent = [
+            (loan, loan.place)
+            for loan in self._loans.values()
+            if loan and loan.place and loan.counts
+        ]
+        stoppable = [
+            (loan, holder)
+            for loan, holder in lent
+            if holder.give_back and working[holder.client] > 1
+        ]
         # the last one of the client that has the most
-        loan, holder = max(reversed(stoppable), key=lambda each: working[each[1].client], default=(None, None))
+        loan, holder = max(
+            reversed(stoppable), key=lambda each: working[each[1].client], default=(None, None)
+        )
         if loan is not None and holder is not None and holder.give_back is not None:
             give_back, holder.give_back = holder.give_back, None
             holder.gave_back, holder.state = True, State.YIELDING

@@ -23,7 +23,9 @@ def importing() -> Iterator[None]:
 
 
 def keep() -> None:
-    """Has the collector look at nothing that is there now until the process ends: forked ones so share its memory."""
+    """Has the collector look at nothing that is there now until the process ends: forked ones so
+    share its memory.
+    """
     gc.freeze()
     # libraries warn of objects that nobody could free
     atexit.register(gc.unfreeze)

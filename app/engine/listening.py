@@ -1,4 +1,6 @@
-"""Who listens to the task that this process runs: what the task finds goes there at once, before its result."""
+"""Who listens to the task that this process runs: what the task finds goes there at once, before
+its result.
+"""
 
 from __future__ import annotations
 

@@ -29,7 +29,9 @@ _LONGEST_RESTART_DELAY = 30.0
 _CHECK_PERIOD = 1.0
 """Time [s] between two checks that every worker is where it should be."""
 _MOST_DEATHS = 2
-"""Workers that may die of a request that somebody waits for: the first one may have been killed by chance."""
+"""Workers that may die of a request that somebody waits for: the first one may have been killed by
+chance.
+"""
 
 
 class Engine:
@@ -40,7 +42,9 @@ class Engine:
 
     def __init__(self, settings: Settings, warm: Callable[[], None]) -> None:
         self.restarts = 0
-        """Workers that had to be replaced since the start: they were killed, or ended by themselves."""
+        """Workers that had to be replaced since the start: they were killed, or ended by
+        themselves.
+        """
         self._settings = settings
         self._warm = warm
         self.queue: FairQueue = FairQueue(
@@ -68,8 +72,8 @@ class Engine:
 
     @property
     def ready(self) -> bool:
-        """Whether all workers have been warm once, one is now, no request waits while none is at work, and the service
-        is not stopping."""
+        """Whether all workers have been warm once, one is now, no request waits while none is at
+        work, and the service is not stopping."""
         is_served = self.warm_workers > 0 and not self.queue.is_stuck
         return self._was_ready and is_served and not self._draining.is_set()
 
@@ -83,7 +87,10 @@ class Engine:
         start_forkserver()
         # `stop` is skipped when the operator forces the exit
         atexit.register(self._kill_all)
-        self._keepers = [asyncio.create_task(self._keep(first=index == 0)) for index in range(self._settings.workers)]
+        self._keepers = [
+            asyncio.create_task(self._keep(first=index == 0))
+            for index in range(self._settings.workers)
+        ]
         self._keepers.append(asyncio.create_task(self._check()))
 
     async def stop(self) -> None:
@@ -111,13 +118,17 @@ class Engine:
         """The engine for the requests of one client."""
         return ClientEngine(self, client)
 
-    async def run(self, task: Task, deadline: float, client: str = "", tell: Tell = nobody) -> TaskResult:
-        """The task's result, within `deadline` seconds and `settings.deadline_grace`. Time in the queue counts.
+    async def run(
+        self, task: Task, deadline: float, client: str = "", tell: Tell = nobody
+    ) -> TaskResult:
+        """The task's result, within `deadline` seconds and `settings.deadline_grace`. Time in the
+        queue counts.
 
-        Clients have their turns, see `FairQueue`. A task whose worker another client needs begins again later, and once
-        one whose worker died. `tell` gets what the task finds, after a new begin from the first on.
-        If cancelled, the task leaves the queue or is stopped. Raises what the task raises (see `Task.run`), Busy,
-        TooManyRequests, ShuttingDown, DeadlineExceeded, or WorkerLost if two workers died of it.
+        Clients have their turns, see `FairQueue`. A task whose worker another client needs begins
+        again later, and once one whose worker died. `tell` gets what the task finds, after a new
+        begin from the first on. If cancelled, the task leaves the queue or is stopped. Raises what
+        the task raises (see `Task.run`), Busy, TooManyRequests, ShuttingDown, DeadlineExceeded, or
+        WorkerLost if two workers died of it.
         """
         if self._draining.is_set():
             raise ShuttingDown
@@ -142,7 +153,8 @@ class Engine:
             async with AsyncExitStack() as turn:
                 with self.spare.someone_waits():
                     worker = await turn.enter_async_context(self.queue.worker(place))
-                # the optimiser watches the deadline and returns its best motion: the grace is for that
+                # the optimiser watches the deadline and returns its best motion: the grace is for
+                # that
                 limit.reschedule(min(end + self._settings.deadline_grace, self._latest_end))
                 left = end - asyncio.get_running_loop().time()
                 if left <= 0:
@@ -161,7 +173,10 @@ class Engine:
                         raise
                     reason = "its worker died"
             place.begins_again = True
-            logger.info("begins again", extra={"request_id": task.request_id, "client": place.client, "reason": reason})
+            logger.info(
+                "begins again",
+                extra={"request_id": task.request_id, "client": place.client, "reason": reason},
+            )
 
     async def _keep(self, first: bool) -> None:
         """Keeps one worker alive: starts it, waits for its end, starts the next."""
@@ -171,12 +186,18 @@ class Engine:
         delay = _FIRST_RESTART_DELAY
         while True:
             try:
-                worker = Worker(self._warm, self._settings.log_level, self._threads, self._settings.stop_grace)
+                worker = Worker(
+                    self._warm, self._settings.log_level, self._threads, self._settings.stop_grace
+                )
                 await worker.start()
             except Exception as error:
                 # also without memory, files or threads for it: there may be some later
                 is_told = isinstance(error, WorkerLost)
-                logger.error("worker did not start", exc_info=None if is_told else error, extra={"retry_in": delay})
+                logger.error(
+                    "worker did not start",
+                    exc_info=None if is_told else error,
+                    extra={"retry_in": delay},
+                )
                 await asyncio.sleep(delay)
                 delay = min(2 * delay, _LONGEST_RESTART_DELAY)
                 continue

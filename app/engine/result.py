@@ -1,4 +1,6 @@
-"""The result of a task: an encoded document. It knows nothing of HTTP, so that any caller of the engine can use it."""
+"""The result of a task: an encoded document. It knows nothing of HTTP, so that any caller of the
+engine can use it.
+"""
 
 from __future__ import annotations
 
@@ -21,8 +23,8 @@ _HEAD = re.compile(rb'\{"request":"([^"]*)","id":(?:null|"([^"]*)")')
 class StoredAnswer:
     """A complete answer (JSON), the id under which it is to be stored, and what lists show of it.
 
-    The task chooses the id, so that the document holds the final path from the first. Nothing is ever searched and
-    replaced in a document, which repeats texts of the caller.
+    The task chooses the id, so that the document holds the final path from the first. Nothing is
+    ever searched and replaced in a document, which repeats texts of the caller.
     """
 
     id: str
@@ -39,11 +41,12 @@ class StoredAnswer:
 class TaskResult:
     """A document and its media type. A task that fails raises an exception instead.
 
-    `stored` are complete answers that belong into the database before the document is sent: it refers to them.
-    `kept_as` is the id under which the document itself is to be kept: its field `id`, the second one, has it, and the
-    path is in the last one, `answer`, if there is one. `figures` are what lists show of it.
-    `is_optimal`: no more time would make it better. `age` [s] is that of a document that was computed before. `motions`
-    are those that it used or found of a cell, by their keys: later rounds may have them in common.
+    `stored` are complete answers that belong into the database before the document is sent: it
+    refers to them. `kept_as` is the id under which the document itself is to be kept: its field
+    `id`, the second one, has it, and the path is in the last one, `answer`, if there is one.
+    `figures` are what lists show of it. `is_optimal`: no more time would make it better. `age` [s]
+    is that of a document that was computed before. `motions` are those that it used or found of a
+    cell, by their keys: later rounds may have them in common.
     """
 
     document: bytes
@@ -61,10 +64,16 @@ class TaskResult:
         return cls(json_document(content), "application/json", stored)
 
     @classmethod
-    def of_kept_json(cls, content: Any, figures: AnswerFigures, stored: tuple[StoredAnswer, ...] = ()) -> TaskResult:
-        """A JSON document that is to be kept. Its fields `request` and `id` come first, `answer` comes last."""
+    def of_kept_json(
+        cls, content: Any, figures: AnswerFigures, stored: tuple[StoredAnswer, ...] = ()
+    ) -> TaskResult:
+        """A JSON document that is to be kept. Its fields `request` and `id` come first, `answer`
+        comes last.
+        """
         is_optimal = figures.status == "optimal"
-        return cls(json_document(content), "application/json", stored, None, figures, is_optimal).kept()
+        return cls(
+            json_document(content), "application/json", stored, None, figures, is_optimal
+        ).kept()
 
     def kept(self) -> TaskResult:
         """The same document, to be kept under an id of its own."""
@@ -75,11 +84,15 @@ class TaskResult:
         return self._under(None)
 
     def for_request(self, request_id: str) -> TaskResult:
-        """The same document as the answer to another request: its field `request` is the id of that."""
+        """The same document as the answer to another request: its field `request` is the id of
+        that.
+        """
         head = _HEAD.match(self.document)
         assert head is not None
         start, end = head.span(1)
-        return replace(self, document=self.document[:start] + request_id.encode() + self.document[end:])
+        return replace(
+            self, document=self.document[:start] + request_id.encode() + self.document[end:]
+        )
 
     def copied(self, request_id: str) -> TaskResult:
         """The same document for another request, to be kept as another answer."""
@@ -104,9 +117,18 @@ class TaskResult:
 
 
 def _last_field(answer_id: str | None) -> bytes:
-    return b',"answer":null}' if answer_id is None else b',"answer":"%s"}' % StoredAnswer(answer_id, b"").path.encode()
+    return (
+        b',"answer":null}'
+        if answer_id is None
+        else b',"answer":"%s"}' % StoredAnswer(answer_id, b"").path.encode()
+    )
 
 
 def json_document(content: Any) -> bytes:
-    """An object of a declared class, or a dict, as JSON. A number that is not finite becomes null."""
-    return orjson.dumps(content, default=as_json, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_PASSTHROUGH_DATACLASS)
+    """An object of a declared class, or a dict, as JSON. A number that is not finite becomes
+    null."""
+    return orjson.dumps(
+        content,
+        default=as_json,
+        option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_PASSTHROUGH_DATACLASS,
+    )

@@ -1,4 +1,6 @@
-"""Work that can wait: it gets workers that no caller waits for, and gives one back to a caller that waits too long."""
+"""Work that can wait: it gets workers that no caller waits for, and gives one back to a caller that
+waits too long.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,8 @@ from joulepath.optimizer.exceptions import DeadlineExceeded
 
 @dataclass(eq=False)
 class _Run:
-    """Work on a worker. `at`: what it is at work on, since `began` [s]. `preempted`: a caller took the worker. `over`:
-    nothing more is told of it."""
+    """Work on a worker. `at`: what it is at work on, since `began` [s]. `preempted`: a caller took
+    the worker. `over`: nothing more is told of it."""
 
     worker: Worker
     at: Work | None
@@ -42,7 +44,9 @@ class _Run:
 
 
 class SpareWorkers:
-    """Lends idle workers of an engine. `grace` [s] is the time after a deadline at which a work is stopped."""
+    """Lends idle workers of an engine. `grace` [s] is the time after a deadline at which a work is
+    stopped.
+    """
 
     def __init__(self, queue: FairQueue, workers: set[Worker], grace: float) -> None:
         self._queue, self._workers, self._grace = queue, workers, grace
@@ -51,9 +55,9 @@ class SpareWorkers:
     async def run(self, take: Take) -> None:
         """Runs works one after another on one worker, once it is idle and no caller waits for one.
 
-        It ends if there is no more work, a caller waits, or the worker is gone. The work that it was at then has ended
-        with DeadlineExceeded, WorkerLost, or, if it is `stoppable`, Preempted: a caller took the worker. If cancelled,
-        the work is stopped, and has not ended.
+        It ends if there is no more work, a caller waits, or the worker is gone. The work that it
+        was at then has ended with DeadlineExceeded, WorkerLost, or, if it is `stoppable`,
+        Preempted: a caller took the worker. If cancelled, the work is stopped, and has not ended.
         """
         async with self._queue.spare() as worker:
             first = take()

@@ -23,13 +23,15 @@ class Task(Protocol):
     def run(self, deadline: float) -> TaskResult:
         """The result, within about `deadline` seconds. What it finds before goes to `listener()`.
 
-        A JoulepathError or ServiceError reaches the caller of `Engine.run` as it is. Any other exception is a defect:
-        the worker logs it, and the caller gets InternalError.
+        A JoulepathError or ServiceError reaches the caller of `Engine.run` as it is. Any other
+        exception is a defect: the worker logs it, and the caller gets InternalError.
         """
 
 
 def outcome(task: Task, deadline: float) -> TaskResult | DeclaredError | Stopped:
-    """The task's result, the error that its caller gets, or that it was stopped; all can be pickled."""
+    """The task's result, the error that its caller gets, or that it was stopped; all can be
+    pickled.
+    """
     ended: TaskResult | DeclaredError
     try:
         checkpoint()
@@ -42,5 +44,6 @@ def outcome(task: Task, deadline: float) -> TaskResult | DeclaredError | Stopped
         if not is_stopped():
             logger.exception("unforeseen error", extra={"request_id": task.request_id})
         ended = InternalError()
-    # a task that is stopped may end as if its deadline had passed: that is no answer for whoever gave its worker back
+    # a task that is stopped may end as if its deadline had passed: that is no answer for whoever
+    # gave its worker back
     return Stopped() if is_stopped() else ended

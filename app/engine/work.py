@@ -1,4 +1,6 @@
-"""Work that can wait: tasks that one worker after another takes from a common heap, and what becomes of each."""
+"""Work that can wait: tasks that one worker after another takes from a common heap, and what
+becomes of each.
+"""
 
 from __future__ import annotations
 
@@ -17,10 +19,11 @@ Ended = TaskResult | Exception
 
 @dataclass(eq=False)
 class Work:
-    """A task, for which `deadline` [s] is left once work on it begins. `ended` gets what becomes of it.
+    """A task, for which `deadline` [s] is left once work on it begins. `ended` gets what becomes of
+    it.
 
-    `stoppable`: a caller may take its worker. `tell` gets what the task finds. `expected` [s] is what it may take.
-    `is_small`: its pickled task has a few kilobytes at most.
+    `stoppable`: a caller may take its worker. `tell` gets what the task finds. `expected` [s] is
+    what it may take. `is_small`: its pickled task has a few kilobytes at most.
     """
 
     task: Task
@@ -33,7 +36,9 @@ class Work:
 
     @property
     def is_short(self) -> bool:
-        """Whether it may lie in the pipe of a worker that is at work: it holds up neither a caller nor the pipe."""
+        """Whether it may lie in the pipe of a worker that is at work: it holds up neither a caller
+        nor the pipe.
+        """
         return self.is_small and self.expected <= SHORT
 
 
@@ -54,7 +59,9 @@ async def result_of(
     stoppable: bool = True,
     tell: Tell = nobody,
 ) -> TaskResult:
-    """The result of one task from what runs many. Raises what becomes of it otherwise, and what `run` raises."""
+    """The result of one task from what runs many. Raises what becomes of it otherwise, and what
+    `run` raises.
+    """
     found: list[Ended] = []
     await run(taking(Work(task, deadline, found.append, stoppable, tell)))
     (ended,) = found

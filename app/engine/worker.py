@@ -1,8 +1,8 @@
-"""One worker process: it is started, warms up, and runs one task at a time. It is told to end a task that nobody wants
-any more, and killed if it does not.
+"""One worker process: it is started, warms up, and runs one task at a time. It is told to end a
+task that nobody wants any more, and killed if it does not.
 
-Each worker has a pipe of its own and shares no lock with the others. It can therefore be killed at any moment, and its
-end, whatever the cause, shows as the end of its pipe.
+Each worker has a pipe of its own and shares no lock with the others. It can therefore be killed at
+any moment, and its end, whatever the cause, shows as the end of its pipe.
 """
 
 from __future__ import annotations
@@ -42,14 +42,18 @@ Turn = Callable[[Work, Ended, Work | None], object]
 class Worker:
     """The parent's side of a worker process.
 
-    Its exchanges with the process are numbered. To stop one, it writes the number into memory that both share, where
-    the process looks at every `checkpoint` of its task: it ends exchanges up to that number. A word that comes late
-    therefore ends nothing but what it was meant for. `stop_grace` [s] is the time that the process has to end it.
+    Its exchanges with the process are numbered. To stop one, it writes the number into memory that
+    both share, where the process looks at every `checkpoint` of its task: it ends exchanges up to
+    that number. A word that comes late therefore ends nothing but what it was meant for.
+    `stop_grace` [s] is the time that the process has to end it.
     """
 
-    def __init__(self, warm: Callable[[], None], log_level: str, threads: Executor, stop_grace: float) -> None:
+    def __init__(
+        self, warm: Callable[[], None], log_level: str, threads: Executor, stop_grace: float
+    ) -> None:
         self._pipe, self._child_pipe = CONTEXT.Pipe()
-        # one aligned word, which is read and written at once: it needs no lock, which a killed process could hold
+        # one aligned word, which is read and written at once: it needs no lock, which a killed
+        # process could hold
         self._stopped_up_to = CONTEXT.RawValue("Q", 0)
         self._process = CONTEXT.Process(
             target=_serve,
@@ -86,7 +90,9 @@ class Worker:
             self._exchange.add_done_callback(lambda _: call())
 
     async def start(self) -> None:
-        """Starts the process and waits until it is warm. If cancelled, it kills it. Raises WorkerLost."""
+        """Starts the process and waits until it is warm. If cancelled, it kills it. Raises
+        WorkerLost.
+        """
         loop = asyncio.get_running_loop()
         try:
             await loop.run_in_executor(self._threads, self._start)
@@ -100,8 +106,8 @@ class Worker:
     async def ask(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
         """The task's result. If cancelled, it stops the task.
 
-        `tell` gets what the task finds, before the result. Raises what the task raises (see `Task.run`), Preempted if
-        the task was stopped, or WorkerLost.
+        `tell` gets what the task finds, before the result. Raises what the task raises (see
+        `Task.run`), Preempted if the task was stopped, or WorkerLost.
         """
         heard = _heard(tell, asyncio.get_running_loop())
         ended = await self._exchanged(lambda number: self._ask(number, task, deadline, heard))
@@ -110,15 +116,19 @@ class Worker:
         return ended
 
     async def ask_all(self, first: Work, take: Take, turn: Turn) -> None:
-        """Runs works one after another, until there is none. If cancelled, it stops. Raises Preempted or WorkerLost.
+        """Runs works one after another, until there is none. If cancelled, it stops. Raises
+        Preempted or WorkerLost.
 
-        Each gets to the process as soon as the last one has ended: the event loop, which calls `turn`, may be late.
+        Each gets to the process as soon as the last one has ended: the event loop, which calls
+        `turn`, may be late.
         """
         loop = asyncio.get_running_loop()
         await self._exchanged(lambda number: self._ask_all(number, first, take, turn, loop))
 
     def stop(self) -> None:
-        """Has the process end what it is at, and kills it if that takes longer than the grace. Returns at once."""
+        """Has the process end what it is at, and kills it if that takes longer than the grace.
+        Returns at once.
+        """
         exchange = self._exchange
         if exchange is None or exchange.done() or self._is_stopped(self._number):
             return
@@ -138,14 +148,18 @@ class Worker:
             self.kill()
 
     async def _exchanged(self, call: Callable[[int], T]) -> T:
-        """The result of an exchange with the process, in a thread. Raises WorkerLost, or Preempted if it was stopped.
+        """The result of an exchange with the process, in a thread. Raises WorkerLost, or Preempted
+        if it was stopped.
 
-        The exchange goes on after a cancellation until the process has ended the task: see `when_free`.
+        The exchange goes on after a cancellation until the process has ended the task: see
+        `when_free`.
         """
         assert self.is_free, "the answer to another task would be taken for that to this one"
         self._number += 1
         number = self._number
-        exchange = asyncio.get_running_loop().run_in_executor(self._threads, self._in_step, call, number)
+        exchange = asyncio.get_running_loop().run_in_executor(
+            self._threads, self._in_step, call, number
+        )
         # whoever asked may have left by then
         exchange.add_done_callback(lambda done: done.cancelled() or done.exception())
         self._exchange = exchange
@@ -192,7 +206,9 @@ class Worker:
         ended: Ended = received
         return ended
 
-    def _ask_all(self, number: int, first: Work, take: Take, turn: Turn, loop: asyncio.AbstractEventLoop) -> None:
+    def _ask_all(
+        self, number: int, first: Work, take: Take, turn: Turn, loop: asyncio.AbstractEventLoop
+    ) -> None:
         self._send(number, first)
         work: Work | None = first
         while work is not None:
@@ -220,7 +236,10 @@ class Worker:
         asyncio.get_running_loop().remove_reader(self._process.sentinel)
         self._process.join()
         if not self._killed:
-            logger.error("worker ended by itself", extra={"pid": self.pid, "exit_code": self._process.exitcode})
+            logger.error(
+                "worker ended by itself",
+                extra={"pid": self.pid, "exit_code": self._process.exitcode},
+            )
         self.ended.set()
 
 
@@ -229,9 +248,11 @@ def _heard(tell: Tell, loop: asyncio.AbstractEventLoop) -> Heard:
 
 
 def _serve(pipe: Connection, stopped_up_to: Any, warm: Callable[[], None], log_level: str) -> None:
-    """The worker process. It ends tasks of exchanges up to the number `stopped_up_to` at their next checkpoint."""
-    # Ctrl-C in a terminal and SIGTERM from a service manager reach the whole process group. Only the parent acts on
-    # them: it lets requests in flight finish, and then kills its workers
+    """The worker process. It ends tasks of exchanges up to the number `stopped_up_to` at their next
+    checkpoint.
+    """
+    # Ctrl-C in a terminal and SIGTERM from a service manager reach the whole process group. Only
+    # the parent acts on them: it lets requests in flight finish, and then kills its workers
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     configure_logging(log_level)
@@ -247,7 +268,10 @@ def _serve(pipe: Connection, stopped_up_to: Any, warm: Callable[[], None], log_l
             number, task, deadline, is_heard = pipe.recv()
         except EOFError:
             return
-        with listening(pipe.send if is_heard else nobody), stoppable(partial(_is_stopped, stopped_up_to, number)):
+        with (
+            listening(pipe.send if is_heard else nobody),
+            stoppable(partial(_is_stopped, stopped_up_to, number)),
+        ):
             ended = outcome(task, deadline)
         pipe.send(ended)
 

@@ -24,9 +24,10 @@ class FieldError(TypedDict):
 
 @dataclass(eq=False)
 class InvalidRequest(ServiceError):
-    """The request is malformed or contradicts itself. The body is no JSON, or a field is missing, unknown, of the wrong
-    type or length, out of range, or not finite. A payload beyond the robot's rating, a limit wider than the robot's, a
-    deadline above the maximum and too many candidates belong here, too."""
+    """The request is malformed or contradicts itself. The body is no JSON, or a field is missing,
+    unknown, of the wrong type or length, out of range, or not finite. A payload beyond the robot's
+    rating, a limit wider than the robot's, a deadline above the maximum and too many candidates
+    belong here, too."""
 
     title = "Invalid request"
     remedy = "Correct the fields in `errors` and send the request again."

@@ -6,8 +6,8 @@ from joulepath.app.exceptions.base import ServiceError
 
 
 class Busy(ServiceError):
-    """All workers are taken and the queue is full, too many requests of jobs wait, or the service has as many
-    connections, or bytes of bodies and answers in flight, as it may."""
+    """All workers are taken and the queue is full, too many requests of jobs wait, or the service
+    has as many connections, or bytes of bodies and answers in flight, as it may."""
 
     status = 503
     retry_after = 2
@@ -25,27 +25,35 @@ class TooManyConnections(Busy):
 class TooManyBytes(Busy):
     """Bodies and answers in flight have as many bytes as the service may hold."""
 
-    detail = "The service holds as many bytes of requests and answers as it may: try again after a few seconds."
+    detail = (
+        "The service holds as many bytes of requests and answers as it may: try again after "
+        "a few seconds."
+    )
 
 
 class TooManyWaiting(Busy):
     """Too many requests of jobs wait."""
 
-    detail = "Too many requests of jobs wait: send this job again when others have ended, or send a smaller one."
+    detail = (
+        "Too many requests of jobs wait: send this job again when others have ended, or send "
+        "a smaller one."
+    )
 
 
 class TooManyRequests(Busy):
-    """You have your share of the service: of requests in flight and waiting, of connections, or of bytes of bodies and
-    answers in flight; `detail` says of which. Others are served meanwhile."""
+    """You have your share of the service: of requests in flight and waiting, of connections, or of
+    bytes of bodies and answers in flight; `detail` says of which. Others are served meanwhile."""
 
     status = 429
     title = "Too many requests"
     remedy = (
-        "Wait for your answers, read them, and send fewer requests at a time. Try again after the time [s] in the "
+        "Wait for your answers, read them, and send fewer requests at a time. Try again after the "
+        "time [s] in the "
         "header `Retry-After`."
     )
     detail = (
-        "You have as many requests in flight as one client may: wait for their answers before you send more, or send "
+        "You have as many requests in flight as one client may: wait for their answers before you "
+        "send more, or send "
         "them one after another."
     )
 
@@ -54,7 +62,8 @@ class TooManyConnectionsOfClient(TooManyRequests):
     """The client has as many connections, or requests ahead of their answers, as it may."""
 
     detail = (
-        "You have as many connections, or as many requests ahead on one of them, as one client may: close those that "
+        "You have as many connections, or as many requests ahead on one of them, as one client "
+        "may: close those that "
         "you do not need, and use one for several requests, one after another."
     )
 
@@ -63,30 +72,33 @@ class TooManyBytesOfClient(TooManyRequests):
     """The client's bodies and answers in flight have as many bytes as one client may."""
 
     detail = (
-        "The bodies and answers of your requests in flight have as many bytes as one client may: wait for their "
+        "The bodies and answers of your requests in flight have as many bytes as one client may: "
+        "wait for their "
         "answers, read them, and send fewer at a time."
     )
 
 
 class ClusterUnavailable(ServiceError):
-    """The scheduler of the cluster that works on jobs cannot be reached, or does not have the same version of joulepath
-    as the service, whose log says which. Jobs are accepted, and wait until it can be used. Requests that are answered
-    at once are computed by the service itself."""
+    """The scheduler of the cluster that works on jobs cannot be reached, or does not have the same
+    version of joulepath as the service, whose log says which. Jobs are accepted, and wait until it
+    can be used. Requests that are answered at once are computed by the service itself."""
 
     status = 503
     retry_after = 5
     title = "Cluster unavailable"
     remedy = "Try again after the time [s] in the header `Retry-After`."
     detail = (
-        "The scheduler of the cluster does not answer, or does not have the same version of joulepath as this service, "
-        "whose log says which: jobs wait until it does. Requests that are answered at once are computed by this "
+        "The scheduler of the cluster does not answer, or does not have the same version of "
+        "joulepath as this service, "
+        "whose log says which: jobs wait until it does. Requests that are answered at once are "
+        "computed by this "
         "service meanwhile."
     )
 
 
 class NotReady(ServiceError):
-    """The workers are still starting, or all of them have ended and are being replaced: requests wait, and none is at
-    work."""
+    """The workers are still starting, or all of them have ended and are being replaced: requests
+    wait, and none is at work."""
 
     status = 503
     retry_after = 2
@@ -102,40 +114,46 @@ class ShuttingDown(ServiceError):
     retry_after = 5
     title = "Shutting down"
     remedy = (
-        "Send it again after the time [s] in the header `Retry-After`: another instance, or the restarted one, answers."
+        "Send it again after the time [s] in the header `Retry-After`: another instance, or "
+        "the restarted one, answers."
     )
     detail = "The service is stopping: send the request again."
 
 
 class WorkerLost(ServiceError):
-    """Two processes that worked on this request died, one after the other, most often because the machine ran out of
-    memory. The service does not try it a third time by itself."""
+    """Two processes that worked on this request died, one after the other, most often because the
+    machine ran out of memory. The service does not try it a third time by itself."""
 
     status = 503
     retry_after = 5
     title = "Worker lost"
     remedy = (
-        "Try again after the time [s] in the header `Retry-After`; if that does not help, make the request smaller, or "
+        "Try again after the time [s] in the header `Retry-After`; if that does not help, make the "
+        "request smaller, or "
         "report it with the value of `instance`."
     )
     detail = (
-        "Two processes that worked on this request died, for example because the machine ran out of memory: try again "
-        "after some seconds, make the request smaller if that does not help, or report it with the id in `instance`."
+        "Two processes that worked on this request died, for example because the machine ran out "
+        "of memory: try again "
+        "after some seconds, make the request smaller if that does not help, or report it with the "
+        "id in `instance`."
     )
 
 
 class WorkerDied(ServiceError):
-    """Each of the three processes that worked on this request of a job died, for example because it ran out of memory.
-    The service does not try it again by itself."""
+    """Each of the three processes that worked on this request of a job died, for example because it
+    ran out of memory. The service does not try it again by itself."""
 
     status = 500
     title = "Worker died"
     remedy = (
-        "Make the request smaller, and send it again; if that does not help, please report it with the value of "
+        "Make the request smaller, and send it again; if that does not help, please report it with "
+        "the value of "
         "`instance`."
     )
     detail = (
-        "Each process that worked on this request died: make the request smaller, or report it with the id in "
+        "Each process that worked on this request died: make the request smaller, or report it "
+        "with the id in "
         "`instance`."
     )
 

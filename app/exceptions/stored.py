@@ -11,22 +11,28 @@ from joulepath.optimizer.declared import Internal, Unit
 StoreFault = Literal["full", "read-only", "locked", "deleted", "unreachable"]
 """What is wrong with the database."""
 _FAULTS: dict[StoreFault, str] = {
-    "full": "The disk of the database is full: delete studies that are not needed, or enlarge the disk. Deleting "
+    "full": "The disk of the database is full: delete studies that are not needed, or enlarge the "
+    "disk. Deleting "
     "works.",
-    "read-only": "The database is read-only: reading works, and the operator of the service must make it writable.",
-    "locked": "Another process locks the database: try again later, or ask the operator of the service to end that "
+    "read-only": "The database is read-only: reading works, and the operator of the service must "
+    "make it writable.",
+    "locked": "Another process locks the database: try again later, or ask the operator of the "
+    "service to end that "
     "process.",
-    "deleted": "The file of the database was deleted or replaced: the operator of the service must put it back, or "
+    "deleted": "The file of the database was deleted or replaced: the operator of the service must "
+    "put it back, or "
     "restart the service, which then begins an empty one.",
-    "unreachable": "The database does not answer: try again later, or ask the operator of the service.",
+    "unreachable": "The database does not answer: try again later, or ask the operator of the "
+    "service.",
 }
 
 
 @dataclass(eq=False)
 class StoreUnavailable(ServiceError):
-    """The database of studies and answers cannot be reached, read or written; `cause` says why, and the service's log
-    has more. Nothing of the request was stored. Requests that need no database, for example `POST /optimize`, still
-    work. On a full disk, `DELETE` works, so that space can be freed."""
+    """The database of studies and answers cannot be reached, read or written; `cause` says why, and
+    the service's log has more. Nothing of the request was stored. Requests that need no database,
+    for example `POST /optimize`, still work. On a full disk, `DELETE` works, so that space can be
+    freed."""
 
     status = 503
     retry_after = 5
@@ -34,16 +40,17 @@ class StoreUnavailable(ServiceError):
     remedy = "Try again after the time [s] in the header `Retry-After`."
 
     cause: StoreFault
-    """`full`: no space is left. `read-only`: it takes no changes. `locked`: another process locks it. `deleted`: its
-    file was deleted or replaced while the service ran. `unreachable`: it does not answer, or cannot be read."""
+    """`full`: no space is left. `read-only`: it takes no changes. `locked`: another process locks
+    it. `deleted`: its file was deleted or replaced while the service ran. `unreachable`: it does
+    not answer, or cannot be read."""
 
     def __str__(self) -> str:
         return _FAULTS[self.cause]
 
 
 class UnknownAnswer(ServiceError):
-    """No answer with this id is stored. It never existed, its study was deleted, or it was deleted to make space for
-    newer answers."""
+    """No answer with this id is stored. It never existed, its study was deleted, or it was deleted
+    to make space for newer answers."""
 
     status = 404
     title = "Unknown answer"
@@ -55,7 +62,10 @@ class UnknownAnswer(ServiceError):
 class PartsNeeded(UnknownAnswer):
     """An export refers to kept answers that are not at hand."""
 
-    detail = "The answer refers to kept answers that are not at hand: export it where the service keeps them."
+    detail = (
+        "The answer refers to kept answers that are not at hand: export it where the service "
+        "keeps them."
+    )
 
     names: Annotated[list[str], Internal]
     """Ids or paths of these answers."""
@@ -71,8 +81,8 @@ class AnswerInUse(ServiceError):
 
 
 class UnknownStudy(ServiceError):
-    """No study has this id, or the study has no iteration with this number. It never existed, or the study was
-    deleted."""
+    """No study has this id, or the study has no iteration with this number. It never existed, or
+    the study was deleted."""
 
     status = 404
     title = "Unknown study"
@@ -96,7 +106,9 @@ class EmptyStudy(ServiceError):
 
 
 class UnknownJob(ServiceError):
-    """No job has this id. It never existed, it was deleted, or it ended longer ago than jobs are kept."""
+    """No job has this id. It never existed, it was deleted, or it ended longer ago than jobs are
+    kept.
+    """
 
     status = 404
     title = "Unknown job"
@@ -110,7 +122,10 @@ class JobNotCancellable(ServiceError):
     status = 409
     title = "Job not cancellable"
     remedy = "Its answers stay until it is deleted with `DELETE /jobs/{id}`."
-    detail = "The job has ended: there is nothing left to cancel. DELETE /jobs/{id} deletes it with its answers."
+    detail = (
+        "The job has ended: there is nothing left to cancel. DELETE /jobs/{id} deletes it "
+        "with its answers."
+    )
 
 
 class RobotExists(ServiceError):
@@ -119,17 +134,22 @@ class RobotExists(ServiceError):
     status = 409
     title = "Robot exists"
     remedy = (
-        "Use another name, or `PUT /robots/{name}` to replace a robot that was added. The robots that come with the "
+        "Use another name, or `PUT /robots/{name}` to replace a robot that was added. The robots "
+        "that come with the "
         "service can be neither replaced nor deleted."
     )
-    detail = "A robot has this name: use another name, or replace the robot (`PUT`, on the command line `--replace`)."
+    detail = (
+        "A robot has this name: use another name, or replace the robot (`PUT`, on the "
+        "command line `--replace`)."
+    )
 
 
 class BundledRobot(RobotExists):
     """The robot comes with the service: nobody adds, replaces or deletes it."""
 
     detail = (
-        "This robot comes with the service and can be neither replaced nor deleted: only robots that were added can. "
+        "This robot comes with the service and can be neither replaced nor deleted: only robots "
+        "that were added can. "
         "Give a robot of your own another name."
     )
 
@@ -149,7 +169,8 @@ class NoMeshes(ServiceError):
     status = 404
     title = "No meshes"
     remedy = (
-        "Those of ur3e and ur5e come with `pip install 'joulepath[meshes]'`. The capsules of `GET /robots/{name}` show "
+        "Those of ur3e and ur5e come with `pip install 'joulepath[meshes]'`. The capsules of `GET "
+        "/robots/{name}` show "
         "every robot."
     )
     detail = "No meshes of this robot are installed: the extra `meshes` has those of ur3e and ur5e."
@@ -174,23 +195,31 @@ class TooManyLogs(ServiceError):
 
     status = 409
     title = "Too many logs"
-    remedy = "Delete logs that are not needed with `DELETE /logs/{id}`; what was identified from them stays."
+    remedy = (
+        "Delete logs that are not needed with `DELETE /logs/{id}`; what was identified from "
+        "them stays."
+    )
 
     limit: Annotated[int, Unit("byte")]
     """Largest total size of the logs, compressed."""
 
     def __str__(self) -> str:
-        return f"The stored logs would exceed {self.limit} bytes, compressed: delete some that are not needed."
+        return (
+            f"The stored logs would exceed {self.limit} bytes, compressed: delete some that "
+            "are not needed."
+        )
 
 
 class UnknownIdentification(ServiceError):
-    """No identification has this id. It never existed, or it was deleted: an identification is a job, which is kept as
-    long as `JOULEPATH_ANSWERS_MAX_AGE` says."""
+    """No identification has this id. It never existed, or it was deleted: an identification is a
+    job, which is kept as long as `JOULEPATH_ANSWERS_MAX_AGE` says."""
 
     status = 404
     title = "Unknown identification"
     remedy = "Send it again with `POST /identifications`."
-    detail = "No identification has this id: it may be older than the service keeps jobs. Send it again."
+    detail = (
+        "No identification has this id: it may be older than the service keeps jobs. Send it again."
+    )
 
 
 @dataclass(eq=False)
@@ -199,7 +228,9 @@ class UnknownFigures(ServiceError):
 
     status = 404
     title = "Unknown figures"
-    remedy = "Use figures that `GET /figures` lists, or send their document again with `PUT /figures`."
+    remedy = (
+        "Use figures that `GET /figures` lists, or send their document again with `PUT /figures`."
+    )
     detail = "No figures have this id: GET /figures lists all figures."
 
     id: Annotated[str, Internal] = ""
@@ -225,9 +256,12 @@ class TooManyFigures(ServiceError):
 
 
 class KeyReused(ServiceError):
-    """This `Idempotency-Key` was already used for a different request. A key belongs to one request and its
-    repetitions."""
+    """This `Idempotency-Key` was already used for a different request. A key belongs to one request
+    and its repetitions."""
 
     title = "Idempotency-Key reused"
     remedy = "Use a new key for each new request."
-    detail = "This Idempotency-Key was already used for a different request: use a new key for each new request."
+    detail = (
+        "This Idempotency-Key was already used for a different request: use a new key for "
+        "each new request."
+    )

@@ -39,23 +39,30 @@ class BodyTooLarge(ServiceError):
 
 @dataclass(eq=False)
 class HeadTooLarge(ServiceError):
-    """The request's line and headers exceed `JOULEPATH_MAX_HEAD_BYTES`. The connection is closed."""
+    """The request's line and headers exceed `JOULEPATH_MAX_HEAD_BYTES`. The connection is
+    closed."""
 
     status = 431
     title = "Request head too large"
-    remedy = "Requests to this service need few headers: leave out cookies and headers that it does not use."
+    remedy = (
+        "Requests to this service need few headers: leave out cookies and headers that it "
+        "does not use."
+    )
 
     limit: Annotated[int, Unit("byte"), Internal]
     """Largest size of the line and the headers."""
 
     def __str__(self) -> str:
-        return f"The line and the headers of the request have more than {self.limit} bytes: send shorter ones."
+        return (
+            f"The line and the headers of the request have more than {self.limit} bytes: send "
+            "shorter ones."
+        )
 
 
 @dataclass(eq=False)
 class RequestTimeout(ServiceError):
-    """The request did not arrive in time: its line and headers within `JOULEPATH_HEAD_TIMEOUT`, its body within
-    `JOULEPATH_BODY_TIMEOUT`."""
+    """The request did not arrive in time: its line and headers within `JOULEPATH_HEAD_TIMEOUT`, its
+    body within `JOULEPATH_BODY_TIMEOUT`."""
 
     status = 408
     title = "Request not received in time"
@@ -66,7 +73,8 @@ class RequestTimeout(ServiceError):
 
     def __str__(self) -> str:
         return (
-            f"The request did not arrive whole within {self.limit:g} s: send it again, over a faster connection or "
+            f"The request did not arrive whole within {self.limit:g} s: send it again, over a "
+            "faster connection or "
             "with a smaller body."
         )
 
@@ -77,44 +85,59 @@ class UnsupportedMediaType(ServiceError):
     status = 415
     title = "Unsupported media type"
     remedy = (
-        "JSON is `application/json`; the CSV of `POST /evaluate` and `POST /logs` is `text/csv`. `text/plain`, a form, "
-        "and no header at all are read as JSON, too, where a path takes JSON. The body is the document itself: "
+        "JSON is `application/json`; the CSV of `POST /evaluate` and `POST /logs` is `text/csv`. "
+        "`text/plain`, a form, "
+        "and no header at all are read as JSON, too, where a path takes JSON. The body is the "
+        "document itself: "
         "`curl --data-binary @file`, not `curl -F file=@file`."
     )
     detail = (
-        "The header Content-Type declares something else than this path takes: send JSON as application/json, and to "
-        "POST /evaluate also CSV as text/csv, to POST /logs CSV only. The body is the document itself, not a form with "
+        "The header Content-Type declares something else than this path takes: send JSON as "
+        "application/json, and to "
+        "POST /evaluate also CSV as text/csv, to POST /logs CSV only. The body is the document "
+        "itself, not a form with "
         "a file."
     )
 
 
 class UnsupportedCoding(ServiceError):
-    """The header `Content-Encoding` names a coding that the service cannot unpack, or several at once."""
+    """The header `Content-Encoding` names a coding that the service cannot unpack, or several at
+    once.
+    """
 
     status = 415
     title = "Unsupported content coding"
-    remedy = "Pack the body with `gzip`, `deflate` or `zstd`, or send it as it is, without this header."
-    detail = "The header Content-Encoding names something else than gzip, deflate or zstd: use one of them, or none."
+    remedy = (
+        "Pack the body with `gzip`, `deflate` or `zstd`, or send it as it is, without this header."
+    )
+    detail = (
+        "The header Content-Encoding names something else than gzip, deflate or zstd: use "
+        "one of them, or none."
+    )
 
 
 class MalformedHttp(ServiceError):
-    """What arrived at the port is no HTTP/1.1 request, or contradicts itself: a TLS handshake, a request line or header
-    with other characters, two lengths of the body, or a chunk without a length. The service closes the connection."""
+    """What arrived at the port is no HTTP/1.1 request, or contradicts itself: a TLS handshake, a
+    request line or header with other characters, two lengths of the body, or a chunk without a
+    length. The service closes the connection."""
 
     status = 400
     title = "Malformed HTTP"
     remedy = "Speak HTTP to this port, or HTTPS to the proxy before it."
     detail = (
-        "What arrived is no HTTP/1.1 request: check the address and that the client speaks HTTP, not HTTPS, to this "
+        "What arrived is no HTTP/1.1 request: check the address and that the client speaks HTTP, "
+        "not HTTPS, to this "
         "port, and the request line, the headers and the chunks of the body."
     )
 
 
 class NotAcceptable(ServiceError):
-    """The header `Accept-Encoding` allows no coding in which the service could answer: it has `zstd`, `gzip` and
-    `identity`, which is no coding. Nothing was computed."""
+    """The header `Accept-Encoding` allows no coding in which the service could answer: it has
+    `zstd`, `gzip` and `identity`, which is no coding. Nothing was computed."""
 
     status = 406
     title = "No acceptable coding"
     remedy = "Allow one of them, or leave the header out."
-    detail = "The header Accept-Encoding excludes all of zstd, gzip and identity: allow one of them."
+    detail = (
+        "The header Accept-Encoding excludes all of zstd, gzip and identity: allow one of them."
+    )

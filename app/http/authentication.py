@@ -38,4 +38,6 @@ def authenticate(request: Request, keys: KeyRing) -> None:
 
 def challenge(error: Unauthenticated) -> str:
     """The header WWW-Authenticate of a refusal (RFC 6750)."""
-    return f'{SCHEME} realm="{REALM}"' + (', error="invalid_token"' if isinstance(error, WrongKey) else "")
+    return f'{SCHEME} realm="{REALM}"' + (
+        ', error="invalid_token"' if isinstance(error, WrongKey) else ""
+    )

@@ -22,7 +22,10 @@ from joulepath.app.exceptions.transport import BodyTooLarge, RequestTimeout, Uns
 from joulepath.app.http.bytes_in_flight import Held
 from joulepath.app.settings import Settings
 
-_DAMAGED = "The body is not complete or not what its `Content-Encoding` says: send it again, or leave the header out"
+_DAMAGED = (
+    "The body is not complete or not what its `Content-Encoding` says: send it again, or "
+    "leave the header out"
+)
 
 
 @dataclass(frozen=True)
@@ -48,7 +51,9 @@ class Bodies:
 
     def drain(self) -> None:
         """Refuses bodies that are still being sent."""
-        for limit in [each for each in self.reading if not each.expired()]:  # one that has just run out ends by itself
+        for limit in [
+            each for each in self.reading if not each.expired()
+        ]:  # one that has just run out ends by itself
             limit.reschedule(0)
 
     def most(self, path: str) -> int:
@@ -59,7 +64,10 @@ class Bodies:
             "/jobs": settings.max_job_bytes,
             "/studies/[^/]+/iterations|/whatif": settings.max_iteration_bytes,
         }
-        return next((most for paths, most in uploads.items() if re.fullmatch(paths, path)), settings.max_body_bytes)
+        return next(
+            (most for paths, most in uploads.items() if re.fullmatch(paths, path)),
+            settings.max_body_bytes,
+        )
 
     def stream(self, coding: str) -> Any:
         """What unpacks one member of a body, with the interface of `zlib.decompressobj`. Raises
@@ -86,7 +94,11 @@ class Body:
         self._declared = int(declared) if declared.isdecimal() else 0
         coding = ",".join(request.headers.getlist("content-encoding")).strip().lower()
         parts = self._arriving()
-        self._parts = parts if coding in ("", "identity") else self._unpacked(parts, partial(bodies.stream, coding))
+        self._parts = (
+            parts
+            if coding in ("", "identity")
+            else self._unpacked(parts, partial(bodies.stream, coding))
+        )
         self._is_whole = False
 
     async def receive(self) -> Message:
@@ -132,7 +144,9 @@ class Body:
             yield message.get("body", b"")
             more = message.get("more_body", False)
 
-    async def _unpacked(self, parts: AsyncIterator[bytes], begin: Callable[[], Any]) -> AsyncIterator[bytes]:
+    async def _unpacked(
+        self, parts: AsyncIterator[bytes], begin: Callable[[], Any]
+    ) -> AsyncIterator[bytes]:
         """The unpacked body. Several members may follow one another."""
         stream, piece, size = begin(), bytearray(), 0
         async for part in parts:

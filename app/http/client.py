@@ -24,11 +24,13 @@ def client_of(request: HTTPConnection) -> Client:
     return client
 
 
-def sender(scope: Scope, proxies: Sequence[IPv4Network | IPv6Network], header: ProxyHeader) -> Client:
+def sender(
+    scope: Scope, proxies: Sequence[IPv4Network | IPv6Network], header: ProxyHeader
+) -> Client:
     """The client of a request by its address, without its key.
 
-    Each proxy appends the address that it was called from. From the right, the first address that is no trusted proxy
-    is the client's: everything to the left of it is the client's own word.
+    Each proxy appends the address that it was called from. From the right, the first address that
+    is no trusted proxy is the client's: everything to the left of it is the client's own word.
     """
     peer = scope["client"][0] if scope.get("client") else _NOBODY
     address = _address(peer)
@@ -55,7 +57,9 @@ def _reported(lines: Sequence[str], header: ProxyHeader) -> Iterator[str]:
 
 
 def _address(text: str) -> Address | None:
-    """The address in `192.0.2.1`, `192.0.2.1:80`, `2001:db8::1`, `[2001:db8::1]:80`, quoted or not; else None."""
+    """The address in `192.0.2.1`, `192.0.2.1:80`, `2001:db8::1`, `[2001:db8::1]:80`, quoted or not;
+    else None.
+    """
     text = text.strip().strip('"')
     if text.startswith("["):
         text = text[1:].partition("]")[0]

@@ -52,7 +52,9 @@ class Compression:
 
         Raises NotAcceptable if the header allows no coding that is offered.
         """
-        given = {{"x-gzip": "gzip"}.get(name, name): weight for name, weight in weights(header).items()}
+        given = {
+            {"x-gzip": "gzip"}.get(name, name): weight for name, weight in weights(header).items()
+        }
         anything = given.get("*")
         # no coding is allowed unless it is excluded, and the least wanted unless it is named
         plain = given.get("identity", 0.0 if anything == 0 else None)
@@ -69,7 +71,10 @@ class Compression:
         headers that fit it.
         """
         headers = MutableHeaders(scope=start)
-        if not headers.get("content-type", "").startswith(self.kinds) or "content-encoding" in headers:
+        if (
+            not headers.get("content-type", "").startswith(self.kinds)
+            or "content-encoding" in headers
+        ):
             return first
         headers.add_vary_header("Accept-Encoding")
         body: bytes = first.get("body", b"")

@@ -57,10 +57,15 @@ class Connections:
         """The error for one connection too many; None within the ceilings."""
         if len(self.open) > self.settings.max_connections:
             return TooManyConnections()
-        if sum(each.peer == connection.peer for each in self.open) <= self.settings.client_connections:
+        if (
+            sum(each.peer == connection.peer for each in self.open)
+            <= self.settings.client_connections
+        ):
             return None
         address = address_of(connection.client.address)
-        is_proxy = address is not None and any(address in network for network in self.settings.trusted_proxies)
+        is_proxy = address is not None and any(
+            address in network for network in self.settings.trusted_proxies
+        )
         return None if is_proxy else TooManyConnectionsOfClient()
 
     def reset(self) -> None:
@@ -76,7 +81,8 @@ class Connection(asyncio.Protocol):
 
     Args:
         connections: all connections of the service.
-        app_state: state of the application, as uvicorn gives it to its protocols. The state of every request is a copy
+        app_state: state of the application, as uvicorn gives it to its protocols. The state of
+            every request is a copy
             of it, with the connection added.
         given: further arguments for uvicorn's protocol.
     """
@@ -87,7 +93,9 @@ class Connection(asyncio.Protocol):
         self.is_refused = False
         self._in_hand = self._discarded = 0
         self._loop = asyncio.get_running_loop()
-        self._until = self._read_until = self._loop.call_later(self._settings.head_timeout, self._miss_head)
+        self._until = self._read_until = self._loop.call_later(
+            self._settings.head_timeout, self._miss_head
+        )
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Refuses the connection above a ceiling."""
@@ -98,7 +106,8 @@ class Connection(asyncio.Protocol):
         self.inner.connection_made(cast(asyncio.Transport, _Wire(self)))
         if refusal := self._connections.refusal(self):
             self.refuse(refusal)
-        # Refused connections count as well. Above twice the limit, connections are reset without a response.
+        # Refused connections count as well. Above twice the limit, connections are reset without a
+        # response.
         if len(self._connections.open) > 2 * self._settings.max_connections:
             self.reset()
 
@@ -139,7 +148,8 @@ class Connection(asyncio.Protocol):
     def __exit__(self, *_: object) -> None:
         self._in_hand -= 1
         if not self._in_hand:
-            # uvicorn closes an idle connection earlier, but keeps one on which part of a head has arrived.
+            # uvicorn closes an idle connection earlier, but keeps one on which part of a head has
+            # arrived.
             self._end_after(max(self._settings.head_timeout, self._settings.write_timeout))
 
     def refuse(self, error: ServiceError) -> None:
@@ -165,7 +175,9 @@ class Connection(asyncio.Protocol):
     def reset(self) -> None:
         """Ends the connection at once. The kernel, too, throws away what was not read."""
         with contextlib.suppress(OSError):  # it has just ended by itself
-            self.transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
+            self.transport.get_extra_info("socket").setsockopt(
+                socket.SOL_SOCKET, socket.SO_LINGER, _RESET
+            )
         self.transport.abort()
 
     def _end_after(self, time: float) -> None:

@@ -14,7 +14,8 @@ T = TypeVar("T")
 
 
 async def unless_disconnected(request: Request, work: Coroutine[Any, Any, T]) -> T:
-    """The work's result. If the client closes the connection, cancels the work and raises ClientDisconnected.
+    """The work's result. If the client closes the connection, cancels the work and raises
+    ClientDisconnected.
 
     The body of the request must have been read.
     """
@@ -31,7 +32,8 @@ async def unless_disconnected(request: Request, work: Coroutine[Any, Any, T]) ->
 
 
 async def _disconnected(request: Request) -> None:
-    """Returns when the client closes the connection. The body of the request must have been read."""
+    """Returns when the client closes the connection. The body of the request must have been
+    read."""
     # the body has been read: the next message is the end of the connection
     while (await request.receive())["type"] != "http.disconnect":
         pass

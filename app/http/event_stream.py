@@ -1,4 +1,6 @@
-"""Answers one request by server-sent events: what its work tells while it runs, and at the end what it answers."""
+"""Answers one request by server-sent events: what its work tells while it runs, and at the end what
+it answers.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,10 @@ from joulepath.optimizer.progress import Event, Tell, forward
 logger = logging.getLogger(__name__)
 
 EVENT_STREAM = "text/event-stream"
-EVENT_SCHEMA = {"type": "object", "properties": {name: {"type": "string"} for name in ("id", "event", "data")}}
+EVENT_SCHEMA = {
+    "type": "object",
+    "properties": {name: {"type": "string"} for name in ("id", "event", "data")},
+}
 """One event, in the OpenAPI document."""
 Work = Callable[[Tell], Coroutine[Any, Any, TaskResult]]
 _PAUSE = 15.0
@@ -35,10 +40,11 @@ _COMMENT = b": working\n\n"
 
 
 class EventStream(StreamingResponse):
-    """The events of `work`, which gets whom to tell, then `answer` with its result or `problem` with its error.
+    """The events of `work`, which gets whom to tell, then `answer` with its result or `problem`
+    with its error.
 
-    The stream begins with the first event. Work that fails before raises here, so that its problem is answered as to
-    any request. If the client closes the connection, the work is cancelled.
+    The stream begins with the first event. Work that fails before raises here, so that its problem
+    is answered as to any request. If the client closes the connection, the work is cancelled.
     """
 
     def __init__(self, request: Request, work: Work) -> None:
@@ -47,7 +53,9 @@ class EventStream(StreamingResponse):
         self._begun = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Sends the events. Raises ClientDisconnected, and what the work raises before the first event."""
+        """Sends the events. Raises ClientDisconnected, and what the work raises before the first
+        event.
+        """
         await unless_disconnected(self._request, self._answer(send))
 
     async def _answer(self, send: Send) -> None:
@@ -98,7 +106,13 @@ class EventStream(StreamingResponse):
     async def _send(self, send: Send, name: str, document: bytes) -> None:
         if not self._begun:
             self._begun = True
-            await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
+            await send(
+                {
+                    "type": "http.response.start",
+                    "status": self.status_code,
+                    "headers": self.raw_headers,
+                }
+            )
         await send(_body(b"event: %s\ndata: %s\n\n" % (name.encode(), document)))
 
 

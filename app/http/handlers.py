@@ -20,7 +20,9 @@ PROBLEM_MEDIA_TYPE = "application/problem+json"
 
 
 def install_handlers(app: FastAPI) -> None:
-    """Answers every exception of the routes with a problem. `RequestContext` handles those that no route expects."""
+    """Answers every exception of the routes with a problem. `RequestContext` handles those that no
+    route expects.
+    """
     for kind in (DeclaredError, RequestValidationError, HTTPException):
         app.add_exception_handler(kind, problem_response)
 
@@ -52,18 +54,25 @@ def result_response(result: TaskResult) -> Response:
 
 
 def _is_not_json(request: Request, error: RequestValidationError) -> bool:
-    """Whether the body was not read because it is declared as something else. FastAPI then validates its bytes."""
+    """Whether the body was not read because it is declared as something else. FastAPI then
+    validates its bytes.
+    """
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     is_json = kind.startswith("application/") and kind.endswith(("/json", "+json"))
     return not is_json and kind != "" and any(each["loc"] == ("body",) for each in error.errors())
 
 
 def _allowed(request: Request) -> list[str]:
-    """Every method that the path accepts. Starlette's own list is that of the first route with this path only."""
+    """Every method that the path accepts. Starlette's own list is that of the first route with this
+    path only.
+    """
     return [
         method
         for method in ("GET", "POST", "PUT", "PATCH", "DELETE")
-        if any(route.matches({**request.scope, "method": method})[0] is Match.FULL for route in request.app.routes)
+        if any(
+            route.matches({**request.scope, "method": method})[0] is Match.FULL
+            for route in request.app.routes
+        )
     ]
 
 

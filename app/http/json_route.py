@@ -1,4 +1,5 @@
-"""Routes whose JSON bodies are read strictly: no name twice, and errors that say line and column."""
+"""Routes whose JSON bodies are read strictly: no name twice, and errors that say line and
+column."""
 
 from __future__ import annotations
 

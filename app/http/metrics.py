@@ -1,4 +1,6 @@
-"""Measurements in the formats of Prometheus. Every label has few values: no path, key or address is one."""
+"""Measurements in the formats of Prometheus. Every label has few values: no path, key or address is
+one.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,10 @@ class Metrics:
     def __init__(self) -> None:
         self._registry = CollectorRegistry()
         self._requests = Counter(
-            "joulepath_http_requests", "Requests answered.", ["method", "route", "status"], registry=self._registry
+            "joulepath_http_requests",
+            "Requests answered.",
+            ["method", "route", "status"],
+            registry=self._registry,
         )
         self._durations = Histogram(
             "joulepath_http_request_duration_seconds",
@@ -35,11 +40,16 @@ class Metrics:
             registry=self._registry,
         )
         self._problems = Counter(
-            "joulepath_problems", "Requests answered with a problem, by its type.", ["problem"], registry=self._registry
+            "joulepath_problems",
+            "Requests answered with a problem, by its type.",
+            ["problem"],
+            registry=self._registry,
         )
         ProcessCollector(registry=self._registry)
 
-    def observe(self, method: str, route: str | None, status: int, problem: str | None, duration: float) -> None:
+    def observe(
+        self, method: str, route: str | None, status: int, problem: str | None, duration: float
+    ) -> None:
         """Counts an answered request: `route` is the template of its path, `duration` in s."""
         method = method if method in _METHODS else _OTHER
         route = route or _NO_ROUTE
@@ -70,8 +80,14 @@ class _Now(Collector):
         queue = self._engine.queue
         gauges = {
             "joulepath_queue_length": ("Requests that wait for a worker.", len(queue.waiting)),
-            "joulepath_queue_oldest_seconds": ("Time for which the oldest of them has waited.", queue.oldest),
-            "joulepath_workers_warm": ("Workers that run a request or could run one.", self._engine.warm_workers),
+            "joulepath_queue_oldest_seconds": (
+                "Time for which the oldest of them has waited.",
+                queue.oldest,
+            ),
+            "joulepath_workers_warm": (
+                "Workers that run a request or could run one.",
+                self._engine.warm_workers,
+            ),
             "joulepath_workers_busy": ("Workers that run a request.", queue.busy),
             "joulepath_ready": ("Whether /readyz says ready.", self._engine.ready),
             "joulepath_store_up": ("Whether the database answers.", self._store_up),

@@ -1,4 +1,6 @@
-"""Additions to FastAPI's OpenAPI document: problems, API keys, and the longest deadline of the settings."""
+"""Additions to FastAPI's OpenAPI document: problems, API keys, and the longest deadline of the
+settings.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,13 @@ _REF = "#/components/schemas/{model}"
 def problem_responses(*problems: type[DeclaredError]) -> dict[int | str, dict[str, Any]]:
     """The `responses` of a route for its problems. Those of every request are always among them."""
     by_status: defaultdict[int | str, list[type[DeclaredError]]] = defaultdict(list)
-    every: tuple[type[DeclaredError], ...] = (*problems, HeadTooLarge, Busy, TooManyRequests, InternalError)
+    every: tuple[type[DeclaredError], ...] = (
+        *problems,
+        HeadTooLarge,
+        Busy,
+        TooManyRequests,
+        InternalError,
+    )
     for problem in dict.fromkeys(every):
         by_status[problem.status].append(problem)
     return {status: _response(same) for status, same in by_status.items()}
@@ -66,7 +74,10 @@ def _response(same_status: list[type[DeclaredError]]) -> dict[str, Any]:
         }
     if Unauthenticated in same_status:
         response["headers"] = {
-            "WWW-Authenticate": {"description": "The scheme of the key (RFC 6750).", "schema": {"type": "string"}}
+            "WWW-Authenticate": {
+                "description": "The scheme of the key (RFC 6750).",
+                "schema": {"type": "string"},
+            }
         }
     return response
 
@@ -97,16 +108,23 @@ def _document(app: FastAPI, settings: Settings, with_keys: bool) -> dict[str, An
     _, others = models_json_schema(
         [(model_of_problem(kind), "serialization") for kind in types_of_error()]
         # the routes read these bodies themselves, so that FastAPI does not know their schemas
-        + [(model, "validation") for model in (EvaluateRequest, EvaluateCsvSettings, LogSettings, NewJob)],
+        + [
+            (model, "validation")
+            for model in (EvaluateRequest, EvaluateCsvSettings, LogSettings, NewJob)
+        ],
         ref_template=_REF,
     )
     schemas.update(others["$defs"])
     for kind in types_of_error():
-        schemas[kind.__name__]["examples"] = [orjson.loads(json_document(problem_of(example_of(kind), REQUEST_ID)))]
+        schemas[kind.__name__]["examples"] = [
+            orjson.loads(json_document(problem_of(example_of(kind), REQUEST_ID)))
+        ]
     # FastAPI's own error model: no route answers with it
     for name in ("HTTPValidationError", "ValidationError"):
         schemas.pop(name, None)
-    for operation in (operation for path in document["paths"].values() for operation in path.values()):
+    for operation in (
+        operation for path in document["paths"].values() for operation in path.values()
+    ):
         if "HTTPValidationError" in str(operation["responses"].get("422", "")):
             del operation["responses"]["422"]
     # put in here, because FastAPI leaves out what is null in the examples of a route
@@ -131,7 +149,11 @@ def _document(app: FastAPI, settings: Settings, with_keys: bool) -> dict[str, An
 def _add_access(document: dict[str, Any], with_keys: bool) -> None:
     """What gates answer before a route does, and the API keys."""
     if with_keys:
-        scheme = {"type": "http", "scheme": SCHEME.lower(), "description": "An API key, see `joulepath keys add`."}
+        scheme = {
+            "type": "http",
+            "scheme": SCHEME.lower(),
+            "description": "An API key, see `joulepath keys add`.",
+        }
         document["components"]["securitySchemes"] = {_SECURITY: scheme}
     for path, operations in document["paths"].items():
         for method, operation in operations.items():
@@ -159,16 +181,25 @@ def _add_problem(responses: dict[str, Any], problem: type[DeclaredError]) -> Non
 
 def _deadlines(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """The number schema of every `deadline` that a request may have, in bodies and queries."""
-    fields = [schema.get("properties", {}).get("deadline") for schema in document["components"]["schemas"].values()]
+    fields = [
+        schema.get("properties", {}).get("deadline")
+        for schema in document["components"]["schemas"].values()
+    ]
     for path in document["paths"].values():
         for operation in path.values():
             parameters = operation.get("parameters", ())
-            fields += [_schema_of(parameter) for parameter in parameters if parameter["name"] == "deadline"]
+            fields += [
+                _schema_of(parameter) for parameter in parameters if parameter["name"] == "deadline"
+            ]
     for field in filter(None, fields):
-        yield from (option for option in field.get("anyOf", [field]) if option.get("type") == "number")
+        yield from (
+            option for option in field.get("anyOf", [field]) if option.get("type") == "number"
+        )
 
 
 def _schema_of(parameter: dict[str, Any]) -> dict[str, Any]:
     """The schema of a parameter, given as text or as JSON."""
-    schema: dict[str, Any] = parameter.get("schema") or parameter["content"]["application/json"]["schema"]
+    schema: dict[str, Any] = (
+        parameter.get("schema") or parameter["content"]["application/json"]["schema"]
+    )
     return schema

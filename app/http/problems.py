@@ -1,4 +1,6 @@
-"""Problem details (RFC 9457): documents and schemas, made from what the classes of the errors declare."""
+"""Problem details (RFC 9457): documents and schemas, made from what the classes of the errors
+declare.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ from joulepath.optimizer.search import errors as search
 
 PREFIX = "/problems/"
 MOST_ERRORS = 20
-"""Errors that an `invalid-request` problem lists at most: a body can have thousands, and the first ones suffice."""
+"""Errors that an `invalid-request` problem lists at most: a body can have thousands, and the first
+ones suffice.
+"""
 
 _MODULES = (
     *(base, library, search, sequence, given_motions, exports, logs, identification, excitation),
@@ -39,8 +43,12 @@ _MODULES = (
 @cache
 def types_of_error() -> tuple[type[DeclaredError], ...]:
     """Every type of error that the service answers with."""
-    classes = (each for module in _MODULES for each in vars(module).values() if isinstance(each, type))
-    declared = (each for each in classes if issubclass(each, DeclaredError) and "title" in vars(each))
+    classes = (
+        each for module in _MODULES for each in vars(module).values() if isinstance(each, type)
+    )
+    declared = (
+        each for each in classes if issubclass(each, DeclaredError) and "title" in vars(each)
+    )
     # a module has the classes that it imports, too
     return tuple(dict.fromkeys(declared))
 
@@ -79,7 +87,10 @@ def model_of_problem(kind: type[DeclaredError]) -> type[ProblemDetails]:
     """The pydantic model of the documents of a type of error."""
     fixed = {"type": path_of(kind), "title": kind.title, "status": kind.status}
     fields: dict[str, Any] = {
-        name: (Literal[value], Field(default=value, description=ProblemDetails.model_fields[name].description))
+        name: (
+            Literal[value],
+            Field(default=value, description=ProblemDetails.model_fields[name].description),
+        )
         for name, value in fixed.items()
     }
     fields |= {name: (field.annotation, field) for name, field in _model(kind).model_fields.items()}
@@ -87,7 +98,8 @@ def model_of_problem(kind: type[DeclaredError]) -> type[ProblemDetails]:
 
 
 def own_fields(kind: type[DeclaredError]) -> dict[str, str]:
-    """The fields that the documents of a type have beside those of every type, with their meaning."""
+    """The fields that the documents of a type have beside those of every type, with their
+    meaning."""
     fields = model_of_problem(kind).model_fields
     return {name: fields[name].description or "" for name in _names(kind)}
 

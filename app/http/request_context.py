@@ -47,7 +47,9 @@ class RequestContext:
 
     def __init__(self, app: ASGIApp, settings: Settings, metrics: Metrics) -> None:
         self._app, self._metrics = app, metrics
-        self._sender = partial(sender, proxies=settings.trusted_proxies, header=settings.proxy_header)
+        self._sender = partial(
+            sender, proxies=settings.trusted_proxies, header=settings.proxy_header
+        )
         self._most = settings.max_head_bytes
         self._checks = (
             self._check_head,
@@ -79,7 +81,9 @@ class RequestContext:
                 if not isinstance(error, ServiceError):
                     logger.exception("unforeseen error", extra={"request_id": state["id"]})
                 if exchange.status:
-                    raise  # the server closes the connection, so that the client sees that the response is incomplete
+                    # the server closes the connection, so that the client sees that the response is
+                    # incomplete
+                    raise
                 response = await problem_response(Request(exchange.scope), error)
                 await response(exchange.scope, receive, exchange.send)
             finally:
@@ -89,8 +93,13 @@ class RequestContext:
         """Raises HeadTooLarge for a head that arrived at once: the server bounds those that it
         waits for.
         """
-        headers = sum(len(name) + len(value) + len(b": \r\n") for name, value in request.scope["headers"])
-        if headers + len(request.scope.get("raw_path", b"")) + len(request.scope["query_string"]) > self._most:
+        headers = sum(
+            len(name) + len(value) + len(b": \r\n") for name, value in request.scope["headers"]
+        )
+        if (
+            headers + len(request.scope.get("raw_path", b"")) + len(request.scope["query_string"])
+            > self._most
+        ):
             raise HeadTooLarge(self._most)
 
     def _note(self, exchange: _Exchange) -> None:
@@ -100,7 +109,12 @@ class RequestContext:
         duration, problem = time.perf_counter() - exchange.began, state.get("problem")
         route = getattr(scope.get("route"), "path", None)
         self._metrics.observe(exchange.asked["method"], route, status, problem, duration)
-        told = {"client": state["client"].address, "key": state["client"].key, "status": status, "problem": problem}
+        told = {
+            "client": state["client"].address,
+            "key": state["client"].key,
+            "status": status,
+            "problem": problem,
+        }
         # probes come every few seconds
         level = logging.DEBUG if scope["path"] in (*PROBES, METRICS) else logging.INFO
         logger.log(level, "request", extra=exchange.asked | told | {"duration": round(duration, 6)})

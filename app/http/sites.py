@@ -22,8 +22,9 @@ PROBES = ("/healthz", "/readyz")
 def known_host(names: Collection[str], own: str) -> Callable[[Request], None]:
     """A check of the header Host, which raises WrongHost. `own`: what the service listens on.
 
-    A web page can give its own name the address of this service; the browser then takes the service for the page's own
-    (DNS rebinding). The header keeps the page's name. An address has no name to be given, so that any is allowed.
+    A web page can give its own name the address of this service; the browser then takes the service
+    for the page's own (DNS rebinding). The header keeps the page's name. An address has no name to
+    be given, so that any is allowed.
     """
     known = {*names, own.lower(), "localhost", socket.gethostname().lower()}
 
@@ -43,19 +44,29 @@ def known_host(names: Collection[str], own: str) -> Callable[[Request], None]:
 def same_site(origins: Collection[str]) -> Callable[[Request], None]:
     """A check of Sec-Fetch-Site and Origin, which raises CrossSite; pages of `origins` pass.
 
-    Browsers set both, and pages cannot change them. What is not sent by a browser has neither, and passes.
-    Requests that only read pass, too: a page of another site cannot see the answer.
+    Browsers set both, and pages cannot change them. What is not sent by a browser has neither, and
+    passes. Requests that only read pass, too: a page of another site cannot see the answer.
     """
 
     def check(request: Request) -> None:
         origin = request.headers.get("origin")
-        preflight = request.method == "OPTIONS" and "access-control-request-method" in request.headers
+        preflight = (
+            request.method == "OPTIONS" and "access-control-request-method" in request.headers
+        )
         changes = needed_role(request.method, request.scope["path"]) not in (None, "read")
-        if not (changes or preflight) or EVERYONE in origins or (origin is not None and origin.lower() in origins):
+        if (
+            not (changes or preflight)
+            or EVERYONE in origins
+            or (origin is not None and origin.lower() in origins)
+        ):
             return
         site = request.headers.get("sec-fetch-site")
         # without a secure connection, browsers send Origin only
-        own = site in ("same-origin", "none") if site is not None else origin is None or _is_own(origin, request)
+        own = (
+            site in ("same-origin", "none")
+            if site is not None
+            else origin is None or _is_own(origin, request)
+        )
         if not own:
             raise CrossSite
 
@@ -63,7 +74,9 @@ def same_site(origins: Collection[str]) -> Callable[[Request], None]:
 
 
 def _is_own(origin: str, request: Request) -> bool:
-    """Whether an origin is this service, under the name and port that the request came for. A proxy may add TLS."""
+    """Whether an origin is this service, under the name and port that the request came for. A proxy
+    may add TLS.
+    """
     try:
         return urlsplit(origin).netloc.lower() == request.headers.get("host", "").lower() != ""
     except ValueError:

@@ -28,7 +28,9 @@ class Transfers:
         self._app, self._bodies, self._keys = app, bodies, keys
         self._compression = Compression()
         settings = bodies.settings
-        self._in_flight = BytesInFlight(settings.max_bytes_in_flight, settings.client_bytes_in_flight)
+        self._in_flight = BytesInFlight(
+            settings.max_bytes_in_flight, settings.client_bytes_in_flight
+        )
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Passes the request on."""
@@ -39,12 +41,17 @@ class Transfers:
         try:
             if self._keys is not None:
                 authenticate(request, self._keys)
-            coding = self._compression.preferred(",".join(request.headers.getlist("accept-encoding")))
+            coding = self._compression.preferred(
+                ",".join(request.headers.getlist("accept-encoding"))
+            )
         except ServiceError as error:
             await (await problem_response(request, error))(scope, receive, send)
             return
         client = client_of(request).name
-        with Held(self._in_flight, client) as body_held, Held(self._in_flight, client) as answer_held:
+        with (
+            Held(self._in_flight, client) as body_held,
+            Held(self._in_flight, client) as answer_held,
+        ):
             body = Body(self._bodies, request, receive, body_held)
             answer = _Answer(request, receive, send, answer_held, self._compression, coding)
             await self._app(scope, body.receive, answer.send)
@@ -63,7 +70,13 @@ class _Answer:
     """
 
     def __init__(
-        self, request: Request, receive: Receive, send: Send, held: Held, compression: Compression, coding: Coding
+        self,
+        request: Request,
+        receive: Receive,
+        send: Send,
+        held: Held,
+        compression: Compression,
+        coding: Coding,
     ) -> None:
         self._request, self._receive, self._send, self._held = request, receive, send, held
         self._compression, self._coding = compression, coding
@@ -94,6 +107,8 @@ class _Answer:
         if self._is_by_events:
             self._held.hold(len(body))
         while len(body) > self.piece:
-            await self._send({"type": "http.response.body", "body": body[: self.piece], "more_body": True})
+            await self._send(
+                {"type": "http.response.body", "body": body[: self.piece], "more_body": True}
+            )
             body = body[self.piece :]
         await self._send({**message, "body": body})

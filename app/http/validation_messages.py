@@ -1,7 +1,7 @@
 """What a client is told of an error of pydantic: where it is, and what to do.
 
-A location keeps only names that the contract knows, or that are plain; pydantic's `input` is left out. Both may repeat
-what the client sent.
+A location keeps only names that the contract knows, or that are plain; pydantic's `input` is left
+out. Both may repeat what the client sent.
 """
 
 from __future__ import annotations
@@ -48,7 +48,9 @@ def told(error: Mapping[str, Any], where: tuple[str, ...]) -> Iterator[FieldErro
     """What is told of one error of pydantic: one entry, or one for each unknown field."""
     loc: list[str | int] = [*where]
     for part in error["loc"]:
-        keyed = bool(loc) and loc[-1] in _keyed_fields() and PLAIN_NAME.fullmatch(str(part)) is not None
+        keyed = (
+            bool(loc) and loc[-1] in _keyed_fields() and PLAIN_NAME.fullmatch(str(part)) is not None
+        )
         # the names of parameters are the service's own
         parameter = loc[:1] in (["path"], ["query"], ["header"]) and error["type"] != UNKNOWN_FIELD
         if isinstance(part, int) or keyed or parameter or part in _field_names():
@@ -63,7 +65,10 @@ def told(error: Mapping[str, Any], where: tuple[str, ...]) -> Iterator[FieldErro
         # a name of any other form may be anything, also something secret: it is not repeated
         plain = PLAIN_NAME.fullmatch(name) is not None
         hint = f"did you mean `{meant}`?" if meant else "leave it out."
-        msg = f"Unknown field{f' `{name}`' if plain else ''}: {hint} Known here: {', '.join(context['known'])}"
+        msg = (
+            f"Unknown field{f' `{name}`' if plain else ''}: {hint} Known here: "
+            f"{', '.join(context['known'])}"
+        )
         yield {"loc": [*loc, name] if plain else loc, "msg": msg}
 
 
@@ -80,11 +85,18 @@ def _message(error: Mapping[str, Any]) -> str:
 @cache
 def _keyed_fields() -> set[str]:
     """Fields whose value is an object with names of the caller's."""
-    return {name for model in _models(RequestModel) for name, field in model.model_fields.items() if _is_keyed(field)}
+    return {
+        name
+        for model in _models(RequestModel)
+        for name, field in model.model_fields.items()
+        if _is_keyed(field)
+    }
 
 
 def _is_keyed(field: FieldInfo) -> bool:
-    return any(get_origin(option) is dict for option in (field.annotation, *get_args(field.annotation)))
+    return any(
+        get_origin(option) is dict for option in (field.annotation, *get_args(field.annotation))
+    )
 
 
 def _models(model: type[RequestModel]) -> set[type[RequestModel]]:
@@ -93,7 +105,11 @@ def _models(model: type[RequestModel]) -> set[type[RequestModel]]:
 
 @cache
 def _field_names() -> set[str]:
-    return {field.alias or name for model in _models(RequestModel) for name, field in model.model_fields.items()} | {
+    return {
+        field.alias or name
+        for model in _models(RequestModel)
+        for name, field in model.model_fields.items()
+    } | {
         "body",
         "path",
         "query",

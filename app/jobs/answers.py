@@ -23,7 +23,18 @@ _BATCH = 20
 """Results that are read at a time: an answer may have a hundred kilobytes."""
 _ROWS = 1000
 """Rows of a table that are read at a time."""
-_COLUMNS = ("index", "kind", "state", "attempt", "wall_time_s", "energy_J", "duration_s", "status", "answer", "problem")
+_COLUMNS = (
+    "index",
+    "kind",
+    "state",
+    "attempt",
+    "wall_time_s",
+    "energy_J",
+    "duration_s",
+    "status",
+    "answer",
+    "problem",
+)
 
 
 def summary(view: JobView) -> dict[str, Any]:
@@ -31,7 +42,11 @@ def summary(view: JobView) -> dict[str, Any]:
     job, counts = view.job, view.counts
     names = ("id", "name", "state", "created", "started", "ended", "owner")
     own = {name: getattr(job, name) for name in names}
-    return own | {"counts": counts, "progress": progress(job, counts), "eta": eta(job, counts, now())}
+    return own | {
+        "counts": counts,
+        "progress": progress(job, counts),
+        "eta": eta(job, counts, now()),
+    }
 
 
 def status(request: JobRequest) -> dict[str, Any]:
@@ -50,7 +65,9 @@ def detail(view: JobView, requests: Sequence[JobRequest], limit: int) -> dict[st
 
 
 async def as_lines(store: Store, job_id: str) -> AsyncIterator[bytes]:
-    """The requests of a job that have ended, in order of their index: one line of JSON each, with the whole answer."""
+    """The requests of a job that have ended, in order of their index: one line of JSON each, with
+    the whole answer.
+    """
     last = -1
     while found := await store.read(partial(jobs.results, job_id=job_id, limit=_BATCH, after=last)):
         last = found[-1][0].number
@@ -58,7 +75,8 @@ async def as_lines(store: Store, job_id: str) -> AsyncIterator[bytes]:
 
 
 async def as_csv(store: Store, job_id: str) -> AsyncIterator[bytes]:
-    """The requests of a job that have ended, in order of their index, as a table of their figures."""
+    """The requests of a job that have ended, in order of their index, as a table of their
+    figures."""
     yield _rows([_COLUMNS])
     last = -1
     while found := await store.read(partial(jobs.ended, job_id=job_id, limit=_ROWS, after=last)):

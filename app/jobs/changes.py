@@ -51,7 +51,9 @@ class Changes:
             del self._waiting[job_id]
 
     async def shared(self, what: Hashable, read: Callable[[], Coroutine[Any, Any, T]]) -> T:
-        """What `read` returns. Those who ask for the same while it is read, and before more happens, share one read."""
+        """What `read` returns. Those who ask for the same while it is read, and before more
+        happens, share one read.
+        """
         key = (what, self._rung)
         reading = self._reads.get(key)
         if reading is None:

@@ -1,4 +1,6 @@
-"""The dispatcher: leases requests of jobs from the database, has them run, and stores their outcomes."""
+"""The dispatcher: leases requests of jobs from the database, has them run, and stores their
+outcomes.
+"""
 
 from __future__ import annotations
 
@@ -30,13 +32,19 @@ logger = logging.getLogger(__name__)
 LEASE = timedelta(seconds=30)
 """Time for which a request is leased; leases are renewed after a third of it."""
 LOOK = 0.5
-"""Time [s] between two looks into the database: for new requests, and for those that were cancelled elsewhere."""
+"""Time [s] between two looks into the database: for new requests, and for those that were cancelled
+elsewhere.
+"""
 AHEAD = 0.25
-"""Work [s] for each worker that is leased ahead of time, so that small requests share the cost of a transaction."""
+"""Work [s] for each worker that is leased ahead of time, so that small requests share the cost of a
+transaction.
+"""
 MOST_AHEAD = 32
 """Requests for each worker that are leased ahead of time at most."""
 GATHER = 0.05
-"""Time [s] in which outcomes are gathered, to be stored together, while the workers have more to do."""
+"""Time [s] in which outcomes are gathered, to be stored together, while the workers have more to
+do.
+"""
 MOST_EQUAL = 500
 """Requests that are leased beyond that, because they wait for equal ones."""
 MOST_KNOWN = 64
@@ -62,12 +70,16 @@ class _Times:
 class Dispatcher:
     """Works on jobs with as many requests at a time as its executor has slots.
 
-    It leases some requests ahead of time, so that no worker waits for the database. Its loop alone reads and writes the
-    queue. `now` is the clock of the leases.
+    It leases some requests ahead of time, so that no worker waits for the database. Its loop alone
+    reads and writes the queue. `now` is the clock of the leases.
     """
 
     def __init__(
-        self, store: Store, executor: Executor, settings: Settings, now: Callable[[], datetime] = present_time
+        self,
+        store: Store,
+        executor: Executor,
+        settings: Settings,
+        now: Callable[[], datetime] = present_time,
     ) -> None:
         self.changes = Changes()
         self.holder = new_holder()
@@ -155,11 +167,15 @@ class Dispatcher:
         taken, kind = outcome.wall_time, held.lease.kind
         if taken is not None:
             self._mean_work += 0.2 * (taken - self._mean_work)
-            self._mean_of[kind] = self._mean_of.get(kind, taken) + 0.2 * (taken - self._mean_of.get(kind, taken))
+            self._mean_of[kind] = self._mean_of.get(kind, taken) + 0.2 * (
+                taken - self._mean_of.get(kind, taken)
+            )
         self._has_outcome(held, outcome)
 
     def _give_back(self, held: Held) -> None:
-        """A request that nobody wants here waits again, unless its job was cancelled: `settle` knows."""
+        """A request that nobody wants here waits again, unless its job was cancelled: `settle`
+        knows.
+        """
         self._has_outcome(held, Outcome(held.lease, "waiting"))
 
     def _has_outcome(self, held: Held, outcome: Outcome) -> None:
@@ -205,12 +221,19 @@ class Dispatcher:
         more = self._executor.slots + 1 - len(self._tasks)
         self._tasks += [asyncio.create_task(self._run()) for _ in range(more)]
         await self._begin(self._equals.released())
-        want = self._most_held + min(self._equals.waiting, MOST_EQUAL) + self._more_known - len(self._held)
+        want = (
+            self._most_held
+            + min(self._equals.waiting, MOST_EQUAL)
+            + self._more_known
+            - len(self._held)
+        )
         if want <= 0 or self._draining:
             return
         now = self._now()
         if self._more or await self._store.read(partial(leases.is_due, now=now)):
-            lease = partial(leases.lease, holder=self.holder, count=want, now=now, until=now + LEASE)
+            lease = partial(
+                leases.lease, holder=self.holder, count=want, now=now, until=now + LEASE
+            )
             leased, changed = await self._store.write(lease)
             self._more = len(leased) == want
             self.changes.ring(changed)
@@ -295,5 +318,7 @@ class Dispatcher:
 
     async def _settle(self, outcomes: list[Outcome]) -> set[str]:
         most = self._settings.max_figures
-        settle = partial(leases.settle, holder=self.holder, outcomes=outcomes, now=self._now(), most=most)
+        settle = partial(
+            leases.settle, holder=self.holder, outcomes=outcomes, now=self._now(), most=most
+        )
         return await self._store.write(settle)

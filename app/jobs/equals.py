@@ -24,7 +24,9 @@ from joulepath.app.store.tables import Answer
 from joulepath.app.tasks.answer_cache import asked_for
 
 ALONE = ("optimize", "compare", "evaluate")
-"""Endpoints whose answers refer to no other answer. The others refer to answers that are kept as long as their job."""
+"""Endpoints whose answers refer to no other answer. The others refer to answers that are kept as
+long as their job.
+"""
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,9 @@ class Sorted:
 
 
 class Equals:
-    """Those that wait until an equal one has been computed here: `released` gives them once its answer is stored."""
+    """Those that wait until an equal one has been computed here: `released` gives them once its
+    answer is stored.
+    """
 
     def __init__(self, store: Store) -> None:
         self._store = store
@@ -49,13 +53,19 @@ class Equals:
         return sum(map(len, self._followers.values())) + len(self._released)
 
     async def sort(self, held: Sequence[Held]) -> Sorted:
-        """Finds out which requests must be computed; others are known, or wait. Raises StoreUnavailable."""
+        """Finds out which requests must be computed; others are known, or wait. Raises
+        StoreUnavailable.
+        """
         began = time.perf_counter()
         for each in held:
             each.asked = await self._asked(each)
         asked = [each.asked for each in held if each.asked is not None]
         found = await self._store.read(partial(cache.find, asked=asked)) if asked else {}
-        hits = [(each, found[each.asked]) for each in held if each.asked is not None and each.asked in found]
+        hits = [
+            (each, found[each.asked])
+            for each in held
+            if each.asked is not None and each.asked in found
+        ]
         known = await asyncio.to_thread(_copies, hits, began) if hits else {}
         to_compute = [each for each in held if each not in known and not self._follows(each)]
         for each in to_compute:
@@ -67,10 +77,13 @@ class Equals:
         meaning = held.lease.meaning
         if meaning is not None and "cell" in meaning:
             with suppress(StoreUnavailable):
-                held.motions = await self._store.read(partial(known_motions.find, cell=meaning["cell"]))
+                held.motions = await self._store.read(
+                    partial(known_motions.find, cell=meaning["cell"])
+                )
 
     def ended(self, held: Held, outcome: Outcome) -> list[tuple[Held, Outcome]]:
-        """A request has been computed; the outcomes of those that wait for it and fail as it did."""
+        """A request has been computed; the outcomes of those that wait for it and fail as it
+        did."""
         if held.asked is None or not held.leads:
             return []
         held.leads = False
@@ -81,12 +94,21 @@ class Equals:
             return []
         # the request itself is at fault
         return [
-            (each, replace(outcome, lease=each.lease, problem=problem | {"instance": request_id_of(each.lease)}))
+            (
+                each,
+                replace(
+                    outcome,
+                    lease=each.lease,
+                    problem=problem | {"instance": request_id_of(each.lease)},
+                ),
+            )
             for each in followers
         ]
 
     def released(self) -> list[Held]:
-        """Those that wait no longer: for an answer that is there, or because nobody wants them any more."""
+        """Those that wait no longer: for an answer that is there, or because nobody wants them any
+        more.
+        """
         for key, followers in self._followers.items():
             self._released += [each for each in followers if each.dropped]
             self._followers[key] = [each for each in followers if not each.dropped]

@@ -35,8 +35,11 @@ class _Batch:
     over: bool
 
 
-async def events_after(store: Store, dispatcher: Dispatcher, job_id: str, number: int) -> AsyncIterator[bytes]:
-    """The events after that of `number`, until the end of the job or of the service, in the form of server-sent events.
+async def events_after(
+    store: Store, dispatcher: Dispatcher, job_id: str, number: int
+) -> AsyncIterator[bytes]:
+    """The events after that of `number`, until the end of the job or of the service, in the form of
+    server-sent events.
 
     Readers of one job that are equally far share what is read and written for them.
     """
@@ -71,5 +74,8 @@ async def events_after(store: Store, dispatcher: Dispatcher, job_id: str, number
 
 def _batch(session: Session, job_id: str, number: int) -> _Batch:
     found, over = job_events.after(session, job_id, number, _BATCH)
-    texts = [format_sse_event(data_str=json.dumps(each.data), event=each.name, id=str(each.number)) for each in found]
+    texts = [
+        format_sse_event(data_str=json.dumps(each.data), event=each.name, id=str(each.number))
+        for each in found
+    ]
     return _Batch(b"".join(texts), len(found), found[-1].number if found else number, over)

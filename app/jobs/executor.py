@@ -34,16 +34,18 @@ class Executor(Protocol):
     async def run(self, take: Take) -> None:
         """Runs works until there is none, or a caller of the service needs the worker.
 
-        Each ends with its result, what its task raises, DeadlineExceeded, WorkerLost, or, if it is `stoppable`,
-        Preempted. If cancelled, the work is stopped at once. Raises ClusterUnavailable; what has not ended then is to
-        be run again.
+        Each ends with its result, what its task raises, DeadlineExceeded, WorkerLost, or, if it is
+        `stoppable`, Preempted. If cancelled, the work is stopped at once. Raises
+        ClusterUnavailable; what has not ended then is to be run again.
         """
         ...
 
 
 @dataclass(frozen=True)
 class LocalExecutor:
-    """Runs works in workers of this service that no caller waits for. Users' own robots come from the database."""
+    """Runs works in workers of this service that no caller waits for. Users' own robots come from
+    the database.
+    """
 
     engine: Engine
     store: Store
@@ -101,7 +103,8 @@ def _needs_logs(task: Task) -> TypeGuard[JobRequestTask]:
 
 
 async def _with_logs(task: Task, store: Store) -> Task:
-    """The task with the logs that an identification names. Raises UnknownLog or StoreUnavailable."""
+    """The task with the logs that an identification names. Raises UnknownLog or
+    StoreUnavailable."""
     if not _needs_logs(task):
         return task
     asked = IdentifyRequest.model_validate_json(unpacked(task.body))

@@ -22,7 +22,8 @@ SMALL = 1 << 12
 
 @dataclass(eq=False)
 class Held:
-    """A lease and the work on it. `began` [s] is its start by `perf_counter`; `dropped`: nobody wants it any more.
+    """A lease and the work on it. `began` [s] is its start by `perf_counter`; `dropped`: nobody
+    wants it any more.
 
     `leads`: equal requests may wait for it. `motions` are known ones of the cell of a cycle.
     """
@@ -45,7 +46,9 @@ class Held:
 
 
 class Heap:
-    """Leased requests, in the order in which they are to be worked on. Takers take from it in threads."""
+    """Leased requests, in the order in which they are to be worked on. Takers take from it in
+    threads.
+    """
 
     def __init__(self) -> None:
         self.ready: deque[Held] = deque()
@@ -72,12 +75,15 @@ class Heap:
 
 
 class Taker:
-    """Takes requests for one run of an executor. `ended` gets what becomes of each while it is `left`.
+    """Takes requests for one run of an executor. `ended` gets what becomes of each while it is
+    `left`.
 
     `expected` [s] is the time that a request of a kind may take.
     """
 
-    def __init__(self, heap: Heap, ended: Callable[[Held, Ended], object], expected: Callable[[str], float]) -> None:
+    def __init__(
+        self, heap: Heap, ended: Callable[[Held, Ended], object], expected: Callable[[str], float]
+    ) -> None:
         self.left: dict[Held, None] = {}
         """What it took that has not ended, in order."""
         self.working: asyncio.Task[None] | None = None

@@ -1,4 +1,6 @@
-"""Names of the processes that hold leases. A name tells whether its process has ended, if it ran on this machine."""
+"""Names of the processes that hold leases. A name tells whether its process has ended, if it ran on
+this machine.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +15,16 @@ def new_holder() -> str:
 
 
 def is_gone(holder: str) -> bool:
-    """Whether the process of this holder is known to have ended: on this machine, no process with its id began when it
-    did. False for a holder on another machine or in another container."""
+    """Whether the process of this holder is known to have ended: on this machine, no process with
+    its id began when it did. False for a holder on another machine or in another container."""
     *machine, pid, start, _ = holder.split()
     return " ".join(machine) == _machine() and _start_of(int(pid)) != int(start)
 
 
 def _machine() -> str:
-    """The boot of the machine and the namespace of process ids: within both, an id and its start are unique."""
+    """The boot of the machine and the namespace of process ids: within both, an id and its start
+    are unique.
+    """
     boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
     return f"{boot} {Path('/proc/self/ns/pid').readlink().name}"
 
@@ -29,7 +33,10 @@ def _start_of(pid: int) -> int | None:
     """Start of a process in ticks since the boot; None if there is none."""
     try:
         state, *fields = (
-            Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
+            Path(f"/proc/{pid}/stat")
+            .read_text(encoding="utf-8", errors="replace")
+            .rpartition(")")[2]
+            .split()
         )
     except OSError:
         return None

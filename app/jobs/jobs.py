@@ -26,9 +26,13 @@ class Jobs:
     settings: Settings
 
     async def create(self, new: NewJob, key: str | None, owner: str | None) -> tuple[str, bool]:
-        """See `joulepath.app.store.jobs.create`. Raises KeyReused, TooManyWaiting or StoreUnavailable."""
+        """See `joulepath.app.store.jobs.create`. Raises KeyReused, TooManyWaiting or
+        StoreUnavailable.
+        """
         made = await self.store.create(
-            partial(jobs.create, new=new, key=key, most_waiting=self.settings.max_waiting, owner=owner)
+            partial(
+                jobs.create, new=new, key=key, most_waiting=self.settings.max_waiting, owner=owner
+            )
         )
         self.dispatcher.wake()
         return made
@@ -43,19 +47,24 @@ class Jobs:
         self._has_changed(job_id, stop=True)
 
     async def retry(self, job_id: str, client: Client) -> None:
-        """Lets failed and cancelled requests wait again. Raises UnknownJob, NotOwner, TooManyWaiting or
-        StoreUnavailable."""
-        write = partial(jobs.retry, job_id=job_id, client=client, most_waiting=self.settings.max_waiting)
+        """Lets failed and cancelled requests wait again. Raises UnknownJob, NotOwner,
+        TooManyWaiting or StoreUnavailable."""
+        write = partial(
+            jobs.retry, job_id=job_id, client=client, most_waiting=self.settings.max_waiting
+        )
         await self.store.write(write)
         self._has_changed(job_id)
 
     async def delete(self, job_id: str, client: Client) -> None:
-        """Deletes a job with its answers; what runs is stopped. Raises UnknownJob, NotOwner or StoreUnavailable."""
+        """Deletes a job with its answers; what runs is stopped. Raises UnknownJob, NotOwner or
+        StoreUnavailable.
+        """
         await self.store.write(partial(jobs.delete, job_id=job_id, client=client), frees=True)
         self._has_changed(job_id, stop=True)
 
     async def ended(self, job_id: str, longest: float) -> JobView:
-        """A job after its end, or as it is after a time [s]. Raises UnknownJob or StoreUnavailable."""
+        """A job after its end, or as it is after a time [s]. Raises UnknownJob or
+        StoreUnavailable."""
         clock = asyncio.get_running_loop().time
         end, changes = clock() + longest, self.dispatcher.changes
         bell = changes.listen(job_id)

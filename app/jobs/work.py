@@ -12,7 +12,13 @@ import orjson
 from joulepath.app.engine.result import TaskResult, json_document
 from joulepath.app.engine.work import Ended
 from joulepath.app.exceptions.base import InternalError
-from joulepath.app.exceptions.queue import ClusterUnavailable, Preempted, ShuttingDown, WorkerDied, WorkerLost
+from joulepath.app.exceptions.queue import (
+    ClusterUnavailable,
+    Preempted,
+    ShuttingDown,
+    WorkerDied,
+    WorkerLost,
+)
 from joulepath.app.exceptions.stored import StoreUnavailable
 from joulepath.app.http.problems import problem_of
 from joulepath.app.store.leases import Lease, Outcome
@@ -77,7 +83,9 @@ def request_id_of(lease: Lease) -> str:
 
 
 def _failed(lease: Lease, error: Exception, began: float) -> Outcome:
-    return Outcome(lease, "failed", time.perf_counter() - began, problem=_content(error, request_id_of(lease)))
+    return Outcome(
+        lease, "failed", time.perf_counter() - began, problem=_content(error, request_id_of(lease))
+    )
 
 
 def _content(error: Exception, request_id: str) -> dict[str, Any]:

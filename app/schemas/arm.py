@@ -29,14 +29,18 @@ def one_or_each(value: Any) -> str | None:
 
 
 _ONE_OR_EACH = Discriminator(
-    one_or_each, custom_error_type="one_or_each", custom_error_message="Give one number or a list with one per joint"
+    one_or_each,
+    custom_error_type="one_or_each",
+    custom_error_message="Give one number or a list with one per joint",
 )
 RatePerJoint = Annotated[
-    Annotated[Rate, Tag("one")] | Annotated[Annotated[list[Rate], Field(min_length=1, max_length=16)], Tag("each")],
+    Annotated[Rate, Tag("one")]
+    | Annotated[Annotated[list[Rate], Field(min_length=1, max_length=16)], Tag("each")],
     _ONE_OR_EACH,
 ]
 AnglePerJoint = Annotated[
-    Annotated[Angle, Tag("one")] | Annotated[Annotated[list[Angle], Field(min_length=1, max_length=16)], Tag("each")],
+    Annotated[Angle, Tag("one")]
+    | Annotated[Annotated[list[Angle], Field(min_length=1, max_length=16)], Tag("each")],
     _ONE_OR_EACH,
 ]
 
@@ -52,7 +56,8 @@ class Payload(Request):
         default=[0.0, 0.0, 0.0],
     )
     inertia: list[float] | None = described(
-        "Inertia about the centre of mass, in the axes of the flange frame: [ixx, ixy, ixz, iyy, iyz, izz]. Null: a "
+        "Inertia about the centre of mass, in the axes of the flange frame: [ixx, ixy, ixz, iyy, "
+        "iyz, izz]. Null: a "
         "point mass.",
         "kg·m²",
         [0.004, 0.0, 0.0, 0.004, 0.0, 0.003],
@@ -71,7 +76,9 @@ class Payload(Request):
     @model_validator(mode="after")
     def _has_a_centre(self) -> Self:
         if self.mass > 0 and "com" not in self.model_fields_set:
-            missing = InitErrorDetails(type="missing", loc=("com",), input=self.model_dump(exclude_unset=True))
+            missing = InitErrorDetails(
+                type="missing", loc=("com",), input=self.model_dump(exclude_unset=True)
+            )
             raise ValidationError.from_exception_data("Payload", [missing])
         return self
 
@@ -88,14 +95,21 @@ class PositionLimits(Request):
 
 
 class MoveLimits(Request):
-    """Limits within those of the robot. One number applies to every joint, a list has one per joint. Null: the
-    robot's."""
+    """Limits within those of the robot. One number applies to every joint, a list has one per
+    joint. Null: the robot's."""
 
-    velocity: RatePerJoint | None = described("Largest absolute joint velocity.", "rad/s", 2.0, default=None)
-    acceleration: RatePerJoint | None = described("Largest absolute joint acceleration.", "rad/s²", 5.0, default=None)
-    jerk: RatePerJoint | None = described("Largest absolute joint jerk.", "rad/s³", 100.0, default=None)
+    velocity: RatePerJoint | None = described(
+        "Largest absolute joint velocity.", "rad/s", 2.0, default=None
+    )
+    acceleration: RatePerJoint | None = described(
+        "Largest absolute joint acceleration.", "rad/s²", 5.0, default=None
+    )
+    jerk: RatePerJoint | None = described(
+        "Largest absolute joint jerk.", "rad/s³", 100.0, default=None
+    )
     torque: RatePerJoint | None = described(
-        "Largest absolute torque at the joint: of the motor, with rotor and friction, or of the link, without, as the "
+        "Largest absolute torque at the joint: of the motor, with rotor and friction, or of the "
+        "link, without, as the "
         "robot's `limits.torque_side` says.",
         "N·m",
         [120.0, 120.0, 120.0, 20.0, 20.0, 20.0],
@@ -103,13 +117,16 @@ class MoveLimits(Request):
     )
     tcp_speed: Speed | None = described("Largest speed of the TCP.", "m/s", 0.25, default=None)
     elbow_speed: Speed | None = described(
-        "Largest speed of the elbow: of both ends of the axis of its capsule.", "m/s", 0.25, default=None
+        "Largest speed of the elbow: of both ends of the axis of its capsule.",
+        "m/s",
+        0.25,
+        default=None,
     )
 
 
 class Limits(MoveLimits):
-    """Limits within those of the robot. One number applies to every joint, a list has one per joint. Null: the
-    robot's."""
+    """Limits within those of the robot. One number applies to every joint, a list has one per
+    joint. Null: the robot's."""
 
     position: PositionLimits | None = described(
         "Narrower joint range.", None, {"lower": -3.0, "upper": 3.0}, default=None
@@ -119,45 +136,59 @@ class Limits(MoveLimits):
 class ToolCone(Cone):
     """An axis of the tool stays within an angle of a direction during the whole motion."""
 
-    half_angle: float = described("Largest allowed angle between `axis` and `direction`.", "rad", 0.2, ge=1e-3, le=pi)
+    half_angle: float = described(
+        "Largest allowed angle between `axis` and `direction`.", "rad", 0.2, ge=1e-3, le=pi
+    )
     frame: Frame = frame_of("`direction`")
 
 
 Scale = Annotated[float, Field(ge=0.1, le=10)]
 _ScaleList = Annotated[list[Scale], Field(min_length=1, max_length=16)]
-ScalePerJoint = Annotated[Annotated[Scale, Tag("one")] | Annotated[_ScaleList, Tag("each")], _ONE_OR_EACH]
+ScalePerJoint = Annotated[
+    Annotated[Scale, Tag("one")] | Annotated[_ScaleList, Tag("each")], _ONE_OR_EACH
+]
 Loss = Annotated[float, Field(ge=0, le=1e3)]
 _LossList = Annotated[list[Loss], Field(min_length=1, max_length=16)]
-LossPerJoint = Annotated[Annotated[Loss, Tag("one")] | Annotated[_LossList, Tag("each")], _ONE_OR_EACH]
+LossPerJoint = Annotated[
+    Annotated[Loss, Tag("one")] | Annotated[_LossList, Tag("each")], _ONE_OR_EACH
+]
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class Inverter(Request):
-    """Loss of an inverter at the motor current i: constant + linear·|i| + quadratic·i². One number applies to every
-    joint, a list has one per joint. Null: the robot's own parameter."""
+    """Loss of an inverter at the motor current i: constant + linear·|i| + quadratic·i². One number
+    applies to every joint, a list has one per joint. Null: the robot's own parameter."""
 
     constant: LossPerJoint | None = described("Loss at zero current.", "W", 1.5, default=None)
     linear: LossPerJoint | None = described("Loss per ampere.", "W/A", 0.6, default=None)
-    quadratic: LossPerJoint | None = described("Loss per ampere squared.", "W/A²", 0.02, default=None)
+    quadratic: LossPerJoint | None = described(
+        "Loss per ampere squared.", "W/A²", 0.02, default=None
+    )
 
 
 class Drives(Request):
     """Drives of the joints: motors, gears and inverters."""
 
-    inverter: Inverter = described("Loss of the inverters.", None, {"constant": 1.5, "linear": 0.6}, default=Inverter())
+    inverter: Inverter = described(
+        "Loss of the inverters.", None, {"constant": 1.5, "linear": 0.6}, default=Inverter()
+    )
 
 
 class SharedBus(Request):
-    """Joints exchange power. The brake resistor dissipates the net surplus, except the fraction `regeneration` (a
-    parameter of the robot) that the supply takes back."""
+    """Joints exchange power. The brake resistor dissipates the net surplus, except the fraction
+    `regeneration` (a parameter of the robot) that the supply takes back."""
 
-    mode: Literal["shared"] = described("Surplus feeds the other joints; the rest is dissipated.", None, "shared")
+    mode: Literal["shared"] = described(
+        "Surplus feeds the other joints; the rest is dissipated.", None, "shared"
+    )
 
 
 class IsolatedBus(Request):
     """Each joint dissipates its own surplus."""
 
-    mode: Literal["isolated"] = described("The surplus of a joint feeds no other joint.", None, "isolated")
+    mode: Literal["isolated"] = described(
+        "The surplus of a joint feeds no other joint.", None, "isolated"
+    )
 
 
 class RecuperatingBus(Request):
@@ -166,23 +197,34 @@ class RecuperatingBus(Request):
     mode: Literal["recuperating"] = described(
         "Surplus feeds the other joints; the rest is fed back to the supply.", None, "recuperating"
     )
-    efficiency: Share = described("Fraction of the net surplus that the supply takes back.", "1", 0.8)
+    efficiency: Share = described(
+        "Fraction of the net surplus that the supply takes back.", "1", 0.8
+    )
 
 
 class StorageBus(Request):
-    """Joints exchange power. The net surplus charges an energy storage on the bus (capacitor or flywheel), which feeds
-    later demand. What the storage cannot take is treated as on the shared bus."""
+    """Joints exchange power. The net surplus charges an energy storage on the bus (capacitor or
+    flywheel), which feeds later demand. What the storage cannot take is treated as on the shared
+    bus."""
 
     mode: Literal["storage"] = described(
         "Surplus feeds the other joints; the rest charges the energy storage.", None, "storage"
     )
-    capacity: float = described("Energy that the full storage can deliver.", "J", 30.0, ge=0, le=1e9)
-    power: Annotated[float, Field(gt=0, le=1e9)] | None = described(
-        "Largest charging and discharging power, at the bus. Null: no limit.", "W", 500.0, default=None
+    capacity: float = described(
+        "Energy that the full storage can deliver.", "J", 30.0, ge=0, le=1e9
     )
-    efficiency: Share = described("Round-trip efficiency; the loss occurs while charging.", "1", 0.9, default=1.0)
+    power: Annotated[float, Field(gt=0, le=1e9)] | None = described(
+        "Largest charging and discharging power, at the bus. Null: no limit.",
+        "W",
+        500.0,
+        default=None,
+    )
+    efficiency: Share = described(
+        "Round-trip efficiency; the loss occurs while charging.", "1", 0.9, default=1.0
+    )
     initial: float = described(
-        "Charge at the start, at most `capacity`. The charge that the motion uses is added to the total.",
+        "Charge at the start, at most `capacity`. The charge that the motion uses is added to the "
+        "total.",
         "J",
         0.0,
         default=0.0,
@@ -204,7 +246,8 @@ Bus = Annotated[
     Discriminator(
         _by_mode,
         custom_error_type="bus_mode",
-        custom_error_message="Give an object whose `mode` is shared, isolated, recuperating or storage",
+        custom_error_message="Give an object whose `mode` is shared, isolated, recuperating or "
+        "storage",
     ),
 ]
 
@@ -213,16 +256,23 @@ class ArmRequest(CellRequest):
     """The arm with its payload, limits, drives, power bus, and surroundings."""
 
     figures: FiguresId | None = described(
-        "Id of figures that were identified on one arm of this robot, from `GET /figures`. Null: the robot's own.",
+        "Id of figures that were identified on one arm of this robot, from `GET /figures`. Null: "
+        "the robot's own.",
         None,
         FIGURES_ID,
         default=None,
     )
     payload: Payload | None = described(
-        "Payload at the flange. Null: no payload.", None, {"mass": 2.0, "com": [0.0, 0.0, 0.05]}, default=None
+        "Payload at the flange. Null: no payload.",
+        None,
+        {"mass": 2.0, "com": [0.0, 0.0, 0.05]},
+        default=None,
     )
-    gravity: Annotated[list[Annotated[float, Field(ge=-100, le=100)]], Field(min_length=3, max_length=3)] = described(
-        "Acceleration of gravity, [x, y, z] in the robot's base frame (`base`). For a ceiling mount: [0, 0, 9.81].",
+    gravity: Annotated[
+        list[Annotated[float, Field(ge=-100, le=100)]], Field(min_length=3, max_length=3)
+    ] = described(
+        "Acceleration of gravity, [x, y, z] in the robot's base frame (`base`). For a ceiling "
+        "mount: [0, 0, 9.81].",
         "m/s²",
         [0.0, 0.0, -9.81],
         default=[0.0, 0.0, -9.81],
@@ -234,7 +284,8 @@ class ArmRequest(CellRequest):
         default=Limits(),
     )
     friction: Annotated[str, Field(min_length=1, max_length=64)] | None = described(
-        "Name of one of the robot's friction models, from `GET /robots/{name}`. Null: its default model.",
+        "Name of one of the robot's friction models, from `GET /robots/{name}`. Null: its default "
+        "model.",
         None,
         "curved",
         default=None,
@@ -252,21 +303,25 @@ class ArmRequest(CellRequest):
         default=SharedBus(mode="shared"),
     )
     link_mass_scale: ScalePerJoint = described(
-        "Factor on mass and inertia of the link that a joint moves: one number, or one per joint. Payload and rotors "
+        "Factor on mass and inertia of the link that a joint moves: one number, or one per joint. "
+        "Payload and rotors "
         "do not change.",
         "1",
         0.8,
         default=1.0,
     )
     collisions: bool = described(
-        "Whether collisions are checked. If false, `tool`, `payload.shape` and `scene` have no effect. Use false for "
-        "motions that are known to be collision-free but that the capsules of the links are too coarse to allow.",
+        "Whether collisions are checked. If false, `tool`, `payload.shape` and `scene` have no "
+        "effect. Use false for "
+        "motions that are known to be collision-free but that the capsules of the links are too "
+        "coarse to allow.",
         None,
         True,
         default=True,
     )
     tool_cone: ToolCone | None = described(
-        "Limits the angle between an axis of the tool and a direction during the whole motion, for example for an open "
+        "Limits the angle between an axis of the tool and a direction during the whole motion, for "
+        "example for an open "
         "glass. Null: no limit.",
         None,
         {"axis": [0.0, 0.0, 1.0], "direction": [0.0, 0.0, -1.0], "half_angle": 0.2},

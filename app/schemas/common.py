@@ -7,7 +7,15 @@ from difflib import get_close_matches
 from itertools import islice
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from joulepath.app.answers.declared import with_unit
@@ -25,8 +33,8 @@ _MOST_MEANT = 4
 
 
 UNKNOWN_FIELD = "unknown_field"
-"""Type of the error about fields that a model does not have; its context has the names of those that it has, `known`,
-and the first that it has not, `unknown`."""
+"""Type of the error about fields that a model does not have; its context has the names of those
+that it has, `known`, and the first that it has not, `unknown`."""
 MOST_UNKNOWN = 20
 
 
@@ -36,7 +44,11 @@ def nearest(name: str, known: Iterable[str], alike: float = _ALIKE) -> str | Non
     `alike` is the least share of letters in common, see difflib.
     """
     by_form = {_form(each): each for each in known}
-    begun = [each for form, each in by_form.items() if len(name) >= _SHORTEST and form.startswith(_form(name))]
+    begun = [
+        each
+        for form, each in by_form.items()
+        if len(name) >= _SHORTEST and form.startswith(_form(name))
+    ]
     if len(begun) == 1:
         return begun[0]
     found = get_close_matches(_form(name[:_LONGEST_TYPO]), by_form, n=1, cutoff=alike)
@@ -48,25 +60,37 @@ def _form(name: str) -> str:
 
 
 def described(description: str, unit: str | None, example: Any, **constraints: Any) -> Any:
-    """A field with its description, its unit (None: has no unit, "1": a plain number) and a realistic example."""
+    """A field with its description, its unit (None: has no unit, "1": a plain number) and a
+    realistic example.
+    """
     extra: dict[str, Any] = {} if unit is None else {"x-unit": unit}
-    return Field(description=with_unit(description, unit), examples=[example], json_schema_extra=extra, **constraints)
+    return Field(
+        description=with_unit(description, unit),
+        examples=[example],
+        json_schema_extra=extra,
+        **constraints,
+    )
 
 
 def part(description: str) -> Any:
-    """A field of an answer whose value is a model, or a list or dict of models: their fields have the examples."""
+    """A field of an answer whose value is a model, or a list or dict of models: their fields have
+    the examples.
+    """
     return Field(description=description)
 
 
 class Request(BaseModel):
     """A part of a request: no conversion of JSON types, no NaN or infinity, no unknown fields."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True, serialize_by_alias=True)
+    model_config = ConfigDict(
+        extra="forbid", strict=True, allow_inf_nan=False, frozen=True, serialize_by_alias=True
+    )
 
     @model_validator(mode="before")
     @classmethod
     def _refuse_unknown_fields(cls, data: Any) -> Any:
-        # before `extra="forbid"`, whose error repeats the unknown name: no answer echoes the caller's input
+        # before `extra="forbid"`, whose error repeats the unknown name: no answer echoes the
+        # caller's input
         fields = [field.alias or name for name, field in cls.model_fields.items()]
         if isinstance(data, dict) and not data.keys() <= set(fields):
             # a body can have thousands, each of which would take time
@@ -88,9 +112,12 @@ class Response(BaseModel):
 class Answer(Response):
     """The fields of every answer about a robot."""
 
-    request: str = described("Id of the request, as in the header `X-Request-ID`.", None, REQUEST_ID)
+    request: str = described(
+        "Id of the request, as in the header `X-Request-ID`.", None, REQUEST_ID
+    )
     id: str | None = described(
-        "Id of this answer: `GET /answers/{id}` returns it again, and exports and replays take it. Null if it is not "
+        "Id of this answer: `GET /answers/{id}` returns it again, and exports and replays take it. "
+        "Null if it is not "
         "kept.",
         None,
         ANSWER_ID,
@@ -102,7 +129,8 @@ class MotionAnswer(Answer):
     """The fields of an answer that is a motion."""
 
     arm: dict[str, Any] | None = described(
-        "What the request says of the arm beside its robot: payload, limits, scene, ... as it was sent. Null if that "
+        "What the request says of the arm beside its robot: payload, limits, scene, ... as it was "
+        "sent. Null if that "
         "is larger than 64 KiB of JSON.",
         None,
         {"payload": {"mass": 2.0, "com": [0.0, 0.0, 0.05]}},
@@ -110,16 +138,23 @@ class MotionAnswer(Answer):
 
 
 def by_field(*names: str, beside: str | None = None) -> Discriminator:
-    """Discriminator of a union whose members are tagged `by <name>`: the object has exactly one field of `names`.
+    """Discriminator of a union whose members are tagged `by <name>`: the object has exactly one
+    field of `names`.
 
     `beside` is a field that all members have.
     """
 
     def choose(value: Any) -> str | None:
-        present = [name for name in names if (name in value if isinstance(value, dict) else hasattr(value, name))]
+        present = [
+            name
+            for name in names
+            if (name in value if isinstance(value, dict) else hasattr(value, name))
+        ]
         if not present and isinstance(value, dict):
             # a name that is nearly one of them: the member that has the right name says so
-            meant = (nearest(str(given), names, _NEARLY_SAME) for given in islice(value, _MOST_MEANT))
+            meant = (
+                nearest(str(given), names, _NEARLY_SAME) for given in islice(value, _MOST_MEANT)
+            )
             present = list(islice((name for name in meant if name is not None), 1))
         return f"by {present[0]}" if len(present) == 1 else None
 
@@ -132,7 +167,8 @@ def by_field(*names: str, beside: str | None = None) -> Discriminator:
 
 
 def number_or_object(number: str, error: str, message: str) -> Discriminator:
-    """Discriminator of a union of a number, with the tag `number`, and an object, with the tag `range`.
+    """Discriminator of a union of a number, with the tag `number`, and an object, with the tag
+    `range`.
 
     Anything else is an error of type `error`.
     """
@@ -150,28 +186,39 @@ def number_or_object(number: str, error: str, message: str) -> Discriminator:
 def _is_unit(quaternion: list[float]) -> list[float]:
     norm = sum(part * part for part in quaternion) ** 0.5
     if abs(norm - 1) > QUATERNION_TOLERANCE:
-        raise PydanticCustomError("not_unit", "The norm of the quaternion must be within 0.001 of 1")
+        raise PydanticCustomError(
+            "not_unit", "The norm of the quaternion must be within 0.001 of 1"
+        )
     return quaternion
 
 
 def _plain(name: str) -> str:
     if not is_plain(name):
         raise PydanticCustomError(
-            "plain", "The name is blank or has control or invisible characters: use letters, digits, signs and spaces"
+            "plain",
+            "The name is blank or has control or invisible characters: use letters, digits, signs "
+            "and spaces",
         )
     return name
 
 
-# the pattern shows a part of the rule in the schema: no control characters, which a database may reject, too
+# the pattern shows a part of the rule in the schema: no control characters, which a database may
+# reject, too
 NO_CONTROLS = r"^[^\x00-\x1F\x7F-\x9F]+$"
 PLAIN = AfterValidator(_plain)
 """Refuses a name with characters that do not show."""
 
-Vector3 = Annotated[list[Annotated[float, Field(ge=-1e3, le=1e3)]], Field(min_length=3, max_length=3)]
-Quaternion = Annotated[
-    list[Annotated[float, Field(ge=-1.1, le=1.1)]], Field(min_length=4, max_length=4), AfterValidator(_is_unit)
+Vector3 = Annotated[
+    list[Annotated[float, Field(ge=-1e3, le=1e3)]], Field(min_length=3, max_length=3)
 ]
-JointPositions = Annotated[list[Annotated[float, Field(ge=-1e3, le=1e3)]], Field(min_length=1, max_length=16)]
+Quaternion = Annotated[
+    list[Annotated[float, Field(ge=-1.1, le=1.1)]],
+    Field(min_length=4, max_length=4),
+    AfterValidator(_is_unit),
+]
+JointPositions = Annotated[
+    list[Annotated[float, Field(ge=-1e3, le=1e3)]], Field(min_length=1, max_length=16)
+]
 
 
 class Positioned(Request):
@@ -184,7 +231,8 @@ class WithQuaternion(Request):
     """An orientation as a quaternion."""
 
     quaternion: Quaternion = described(
-        "Orientation as a quaternion [x, y, z, w]. Its norm must be within 0.001 of 1; it is then normalised.",
+        "Orientation as a quaternion [x, y, z, w]. Its norm must be within 0.001 of 1; it is then "
+        "normalised.",
         "1",
         [0.0, 1.0, 0.0, 0.0],
     )
@@ -235,9 +283,12 @@ Frame = Literal["base", "base_link"]
 def frame_of(what: str) -> Any:
     """The field `frame` of what is given in one of the two frames at the robot's base."""
     return described(
-        f"Frame of {what}. `base`: the robot's base frame, as on the teach pendant and in every answer. `base_link`: "
-        "the frame of this name in ROS. For Universal Robots it is `base` after half a turn about z, so x and y have "
-        "the opposite sign. For a robot whose figures have no `base_link_origin`, the two are the same.",
+        f"Frame of {what}. `base`: the robot's base frame, as on the teach pendant and in every "
+        "answer. `base_link`: "
+        "the frame of this name in ROS. For Universal Robots it is `base` after half a turn about "
+        "z, so x and y have "
+        "the opposite sign. For a robot whose figures have no `base_link_origin`, the two are the "
+        "same.",
         None,
         "base",
         default="base",
@@ -259,7 +310,9 @@ class BaseRpyPose(RpyPose, InFrame):
 
 
 class BaseRotvecPose(RotvecPose, InFrame):
-    """Position and rotation vector in a frame of the robot's base, by default the one of the teach pendant."""
+    """Position and rotation vector in a frame of the robot's base, by default the one of the teach
+    pendant.
+    """
 
 
 BasePose = Annotated[
@@ -278,7 +331,9 @@ RobotName = Annotated[str, Field(min_length=1, max_length=ROBOT_LENGTH)]
 class RobotWithTcp(Request):
     """A robot and its tool centre point (TCP)."""
 
-    robot: RobotName = described("Name of the robot, from `GET /robots`.", None, "ur5e", default="ur5e")
+    robot: RobotName = described(
+        "Name of the robot, from `GET /robots`.", None, "ur5e", default="ur5e"
+    )
     tcp: Pose = described(
         "Pose of the TCP in the flange frame.",
         None,

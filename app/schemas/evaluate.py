@@ -22,9 +22,13 @@ MAX_ROWS = 100_000
 """Largest number of rows of a motion sent as JSON; a CSV file may have more."""
 
 Rows = Annotated[list[JointPositions], Field(min_length=2, max_length=MAX_ROWS)]
-_Rates = Annotated[list[Annotated[float, Field(ge=-1e7, le=1e7)]], Field(min_length=1, max_length=16)]
+_Rates = Annotated[
+    list[Annotated[float, Field(ge=-1e7, le=1e7)]], Field(min_length=1, max_length=16)
+]
 RateRows = Annotated[list[_Rates], Field(min_length=2, max_length=MAX_ROWS)]
-Times = Annotated[list[Annotated[float, Field(ge=-1e12, le=1e12)]], Field(min_length=2, max_length=MAX_ROWS)]
+Times = Annotated[
+    list[Annotated[float, Field(ge=-1e12, le=1e12)]], Field(min_length=2, max_length=MAX_ROWS)
+]
 SecondsPerSegment = Annotated[
     Annotated[Seconds, Tag("one")]
     | Annotated[Annotated[list[Seconds], Field(min_length=1, max_length=MAX_ROWS)], Tag("each")],
@@ -37,10 +41,14 @@ SecondsPerSegment = Annotated[
 
 
 class LoggedTrajectory(Request):
-    """Joint positions over time, from a log or from the answer of `POST /optimize`; arrays are [sample][joint]."""
+    """Joint positions over time, from a log or from the answer of `POST /optimize`; arrays are
+    [sample][joint].
+    """
 
     t: Times = described(
-        "Time of each sample; each later than the previous one by 1 µs or more.", "s", [0.0, 0.008, 0.016]
+        "Time of each sample; each later than the previous one by 1 µs or more.",
+        "s",
+        [0.0, 0.008, 0.016],
     )
     q: Rows = described("Joint positions.", "rad", [_HOME, _HOME, _HOME])
     v: RateRows | None = described(
@@ -50,7 +58,8 @@ class LoggedTrajectory(Request):
         default=None,
     )
     a: RateRows | None = described(
-        "Joint accelerations. Null: the derivative of the cubic spline through the velocities. Noise is not smoothed: "
+        "Joint accelerations. Null: the derivative of the cubic spline through the velocities. "
+        "Noise is not smoothed: "
         "an error e in `q` at a period h becomes an error of up to 12 e / h² here.",
         "rad/s²",
         [[0.0] * 6] * 3,
@@ -61,11 +70,17 @@ class LoggedTrajectory(Request):
     def _same_length(self) -> Self:
         logged = [rows for rows in (self.q, self.v, self.a) if rows is not None]
         if any(len(rows) != len(self.t) for rows in logged):
-            raise PydanticCustomError("lengths", "`t`, `q`, `v` and `a` must have the same number of samples")
+            raise PydanticCustomError(
+                "lengths", "`t`, `q`, `v` and `a` must have the same number of samples"
+            )
         if any(
-            rows is not None and len(row) != len(self.q[0]) for rows in (self.q, self.v, self.a) for row in rows or []
+            rows is not None and len(row) != len(self.q[0])
+            for rows in (self.q, self.v, self.a)
+            for row in rows or []
         ):
-            raise PydanticCustomError("lengths", "Every row of `q`, `v` and `a` must have one number per joint")
+            raise PydanticCustomError(
+                "lengths", "Every row of `q`, `v` and `a` must have one number per joint"
+            )
         return self
 
 
@@ -73,22 +88,27 @@ class EvaluateSettings(ArmRequest):
     """The arm, and how to interpret the motion."""
 
     time_per_segment: SecondsPerSegment | None = described(
-        "Duration from each configuration to the next: one number, or one per segment. Required with `configurations`.",
+        "Duration from each configuration to the next: one number, or one per segment. Required "
+        "with `configurations`.",
         "s",
         1.5,
         default=None,
     )
     interpolation: Literal["linear", "trapezoid", "quintic", "spline"] = described(
-        "Motion through `configurations`. `linear`: constant joint velocity within each segment; the velocity has a "
-        "step where segments meet. `trapezoid`: trapezoidal velocity with standstill at both ends of every segment. "
-        "`quintic`: polynomial of degree 5 with standstill at both ends of every segment. `spline`: one smooth curve "
+        "Motion through `configurations`. `linear`: constant joint velocity within each segment; "
+        "the velocity has a "
+        "step where segments meet. `trapezoid`: trapezoidal velocity with standstill at both ends "
+        "of every segment. "
+        "`quintic`: polynomial of degree 5 with standstill at both ends of every segment. "
+        "`spline`: one smooth curve "
         "through all configurations, with standstill at the start and at the end.",
         None,
         "linear",
         default="quintic",
     )
     sample_period: float | None = described(
-        "Time between the returned samples; the last sample is at the end. Null: no samples. At most "
+        "Time between the returned samples; the last sample is at the end. Null: no samples. At "
+        "most "
         f"{MOST_SAMPLES} samples.",
         "s",
         0.05,
@@ -97,7 +117,8 @@ class EvaluateSettings(ArmRequest):
         le=3600,
     )
     deadline: float | None = described(
-        "Wall time from the end of the upload, including the wait for a worker. Null: the longest that the service "
+        "Wall time from the end of the upload, including the wait for a worker. Null: the longest "
+        "that the service "
         "allows.",
         "s",
         10.0,
@@ -120,7 +141,8 @@ class EvaluateRequest(EvaluateSettings):
         default=None,
     )
     log: Annotated[str, Field(max_length=ID_LENGTH)] | None = described(
-        "Id of a stored log, from `POST /logs`: the motion that the arm has made. `robot`, `payload` and `gravity` are "
+        "Id of a stored log, from `POST /logs`: the motion that the arm has made. `robot`, "
+        "`payload` and `gravity` are "
         "those of the log where they are left out.",
         None,
         LOG_ID,
@@ -131,14 +153,17 @@ class EvaluateRequest(EvaluateSettings):
     def _one_motion(self) -> Self:
         motions = {"configurations", "trajectory", "log"}
         if sum(getattr(self, name) is not None for name in motions) != 1:
-            raise PydanticCustomError("exactly_one", "Give exactly one of `configurations`, `trajectory` and `log`")
+            raise PydanticCustomError(
+                "exactly_one", "Give exactly one of `configurations`, `trajectory` and `log`"
+            )
         if self.configurations is not None and self.time_per_segment is None:
             raise PydanticCustomError("times", "`configurations` require `time_per_segment`")
         given = self.model_fields_set & {"time_per_segment", "interpolation"}
         if self.configurations is None and given:
             raise PydanticCustomError(
                 "contradiction",
-                "A `trajectory` and a `log` have their own times: leave out `time_per_segment` and `interpolation`",
+                "A `trajectory` and a `log` have their own times: leave out `time_per_segment` and "
+                "`interpolation`",
             )
         return self
 

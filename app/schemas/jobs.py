@@ -77,7 +77,8 @@ class NewJob(Request):
     """Requests that are computed while their client does not wait."""
 
     requests: list[RequestOfJob] = described(
-        "The requests, in any mixture. `deadline` counts from the begin of the work on a request. It may be longer "
+        "The requests, in any mixture. `deadline` counts from the begin of the work on a request. "
+        "It may be longer "
         "than that of a request that is answered at once: up to `JOULEPATH_MAX_JOB_DEADLINE`.",
         None,
         [{"optimize": OPTIMIZE}, {"evaluate": EVALUATE}],
@@ -86,7 +87,8 @@ class NewJob(Request):
     )
     name: Name | None = described("Name of the job.", None, "Night run, cell 4", default=None)
     keep_going: bool = described(
-        "Whether the other requests go on after one has failed. If not, the first failure cancels them.",
+        "Whether the other requests go on after one has failed. If not, the first failure cancels "
+        "them.",
         None,
         True,
         default=True,
@@ -109,16 +111,25 @@ class Job(Response):
     id: str = described("Id of the job.", None, JOB_ID)
     name: str | None = described("Name of the job.", None, "Night run, cell 4")
     state: JobState = described(
-        "`done`: every request has ended. `cancelling`: what runs is being stopped.", None, "running"
+        "`done`: every request has ended. `cancelling`: what runs is being stopped.",
+        None,
+        "running",
     )
     created: datetime = described("Time at which it was sent, in UTC.", None, CREATED)
-    started: datetime | None = described("Time at which work on it began, in UTC; null before.", None, CREATED)
-    ended: datetime | None = described("Time at which its last request ended, in UTC; null before.", None, None)
-    owner: str | None = described("Name of the API key that sent it; null without one.", None, "press_shop")
+    started: datetime | None = described(
+        "Time at which work on it began, in UTC; null before.", None, CREATED
+    )
+    ended: datetime | None = described(
+        "Time at which its last request ended, in UTC; null before.", None, None
+    )
+    owner: str | None = described(
+        "Name of the API key that sent it; null without one.", None, "press_shop"
+    )
     counts: Counts = part("How many of its requests are in each state.")
     progress: float = described("Share of the requests that have ended.", "1", 0.8)
     eta: float | None = described(
-        "Time until it ends at its present speed; null before 5 % of its requests have ended, and after its end.",
+        "Time until it ends at its present speed; null before 5 % of its requests have ended, and "
+        "after its end.",
         "s",
         12.5,
     )
@@ -131,22 +142,32 @@ class RequestStatus(Response):
     kind: Kind = described("Endpoint of the request.", None, "optimize")
     state: RequestState = described("State of the request.", None, "done")
     attempt: int = described(
-        "How often work on it began. A worker that dies, or a service that stops, begins again.", "1", 1
+        "How often work on it began. A worker that dies, or a service that stops, begins again.",
+        "1",
+        1,
     )
-    wall_time: float | None = described("Time that the last work on it took; null before its end.", "s", 0.21)
+    wall_time: float | None = described(
+        "Time that the last work on it took; null before its end.", "s", 0.21
+    )
     energy: float | None = described(
-        "Energy of the motion or cycle that answers it, of its objective (electrical for `evaluate`). Null for other "
+        "Energy of the motion or cycle that answers it, of its objective (electrical for "
+        "`evaluate`). Null for other "
         "kinds, and without an answer.",
         "J",
         57.5,
     )
-    duration: float | None = described("Duration of that motion or cycle; null as `energy`.", "s", 1.33)
+    duration: float | None = described(
+        "Duration of that motion or cycle; null as `energy`.", "s", 1.33
+    )
     status: str | None = described("`status` of the answer; null if it has none.", None, "optimal")
     answer: str | None = described(
-        "Path of the complete answer. It is kept as long as the job. Null without an answer.", None, ANSWER_PATH
+        "Path of the complete answer. It is kept as long as the job. Null without an answer.",
+        None,
+        ANSWER_PATH,
     )
     problem: dict[str, Any] | None = described(
-        "Why it failed: the problem (RFC 9457) that its endpoint would have answered. Null if it did not fail.",
+        "Why it failed: the problem (RFC 9457) that its endpoint would have answered. Null if it "
+        "did not fail.",
         None,
         {"type": "/problems/duration-too-short", "title": "Duration too short", "status": 422},
     )
@@ -156,7 +177,9 @@ class JobDetail(Job):
     """A job and a page of its requests."""
 
     requests: list[RequestStatus] = part("Requests in order of their index.")
-    next: int | None = described("Value of `after` for the next page; null on the last page.", "1", 99)
+    next: int | None = described(
+        "Value of `after` for the next page; null on the last page.", "1", 99
+    )
 
 
 class JobList(Response):
@@ -171,13 +194,22 @@ class JobPage(Query):
 
     limit: int = limit_of("jobs")
     after: str | None = after_of(JOB_ID)
-    state: JobState | None = described("Only jobs in this state. Null: all.", None, "running", default=None)
+    state: JobState | None = described(
+        "Only jobs in this state. Null: all.", None, "running", default=None
+    )
 
 
 class RequestPage(Query):
     """The part of a job's requests that is returned."""
 
-    limit: int = described("Largest number of requests in the answer.", "1", 100, default=100, ge=1, le=1000)
+    limit: int = described(
+        "Largest number of requests in the answer.", "1", 100, default=100, ge=1, le=1000
+    )
     after: int = described(
-        "Value of `next` on the previous page. -1: the first page.", "1", 99, default=-1, ge=-1, le=MOST_REQUESTS
+        "Value of `next` on the previous page. -1: the first page.",
+        "1",
+        99,
+        default=-1,
+        ge=-1,
+        le=MOST_REQUESTS,
     )

@@ -15,24 +15,39 @@ _Columns = Annotated[list[_Column], Field(min_length=1, max_length=16)]
 
 
 class LogColumns(Request):
-    """Names of the columns of a log, as in its header; of joints one each, from base to flange. Null: none."""
+    """Names of the columns of a log, as in its header; of joints one each, from base to flange.
+    Null: none.
+    """
 
     time: _Column = described("Times [s].", None, "time_s")
-    nanoseconds: _Column | None = described("Nanoseconds beside times in whole seconds.", None, "nsecs", default=None)
+    nanoseconds: _Column | None = described(
+        "Nanoseconds beside times in whole seconds.", None, "nsecs", default=None
+    )
     q: _Columns = described("Joint positions.", None, ["axis_1", "axis_2"])
     v: _Columns | None = described("Joint velocities.", None, ["speed_1", "speed_2"], default=None)
     a: _Columns | None = described("Joint accelerations.", None, ["acc_1", "acc_2"], default=None)
-    current: _Columns | None = described("Motor currents.", None, ["amps_1", "amps_2"], default=None)
-    torque: _Columns | None = described("Motor torques at the joints.", None, ["nm_1", "nm_2"], default=None)
-    effort: _Columns | None = described("Efforts of unknown meaning.", None, ["eff_1", "eff_2"], default=None)
-    temperature: _Columns | None = described("Temperatures of the joints [°C].", None, ["t_1", "t_2"], default=None)
+    current: _Columns | None = described(
+        "Motor currents.", None, ["amps_1", "amps_2"], default=None
+    )
+    torque: _Columns | None = described(
+        "Motor torques at the joints.", None, ["nm_1", "nm_2"], default=None
+    )
+    effort: _Columns | None = described(
+        "Efforts of unknown meaning.", None, ["eff_1", "eff_2"], default=None
+    )
+    temperature: _Columns | None = described(
+        "Temperatures of the joints [°C].", None, ["t_1", "t_2"], default=None
+    )
     wrench: _Columns | None = described(
-        "Force [N] and torque [N·m] on a sensor beneath the base, about and along the axes of the base frame.",
+        "Force [N] and torque [N·m] on a sensor beneath the base, about and along the axes of the "
+        "base frame.",
         None,
         ["f_x", "f_y", "f_z", "t_x", "t_y", "t_z"],
         default=None,
     )
-    power: _Column | None = described("Power drawn from the bus of the arm [W].", None, "watts", default=None)
+    power: _Column | None = described(
+        "Power drawn from the bus of the arm [W].", None, "watts", default=None
+    )
 
 
 class LogFile(Request):
@@ -49,7 +64,8 @@ class LogFile(Request):
     )
     current_units: Literal["A", "mA"] = described("Unit of currents.", None, "A", default="A")
     effort: Literal["auto", "current", "torque", "external"] = described(
-        "What the efforts are: motor currents, motor torques at the joints, or torques from outside, without gravity. "
+        "What the efforts are: motor currents, motor torques at the joints, or torques from "
+        "outside, without gravity. "
         "`auto` finds it out.",
         None,
         "auto",

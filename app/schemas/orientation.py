@@ -38,7 +38,8 @@ Axis = Annotated[Vector3, AfterValidator(_has_direction)]
 
 class _FreeAbout(Request):
     free_about: Axis = described(
-        "Axis of the tool in the TCP frame about which it may rotate freely; any length except zero.",
+        "Axis of the tool in the TCP frame about which it may rotate freely; any length except "
+        "zero.",
         "1",
         [0.0, 0.0, 1.0],
     )
@@ -57,15 +58,22 @@ class RotvecFreeAbout(WithRotvec, _FreeAbout):
 
 
 class Cone(Request):
-    """All orientations with an axis of the tool within an angle of a direction. The tool may rotate about that axis."""
+    """All orientations with an axis of the tool within an angle of a direction. The tool may rotate
+    about that axis.
+    """
 
-    axis: Axis = described("Axis of the tool in the TCP frame; any length except zero.", "1", [0.0, 0.0, 1.0])
+    axis: Axis = described(
+        "Axis of the tool in the TCP frame; any length except zero.", "1", [0.0, 0.0, 1.0]
+    )
     direction: Axis = described(
-        "Direction in the robot's base frame, or in the `frame` that is given; any length except zero.",
+        "Direction in the robot's base frame, or in the `frame` that is given; any length except "
+        "zero.",
         "1",
         [0.0, 0.0, -1.0],
     )
-    half_angle: float = described("Largest allowed angle between `axis` and `direction`.", "rad", 0.35, ge=0, le=pi)
+    half_angle: float = described(
+        "Largest allowed angle between `axis` and `direction`.", "rad", 0.35, ge=0, le=pi
+    )
 
 
 class InCone(Request):
@@ -82,7 +90,11 @@ def _by_kind(value: Any) -> str | None:
     if isinstance(value, str):
         return "by word"
     names = ("cone", "free_about")
-    present = [name for name in names if (name in value if isinstance(value, dict) else hasattr(value, name))]
+    present = [
+        name
+        for name in names
+        if (name in value if isinstance(value, dict) else hasattr(value, name))
+    ]
     return f"by {present[0]}" if len(present) == 1 else None
 
 
@@ -110,8 +122,10 @@ class ConeOrientedPose(Positioned, InFrame):
     """A position with an orientation that is free in part."""
 
     orientation: Orientation = described(
-        '"free": any orientation. `free_about`: a given orientation, rotated by any angle about an axis of the tool. '
-        "`cone`: an axis of the tool within an angle of a direction, and any rotation about this axis.",
+        '"free": any orientation. `free_about`: a given orientation, rotated by any angle about an '
+        "axis of the tool. "
+        "`cone`: an axis of the tool within an angle of a direction, and any rotation about this "
+        "axis.",
         None,
         {"cone": {"axis": [0.0, 0.0, 1.0], "direction": [0.0, 0.0, -1.0], "half_angle": 0.35}},
     )

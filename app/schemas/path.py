@@ -30,13 +30,15 @@ class SpeedRange(Request):
     """Bounds on the speed of the TCP along a path."""
 
     min: Speed | None = described(
-        "Smallest speed, but for the ramps at both ends, where the arm comes from rest and to rest. Null: no bound.",
+        "Smallest speed, but for the ramps at both ends, where the arm comes from rest and to "
+        "rest. Null: no bound.",
         "m/s",
         0.1,
         default=None,
     )
     max: Speed | None = described(
-        "Largest speed, at least 1.05 times `min`; or equal to it: the speed is fixed then, and held within "
+        "Largest speed, at least 1.05 times `min`; or equal to it: the speed is fixed then, and "
+        "held within "
         f"{SPEED_TOLERANCE:.1%} between the ramps. Null: as fast as the limits allow.",
         "m/s",
         0.2,
@@ -57,7 +59,8 @@ class SpeedRange(Request):
         if between and (self.max or 0.0) < SPEED_RANGE * (self.min or 0.0):
             raise PydanticCustomError(
                 "range",
-                f"`max` must be at least {SPEED_RANGE:g} times `min`, or equal to it: then the speed is fixed",
+                f"`max` must be at least {SPEED_RANGE:g} times `min`, or equal to it: then the "
+                "speed is fixed",
             )
         return self
 
@@ -68,13 +71,17 @@ class SpeedRange(Request):
 
     @property
     def limit(self) -> float | None:
-        """The limit on the speed of the TCP [m/s]: none of a fixed speed, which is held from both sides."""
+        """The limit on the speed of the TCP [m/s]: none of a fixed speed, which is held from both
+        sides.
+        """
         return self.max if self.fixed is None else None
 
 
 PathSpeed = Annotated[
     Annotated[Speed, Tag("by number")] | Annotated[SpeedRange, Tag("range")],
-    number_or_object("by number", "speed", "Give null, a number of m/s, or an object with `min`, `max` or both"),
+    number_or_object(
+        "by number", "speed", "Give null, a number of m/s, or an object with `min`, `max` or both"
+    ),
 ]
 
 
@@ -82,15 +89,28 @@ class PathTolerance(Request):
     """By how much the motion may be off its path."""
 
     position: float = described(
-        "Largest distance of the TCP.", "m", 1e-4, default=POSITION_TOLERANCE, ge=LEAST_TOLERANCE, le=0.1
+        "Largest distance of the TCP.",
+        "m",
+        1e-4,
+        default=POSITION_TOLERANCE,
+        ge=LEAST_TOLERANCE,
+        le=0.1,
     )
     rotation: float = described(
-        "Largest angle of the tool.", "rad", 2e-3, default=ROTATION_TOLERANCE, ge=LEAST_TOLERANCE, le=0.5
+        "Largest angle of the tool.",
+        "rad",
+        2e-3,
+        default=ROTATION_TOLERANCE,
+        ge=LEAST_TOLERANCE,
+        le=0.5,
     )
     about: Axis | None = described(
-        "Axis of the TCP, of any length, about which the tool may turn on the way: as the arm must to follow the path, "
-        "and as needs least energy. `rotation` is for the direction of this axis then. At both ends "
-        "the tool has its full orientation, unless that is `free_about` the same axis. Null: the orientation is that "
+        "Axis of the TCP, of any length, about which the tool may turn on the way: as the arm must "
+        "to follow the path, "
+        "and as needs least energy. `rotation` is for the direction of this axis then. At both "
+        "ends "
+        "the tool has its full orientation, unless that is `free_about` the same axis. Null: the "
+        "orientation is that "
         "of the path.",
         "1",
         [0.0, 0.0, 1.0],
@@ -100,15 +120,19 @@ class PathTolerance(Request):
 
 class _OnPath(Request):
     shape: PathShape = described(
-        "`lines`: straight from pose to pose, with rounded corners. `curve`: smoothly through every pose, as through "
-        "those of a recorded curve. `arc`: on the circle through the start, the one pose between and the end.",
+        "`lines`: straight from pose to pose, with rounded corners. `curve`: smoothly through "
+        "every pose, as through "
+        "those of a recorded curve. `arc`: on the circle through the start, the one pose between "
+        "and the end.",
         None,
         "lines",
         default="lines",
     )
     blend: float = described(
-        "Length of path before and after each pose between start and end on which a smooth curve replaces the corner "
-        "of two lines. Needed where there are such poses, as the arm cannot turn a sharp corner without a stop.",
+        "Length of path before and after each pose between start and end on which a smooth curve "
+        "replaces the corner "
+        "of two lines. Needed where there are such poses, as the arm cannot turn a sharp corner "
+        "without a stop.",
         "m",
         0.02,
         default=0.0,
@@ -135,14 +159,15 @@ class _OnPath(Request):
 
 
 class Path(_OnPath):
-    """A path of the TCP from `start` to `goal`: straight lines, on which the orientation turns evenly about one axis; a
-    smooth curve; or an arc.
+    """A path of the TCP from `start` to `goal`: straight lines, on which the orientation turns
+    evenly about one axis; a smooth curve; or an arc.
 
     The branch and the timing are chosen; the tool is on the path from the start to the goal.
     """
 
     via: Annotated[list[BasePose], Field(max_length=max(MOST_POINTS.values()))] = described(
-        f"Poses of the TCP between start and goal: at most {MOST_POINTS['lines']} of lines, {MOST_POINTS['curve']} of "
+        f"Poses of the TCP between start and goal: at most {MOST_POINTS['lines']} of lines, "
+        f"{MOST_POINTS['curve']} of "
         "a curve, exactly one of an arc.",
         None,
         [{"position": [0.4, 0.0, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]}],
@@ -151,12 +176,16 @@ class Path(_OnPath):
 
 
 class StopPath(_OnPath):
-    """A path of the TCP at a stop, like that of a bead of glue: the arm rests at its first pose, follows it, and rests
-    at its last. The branch is chosen for the whole cycle."""
+    """A path of the TCP at a stop, like that of a bead of glue: the arm rests at its first pose,
+    follows it, and rests at its last. The branch is chosen for the whole cycle."""
 
-    points: Annotated[list[TargetPose], Field(min_length=2, max_length=max(MOST_POINTS.values()) + 2)] = described(
-        f"Poses of the TCP: 2 to {MOST_POINTS['lines'] + 2} of lines, to {MOST_POINTS['curve'] + 2} of a curve, "
-        "exactly three of an arc. The first and the last may be `free_about` the axis `tolerance.about`: then the "
+    points: Annotated[
+        list[TargetPose], Field(min_length=2, max_length=max(MOST_POINTS.values()) + 2)
+    ] = described(
+        f"Poses of the TCP: 2 to {MOST_POINTS['lines'] + 2} of lines, to "
+        f"{MOST_POINTS['curve'] + 2} of a curve, "
+        "exactly three of an arc. The first and the last may be `free_about` the axis "
+        "`tolerance.about`: then the "
         "angles of the tool there are chosen for the whole cycle.",
         None,
         [
@@ -165,8 +194,10 @@ class StopPath(_OnPath):
         ],
     )
     split: bool = described(
-        "Whether a path that no arm configuration follows whole is divided: into as few parts as possible, with moves "
-        "from one configuration to another between them. Each part is a stop of its own: `NAME/1`, `NAME/2` and so on, "
+        "Whether a path that no arm configuration follows whole is divided: into as few parts as "
+        "possible, with moves "
+        "from one configuration to another between them. Each part is a stop of its own: `NAME/1`, "
+        "`NAME/2` and so on, "
         "the last one `NAME`; each has the lines of the stop.",
         None,
         True,
@@ -180,7 +211,8 @@ class StopPath(_OnPath):
             if isinstance(pose, ConeOrientedPose):
                 raise PydanticCustomError(
                     "full_orientation",
-                    "Only the first and the last pose may leave the orientation free: give pose {number} a "
+                    "Only the first and the last pose may leave the orientation free: give pose "
+                    "{number} a "
                     "quaternion, rpy or rotvec",
                     {"number": k},
                 )
@@ -197,10 +229,13 @@ class Line(Request):
 
     direction: Axis = described("Direction of the motion, of any length.", "1", [0.0, 0.0, 1.0])
     frame: Literal["tcp", "base", "base_link"] = described(
-        "Frame of `direction`: that of the TCP at the stop, the robot's base frame, or ROS's `base_link`.",
+        "Frame of `direction`: that of the TCP at the stop, the robot's base frame, or ROS's "
+        "`base_link`.",
         None,
         "tcp",
         default="tcp",
     )
-    distance: float = described("Length of the line.", "m", 0.08, ge=LEAST_DISTANCE, le=MOST_DISTANCE)
+    distance: float = described(
+        "Length of the line.", "m", 0.08, ge=LEAST_DISTANCE, le=MOST_DISTANCE
+    )
     speed: Speed | None = described(SPEED, "m/s", 0.1, default=None)

@@ -20,7 +20,9 @@ class Query(Request):
 
 def limit_of(things: str) -> Any:
     """The field `limit` of a page of `things`."""
-    return described(f"Largest number of {things} in the answer.", "1", 50, default=50, ge=1, le=200)
+    return described(
+        f"Largest number of {things} in the answer.", "1", 50, default=50, ge=1, le=200
+    )
 
 
 def after_of(example_id: str) -> Any:
@@ -36,7 +38,9 @@ def after_of(example_id: str) -> Any:
 
 def next_of(example_id: str) -> Any:
     """The field `next` of the answer with a page."""
-    return described("Value of `after` for the next page; null on the last page.", None, _position(example_id))
+    return described(
+        "Value of `after` for the next page; null on the last page.", None, _position(example_id)
+    )
 
 
 def _position(example_id: str) -> str:

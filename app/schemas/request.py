@@ -9,7 +9,13 @@ from pydantic import Field, Tag, ValidationInfo, field_validator, model_validato
 from pydantic_core import PydanticCustomError
 
 from joulepath.app.schemas.arm import ArmRequest
-from joulepath.app.schemas.common import JointPositions, Request, by_field, described, number_or_object
+from joulepath.app.schemas.common import (
+    JointPositions,
+    Request,
+    by_field,
+    described,
+    number_or_object,
+)
 from joulepath.app.schemas.orientation import TargetPose
 from joulepath.app.schemas.path import Path
 from joulepath.app.settings import LONGEST_DEADLINE
@@ -26,8 +32,10 @@ WhichCandidates = Literal["all", "computed", "none"]
 def which_candidates() -> Any:
     """The field `candidates` of a request."""
     return described(
-        "Candidates that the answer lists. `computed`: those for which a motion was computed, found or not (`solved`, "
-        "`failed`, and `pruned` on the way). `all`: also those that were ruled out or not reached, thousands for two "
+        "Candidates that the answer lists. `computed`: those for which a motion was computed, "
+        "found or not (`solved`, "
+        "`failed`, and `pruned` on the way). `all`: also those that were ruled out or not reached, "
+        "thousands for two "
         "poses. `none`: no candidates. `candidate_counts` counts all of them in any case.",
         None,
         "all",
@@ -38,14 +46,17 @@ def which_candidates() -> Any:
 class JointTarget(Request):
     """A target as joint positions."""
 
-    q: JointPositions = described("Joint positions, from base to flange.", "rad", [0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
+    q: JointPositions = described(
+        "Joint positions, from base to flange.", "rad", [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
+    )
 
 
 class PoseTarget(Request):
     """A target as a pose of the TCP. Every arm configuration that reaches it is a candidate."""
 
     pose: TargetPose = described(
-        "Pose of the TCP in the robot's base frame, or in its `frame`. The orientation of a goal may be free in part, "
+        "Pose of the TCP in the robot's base frame, or in its `frame`. The orientation of a goal "
+        "may be free in part, "
         "and that of a start with a `path`.",
         None,
         {"position": [0.4, -0.2, 0.3], "quaternion": [0, 1, 0, 0]},
@@ -53,7 +64,8 @@ class PoseTarget(Request):
 
 
 SingleTarget = Annotated[
-    Annotated[JointTarget, Tag("by q")] | Annotated[PoseTarget, Tag("by pose")], by_field("q", "pose")
+    Annotated[JointTarget, Tag("by q")] | Annotated[PoseTarget, Tag("by pose")],
+    by_field("q", "pose"),
 ]
 
 
@@ -61,7 +73,8 @@ class AnyOfTarget(Request):
     """Several targets. The answer moves to the one that needs the least energy."""
 
     any_of: list[SingleTarget] = described(
-        "Joint positions and poses, mixed. Targets that the arm cannot reach are in `unreachable` of the answer.",
+        "Joint positions and poses, mixed. Targets that the arm cannot reach are in `unreachable` "
+        "of the answer.",
         None,
         [
             {"pose": {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
@@ -97,14 +110,19 @@ SECONDS_OR_RANGE = number_or_object(
     "seconds", "duration", "Give null, a number of seconds, or an object with `min`, `max` or both"
 )
 
-Duration = Annotated[Annotated[Seconds, Tag("seconds")] | Annotated[DurationRange, Tag("range")], SECONDS_OR_RANGE]
+Duration = Annotated[
+    Annotated[Seconds, Tag("seconds")] | Annotated[DurationRange, Tag("range")], SECONDS_OR_RANGE
+]
 
 
 class Branch(Request):
     """Allowed branches. A part that is null may have any value."""
 
     shoulder: Literal["left", "right"] | None = described(
-        "Side of the first axis on which the plane of the arm lies, seen along the reach.", None, "left", default=None
+        "Side of the first axis on which the plane of the arm lies, seen along the reach.",
+        None,
+        "left",
+        default=None,
     )
     elbow: Literal["up", "down"] | None = described(
         "`up`: the elbow is above the line from shoulder to wrist, if the arm reaches forward.",
@@ -113,7 +131,10 @@ class Branch(Request):
         default=None,
     )
     wrist: Literal["flip", "no_flip"] | None = described(
-        "`no_flip`: sin(q5) < 0, as with the tool pointing down in a usual posture.", None, "no_flip", default=None
+        "`no_flip`: sin(q5) < 0, as with the tool pointing down in a usual posture.",
+        None,
+        "no_flip",
+        default=None,
     )
 
 
@@ -121,17 +142,24 @@ class Holding(Request):
     """What holds the arm while it waits."""
 
     hold: Literal["motors", "brakes"] = described(
-        "`motors`: the motors hold the arm during the wait. `brakes`: the motors hold it for `brake_delay`, then the "
+        "`motors`: the motors hold the arm during the wait. `brakes`: the motors hold it for "
+        "`brake_delay`, then the "
         "brakes.",
         None,
         "brakes",
         default="motors",
     )
     brake_delay: float = described(
-        "Time between the end of the motion and the brakes.", "s", 0.5, default=0.0, ge=0, le=LONGEST_DURATION
+        "Time between the end of the motion and the brakes.",
+        "s",
+        0.5,
+        default=0.0,
+        ge=0,
+        le=LONGEST_DURATION,
     )
     brake_power: Annotated[float, Field(ge=0, le=1e4)] | None = described(
-        "Power drawn while the brakes hold, electronics included. Null: the power of the electronics.",
+        "Power drawn while the brakes hold, electronics included. Null: the power of the "
+        "electronics.",
         "W",
         20.0,
         default=None,
@@ -142,7 +170,10 @@ class Dwell(Holding):
     """The wait at the goal: when the arm is needed again, and what holds it until then."""
 
     time: Seconds = described(
-        "Time from the start of the motion until the arm is needed again. The motion takes no longer.", "s", 6.0
+        "Time from the start of the motion until the arm is needed again. The motion takes no "
+        "longer.",
+        "s",
+        6.0,
     )
 
 
@@ -160,34 +191,40 @@ class MotionRequest(ArmRequest):
         {"pose": {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
     )
     objective: Objective = described(
-        "Energy that is minimised. `electrical`: energy drawn from the supply. `mechanical`: work of the joints "
+        "Energy that is minimised. `electrical`: energy drawn from the supply. `mechanical`: work "
+        "of the joints "
         "without friction, ∫ Σ_j |tau_j v_j| dt.",
         None,
         "electrical",
         default="electrical",
     )
     duration: Duration | None = described(
-        "Duration, or bounds on it. Null: the optimiser chooses the duration. The objective `mechanical` needs a "
-        "number, a `max` or a `dwell`, because a slower motion needs less work. The duration is at most "
+        "Duration, or bounds on it. Null: the optimiser chooses the duration. The objective "
+        "`mechanical` needs a "
+        "number, a `max` or a `dwell`, because a slower motion needs less work. The duration is at "
+        "most "
         f"{LONGEST_DURATION:g} s and at most {MOST_SAMPLES} times `sample_period`.",
         "s",
         {"max": 3.0},
         default=None,
     )
     dwell: Dwell | None = described(
-        "The arm waits at the goal until the end of the dwell, and the energy includes the wait. Null: no wait.",
+        "The arm waits at the goal until the end of the dwell, and the energy includes the wait. "
+        "Null: no wait.",
         None,
         {"time": 6.0, "hold": "brakes", "brake_delay": 0.5, "brake_power": 20.0},
         default=None,
     )
     branch: Branch | None = described(
-        "Allowed branches of the arm configurations that reach a pose, at both ends. Null: all branches.",
+        "Allowed branches of the arm configurations that reach a pose, at both ends. Null: all "
+        "branches.",
         None,
         {"shoulder": "left", "elbow": "up", "wrist": "no_flip"},
         default=None,
     )
     windings: bool = described(
-        "Whether full-turn alternatives q + 2πk within the joint range are candidates of their own.",
+        "Whether full-turn alternatives q + 2πk within the joint range are candidates of their "
+        "own.",
         None,
         True,
         default=True,
@@ -203,7 +240,8 @@ class MotionRequest(ArmRequest):
         validate_default=True,
     )
     deadline: float = described(
-        "Wall time from the arrival of the request, including the wait for a worker. When it passes, the service "
+        "Wall time from the arrival of the request, including the wait for a worker. When it "
+        "passes, the service "
         "returns the best certified motion found so far.",
         "s",
         10.0,
@@ -221,7 +259,8 @@ class MotionRequest(ArmRequest):
             least = math.ceil(longest / MOST_SAMPLES * 1e4) / 1e4
             raise PydanticCustomError(
                 "too_many_samples",
-                "An answer has at most {most} samples: for a `duration` of up to {longest} s, `sample_period` must be "
+                "An answer has at most {most} samples: for a `duration` of up to {longest} s, "
+                "`sample_period` must be "
                 "at least {least} s",
                 {"most": MOST_SAMPLES, "longest": longest, "least": least},
             )
@@ -232,29 +271,40 @@ class OptimizeRequest(MotionRequest):
     """A motion from standstill at `start` to standstill at `goal`, by one method."""
 
     method: MethodName = described(
-        "How the motion is parametrised. `bspline`: one B-spline per joint. `time_scaling`: the straight line in joint "
-        "space with an optimised time scaling. `lagrange`: one polynomial per joint, given by its values at Chebyshev "
-        "nodes. `uniform_scaling`: the time-optimal motion, uniformly slowed down. `polynomial_ga`: one polynomial per "
-        "joint, found by a genetic algorithm for at most three candidates; it takes seconds, and its `status` is never "
-        "`optimal`. Every method goes around obstacles; where their own path collides, `time_scaling` and "
+        "How the motion is parametrised. `bspline`: one B-spline per joint. `time_scaling`: the "
+        "straight line in joint "
+        "space with an optimised time scaling. `lagrange`: one polynomial per joint, given by its "
+        "values at Chebyshev "
+        "nodes. `uniform_scaling`: the time-optimal motion, uniformly slowed down. "
+        "`polynomial_ga`: one polynomial per "
+        "joint, found by a genetic algorithm for at most three candidates; it takes seconds, and "
+        "its `status` is never "
+        "`optimal`. Every method goes around obstacles; where their own path collides, "
+        "`time_scaling` and "
         "`uniform_scaling` follow a planned path.",
         None,
         "bspline",
         default="bspline",
     )
     path: Path | None = described(
-        "How the TCP goes from `start` to `goal`, which are joint positions or one pose each then. The orientation of "
-        "either may be `free_about` the axis `tolerance.about`. `method` and `windings` do not matter. Null: the "
+        "How the TCP goes from `start` to `goal`, which are joint positions or one pose each then. "
+        "The orientation of "
+        "either may be `free_about` the axis `tolerance.about`. `method` and `windings` do not "
+        "matter. Null: the "
         "motion is free.",
         None,
         {"tolerance": {"position": 1e-4}},
         default=None,
     )
     bound: BoundEffort = described(
-        "Effort for `lower_bound`. `tight`: the candidates whose bound is below the energy of the answer get a second, "
-        "greater one, which takes the copper loss of holding against gravity into account. It takes about a second per "
-        "candidate, lowest bound first, and ends before the `deadline`. For the objective `electrical`. The bound of a "
-        "free orientation gets more effort, too. For the objective `mechanical`, candidates that differ by full "
+        "Effort for `lower_bound`. `tight`: the candidates whose bound is below the energy of the "
+        "answer get a second, "
+        "greater one, which takes the copper loss of holding against gravity into account. It "
+        "takes about a second per "
+        "candidate, lowest bound first, and ends before the `deadline`. For the objective "
+        "`electrical`. The bound of a "
+        "free orientation gets more effort, too. For the objective `mechanical`, candidates that "
+        "differ by full "
         "turns of the outer joints are all solved, unless their bounds rule them out.",
         None,
         "normal",

@@ -26,7 +26,9 @@ from joulepath.optimizer.problem.names import LONGEST_NAME
 from joulepath.optimizer.problem.scene import DEFAULT_MARGIN, MOST_OBSTACLES, MOST_VERTICES
 
 _POSE = {"position": [0.5, 0.1, 0.2], "quaternion": [0.0, 0.0, 0.0, 1.0]}
-_POSE_TEXT = "Pose of the shape: of an obstacle in the scene's `frame`, of a payload in the flange frame."
+_POSE_TEXT = (
+    "Pose of the shape: of an obstacle in the scene's `frame`, of a payload in the flange frame."
+)
 # standard alphabet, filled to a multiple of four characters
 BASE64 = r"^[A-Za-z0-9+/]*={0,2}$"
 # most cells of a grid in bits, and most bytes of a mesh file, and the lengths of their base64
@@ -72,7 +74,9 @@ class Capsule(_Shape):
 
 
 class Mesh(_Shape):
-    """The convex hull of points. An obstacle that is not convex is a `mesh_file`, or several meshes."""
+    """The convex hull of points. An obstacle that is not convex is a `mesh_file`, or several
+    meshes.
+    """
 
     shape: Literal["mesh"] = described("Kind of shape.", None, "mesh")
     vertices: Annotated[list[Vector3], Field(min_length=4, max_length=MOST_VERTICES)] = described(
@@ -83,20 +87,26 @@ class Mesh(_Shape):
 
 
 class HalfSpace(_Shape):
-    """All points below the xy plane of its pose: a floor, or a wall whose z axis points to the arm."""
+    """All points below the xy plane of its pose: a floor, or a wall whose z axis points to the
+    arm."""
 
     shape: Literal["half_space"] = described("Kind of shape.", None, "half_space")
 
 
 class Points(_Shape):
-    """Balls of one radius about points: a point cloud. Every point counts; none is left out or merged."""
+    """Balls of one radius about points: a point cloud. Every point counts; none is left out or
+    merged.
+    """
 
     shape: Literal["points"] = described("Kind of shape.", None, "points")
     points: Annotated[list[Vector3], Field(min_length=1, max_length=MOST_POINTS)] = described(
-        "Points [x, y, z] in the frame of the pose.", "m", [[0.4, 0.1, 0.0], [0.4, 0.12, 0.0], [0.4, 0.14, 0.01]]
+        "Points [x, y, z] in the frame of the pose.",
+        "m",
+        [[0.4, 0.1, 0.0], [0.4, 0.12, 0.0], [0.4, 0.14, 0.01]],
     )
     radius: Size = described(
-        "Radius of the ball about each point: at least half of the distance between neighbours, so that nothing passes "
+        "Radius of the ball about each point: at least half of the distance between neighbours, so "
+        "that nothing passes "
         "between them.",
         "m",
         0.015,
@@ -106,19 +116,26 @@ class Points(_Shape):
 class VoxelBits(Request):
     """The occupied cells of a grid as one bit each."""
 
-    dimensions: Annotated[list[Annotated[int, Field(ge=1, le=MOST_ALONG_EDGE)]], Field(min_length=3, max_length=3)] = (
-        described("Number of cells along x, y and z; at most 8,388,608 cells in all.", None, [4, 2, 2])
+    dimensions: Annotated[
+        list[Annotated[int, Field(ge=1, le=MOST_ALONG_EDGE)]], Field(min_length=3, max_length=3)
+    ] = described(
+        "Number of cells along x, y and z; at most 8,388,608 cells in all.", None, [4, 2, 2]
     )
-    data: Annotated[str, Field(min_length=4, max_length=MOST_BITS_TEXT, pattern=BASE64)] = described(
-        "Base64 of the bits, eight to a byte, the lowest bit first; 1: occupied. Cell (i, j, k) is bit "
-        "i + dimensions[0] · (j + dimensions[1] · k). The last byte is filled with zeros.",
-        None,
-        "AwE=",
+    data: Annotated[str, Field(min_length=4, max_length=MOST_BITS_TEXT, pattern=BASE64)] = (
+        described(
+            "Base64 of the bits, eight to a byte, the lowest bit first; 1: occupied. Cell (i, j, "
+            "k) is bit "
+            "i + dimensions[0] · (j + dimensions[1] · k). The last byte is filled with zeros.",
+            None,
+            "AwE=",
+        )
     )
 
 
 class Voxels(_Shape):
-    """Cubes of a grid: an occupancy map. The pose is that of the corner of cell (0, 0, 0) with the least x, y and z."""
+    """Cubes of a grid: an occupancy map. The pose is that of the corner of cell (0, 0, 0) with the
+    least x, y and z.
+    """
 
     shape: Literal["voxels"] = described("Kind of shape.", None, "voxels")
     size: Size = described("Length of the edges of a cell.", "m", 0.05)
@@ -134,14 +151,16 @@ class Voxels(_Shape):
         ]
         | None
     ) = described(
-        "Occupied cells [i, j, k]: each is the cube from (i, j, k) · size to (i + 1, j + 1, k + 1) · size. Give either "
+        "Occupied cells [i, j, k]: each is the cube from (i, j, k) · size to (i + 1, j + 1, k + 1) "
+        "· size. Give either "
         "`cells` or `bits`.",
         None,
         [[0, 0, 0], [1, 0, 0], [1, 0, 1]],
         default=None,
     )
     bits: VoxelBits | None = described(
-        "Occupied cells as bits: a hundred times smaller for dense grids. Give either `cells` or `bits`.",
+        "Occupied cells as bits: a hundred times smaller for dense grids. Give either `cells` or "
+        "`bits`.",
         None,
         {"dimensions": [4, 2, 2], "data": "AwE="},
         default=None,
@@ -149,18 +168,19 @@ class Voxels(_Shape):
 
 
 class MeshFile(_Shape):
-    """Triangles from a mesh file, of any form. Every triangle counts: nothing is simplified or made convex.
+    """Triangles from a mesh file, of any form. Every triangle counts: nothing is simplified or made
+    convex.
 
-    A closed mesh, in which every edge belongs to two triangles of opposite directions, is solid. Any other mesh is a
-    surface.
+    A closed mesh, in which every edge belongs to two triangles of opposite directions, is solid.
+    Any other mesh is a surface.
     """
 
     shape: Literal["mesh_file"] = described("Kind of shape.", None, "mesh_file")
     format: Literal["stl", "obj", "glb"] = described(
         "Format of the file: STL (binary or text), Wavefront OBJ, or binary glTF 2.0.", None, "stl"
     )
-    data: Annotated[str, Field(min_length=4, max_length=MOST_FILE_TEXT, pattern=BASE64)] = described(
-        "Base64 of the file, of at most 4 MiB and 100,000 triangles.", None, MESH_FILE
+    data: Annotated[str, Field(min_length=4, max_length=MOST_FILE_TEXT, pattern=BASE64)] = (
+        described("Base64 of the file, of at most 4 MiB and 100,000 triangles.", None, MESH_FILE)
     )
     scale: Annotated[float, Field(ge=1e-6, le=1e3)] = described(
         "Length of one unit of the file: 0.001 for a file in millimetres.", "m", 0.001, default=1.0
@@ -168,8 +188,11 @@ class MeshFile(_Shape):
 
 
 class _Obstacle(Request):
-    name: Annotated[str, Field(min_length=1, max_length=LONGEST_NAME, pattern=NO_CONTROLS), PLAIN] = described(
-        "Name of the obstacle in answers. Each name is used once, and none is a link's, `tool` or `payload`; names "
+    name: Annotated[
+        str, Field(min_length=1, max_length=LONGEST_NAME, pattern=NO_CONTROLS), PLAIN
+    ] = described(
+        "Name of the obstacle in answers. Each name is used once, and none is a link's, `tool` or "
+        "`payload`; names "
         "that differ only in case or spaces count as the same. Every character must show.",
         None,
         "table",
@@ -223,8 +246,8 @@ class HalfSpaceObstacle(HalfSpace, _Obstacle):
 def _by_shape(*known: str) -> Discriminator:
     """Discriminator of a union by the field `shape`, whose members are tagged `a <shape>`.
 
-    Its error does not echo an unknown shape. A tag that were the name of a field, as `points` is, would be taken for
-    one in the location of an error.
+    Its error does not echo an unknown shape. A tag that were the name of a field, as `points` is,
+    would be taken for one in the location of an error.
     """
 
     def choose(value: Any) -> str | None:
@@ -248,13 +271,16 @@ CarriedShape = Annotated[
 ]
 
 
-LinkNames = Annotated[list[Annotated[str, Field(min_length=1, max_length=64)]], Field(max_length=16)]
+LinkNames = Annotated[
+    list[Annotated[str, Field(min_length=1, max_length=64)]], Field(max_length=16)
+]
 
 
 def touched_links(body: str) -> Any:
     """The field `touches` of a body that is fixed to the flange."""
     return described(
-        f"Names of the links that the {body} touches by design: their distance from it is not checked. Null: the link "
+        f"Names of the links that the {body} touches by design: their distance from it is not "
+        "checked. Null: the link "
         "that carries the flange (`wrist_3`). An empty list: none.",
         None,
         ["wrist_3"],
@@ -283,7 +309,17 @@ Obstacle = Annotated[
     | Annotated[PointsObstacle, Tag("a points")]
     | Annotated[VoxelsObstacle, Tag("a voxels")]
     | Annotated[MeshFileObstacle, Tag("a mesh_file")],
-    _by_shape("box", "sphere", "cylinder", "capsule", "mesh", "half_space", "points", "voxels", "mesh_file"),
+    _by_shape(
+        "box",
+        "sphere",
+        "cylinder",
+        "capsule",
+        "mesh",
+        "half_space",
+        "points",
+        "voxels",
+        "mesh_file",
+    ),
 ]
 
 
@@ -302,8 +338,12 @@ class Scene(Request):
 class ToolCapsule(Request):
     """A capsule in the flange frame."""
 
-    start: Vector3 = described("First end of the axis, [x, y, z] in the flange frame.", "m", [0.0, 0.0, 0.03])
-    end: Vector3 = described("Second end of the axis, [x, y, z] in the flange frame.", "m", [0.0, 0.0, 0.12])
+    start: Vector3 = described(
+        "First end of the axis, [x, y, z] in the flange frame.", "m", [0.0, 0.0, 0.03]
+    )
+    end: Vector3 = described(
+        "Second end of the axis, [x, y, z] in the flange frame.", "m", [0.0, 0.0, 0.12]
+    )
     radius: Size = described("Radius.", "m", 0.04)
     touches: LinkNames | None = touched_links("capsule")
 
@@ -333,7 +373,13 @@ class CellRequest(RobotWithTcp):
         None,
         {
             "obstacles": [
-                {"name": "post", "shape": "cylinder", "radius": 0.05, "length": 1.0, "pose": at(0.6, 0.3, 0.5)}
+                {
+                    "name": "post",
+                    "shape": "cylinder",
+                    "radius": 0.05,
+                    "length": 1.0,
+                    "pose": at(0.6, 0.3, 0.5),
+                }
             ]
         },
         default=Scene(),

@@ -34,14 +34,19 @@ class StudyRequest(Request):
     """A study: a motion that is improved step by step until its energy is at most a threshold."""
 
     name: Name = described("Name of the study.", None, "Pick and place, cell 4")
-    robot: RobotName = described("Robot of all iterations: a name from `GET /robots`.", None, "ur5e", default="ur5e")
+    robot: RobotName = described(
+        "Robot of all iterations: a name from `GET /robots`.", None, "ur5e", default="ur5e"
+    )
     figures: FiguresId | None = described(
-        "Id of the identified figures of all iterations, from `GET /figures`. Null: the robot's own figures.",
+        "Id of the identified figures of all iterations, from `GET /figures`. Null: the robot's "
+        "own figures.",
         None,
         FIGURES_ID,
         default=None,
     )
-    threshold: float = described("Energy that is low enough, of the objective.", "J", 60.0, gt=0, le=1e9)
+    threshold: float = described(
+        "Energy that is low enough, of the objective.", "J", 60.0, gt=0, le=1e9
+    )
     objective: Objective = described(
         "Energy that is compared with the threshold, and that the iterations minimise.",
         None,
@@ -61,7 +66,8 @@ class OptimizeStep(Request):
     """An iteration that optimises a motion."""
 
     optimize: OptimizeRequest = described(
-        "A body of `POST /optimize`. If `robot`, `figures` and `objective` are left out, those of the study apply.",
+        "A body of `POST /optimize`. If `robot`, `figures` and `objective` are left out, those of "
+        "the study apply.",
         None,
         OPTIMIZE,
     )
@@ -71,7 +77,10 @@ class EvaluateStep(Request):
     """An iteration that evaluates a given motion."""
 
     evaluate: EvaluateRequest = described(
-        "A body of `POST /evaluate`. If `robot` and `figures` are left out, those of the study apply.", None, EVALUATE
+        "A body of `POST /evaluate`. If `robot` and `figures` are left out, those of the study "
+        "apply.",
+        None,
+        EVALUATE,
     )
 
 
@@ -91,27 +100,35 @@ class Iteration(Response):
     """One iteration of a study."""
 
     number: int = described("Number of the iteration: 1, 2, 3, … without gaps.", "1", 2)
-    kind: Literal["optimize", "evaluate"] = described("Endpoint that computed the iteration.", None, "optimize")
+    kind: Literal["optimize", "evaluate"] = described(
+        "Endpoint that computed the iteration.", None, "optimize"
+    )
     created: datetime = described("Time at which it was added, in UTC.", None, CREATED)
     energy: float = described("Energy of the motion, of the study's objective.", "J", 57.5)
     electrical: float = described("Energy drawn from the supply.", "J", 57.5)
     mechanical: float = described("Mechanical work.", "J", 31.9)
     duration: float = described("Duration of the motion.", "s", 1.33)
     change_from_last: float | None = described(
-        "Energy minus the energy of the previous iteration; a negative value is a saving. Null for the first "
+        "Energy minus the energy of the previous iteration; a negative value is a saving. Null for "
+        "the first "
         "iteration.",
         "J",
         -38.6,
     )
     change_from_best: float | None = described(
-        "Energy minus the least energy of all previous iterations; negative if this iteration is the best so far. Null "
+        "Energy minus the least energy of all previous iterations; negative if this iteration is "
+        "the best so far. Null "
         "for the first iteration.",
         "J",
         -4.1,
     )
-    threshold_met: bool = described("Whether the energy is at most the study's threshold.", None, True)
+    threshold_met: bool = described(
+        "Whether the energy is at most the study's threshold.", None, True
+    )
     answer: str = described(
-        "Id of the complete answer, for `GET /answers/{id}`. It is stored as long as the study.", None, ANSWER_ID
+        "Id of the complete answer, for `GET /answers/{id}`. It is stored as long as the study.",
+        None,
+        ANSWER_ID,
     )
 
 
@@ -128,18 +145,30 @@ class StudySummary(Response):
     id: str = described("Id of the study.", None, STUDY_ID)
     name: str = described("Name of the study.", None, "Pick and place, cell 4")
     robot: str = described("Robot of all iterations.", None, "ur5e")
-    figures: str | None = described("Id of the figures of all iterations; null: the robot's own.", None, FIGURES_ID)
+    figures: str | None = described(
+        "Id of the figures of all iterations; null: the robot's own.", None, FIGURES_ID
+    )
     objective: Objective = described(
-        "Energy that is compared with the threshold, and that the iterations minimise.", None, "electrical"
+        "Energy that is compared with the threshold, and that the iterations minimise.",
+        None,
+        "electrical",
     )
     threshold: float = described("Energy that is low enough, of the objective.", "J", 60.0)
     created: datetime = described("Time at which the study was created, in UTC.", None, CREATED)
-    owner: str | None = described("Name of the API key that created it; null without one.", None, "press_shop")
+    owner: str | None = described(
+        "Name of the API key that created it; null without one.", None, "press_shop"
+    )
     iterations: int = described("Number of iterations.", "1", 2)
     last: IterationEnergy | None = part("The last iteration; null without iterations.")
-    best: IterationEnergy | None = part("The iteration of least energy, the first of equals; null without iterations.")
-    threshold_met: bool = described("Whether the energy of an iteration is at most the threshold.", None, True)
-    threshold_met_by: int | None = described("Number of the first such iteration; null if there is none.", "1", 2)
+    best: IterationEnergy | None = part(
+        "The iteration of least energy, the first of equals; null without iterations."
+    )
+    threshold_met: bool = described(
+        "Whether the energy of an iteration is at most the threshold.", None, True
+    )
+    threshold_met_by: int | None = described(
+        "Number of the first such iteration; null if there is none.", "1", 2
+    )
 
 
 class Study(StudySummary):
@@ -159,12 +188,15 @@ class IterationDetail(Iteration):
     """One iteration of a study, and the state of the study after it."""
 
     request: dict[str, Any] = described(
-        "The request, ready to be sent again to `POST /studies/{id}/iterations`.", None, {"optimize": OPTIMIZE}
+        "The request, ready to be sent again to `POST /studies/{id}/iterations`.",
+        None,
+        {"optimize": OPTIMIZE},
     )
     best: IterationEnergy = part("The iteration of least energy up to this one.")
     threshold: float = described("Threshold of the study.", "J", 60.0)
     threshold_met_by: int | None = described(
-        "Number of the first iteration up to this one with an energy of at most the threshold; null if there is none.",
+        "Number of the first iteration up to this one with an energy of at most the threshold; "
+        "null if there is none.",
         "1",
         2,
     )

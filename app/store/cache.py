@@ -14,7 +14,8 @@ from joulepath.app.store.tables import Answer, CachedAnswer
 
 
 class Meaning(TypedDict):
-    """What a request means to a version of the service: the hash of its canonical form, and the name of its robot.
+    """What a request means to a version of the service: the hash of its canonical form, and the
+    name of its robot.
 
     Of a cycle also its cell, see `KnownMotion`.
     """
@@ -59,7 +60,8 @@ def find(session: Session, asked: Sequence[Asked]) -> dict[Asked, Answer]:
 
 
 def remember(session: Session, answered: Iterable[Answered]) -> None:
-    """Has stored answers answer these requests from now on. Nothing takes the place of an optimal one but another.
+    """Has stored answers answer these requests from now on. Nothing takes the place of an optimal
+    one but another.
 
     It never waits for a request that somebody else is remembering, and fails for none.
     """
@@ -76,7 +78,8 @@ def remember(session: Session, answered: Iterable[Answered]) -> None:
         is_postgresql = session.get_bind().dialect.name == "postgresql"
         insert = postgresql.insert(CachedAnswer) if is_postgresql else sqlite.insert(CachedAnswer)
         values = [
-            {"key": key, "answer_id": own.answer_id, "deadline": _longest(own)} for key, own in sorted(new.items())
+            {"key": key, "answer_id": own.answer_id, "deadline": _longest(own)}
+            for key, own in sorted(new.items())
         ]
         session.execute(insert.on_conflict_do_nothing(), values)
 

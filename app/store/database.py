@@ -35,7 +35,8 @@ _SERVER_TIMEOUT = 5.0
 """Longest wait [s] for an answer of PostgreSQL."""
 _PAGES = ("freelist_count", "page_size")
 _MIGRATION_LOCK = 0x6A6F756C65
-"""Key of the advisory lock in PostgreSQL: any number that no other program uses in this database."""
+"""Key of the advisory lock in PostgreSQL: any number that no other program uses in this
+database."""
 
 
 class OtherVersion(CommandError):
@@ -43,14 +44,17 @@ class OtherVersion(CommandError):
 
     def __init__(self, revision: str, url: URL) -> None:
         super().__init__(
-            f"Another version of the service made the tables of {url.render_as_string()} (revision {revision}), and "
-            "this one cannot migrate them: start that version, or move the database away (or set another "
+            f"Another version of the service made the tables of {url.render_as_string()} (revision "
+            f"{revision}), and "
+            "this one cannot migrate them: start that version, or move the database away (or set "
+            "another "
             "JOULEPATH_DATABASE_URL), and a new one is made."
         )
 
 
 def create_database_engine(url: str) -> Engine:
-    """SQLAlchemy's engine for `sqlite:///file` or `postgresql://user:password@host/name`. It does not connect yet.
+    """SQLAlchemy's engine for `sqlite:///file` or `postgresql://user:password@host/name`. It does
+    not connect yet.
 
     Raises ArgumentError for any other text.
     """
@@ -98,7 +102,8 @@ def _sqlite(url: URL) -> Engine:
     def configure(connection: sqlite3.Connection, record: ConnectionPoolEntry) -> None:
         connection.isolation_level = None  # `begin` below starts each transaction, also around DDL
         # FULL: a committed transaction survives a killed process and a power failure
-        # secure_delete=FAST: with ON, the default of some builds, deleting needs as much space as what is deleted
+        # secure_delete=FAST: with ON, the default of some builds, deleting needs as much space as
+        # what is deleted
         _keep_log(connection)
         for pragma in ("synchronous=FULL", "foreign_keys=ON", "secure_delete=FAST"):
             connection.execute(f"PRAGMA {pragma}")
@@ -107,7 +112,8 @@ def _sqlite(url: URL) -> Engine:
 
     @event.listens_for(engine, "begin")
     def begin(connection: Connection) -> None:
-        # without IMMEDIATE, a transaction that reads and then writes fails if another one writes in between
+        # without IMMEDIATE, a transaction that reads and then writes fails if another one writes in
+        # between
         check(connection.info[OPENED])
         writes = connection.get_execution_options().get("writes", False)
         connection.exec_driver_sql(f"PRAGMA busy_timeout = {_lock_timeout(connection)}")
@@ -117,8 +123,8 @@ def _sqlite(url: URL) -> Engine:
 
 
 def _keep_log(connection: sqlite3.Connection) -> None:
-    """Has the file keep a write-ahead log. Where two processes do so to a new file at once, SQLite fails one of them
-    instead of waiting."""
+    """Has the file keep a write-ahead log. Where two processes do so to a new file at once, SQLite
+    fails one of them instead of waiting."""
     end = time.monotonic() + _LOCK_TIMEOUT
     while True:
         try:
@@ -131,7 +137,8 @@ def _keep_log(connection: sqlite3.Connection) -> None:
 
 
 def migrate(engine: Engine) -> None:
-    """Migrates the tables to this version. Several processes may call it at the same time: one works, the others wait.
+    """Migrates the tables to this version. Several processes may call it at the same time: one
+    works, the others wait.
 
     Raises OtherVersion if the database has tables of which this version has no migration.
     """
@@ -146,7 +153,9 @@ def migrate(engine: Engine) -> None:
     scripts = ScriptDirectory.from_config(config)
     if present == scripts.get_current_head():
         return
-    if present is not None and present not in {script.revision for script in scripts.walk_revisions()}:
+    if present is not None and present not in {
+        script.revision for script in scripts.walk_revisions()
+    }:
         raise OtherVersion(present, engine.url)
     with _migrating(engine) as connection:
         config.attributes["connection"] = connection
@@ -160,7 +169,8 @@ def _migrating(engine: Engine) -> Iterator[Connection]:
         with engine.execution_options(writes=True, migrates=True).begin() as connection:
             yield connection
         return
-    # a connection of the pool would give up on the lock, or on a long change of a table, after `_SERVER_TIMEOUT`
+    # a connection of the pool would give up on the lock, or on a long change of a table, after
+    # `_SERVER_TIMEOUT`
     patient = _postgresql(engine.url, _MIGRATION_TIMEOUT + _SERVER_TIMEOUT)
     try:
         with patient.execution_options(migrates=True).begin() as connection:
@@ -172,12 +182,16 @@ def _migrating(engine: Engine) -> Iterator[Connection]:
 
 def room_inside(session: Session) -> int:
     """Bytes of an SQLite database that hold nothing and are used before its file grows."""
-    pages, size = (session.connection().exec_driver_sql(f"PRAGMA {name}").scalar_one() for name in _PAGES)
+    pages, size = (
+        session.connection().exec_driver_sql(f"PRAGMA {name}").scalar_one() for name in _PAGES
+    )
     return int(pages) * int(size)
 
 
 def is_writable(session: Session) -> bool:
-    """Whether the database takes changes. Nothing is written. Raises DBAPIError, of SQLite also if it does not."""
+    """Whether the database takes changes. Nothing is written. Raises DBAPIError, of SQLite also if
+    it does not.
+    """
     connection = session.connection()
     if connection.dialect.name == "postgresql":
         return str(connection.exec_driver_sql("SHOW transaction_read_only").scalar_one()) == "off"

@@ -32,11 +32,16 @@ def fault_of(error: Exception, file: Path | None) -> StoreFault:
         return "unreachable"
     code = getattr(error.orig, "sqlite_errorcode", None)
     if code is not None:
-        # the memory map beside the file grows by an I/O error where the file itself reports a full disk
+        # the memory map beside the file grows by an I/O error where the file itself reports a full
+        # disk
         full = code & 0xFF == _SQLITE_IO_ERROR and file is not None and room(file) < LEAST_ROOM
         return "full" if full else _SQLITE.get(code & 0xFF, "unreachable")
     told: Any = error.orig.args[0] if error.orig is not None and error.orig.args else None
-    return _POSTGRESQL.get(told.get("C", ""), "unreachable") if isinstance(told, dict) else "unreachable"
+    return (
+        _POSTGRESQL.get(told.get("C", ""), "unreachable")
+        if isinstance(told, dict)
+        else "unreachable"
+    )
 
 
 def room(file: Path) -> int:

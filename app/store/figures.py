@@ -1,4 +1,6 @@
-"""Figures identified on one arm. Each function works on a session: `await store.write(partial(put, …))`."""
+"""Figures identified on one arm. Each function works on a session: `await store.write(partial(put,
+…))`.
+"""
 
 from __future__ import annotations
 
@@ -18,11 +20,12 @@ _SPACE = uuid.UUID("6d0c5a0e-7b0e-5d5f-9a53-1d1f5b1c4a9e")
 
 
 def new_figures(robot: str, content: dict[str, Any], owner: str | None) -> Figures:
-    """Figures that take the place of the robot's own, as `joulepath.models.uncertainty.document.replaced_in` gives
-    them; not yet
-    in the database."""
+    """Figures that take the place of the robot's own, as
+    `joulepath.models.uncertainty.document.replaced_in` gives them; not yet in the database."""
     text = json.dumps([robot, content], sort_keys=True)
-    return Figures(id=str(uuid.uuid5(_SPACE, text)), robot=robot, created=now(), owner=owner, content=content)
+    return Figures(
+        id=str(uuid.uuid5(_SPACE, text)), robot=robot, created=now(), owner=owner, content=content
+    )
 
 
 def put(session: Session, figures: Figures, most: int) -> tuple[Figures, bool]:

@@ -23,7 +23,9 @@ Counts = dict[str, int]
 
 @dataclass(frozen=True)
 class Report:
-    """Progress within an attempt at a request: energy [J] of the best answer, its bound [J], and candidates tried."""
+    """Progress within an attempt at a request: energy [J] of the best answer, its bound [J], and
+    candidates tried.
+    """
 
     attempt: int
     found: float | None = None
@@ -42,8 +44,12 @@ class Report:
 def counts_of(session: Session, job_ids: list[str]) -> dict[str, Counts]:
     """Number of requests in each state, by job."""
     counts = {job_id: dict.fromkeys(STATES, 0) for job_id in job_ids}
-    query = select(JobRequest.job_id, JobRequest.state, func.count()).where(JobRequest.job_id.in_(job_ids))
-    for job_id, state, count in session.execute(query.group_by(JobRequest.job_id, JobRequest.state)):
+    query = select(JobRequest.job_id, JobRequest.state, func.count()).where(
+        JobRequest.job_id.in_(job_ids)
+    )
+    for job_id, state, count in session.execute(
+        query.group_by(JobRequest.job_id, JobRequest.state)
+    ):
         counts[job_id][state] = count
     return counts
 
@@ -63,11 +69,18 @@ def set_state(session: Session, job: Job, state: str) -> None:
 
 def request_ended(session: Session, job: Job, request: JobRequest) -> None:
     """Records that a request of the job has ended."""
-    record(session, job, "request", {"index": request.number, "state": request.state, "energy": request.energy})
+    record(
+        session,
+        job,
+        "request",
+        {"index": request.number, "state": request.state, "energy": request.energy},
+    )
 
 
 def conclude(session: Session, job: Job, now: datetime) -> None:
-    """Records progress, and the end of the job if no request waits or runs. The job's row must be locked."""
+    """Records progress, and the end of the job if no request waits or runs. The job's row must be
+    locked.
+    """
     if job.ended is not None:
         return
     session.flush()
@@ -89,7 +102,9 @@ def progress_is_due(job: Job, now: datetime) -> bool:
     return job.progressed is None or now - job.progressed >= PROGRESS_PERIOD
 
 
-def record_progress(session: Session, job: Job, now: datetime, reports: Mapping[int, Report]) -> Counts:
+def record_progress(
+    session: Session, job: Job, now: datetime, reports: Mapping[int, Report]
+) -> Counts:
     """Records the progress of a job, and within its requests by their index; returns its counts."""
     counts = counts_of(session, [job.id])[job.id]
     job.progressed = now
@@ -114,7 +129,9 @@ def eta(job: Job, counts: Counts, now: datetime) -> float | None:
 
 
 def after(session: Session, job_id: str, number: int, limit: int) -> tuple[list[JobEvent], bool]:
-    """Up to `limit` events after that of `number`, and whether nothing can follow them until the job is retried."""
+    """Up to `limit` events after that of `number`, and whether nothing can follow them until the
+    job is retried.
+    """
     # the job first: events that are recorded in between only make the second value False
     job = session.get(Job, job_id)
     query = select(JobEvent).where(JobEvent.job_id == job_id, JobEvent.number > number)

@@ -1,4 +1,6 @@
-"""Jobs as clients see them. Each function works on a session: `await store.write(partial(create, …))`."""
+"""Jobs as clients see them. Each function works on a session: `await store.write(partial(create,
+…))`.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,15 @@ from joulepath.app.access.rules import check_owner
 from joulepath.app.exceptions.queue import TooManyWaiting
 from joulepath.app.exceptions.stored import JobNotCancellable, KeyReused, UnknownJob
 from joulepath.app.store.cache import Meaning
-from joulepath.app.store.job_events import ENDED, Counts, conclude, counts_of, record, request_ended, set_state
+from joulepath.app.store.job_events import (
+    ENDED,
+    Counts,
+    conclude,
+    counts_of,
+    record,
+    request_ended,
+    set_state,
+)
 from joulepath.app.store.paging import position_after, position_of
 from joulepath.app.store.tables import Answer, Job, JobRequest, is_id, new_id, now
 
@@ -25,8 +35,8 @@ Ts = TypeVarTuple("Ts")
 
 @dataclass(frozen=True)
 class NewRequest:
-    """A validated request to the endpoint `kind`: its `body`, compressed JSON, its deadline [s], and what it means, if
-    an equal one may answer it."""
+    """A validated request to the endpoint `kind`: its `body`, compressed JSON, its deadline [s],
+    and what it means, if an equal one may answer it."""
 
     kind: str
     body: bytes
@@ -57,7 +67,8 @@ def create(
 ) -> tuple[str, bool]:
     """Adds a job and returns its id with False; if its key is known, the id of that job with True.
 
-    Raises KeyReused if that job differs, or TooManyWaiting if more than `most_waiting` requests would wait.
+    Raises KeyReused if that job differs, or TooManyWaiting if more than `most_waiting` requests
+    would wait.
     """
     if key is not None:
         known = session.scalar(select(Job).where(Job.idempotency_key == key))
@@ -83,7 +94,10 @@ def create(
     record(session, job, "state", {"state": "waiting"})
     session.flush()
     fresh = {"state": "waiting", "attempt": 0, "deaths": 0, "preempted": 0}
-    rows = [{"job_id": job.id, "number": number, **vars(each), **fresh} for number, each in enumerate(new.requests)]
+    rows = [
+        {"job_id": job.id, "number": number, **vars(each), **fresh}
+        for number, each in enumerate(new.requests)
+    ]
     session.execute(insert(JobRequest), rows)
     return job.id, False
 
@@ -94,7 +108,9 @@ def view(session: Session, job_id: str) -> JobView:
     return JobView(job, counts_of(session, [job.id])[job.id])
 
 
-def page(session: Session, limit: int, after: str | None, state: str | None) -> tuple[list[JobView], str | None]:
+def page(
+    session: Session, limit: int, after: str | None, state: str | None
+) -> tuple[list[JobView], str | None]:
     """Up to `limit` jobs, newest first, and the `after` of the next page; None on the last page."""
     query = select(Job)
     if state is not None:
@@ -108,11 +124,13 @@ def page(session: Session, limit: int, after: str | None, state: str | None) -> 
 def page_of_kind(
     session: Session, kind: str, limit: int, after: str | None
 ) -> tuple[list[tuple[Job, JobRequest, str | None]], str | None]:
-    """Up to `limit` jobs of one request to the endpoint `kind`, newest first, each with it and the robot of its answer;
-    and the `after` of the next page, None on the last page."""
+    """Up to `limit` jobs of one request to the endpoint `kind`, newest first, each with it and the
+    robot of its answer; and the `after` of the next page, None on the last page."""
     query = select(Job, JobRequest, Answer.robot).join(JobRequest, JobRequest.job_id == Job.id)
     query = query.outerjoin(Answer, Answer.id == JobRequest.answer_id)
-    query = query.where(Job.total == 1, JobRequest.kind == kind).options(defer(JobRequest.body, raiseload=True))
+    query = query.where(Job.total == 1, JobRequest.kind == kind).options(
+        defer(JobRequest.body, raiseload=True)
+    )
     rows = session.execute(_newest_first(query, limit, after))
     found = [(job, request, robot) for job, request, robot in rows]
     more, found = len(found) > limit, found[:limit]
@@ -123,12 +141,15 @@ def _newest_first(query: Select[*Ts], limit: int, after: str | None) -> Select[*
     """One more than `limit` jobs of a query, from a position on."""
     if after is not None:
         created, job_id = position_after(after)
-        query = query.where(or_(Job.created < created, and_(Job.created == created, Job.id < job_id)))
+        query = query.where(
+            or_(Job.created < created, and_(Job.created == created, Job.id < job_id))
+        )
     return query.order_by(Job.created.desc(), Job.id.desc()).limit(limit + 1)
 
 
 def requests(session: Session, job_id: str, limit: int, after: int) -> list[JobRequest]:
-    """Up to `limit` requests of a job with an index above `after`, in order, without their bodies."""
+    """Up to `limit` requests of a job with an index above `after`, in order, without their
+    bodies."""
     return _page(session, job_id, limit, after)
 
 
@@ -137,16 +158,22 @@ def ended(session: Session, job_id: str, limit: int, after: int) -> list[JobRequ
     return _page(session, job_id, limit, after, JobRequest.state.in_(ENDED))
 
 
-def results(session: Session, job_id: str, limit: int, after: int) -> list[tuple[JobRequest, bytes | None]]:
+def results(
+    session: Session, job_id: str, limit: int, after: int
+) -> list[tuple[JobRequest, bytes | None]]:
     """As `ended`, each with the compressed body of its answer; None if it has none."""
     found = ended(session, job_id, limit, after)
-    query = select(Answer.id, Answer.body).where(Answer.id.in_([request.answer_id for request in found]))
+    query = select(Answer.id, Answer.body).where(
+        Answer.id.in_([request.answer_id for request in found])
+    )
     bodies: dict[str, bytes] = dict(session.execute(query).all())
     return [(request, bodies.get(request.answer_id or "")) for request in found]
 
 
 def cancel(session: Session, job_id: str, client: Client) -> None:
-    """Cancels what waits, and asks for the end of what runs. Raises UnknownJob, NotOwner or JobNotCancellable."""
+    """Cancels what waits, and asks for the end of what runs. Raises UnknownJob, NotOwner or
+    JobNotCancellable.
+    """
     job = _job(session, job_id, lock=True)
     check_owner(client, job.owner)
     if job.state == "done":
@@ -156,21 +183,28 @@ def cancel(session: Session, job_id: str, client: Client) -> None:
 
 
 def stop(session: Session, job: Job, at: datetime) -> None:
-    """Cancels what waits of a job, whose row must be locked. What runs is for those who run it to stop."""
+    """Cancels what waits of a job, whose row must be locked. What runs is for those who run it to
+    stop.
+    """
     set_state(session, job, "cancelling")
     # a row that is locked is about to be leased: whoever leases it sees the state of the job
     query = select(JobRequest).where(JobRequest.job_id == job.id, JobRequest.state == "waiting")
-    for request in session.scalars(query.options(defer(JobRequest.body)).with_for_update(skip_locked=True)):
+    for request in session.scalars(
+        query.options(defer(JobRequest.body)).with_for_update(skip_locked=True)
+    ):
         request.state = "cancelled"
         request_ended(session, job, request)
     conclude(session, job, at)
 
 
 def retry(session: Session, job_id: str, client: Client, most_waiting: int) -> None:
-    """Lets failed and cancelled requests wait again. Raises UnknownJob, NotOwner or TooManyWaiting."""
+    """Lets failed and cancelled requests wait again. Raises UnknownJob, NotOwner or
+    TooManyWaiting."""
     job = _job(session, job_id, lock=True)
     check_owner(client, job.owner)
-    again = select(JobRequest).where(JobRequest.job_id == job.id, JobRequest.state.in_(("failed", "cancelled")))
+    again = select(JobRequest).where(
+        JobRequest.job_id == job.id, JobRequest.state.in_(("failed", "cancelled"))
+    )
     found = list(session.scalars(again.options(defer(JobRequest.body))))
     if not found:
         return
@@ -188,7 +222,9 @@ def delete(session: Session, job_id: str, client: Client) -> None:
     job = _job(session, job_id)
     check_owner(client, job.owner)
     # in the order in which those who work on the job lock its rows
-    session.execute(select(JobRequest.number).where(JobRequest.job_id == job.id).with_for_update()).all()
+    session.execute(
+        select(JobRequest.number).where(JobRequest.job_id == job.id).with_for_update()
+    ).all()
     _delete(session, [job.id])
 
 
@@ -198,7 +234,9 @@ def prune(session: Session, max_age: timedelta) -> None:
 
 
 def outcome(session: Session, job_id: str, number: int) -> tuple[JobRequest, bytes | None]:
-    """A request of a job and the compressed body of its answer; None if it has none. Raises UnknownJob."""
+    """A request of a job and the compressed body of its answer; None if it has none. Raises
+    UnknownJob.
+    """
     request = session.get(JobRequest, (job_id, number), options=[defer(JobRequest.body)])
     if request is None:
         raise UnknownJob
@@ -211,20 +249,35 @@ def _delete(session: Session, job_ids: list[str]) -> None:
     session.execute(delete_from(Answer).where(Answer.job_id.in_(job_ids)))
 
 
-def _page(session: Session, job_id: str, limit: int, after: int, *which: ColumnElement[bool]) -> list[JobRequest]:
+def _page(
+    session: Session, job_id: str, limit: int, after: int, *which: ColumnElement[bool]
+) -> list[JobRequest]:
     query = select(JobRequest).where(JobRequest.job_id == job_id, JobRequest.number > after, *which)
-    query = query.order_by(JobRequest.number).limit(limit).options(defer(JobRequest.body, raiseload=True))
+    query = (
+        query.order_by(JobRequest.number)
+        .limit(limit)
+        .options(defer(JobRequest.body, raiseload=True))
+    )
     return list(session.scalars(query))
 
 
 def _job(session: Session, job_id: str, lock: bool = False) -> Job:
-    job = session.get(Job, job_id, with_for_update={"key_share": True} if lock else None) if is_id(job_id) else None
+    job = (
+        session.get(Job, job_id, with_for_update={"key_share": True} if lock else None)
+        if is_id(job_id)
+        else None
+    )
     if job is None:
         raise UnknownJob
     return job
 
 
 def _check_room(session: Session, more: int, most_waiting: int) -> None:
-    waiting = session.scalar(select(func.count()).select_from(JobRequest).where(JobRequest.state == "waiting")) or 0
+    waiting = (
+        session.scalar(
+            select(func.count()).select_from(JobRequest).where(JobRequest.state == "waiting")
+        )
+        or 0
+    )
     if waiting + more > most_waiting:
         raise TooManyWaiting

@@ -1,7 +1,9 @@
-"""The queue of jobs as those see it who work on it. A lease that ran out is leased again; a late result is dropped.
+"""The queue of jobs as those see it who work on it. A lease that ran out is leased again; a late
+result is dropped.
 
-A transaction that holds rows of `job_requests` may wait for rows of `jobs`, in order of their ids. One that holds a row
-of `jobs` never waits for rows of `job_requests`. So no two transactions wait for each other.
+A transaction that holds rows of `job_requests` may wait for rows of `jobs`, in order of their ids.
+One that holds a row of `jobs` never waits for rows of `job_requests`. So no two transactions wait
+for each other.
 """
 
 from __future__ import annotations
@@ -20,7 +22,14 @@ from joulepath.app.engine.result import StoredAnswer
 from joulepath.app.exceptions.stored import TooManyFigures
 from joulepath.app.store import answers, cache, figures, jobs, known_motions
 from joulepath.app.store.cache import Answered, Asked, Meaning
-from joulepath.app.store.job_events import Report, conclude, progress_is_due, record_progress, request_ended, set_state
+from joulepath.app.store.job_events import (
+    Report,
+    conclude,
+    progress_is_due,
+    record_progress,
+    request_ended,
+    set_state,
+)
 from joulepath.app.store.tables import Job, JobRequest, new_id
 
 Key = tuple[str, int]
@@ -29,7 +38,9 @@ Key = tuple[str, int]
 
 @dataclass(frozen=True)
 class Lease:
-    """A request of `owner` that is to be worked on: compressed JSON `body` of the endpoint `kind`, a deadline [s]."""
+    """A request of `owner` that is to be worked on: compressed JSON `body` of the endpoint `kind`,
+    a deadline [s].
+    """
 
     job_id: str
     number: int
@@ -60,10 +71,11 @@ class FoundFigures:
 class Outcome:
     """How the work on a lease ended. `waiting`: it is to be done again.
 
-    `wall_time` [s] is that of the work. `answer` is the compressed document, and `answer_id` its id, if it says so
-    itself. `parts` are the answers that it refers to, compressed, of the endpoint `parts_kind`. `identified` are the
-    figures of an arm that were found, if any. `is_optimal`: no more time would make the answer better. It answers what
-    was `asked`, too. `motions` are those that a cycle used or found in its cell.
+    `wall_time` [s] is that of the work. `answer` is the compressed document, and `answer_id` its
+    id, if it says so itself. `parts` are the answers that it refers to, compressed, of the endpoint
+    `parts_kind`. `identified` are the figures of an arm that were found, if any. `is_optimal`: no
+    more time would make the answer better. It answers what was `asked`, too. `motions` are those
+    that a cycle used or found in its cell.
     """
 
     lease: Lease
@@ -83,10 +95,17 @@ class Outcome:
     motions: Mapping[str, bytes] = field(default_factory=dict)
 
 
-def lease(session: Session, holder: str, count: int, now: datetime, until: datetime) -> tuple[list[Lease], set[str]]:
-    """Up to `count` requests that wait, leased by `holder` until a time; and the jobs that changed."""
+def lease(
+    session: Session, holder: str, count: int, now: datetime, until: datetime
+) -> tuple[list[Lease], set[str]]:
+    """Up to `count` requests that wait, leased by `holder` until a time; and the jobs that
+    changed."""
     _take_back(session, JobRequest.leased_until < now)
-    waiting = select(JobRequest).where(JobRequest.state == "waiting").order_by(JobRequest.number, JobRequest.job_id)
+    waiting = (
+        select(JobRequest)
+        .where(JobRequest.state == "waiting")
+        .order_by(JobRequest.number, JobRequest.job_id)
+    )
     found = list(session.scalars(waiting.limit(count).with_for_update(skip_locked=True)))
     locked = _locked(session, (request.job_id for request in found))
     leased, changed = [], set()
@@ -105,7 +124,17 @@ def lease(session: Session, holder: str, count: int, now: datetime, until: datet
             changed.add(job.id)
         request.state, request.attempt = "running", request.attempt + 1
         request.leased_by, request.leased_until = holder, until
-        names = ("job_id", "number", "attempt", "kind", "body", "deadline", "deaths", "preempted", "meaning")
+        names = (
+            "job_id",
+            "number",
+            "attempt",
+            "kind",
+            "body",
+            "deadline",
+            "deaths",
+            "preempted",
+            "meaning",
+        )
         leased.append(Lease(**{name: getattr(request, name) for name in names}, owner=job.owner))
     for job_id in changed:
         if locked[job_id].state == "cancelling":
@@ -113,14 +142,22 @@ def lease(session: Session, holder: str, count: int, now: datetime, until: datet
     return leased, changed
 
 
-def settle(session: Session, holder: str, outcomes: Sequence[Outcome], now: datetime, most: int) -> set[str]:
-    """Stores outcomes of the leases that `holder` still has, and drops the others; returns the jobs that changed.
+def settle(
+    session: Session, holder: str, outcomes: Sequence[Outcome], now: datetime, most: int
+) -> set[str]:
+    """Stores outcomes of the leases that `holder` still has, and drops the others; returns the jobs
+    that changed.
 
     Of identified figures, the database takes `most`; further ones stay in their answers alone.
     """
     found = _held(session, holder, outcomes)
-    held = [(outcome, found.pop((outcome.lease.key, outcome.lease.attempt), None)) for outcome in outcomes]
-    locked = _locked(session, (outcome.lease.job_id for outcome, request in held if request is not None))
+    held = [
+        (outcome, found.pop((outcome.lease.key, outcome.lease.attempt), None))
+        for outcome in outcomes
+    ]
+    locked = _locked(
+        session, (outcome.lease.job_id for outcome, request in held if request is not None)
+    )
     stopped = []
     for outcome, request in held:
         if request is not None:
@@ -130,7 +167,11 @@ def settle(session: Session, holder: str, outcomes: Sequence[Outcome], now: date
                 stopped.append(job)
     cache.remember(session, _answered(held))
     for outcome, request in held:
-        if request is not None and outcome.lease.meaning is not None and "cell" in outcome.lease.meaning:
+        if (
+            request is not None
+            and outcome.lease.meaning is not None
+            and "cell" in outcome.lease.meaning
+        ):
             known_motions.keep(session, outcome.lease.meaning["cell"], outcome.motions)
     for job in stopped:
         if job.state == "running":
@@ -141,16 +182,24 @@ def settle(session: Session, holder: str, outcomes: Sequence[Outcome], now: date
 
 
 def report(session: Session, holder: str, reports: Mapping[Key, Report], now: datetime) -> set[str]:
-    """Records progress within requests that `holder` has leased; returns the jobs whose progress was due."""
+    """Records progress within requests that `holder` has leased; returns the jobs whose progress
+    was due.
+    """
     keys = tuple_(JobRequest.job_id, JobRequest.number).in_(list(reports))
     query = select(JobRequest.job_id, JobRequest.number, JobRequest.attempt)
-    held = session.execute(query.where(keys, JobRequest.state == "running", JobRequest.leased_by == holder)).all()
+    held = session.execute(
+        query.where(keys, JobRequest.state == "running", JobRequest.leased_by == holder)
+    ).all()
     told: dict[str, dict[int, Report]] = {}
     for job_id, number, attempt in held:
         own = reports[job_id, number]
         if own.attempt == attempt:
             told.setdefault(job_id, {})[number] = own
-    due = [job for job in _locked(session, told).values() if job.ended is None and progress_is_due(job, now)]
+    due = [
+        job
+        for job in _locked(session, told).values()
+        if job.ended is None and progress_is_due(job, now)
+    ]
     for job in due:
         record_progress(session, job, now, told[job.id])
     return {job.id for job in due}
@@ -164,47 +213,74 @@ def renew(session: Session, holder: str, until: datetime) -> None:
 
 def kept(session: Session, holder: str) -> set[tuple[Key, int]]:
     """Requests and attempts that `holder` has leased and nobody has cancelled."""
-    query = select(JobRequest.job_id, JobRequest.number, JobRequest.attempt).join(Job, Job.id == JobRequest.job_id)
-    query = query.where(JobRequest.state == "running", JobRequest.leased_by == holder, Job.state != "cancelling")
+    query = select(JobRequest.job_id, JobRequest.number, JobRequest.attempt).join(
+        Job, Job.id == JobRequest.job_id
+    )
+    query = query.where(
+        JobRequest.state == "running", JobRequest.leased_by == holder, Job.state != "cancelling"
+    )
     return {((job_id, number), attempt) for job_id, number, attempt in session.execute(query)}
 
 
 def is_due(session: Session, now: datetime) -> bool:
     """Whether a request waits, or a lease ran out."""
     waits = select(JobRequest.number).where(JobRequest.state == "waiting").limit(1)
-    ran_out = select(JobRequest.number).where(JobRequest.state == "running", JobRequest.leased_until < now).limit(1)
+    ran_out = (
+        select(JobRequest.number)
+        .where(JobRequest.state == "running", JobRequest.leased_until < now)
+        .limit(1)
+    )
     return session.scalar(waits) is not None or session.scalar(ran_out) is not None
 
 
 def take_back_from(session: Session, is_gone: Callable[[str], bool]) -> None:
     """Ends the leases of holders that are known to have ended."""
-    holders = session.scalars(select(JobRequest.leased_by).where(JobRequest.state == "running").distinct())
+    holders = session.scalars(
+        select(JobRequest.leased_by).where(JobRequest.state == "running").distinct()
+    )
     gone = [holder for holder in holders if holder is not None and is_gone(holder)]
     if gone:
         _take_back(session, JobRequest.leased_by.in_(gone))
 
 
 def _take_back(session: Session, which: Any) -> None:
-    query = select(JobRequest).where(JobRequest.state == "running", which).options(defer(JobRequest.body))
+    query = (
+        select(JobRequest)
+        .where(JobRequest.state == "running", which)
+        .options(defer(JobRequest.body))
+    )
     for request in session.scalars(query.with_for_update(skip_locked=True)):
         request.state, request.leased_by, request.leased_until = "waiting", None, None
     session.flush()
 
 
-def _held(session: Session, holder: str, outcomes: Iterable[Outcome]) -> dict[tuple[Key, int], JobRequest]:
+def _held(
+    session: Session, holder: str, outcomes: Iterable[Outcome]
+) -> dict[tuple[Key, int], JobRequest]:
     """The rows of the leases that `holder` still has, by request and attempt."""
     query = select(JobRequest).where(
-        tuple_(JobRequest.job_id, JobRequest.number).in_([outcome.lease.key for outcome in outcomes]),
+        tuple_(JobRequest.job_id, JobRequest.number).in_(
+            [outcome.lease.key for outcome in outcomes]
+        ),
         JobRequest.state == "running",
         JobRequest.leased_by == holder,
     )
     # in one order for everybody
-    query = query.order_by(JobRequest.job_id, JobRequest.number).options(defer(JobRequest.body)).with_for_update()
-    return {((request.job_id, request.number), request.attempt): request for request in session.scalars(query)}
+    query = (
+        query.order_by(JobRequest.job_id, JobRequest.number)
+        .options(defer(JobRequest.body))
+        .with_for_update()
+    )
+    return {
+        ((request.job_id, request.number), request.attempt): request
+        for request in session.scalars(query)
+    }
 
 
 def _locked(session: Session, job_ids: Iterable[str]) -> dict[str, Job]:
-    query = select(Job).where(Job.id.in_(set(job_ids))).order_by(Job.id).with_for_update(key_share=True)
+    query = (
+        select(Job).where(Job.id.in_(set(job_ids))).order_by(Job.id).with_for_update(key_share=True)
+    )
     return {job.id: job for job in session.scalars(query.execution_options(populate_existing=True))}
 
 
@@ -224,7 +300,11 @@ def _store(session: Session, job: Job, request: JobRequest, outcome: Outcome, mo
         if job.state == "cancelling":
             request.state = "cancelled"
     own = outcome.figures
-    request.wall_time, request.energy, request.duration = outcome.wall_time, own.energy, own.duration
+    request.wall_time, request.energy, request.duration = (
+        outcome.wall_time,
+        own.energy,
+        own.duration,
+    )
     request.status, request.problem = own.status, outcome.problem
     for part in outcome.parts:
         answers.put_of_job(session, outcome.parts_kind, part, job)

@@ -35,11 +35,23 @@ def about(session: Session, log_id: str) -> StoredLog:
 
 
 def page(session: Session, limit: int, after: str | None) -> tuple[list[StoredLog], str | None]:
-    """Up to `limit` logs without their files, newest first, and the `after` of the next page; None on the last page."""
-    query = select(StoredLog).options(_LIGHT).order_by(StoredLog.created.desc(), StoredLog.id.desc()).limit(limit + 1)
+    """Up to `limit` logs without their files, newest first, and the `after` of the next page; None
+    on the last page.
+    """
+    query = (
+        select(StoredLog)
+        .options(_LIGHT)
+        .order_by(StoredLog.created.desc(), StoredLog.id.desc())
+        .limit(limit + 1)
+    )
     if after is not None:
         created, log_id = position_after(after)
-        query = query.where(or_(StoredLog.created < created, and_(StoredLog.created == created, StoredLog.id < log_id)))
+        query = query.where(
+            or_(
+                StoredLog.created < created,
+                and_(StoredLog.created == created, StoredLog.id < log_id),
+            )
+        )
     found = list(session.scalars(query))
     more, found = len(found) > limit, found[:limit]
     return found, position_of(found[-1]) if more else None

@@ -1,4 +1,5 @@
-"""When stored answers are to be pruned: not with every new one, since that reads the sizes of all."""
+"""When stored answers are to be pruned: not with every new one, since that reads the sizes of
+all."""
 
 from __future__ import annotations
 
@@ -21,10 +22,16 @@ class Pruning:
         self._next: float | None = None
 
     def due(self, added: int, most: int) -> bool:
-        """Whether to prune now that `added` bytes more are stored, of at most `most`. It is then counted as done."""
+        """Whether to prune now that `added` bytes more are stored, of at most `most`. It is then
+        counted as done.
+        """
         with self._lock:
             self._added += added
-            if self._next is not None and self._clock() < self._next and self._added <= most // _PARTS:
+            if (
+                self._next is not None
+                and self._clock() < self._next
+                and self._added <= most // _PARTS
+            ):
                 return False
             self._added, self._next = 0, self._clock() + _LONGEST
             return True

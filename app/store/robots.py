@@ -1,4 +1,5 @@
-"""Robots that users added. Each function works on a session: `await store.write(partial(put, …))`."""
+"""Robots that users added. Each function works on a session: `await store.write(partial(put,
+…))`."""
 
 from __future__ import annotations
 
@@ -14,7 +15,9 @@ from joulepath.optimizer.exceptions import UnknownRobot
 
 
 def check_own(name: str) -> None:
-    """Raises BundledRobot for a robot that comes with the service: nobody adds, replaces or deletes it."""
+    """Raises BundledRobot for a robot that comes with the service: nobody adds, replaces or deletes
+    it.
+    """
     if name in robot_names():
         raise BundledRobot
 
@@ -63,8 +66,8 @@ def put(session: Session, robot: OwnRobot, most: int, client: Client) -> bool:
 def delete(session: Session, name: str, client: Client) -> None:
     """Deletes a robot.
 
-    Raises BundledRobot for one that comes with the service, UnknownRobot if there is none, which then knows those that
-    were added, or NotOwner.
+    Raises BundledRobot for one that comes with the service, UnknownRobot if there is none, which
+    then knows those that were added, or NotOwner.
     """
     check_own(name)
     robot = session.get(OwnRobot, name)

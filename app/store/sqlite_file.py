@@ -1,7 +1,8 @@
-"""The file of an SQLite database: which file it is, and bytes beside it that are held back for deleting.
+"""The file of an SQLite database: which file it is, and bytes beside it that are held back for
+deleting.
 
-A connection stays on the file that it opened, even if that file is deleted or replaced: it would then acknowledge what
-nobody can ever read again.
+A connection stays on the file that it opened, even if that file is deleted or replaced: it would
+then acknowledge what nobody can ever read again.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ Identity = dict[Path, tuple[int, int] | None]
 """Device and number of the database's file and of its write-ahead log."""
 
 _RESERVE = 8 << 20
-"""Bytes that are held back. A deletion writes one page for every thousand that it frees: enough for gigabytes."""
+"""Bytes that are held back. A deletion writes one page for every thousand that it frees: enough for
+gigabytes.
+"""
 _SMALLEST_RESERVE = 1 << 20
 
 
@@ -52,14 +55,16 @@ def _number(path: Path) -> tuple[int, int] | None:
 
 
 class Reserve:
-    """A file of unused bytes beside the database. SQLite needs space to delete: without it, a full disk stays full."""
+    """A file of unused bytes beside the database. SQLite needs space to delete: without it, a full
+    disk stays full.
+    """
 
     def __init__(self, database: Path) -> None:
         self._path = Path(f"{database}.reserve")
 
     def fill(self) -> None:
-        """Takes `_RESERVE` bytes of the disk, or half of what is free. Without room for the log nothing can be written,
-        so that the other half stays."""
+        """Takes `_RESERVE` bytes of the disk, or half of what is free. Without room for the log
+        nothing can be written, so that the other half stays."""
         with contextlib.suppress(OSError):
             held = self._path.stat().st_size if self._path.exists() else 0
             size = min(_RESERVE, (room(self._path) + held) // 2)
@@ -73,7 +78,10 @@ class Reserve:
             self._path.unlink()
         except OSError:
             return False
-        logger.warning("the disk is full: the reserve for deleting is in use", extra={"reserve": str(self._path)})
+        logger.warning(
+            "the disk is full: the reserve for deleting is in use",
+            extra={"reserve": str(self._path)},
+        )
         return True
 
     def _take(self, size: int) -> None:

@@ -1,4 +1,5 @@
-"""The database as routes use it: work on a session, in a thread, with one error for all failures."""
+"""The database as routes use it: work on a session, in a thread, with one error for all
+failures."""
 
 from __future__ import annotations
 
@@ -18,7 +19,14 @@ from sqlalchemy.exc import TimeoutError as PoolTimeout
 from sqlalchemy.orm import Session
 
 from joulepath.app.exceptions.stored import StoreFault, StoreUnavailable
-from joulepath.app.store.database import OPENED, create_database_engine, is_writable, migrate, room_inside, sqlite_file
+from joulepath.app.store.database import (
+    OPENED,
+    create_database_engine,
+    is_writable,
+    migrate,
+    room_inside,
+    sqlite_file,
+)
 from joulepath.app.store.faults import LEAST_ROOM, DatabaseMoved, fault_of, room
 from joulepath.app.store.pruning import Pruning
 from joulepath.app.store.sqlite_file import Reserve, check, log_size
@@ -28,12 +36,16 @@ logger = logging.getLogger(__name__)
 T = TypeVar("T")
 
 _THREADS = 4
-"""A statement takes milliseconds, so a few threads suffice; the connection pool has more connections than this."""
+"""A statement takes milliseconds, so a few threads suffice; the connection pool has more
+connections than this.
+"""
 _UNAVAILABLE = (DBAPIError, PoolTimeout, OSError, CommandError)
 _LONG = 0.5
 """Time [s] above which a failure was a wait for a lock or a server."""
 _PAUSE = 1.0
-"""Time [s] after such a failure in which all work fails at once, so that a client waits for one time-out at most."""
+"""Time [s] after such a failure in which all work fails at once, so that a client waits for one
+time-out at most.
+"""
 _CHECK_PERIOD = 2.0
 """Time [s] between two checks of the database."""
 
@@ -55,10 +67,13 @@ class Store:
         self._checking: asyncio.Task[None] | None = None
         self._told: StoreFault | None = None
         self.fault: StoreFault | None = None
-        """What is wrong with the database, as far as known; None if it was last read and written."""
+        """What is wrong with the database, as far as known; None if it was last read and
+        written."""
 
     async def open(self) -> None:
-        """Tries to reach the database, and checks it from then on. If a check fails, logs an error once."""
+        """Tries to reach the database, and checks it from then on. If a check fails, logs an error
+        once.
+        """
         await self.check()
         self._checking = asyncio.create_task(self._check_often())
 
@@ -78,7 +93,8 @@ class Store:
             if self._told != error.cause:
                 self._told = error.cause
                 logger.error(
-                    "the database cannot be used: requests that need studies or stored answers return 503 until it "
+                    "the database cannot be used: requests that need studies or stored answers "
+                    "return 503 until it "
                     "can; all other requests work",
                     extra={"database": str(self), "cause": error.cause},
                 )
@@ -89,10 +105,13 @@ class Store:
 
     async def read(self, work: Callable[[Session], T]) -> T:
         """The result of `work` on a session. Raises StoreUnavailable."""
-        return await asyncio.get_running_loop().run_in_executor(self._threads, self._do, work, False)
+        return await asyncio.get_running_loop().run_in_executor(
+            self._threads, self._do, work, False
+        )
 
     async def write(self, work: Callable[[Session], T], frees: bool = False) -> T:
-        """The result of `work`, after its changes are on the disk. If `work` raises, nothing changes.
+        """The result of `work`, after its changes are on the disk. If `work` raises, nothing
+        changes.
 
         `frees`: the work deletes. On a full disk, it gets the space that is held back for deleting.
 
@@ -102,8 +121,8 @@ class Store:
         return await asyncio.get_running_loop().run_in_executor(self._threads, do, work)
 
     async def create(self, work: Callable[[Session], T]) -> T:
-        """See `write`. The work is done once more if another request or process has just created the same: it sees it
-        then."""
+        """See `write`. The work is done once more if another request or process has just created
+        the same: it sees it then."""
         try:
             return await self.write(work)
         except IntegrityError:
@@ -176,7 +195,11 @@ class Store:
         reason = str(error.orig) if isinstance(error, DBAPIError) else str(error)
         # once, not with every check; each request that it fails is in the log of requests
         level = logging.DEBUG if fault == self.fault else logging.ERROR
-        logger.log(level, "database unavailable", extra={"database": str(self), "cause": fault, "reason": reason})
+        logger.log(
+            level,
+            "database unavailable",
+            extra={"database": str(self), "cause": fault, "reason": reason},
+        )
         if self._clock() - began > _LONG:
             self._paused[writes] = self._clock() + _PAUSE, fault
         if fault == "deleted":
@@ -209,7 +232,8 @@ class Store:
             if self._migrated:
                 return
             if self._was_open and self._file is not None and not self._file.exists():
-                # an empty database in place of one that is missing, for example with its volume, would hide the loss
+                # an empty database in place of one that is missing, for example with its volume,
+                # would hide the loss
                 raise DatabaseMoved(f"{self._file} is gone")
             migrate(self._engine)
             self._migrated = self._was_open = True

@@ -22,12 +22,17 @@ class _TooLarge(Exception):
 
 
 async def store_answers(
-    store: Store, settings: Settings, kind: str, result: TaskResult, owner: str | None, cell: str | None = None
+    store: Store,
+    settings: Settings,
+    kind: str,
+    result: TaskResult,
+    owner: str | None,
+    cell: str | None = None,
 ) -> TaskResult:
     """The result, once the answers that it refers to are stored.
 
-    Stores `result.stored`, answers of the endpoint `kind` that belong to `owner`. Deletes answers that are too old or
-    too many. Keeps its motions, which are of a `cell`. Raises StoreUnavailable.
+    Stores `result.stored`, answers of the endpoint `kind` that belong to `owner`. Deletes answers
+    that are too old or too many. Keeps its motions, which are of a `cell`. Raises StoreUnavailable.
     """
 
     def keep(session: Session) -> None:
@@ -40,9 +45,15 @@ async def store_answers(
 
 
 async def keep_answer(
-    store: Store, settings: Settings, kind: str, result: TaskResult, owner: str | None, asked: Asked | None = None
+    store: Store,
+    settings: Settings,
+    kind: str,
+    result: TaskResult,
+    owner: str | None,
+    asked: Asked | None = None,
 ) -> TaskResult:
-    """The result, once it is stored as `result.kept_as`. If it cannot be, the result without an id of its own.
+    """The result, once it is stored as `result.kept_as`. If it cannot be, the result without an id
+    of its own.
 
     It then answers what was `asked`, too.
     """
@@ -84,7 +95,10 @@ async def _put(
 
     if not store.pruning.due(await store.write(put), settings.answers_max_bytes):
         return
-    target, age = store.pruning.target(settings.answers_max_bytes), timedelta(days=settings.answers_max_age)
+    target, age = (
+        store.pruning.target(settings.answers_max_bytes),
+        timedelta(days=settings.answers_max_age),
+    )
     try:
         await store.write(partial(answers.prune, max_bytes=target, max_age=age), frees=True)
     except StoreUnavailable:

@@ -1,4 +1,6 @@
-"""Studies and their iterations. Each function works on a session: `await store.write(partial(create, …))`."""
+"""Studies and their iterations. Each function works on a session: `await
+store.write(partial(create, …))`.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ _LIGHT = defer(Iteration.request, raiseload=True)
 
 @dataclass(frozen=True)
 class Step:
-    """An iteration to add: a `request` to the endpoint `kind`, its `answer`, duration [s] and energies [J]."""
+    """An iteration to add: a `request` to the endpoint `kind`, its `answer`, duration [s] and
+    energies [J].
+    """
 
     kind: str
     request: dict[str, Any]
@@ -38,8 +42,8 @@ class Step:
 
 @dataclass(frozen=True)
 class Entry:
-    """An iteration, the one before it, and the best ones up to that and up to itself. Requests are loaded for
-    `iteration` only, and there only by `entry`."""
+    """An iteration, the one before it, and the best ones up to that and up to itself. Requests are
+    loaded for `iteration` only, and there only by `entry`."""
 
     study: Study
     iteration: Iteration
@@ -50,7 +54,9 @@ class Entry:
 
 @dataclass(frozen=True)
 class State:
-    """A study with its last and its best iteration; both None if it has none. Their requests are not loaded."""
+    """A study with its last and its best iteration; both None if it has none. Their requests are
+    not loaded.
+    """
 
     study: Study
     last: Iteration | None
@@ -100,11 +106,14 @@ def state(session: Session, study_id: str) -> State:
 
 
 def page(session: Session, limit: int, after: str | None) -> tuple[list[State], str | None]:
-    """Up to `limit` studies, newest first, and the `after` of the next page; None on the last page."""
+    """Up to `limit` studies, newest first, and the `after` of the next page; None on the last
+    page."""
     query = select(Study).order_by(Study.created.desc(), Study.id.desc()).limit(limit + 1)
     if after is not None:
         created, study_id = position_after(after)
-        query = query.where(or_(Study.created < created, and_(Study.created == created, Study.id < study_id)))
+        query = query.where(
+            or_(Study.created < created, and_(Study.created == created, Study.id < study_id))
+        )
     studies = list(session.scalars(query))
     more, studies = len(studies) > limit, studies[:limit]
     return [_state(session, study) for study in studies], position_of(studies[-1]) if more else None
@@ -117,7 +126,9 @@ def delete(session: Session, study_id: str, client: Client) -> None:
     session.execute(delete_from(Study).where(Study.id == study.id))
 
 
-def known_step(session: Session, study_id: str, kind: str, request: dict[str, Any], key: str | None) -> int | None:
+def known_step(
+    session: Session, study_id: str, kind: str, request: dict[str, Any], key: str | None
+) -> int | None:
     """Number of the iteration with this key; None if there is none.
 
     Raises UnknownStudy, or KeyReused if that iteration has another request.
@@ -125,7 +136,9 @@ def known_step(session: Session, study_id: str, kind: str, request: dict[str, An
     _study(session, study_id)
     if key is None:
         return None
-    known = session.scalar(select(Iteration).where(Iteration.study_id == study_id, Iteration.idempotency_key == key))
+    known = session.scalar(
+        select(Iteration).where(Iteration.study_id == study_id, Iteration.idempotency_key == key)
+    )
     if known is None:
         return None
     if (known.kind, known.request) != (kind, request):
@@ -133,13 +146,17 @@ def known_step(session: Session, study_id: str, kind: str, request: dict[str, An
     return known.number
 
 
-def add(session: Session, study_id: str, step: Step, key: str | None, client: Client) -> tuple[int, bool]:
-    """Adds an iteration and returns its number with False; if its key is known, the number of that key with True.
+def add(
+    session: Session, study_id: str, step: Step, key: str | None, client: Client
+) -> tuple[int, bool]:
+    """Adds an iteration and returns its number with False; if its key is known, the number of that
+    key with True.
 
     Raises UnknownStudy, NotOwner or KeyReused.
     """
     check_owner(client, _study(session, study_id).owner)
-    # locks the study (PostgreSQL), so that numbers have no gaps; SQLite has one writer at a time anyway
+    # locks the study (PostgreSQL), so that numbers have no gaps; SQLite has one writer at a time
+    # anyway
     study = session.scalar(select(Study).where(Study.id == study_id).with_for_update())
     if study is None:
         raise UnknownStudy
@@ -185,7 +202,9 @@ def entry(session: Session, study_id: str, number: int) -> Entry:
         raise UnknownIteration
     before = _iteration(session, study_id, number - 1) if number > 1 else None
     best_before = None if before is None else _iteration(session, study_id, before.best)
-    return Entry(study, iteration, before, best_before, _iteration(session, study_id, iteration.best))
+    return Entry(
+        study, iteration, before, best_before, _iteration(session, study_id, iteration.best)
+    )
 
 
 def new_study(
@@ -219,7 +238,12 @@ def _study(session: Session, study_id: str) -> Study:
 
 
 def _state(session: Session, study: Study) -> State:
-    query = select(Iteration).where(Iteration.study_id == study.id).order_by(Iteration.number.desc()).limit(1)
+    query = (
+        select(Iteration)
+        .where(Iteration.study_id == study.id)
+        .order_by(Iteration.number.desc())
+        .limit(1)
+    )
     last = session.scalar(query.options(_LIGHT))
     return State(study, last, None if last is None else _iteration(session, study.id, last.best))
 

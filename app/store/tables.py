@@ -7,10 +7,27 @@ import uuid
 from datetime import UTC, datetime
 from typing import Any
 
-from sqlalchemy import JSON, DateTime, Dialect, ForeignKey, Index, LargeBinary, MetaData, String, TypeDecorator
+from sqlalchemy import (
+    JSON,
+    DateTime,
+    Dialect,
+    ForeignKey,
+    Index,
+    LargeBinary,
+    MetaData,
+    String,
+    TypeDecorator,
+)
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
-from joulepath.app.schemas.lengths import HOLDER_LENGTH, ID_LENGTH, KEY_LENGTH, NAME_LENGTH, OWNER_LENGTH, ROBOT_LENGTH
+from joulepath.app.schemas.lengths import (
+    HOLDER_LENGTH,
+    ID_LENGTH,
+    KEY_LENGTH,
+    NAME_LENGTH,
+    OWNER_LENGTH,
+    ROBOT_LENGTH,
+)
 
 # SQLite can alter a constraint only if it has a name
 _NAMES = {
@@ -52,7 +69,9 @@ class Instant(TypeDecorator[datetime]):
 
 
 class Table(DeclarativeBase):
-    """Base of the tables. A column `owner` has the name of the API key that created the row; null without one."""
+    """Base of the tables. A column `owner` has the name of the API key that created the row; null
+    without one.
+    """
 
     metadata = MetaData(naming_convention=_NAMES)
 
@@ -76,7 +95,9 @@ class Study(Table):
 
 
 class OwnRobot(Table):
-    """A robot that a user added: its figures, as a bundled robot's file has them, and what was remarked on them."""
+    """A robot that a user added: its figures, as a bundled robot's file has them, and what was
+    remarked on them.
+    """
 
     __tablename__ = "robots"
 
@@ -88,7 +109,9 @@ class OwnRobot(Table):
 
 
 class StoredLog(Table):
-    """A log of one arm: the file as it was sent, packed with gzip, and the `settings` with which it is read."""
+    """A log of one arm: the file as it was sent, packed with gzip, and the `settings` with which it
+    is read.
+    """
 
     __tablename__ = "logs"
     __table_args__ = (Index(None, "created", "id"),)
@@ -107,7 +130,9 @@ class StoredLog(Table):
 
 
 class Figures(Table):
-    """Figures of a robot that were identified on one arm: those that take the place of the robot's own."""
+    """Figures of a robot that were identified on one arm: those that take the place of the robot's
+    own.
+    """
 
     __tablename__ = "figures"
     __table_args__ = (Index(None, "created", "id"),)
@@ -121,11 +146,12 @@ class Figures(Table):
 
 
 class Answer(Table):
-    """A complete answer of an endpoint: JSON, compressed. An answer of a study or job is deleted with it, any other by
-    age and total size."""
+    """A complete answer of an endpoint: JSON, compressed. An answer of a study or job is deleted
+    with it, any other by age and total size."""
 
     __tablename__ = "answers"
-    # the first for the sum of sizes from the newest on, the second for the list: without reading the bodies
+    # the first for the sum of sizes from the newest on, the second for the list: without reading
+    # the bodies
     __table_args__ = (
         Index(None, "created", "size"),
         Index(None, "created", "id"),
@@ -159,11 +185,15 @@ class CachedAnswer(Table):
     key: Mapped[str] = mapped_column(String(64), primary_key=True)
     answer_id: Mapped[str] = mapped_column(ForeignKey("answers.id", ondelete="CASCADE"))
     deadline: Mapped[float | None]
-    """Longest deadline [s] of a request that it answers; null if that does not matter, because it is optimal."""
+    """Longest deadline [s] of a request that it answers; null if that does not matter, because it
+    is optimal.
+    """
 
 
 class KnownMotion(Table):
-    """A motion of a move of a cycle. Cycles of the same arm in the same `cell` may have it in common."""
+    """A motion of a move of a cycle. Cycles of the same arm in the same `cell` may have it in
+    common.
+    """
 
     __tablename__ = "known_motions"
     __table_args__ = (Index(None, "cell", "used"), Index(None, "used"))
@@ -178,12 +208,16 @@ class KnownMotion(Table):
 
 
 class Iteration(Table):
-    """One step of a study: the request and the energies [J] of its motion. The complete answer is in `answers`."""
+    """One step of a study: the request and the energies [J] of its motion. The complete answer is
+    in `answers`.
+    """
 
     __tablename__ = "iterations"
     __table_args__ = (Index(None, "study_id", "idempotency_key", unique=True),)
 
-    study_id: Mapped[str] = mapped_column(ForeignKey("studies.id", ondelete="CASCADE"), primary_key=True)
+    study_id: Mapped[str] = mapped_column(
+        ForeignKey("studies.id", ondelete="CASCADE"), primary_key=True
+    )
     number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
     """1, 2, 3, … within the study, without gaps."""
     kind: Mapped[str] = mapped_column(String(32))
@@ -236,7 +270,8 @@ class JobRequest(Table):
     """One request of a job. `state` is `waiting`, `running`, `done`, `failed` or `cancelled`."""
 
     __tablename__ = "job_requests"
-    # what waits, the lowest numbers first: a job that has just begun goes before the rest of a long one
+    # what waits, the lowest numbers first: a job that has just begun goes before the rest of a long
+    # one
     __table_args__ = (Index(None, "state", "number", "job_id"), Index(None, "job_id", "state"))
 
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
@@ -266,7 +301,9 @@ class JobRequest(Table):
     answer_id: Mapped[str | None] = mapped_column(ForeignKey("answers.id"), unique=True)
     problem: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
     figures: Mapped[str | None] = mapped_column(String(ID_LENGTH))
-    """Id of the figures that an identification found, if they could be stored. They may have been deleted since."""
+    """Id of the figures that an identification found, if they could be stored. They may have been
+    deleted since.
+    """
 
 
 class JobEvent(Table):

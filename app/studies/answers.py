@@ -63,7 +63,8 @@ def detail(entry: Entry) -> schemas.IterationDetail:
     """One iteration, and the state of its study after it."""
     study, iteration = entry.study, entry.iteration
     energy, last, best = (
-        None if each is None else energy_of(study, each) for each in (iteration, entry.before, entry.best_before)
+        None if each is None else energy_of(study, each)
+        for each in (iteration, entry.before, entry.best_before)
     )
     assert energy is not None
     return schemas.IterationDetail(

@@ -1,4 +1,6 @@
-"""Progress of a study: each energy compared with the previous one, the best so far, and the threshold."""
+"""Progress of a study: each energy compared with the previous one, the best so far, and the
+threshold.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ class Progress:
 
 
 def step(energy: float, last: float | None, best: float | None, threshold: float) -> Progress:
-    """The progress of one step of `energy` [J], from the previous energy and the least of all before; None: no step."""
+    """The progress of one step of `energy` [J], from the previous energy and the least of all
+    before; None: no step.
+    """
     return Progress(
         change_from_last=None if last is None else energy - last,
         change_from_best=None if best is None else energy - best,

@@ -1,4 +1,5 @@
-"""Suggestions for the next iteration: requests that differ from an iteration of the study in one respect each.
+"""Suggestions for the next iteration: requests that differ from an iteration of the study in one
+respect each.
 
 This module makes the requests only. The optimiser computes their energies.
 """
@@ -49,8 +50,9 @@ class Proposal:
 class Base:
     """The iteration that the suggestions start from.
 
-    `request` is a body of `POST /optimize`, `q_goal` the goal configuration of its motion [rad], `duration` [s] that of
-    the motion. `candidates` are those of its answer; empty if the motion was not optimised.
+    `request` is a body of `POST /optimize`, `q_goal` the goal configuration of its motion [rad],
+    `duration` [s] that of the motion. `candidates` are those of its answer; empty if the motion was
+    not optimised.
     """
 
     request: Fields
@@ -63,11 +65,13 @@ class Base:
 def base_of(kind: str, request: Fields, answer: Fields, objective: str) -> Base | None:
     """The base from the request and the answer of an iteration.
 
-    None if an evaluated motion has no two ends to optimise between: it passes configurations between its ends, or ends
-    where it starts.
+    None if an evaluated motion has no two ends to optimise between: it passes configurations
+    between its ends, or ends where it starts.
     """
     if kind == "optimize":
-        return Base(request, answer["branch"]["goal"]["q"], answer["duration"], True, answer["candidates"])
+        return Base(
+            request, answer["branch"]["goal"]["q"], answer["duration"], True, answer["candidates"]
+        )
     given = request.get("trajectory") or {}
     q = given.get("q") or request["configurations"]
     if ("configurations" in request and len(q) > 2) or np.allclose(q[0], q[-1], rtol=0, atol=1e-6):
@@ -80,7 +84,9 @@ def base_of(kind: str, request: Fields, answer: Fields, objective: str) -> Base 
 
 
 def proposals(base: Base) -> list[Proposal]:
-    """All suggestions for the base, in the order in which they are computed: usually those first that save most."""
+    """All suggestions for the base, in the order in which they are computed: usually those first
+    that save most.
+    """
     arm = to_arm(OptimizeRequest.model_validate(base.request))
     takes_poses = inverse_kinematics_for(arm.robot) is not None
     here, *tilted = _poses(arm, base.q_goal, [np.zeros(3), *_TILTS])
@@ -93,7 +99,9 @@ def _method(base: Base) -> Iterator[Proposal]:
     if not base.optimized:
         yield Proposal("method", "Optimise between the same joint positions.", base.request)
         yield Proposal(
-            "method", "Optimise between the same joint positions in the same time.", _timed(base, base.duration)
+            "method",
+            "Optimise between the same joint positions in the same time.",
+            _timed(base, base.duration),
         )
     elif base.request.get("method", "bspline") != "bspline":
         yield Proposal("method", "Optimise a free B-spline.", base.request | {"method": "bspline"})
@@ -104,23 +112,37 @@ def _duration(base: Base) -> Iterator[Proposal]:
         yield Proposal("duration", "Let the optimiser choose the duration.", _timed(base, None))
     for factor, word in ((_LONGER, "longer"), (1 / _LONGER, "shorter")):
         duration = min(base.duration * factor, LONGEST_DURATION)
-        yield Proposal("duration", f"Make the motion {abs(factor - 1):.0%} {word}.", _timed(base, duration))
+        yield Proposal(
+            "duration", f"Make the motion {abs(factor - 1):.0%} {word}.", _timed(base, duration)
+        )
 
 
 def _same_pose(base: Base, here: Fields) -> Proposal:
     request = _without(base.request, "branch", "windings") | {"goal": here}
-    return Proposal("branch", "Reach the same pose in the arm configuration of least energy.", request)
+    return Proposal(
+        "branch", "Reach the same pose in the arm configuration of least energy.", request
+    )
 
 
 def _branch(base: Base) -> Iterator[Proposal]:
-    if "q" not in base.request["goal"] and any(name in base.request for name in ("branch", "windings")):
+    if "q" not in base.request["goal"] and any(
+        name in base.request for name in ("branch", "windings")
+    ):
         yield Proposal(
             "branch",
             "Allow every arm configuration and all full-turn alternatives.",
             _without(base.request, "branch", "windings"),
         )
-    seen = {_branch_name(candidate["goal"]) for candidate in base.candidates if candidate["q_goal"] == base.q_goal}
-    known = [candidate for candidate in base.candidates if candidate["status"] in ("solved", "pruned", "unvisited")]
+    seen = {
+        _branch_name(candidate["goal"])
+        for candidate in base.candidates
+        if candidate["q_goal"] == base.q_goal
+    }
+    known = [
+        candidate
+        for candidate in base.candidates
+        if candidate["status"] in ("solved", "pruned", "unvisited")
+    ]
     known.sort(key=_least_energy)
     for candidate in known:
         name = _branch_name(candidate["goal"])
@@ -136,11 +158,13 @@ def _orientation(base: Base, here: Fields, tilted: list[Fields]) -> Iterator[Pro
     yield Proposal(
         "orientation",
         "Let the tool rotate freely about its z axis at the goal.",
-        base.request | {"goal": {"pose": {"position": here["pose"]["position"], "orientation": orientation}}},
+        base.request
+        | {"goal": {"pose": {"position": here["pose"]["position"], "orientation": orientation}}},
     )
     yield Proposal(
         "orientation",
-        "Tilt the tool by 10 degrees at the goal, about its x or y axis, in the direction that needs the least energy"
+        "Tilt the tool by 10 degrees at the goal, about its x or y axis, in the direction that "
+        "needs the least energy"
         " (four directions compared).",
         base.request | {"goal": {"any_of": tilted}},
     )
@@ -152,7 +176,8 @@ def _payload(base: Base) -> Iterator[Proposal]:
         nearer = payload | {"com": [_NEARER * part for part in payload["com"]]}
         yield Proposal(
             "payload",
-            "Grip the payload so that its centre of mass is at half its present distance from the flange.",
+            "Grip the payload so that its centre of mass is at half its present distance from the "
+            "flange.",
             base.request | {"payload": nearer},
         )
 
@@ -167,7 +192,10 @@ def _without(request: Fields, *names: str) -> Fields:
 
 def _poses(arm: Arm, q: list[float], rotvecs: list[Array]) -> list[Fields]:
     poses = rotated_poses(arm, np.array(q), rotvecs)
-    return [{"pose": {"position": at.tolist(), "quaternion": quaternion.tolist()}} for at, quaternion in poses]
+    return [
+        {"pose": {"position": at.tolist(), "quaternion": quaternion.tolist()}}
+        for at, quaternion in poses
+    ]
 
 
 def _branch_name(label: str) -> str:

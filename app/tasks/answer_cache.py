@@ -1,4 +1,6 @@
-"""Answers by the canonical form of their requests: what was computed once need not be computed again."""
+"""Answers by the canonical form of their requests: what was computed once need not be computed
+again.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,9 @@ PATIENCE = 0.25
 
 @dataclass(frozen=True)
 class AnswerCache:
-    """The answers of one client in the database. With `by_passed` set, none is found; new ones are remembered."""
+    """The answers of one client in the database. With `by_passed` set, none is found; new ones are
+    remembered.
+    """
 
     store: Store
     owner: str | None
@@ -38,21 +42,27 @@ class AnswerCache:
     in_flight: InFlight = field(default_factory=InFlight)
 
     async def asked(self, kind: str, body: Request | HeldBody, deadline: float) -> Asked | None:
-        """A validated request to the endpoint `kind`, as the cache knows it. None for one that it does not: too large,
-        or of a robot that is not known.
+        """A validated request to the endpoint `kind`, as the cache knows it. None for one that it
+        does not: too large, or of a robot that is not known.
 
-        Two are the same if they mean the same, have the same robot and the same client, and are for the same version
-        of the service.
+        Two are the same if they mean the same, have the same robot and the same client, and are for
+        the same version of the service.
         """
         if isinstance(body, HeldBody) or self.store.fault is not None:
             return None
         return await asked_for(self.store, meaning_of(kind, body), deadline, self.owner)
 
     async def answer(
-        self, asked: Asked | None, request_id: str, deadline: float, compute: Compute, is_heard: bool
+        self,
+        asked: Asked | None,
+        request_id: str,
+        deadline: float,
+        compute: Compute,
+        is_heard: bool,
     ) -> TaskResult:
-        """The answer to a request: a stored one, that to an equal request which is being computed, or what `compute`
-        returns in `deadline` [s]. Raises what that raises. `is_heard`: somebody listens to what `compute` finds."""
+        """The answer to a request: a stored one, that to an equal request which is being computed,
+        or what `compute` returns in `deadline` [s]. Raises what that raises. `is_heard`: somebody
+        listens to what `compute` finds."""
         known = await self.find(asked, request_id)
         if known is not None:
             return known
@@ -62,7 +72,8 @@ class AnswerCache:
         return replace(result, age=0).for_request(request_id) if is_anothers else result
 
     async def motions(self, cell: str | None) -> dict[str, bytes]:
-        """Motions that cycles in this cell may have in common, by their keys; none for a cycle whose cell is not known.
+        """Motions that cycles in this cell may have in common, by their keys; none for a cycle
+        whose cell is not known.
 
         They are shared by all clients: no answer hangs on them.
         """
@@ -107,8 +118,8 @@ def _with_document(session: Session, asked: Asked) -> tuple[Answer, bytes] | Non
 async def asked_for(
     store: Store, meaning: Meaning, deadline: float, owner: str | None, job_id: str | None = None
 ) -> Asked | None:
-    """A request of a client as the cache knows it; None if its robot is not known. With a `job_id`, no request of
-    another job is the same."""
+    """A request of a client as the cache knows it; None if its robot is not known. With a `job_id`,
+    no request of another job is the same."""
     own: dict[str, Any] | None = None
     if meaning["robot"] not in robot_names():
         try:

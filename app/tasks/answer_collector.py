@@ -21,7 +21,8 @@ class AnswerCollector:
         self._answers: list[StoredAnswer] = []
 
     def add(self, content: Answer) -> str:
-        """Adds an answer and returns its path. Its fields `id` and `answer`, those that it has, are set.
+        """Adds an answer and returns its path. Its fields `id` and `answer`, those that it has, are
+        set.
 
         Raises InvalidRequest above MOST_BYTES.
         """
@@ -32,7 +33,9 @@ class AnswerCollector:
         answer = StoredAnswer(answer_id, json_document(kept), content.figures)
         self._answers.append(answer)
         if sum(len(each.body) for each in self._answers) > MOST_BYTES:
-            message = "The answers are too large together: use a longer `sample_period`, or ask for fewer"
+            message = (
+                "The answers are too large together: use a longer `sample_period`, or ask for fewer"
+            )
             raise InvalidRequest([{"loc": ["body"], "msg": message}])
         return answer.path
 

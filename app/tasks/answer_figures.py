@@ -9,8 +9,8 @@ from joulepath.app.answers.envelope import AnswerFigures
 
 
 def figures_of(answer: Mapping[str, Any]) -> AnswerFigures:
-    """The figures of the JSON answer of any endpoint. Only a motion or a cycle has an energy: that of
-    its objective, electrical for `evaluate`."""
+    """The figures of the JSON answer of any endpoint. Only a motion or a cycle has an energy: that
+    of its objective, electrical for `evaluate`."""
     given = answer.get("total", answer)
     energy, objective = given.get("energy"), answer.get("objective", "electrical")
     return AnswerFigures(

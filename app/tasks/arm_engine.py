@@ -1,4 +1,6 @@
-"""The engine for requests that name a robot: users' own robots come from the database, and go along with the task."""
+"""The engine for requests that name a robot: users' own robots come from the database, and go along
+with the task.
+"""
 
 from __future__ import annotations
 
@@ -55,8 +57,8 @@ class Equipped:
 
 @dataclass(frozen=True)
 class Needs:
-    """Items of the database that a task uses: a robot by its name, figures and a log by their ids, and kept answers
-    by their ids or paths."""
+    """Items of the database that a task uses: a robot by its name, figures and a log by their ids,
+    and kept answers by their ids or paths."""
 
     robot: str | None = None
     figures: str | None = None
@@ -64,7 +66,9 @@ class Needs:
     answers: tuple[str, ...] = ()
 
     def after(self, error: UnknownRobot | UnknownFigures | UnknownLog | PartsNeeded) -> Needs:
-        """Adds the item that a worker asked for. Raises the worker's error if the item was provided already."""
+        """Adds the item that a worker asked for. Raises the worker's error if the item was provided
+        already.
+        """
         if isinstance(error, UnknownRobot):
             more = replace(self, robot=error.name)
         elif isinstance(error, UnknownFigures):
@@ -78,8 +82,8 @@ class Needs:
         return more
 
     async def given(self, store: Store) -> tuple[Given, ...]:
-        """The items, read from the database. Raises UnknownRobot, UnknownFigures, UnknownLog, UnknownAnswer or
-        StoreUnavailable."""
+        """The items, read from the database. Raises UnknownRobot, UnknownFigures, UnknownLog,
+        UnknownAnswer or StoreUnavailable."""
         found: list[Given] = []
         if self.log is not None:
             found.append(partial(log_given, await given_log(store, self.log)))
@@ -95,8 +99,8 @@ class Needs:
 
 @dataclass(frozen=True)
 class ArmEngine:
-    """Runs tasks about robots that come with the service and about those in the database, with their own figures or
-    with identified ones."""
+    """Runs tasks about robots that come with the service and about those in the database, with
+    their own figures or with identified ones."""
 
     engine: Runner
     store: Store
@@ -104,15 +108,18 @@ class ArmEngine:
     async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
         """The task's result; `tell` gets what it finds.
 
-        Raises UnknownRobot, UnknownFigures, UnknownLog, UnknownAnswer, and what the engine raises; StoreUnavailable
-        only for figures, a log, kept answers, and a robot that does not come with the service.
+        Raises UnknownRobot, UnknownFigures, UnknownLog, UnknownAnswer, and what the engine raises;
+        StoreUnavailable only for figures, a log, kept answers, and a robot that does not come with
+        the service.
         """
         request = getattr(task, "request", None)
         needs = Needs(getattr(request, "robot", None), getattr(request, "figures", None))
         while True:
             given = await needs.given(self.store)
             try:
-                return await self.engine.run(Equipped(task, given) if given else task, deadline, tell)
+                return await self.engine.run(
+                    Equipped(task, given) if given else task, deadline, tell
+                )
             # only the worker reads the body of an upload, or a kept answer, and the names in it
             except (UnknownRobot, UnknownFigures, UnknownLog, PartsNeeded) as error:
                 needs = needs.after(error)
@@ -123,11 +130,16 @@ async def robot_in(store: Store, name: str) -> Robot:
 
     Raises UnknownRobot; StoreUnavailable only for a robot that does not come with the service.
     """
-    return load_robot(name) if name in robot_names() else own_robot_of(name, await own_figures(store, name))
+    return (
+        load_robot(name)
+        if name in robot_names()
+        else own_robot_of(name, await own_figures(store, name))
+    )
 
 
 async def known_here(store: Store, name: str, used: str | None) -> AbstractContextManager[Any]:
-    """A context in which this process knows the robot of this name, too, and the figures of this id.
+    """A context in which this process knows the robot of this name, too, and the figures of this
+    id.
 
     Raises UnknownRobot, UnknownFigures or StoreUnavailable.
     """

@@ -6,7 +6,11 @@ from joulepath.optimizer.result.solution import Solution
 
 
 def certified(solution: Solution) -> Solution:
-    """The solution. Raises AssertionError if its certificate is not valid: the optimizer returns certified motions."""
+    """The solution. Raises AssertionError if its certificate is not valid: the optimizer returns
+    certified motions.
+    """
     if not solution.certificate.valid:
-        raise AssertionError(f"The certificate of the optimizer's motion is not valid: {solution.certificate}")
+        raise AssertionError(
+            f"The certificate of the optimizer's motion is not valid: {solution.certificate}"
+        )
     return solution

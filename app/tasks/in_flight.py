@@ -29,10 +29,12 @@ class InFlight:
         self._works: dict[Asked, _Work] = {}
 
     async def result(self, asked: Asked, compute: Compute) -> tuple[TaskResult, bool]:
-        """The answer to a request, and whether it was computed for an equal one, with the same deadline.
+        """The answer to a request, and whether it was computed for an equal one, with the same
+        deadline.
 
-        The work goes on while somebody waits for it. Raises what it raises. If another request's work fails because of
-        the service, not of the request, this one is computed itself. Work that workers died of is not begun again.
+        The work goes on while somebody waits for it. Raises what it raises. If another request's
+        work fails because of the service, not of the request, this one is computed itself. Work
+        that workers died of is not begun again.
         """
         loop = asyncio.get_running_loop()
         end = loop.time() + asked.deadline

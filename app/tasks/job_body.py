@@ -44,7 +44,8 @@ class Validated(TaskResult):
 
 @dataclass(frozen=True)
 class JobBodyTask:
-    """The JSON body of `POST /jobs` in `file`; with `evaluate`, the body of `POST /evaluate` as a job of its own.
+    """The JSON body of `POST /jobs` in `file`; with `evaluate`, the body of `POST /evaluate` as a
+    job of its own.
 
     `fresh`: the answers of equal requests do not do.
     """
@@ -61,7 +62,12 @@ class JobBodyTask:
         try:
             if self.evaluate:
                 return Validated.of(
-                    job_of_one("evaluate", EvaluateRequest.model_validate(content), self.deadlines, self.fresh)
+                    job_of_one(
+                        "evaluate",
+                        EvaluateRequest.model_validate(content),
+                        self.deadlines,
+                        self.fresh,
+                    )
                 )
             asked = JobModel.model_validate(content)
         except ValidationError as error:
@@ -71,7 +77,9 @@ class JobBodyTask:
 
 @dataclass(frozen=True)
 class JobOfOneTask:
-    """A validated request to the endpoint `kind`, which is too large to be looked at in the service's process."""
+    """A validated request to the endpoint `kind`, which is too large to be looked at in the
+    service's process.
+    """
 
     kind: str
     asked: Request | HeldBody
@@ -86,8 +94,8 @@ class JobOfOneTask:
 
 
 def job_of_one(kind: str, asked: Request, deadlines: Deadlines, fresh: bool) -> NewJob:
-    """A validated request as a job; `fresh`: the answer of an equal one does not do. Raises InvalidRequest if its
-    deadline is too long."""
+    """A validated request as a job; `fresh`: the answer of an equal one does not do. Raises
+    InvalidRequest if its deadline is too long."""
     too_long = _too_long(asked, deadlines)
     if too_long is not None:
         raise InvalidRequest([{"loc": ["body", "deadline"], "msg": too_long}])

@@ -29,16 +29,19 @@ from joulepath.app.tasks.answer_figures import figures_of
 from joulepath.optimizer.deadline import Deadline
 
 IDENTIFY, CYCLE = "identify", "cycle"
-"""Kinds of requests that need something of the database: stored logs, and motions that are known."""
+"""Kinds of requests that need something of the database: stored logs, and motions that are
+known."""
 RESIDUALS = "residuals"
 """Kind of the answer beside that of an identification: its curves."""
 
 
 @dataclass(frozen=True)
 class JobResult(TaskResult):
-    """An answer with its figures. Its documents are compressed; `parts` is the kind of those in `stored`.
+    """An answer with its figures. Its documents are compressed; `parts` is the kind of those in
+    `stored`.
 
-    `wall_time` [s] is that of the work. `identified` are the figures of an arm that were found, if any.
+    `wall_time` [s] is that of the work. `identified` are the figures of an arm that were found, if
+    any.
     """
 
     wall_time: float = field(kw_only=True)
@@ -73,7 +76,8 @@ class JobRequestTask:
         result = result if result.kept_as is not None else result.kept()
         answer = orjson.loads(result.document)
         figures = figures_of(answer)
-        # here and not in the service, which has more to do; nobody waits, so that size counts more than time
+        # here and not in the service, which has more to do; nobody waits, so that size counts more
+        # than time
         return JobResult(
             packed(result.document),
             result.media_type,
@@ -102,13 +106,23 @@ def _identified(answer: dict[str, Any]) -> FoundFigures:
 
 def _evaluate(body: bytes, request_id: str, deadline: float) -> TaskResult:
     request = EvaluateRequest.model_validate_json(body)
-    return TaskResult.of_json(EvaluateAnswer.of(request_id, evaluated(request, Deadline.after(deadline))))
+    return TaskResult.of_json(
+        EvaluateAnswer.of(request_id, evaluated(request, Deadline.after(deadline)))
+    )
 
 
 _RUN: dict[str, Callable[[bytes, str, float], TaskResult]] = {
-    "optimize": lambda body, own, left: OptimizeTask(OptimizeRequest.model_validate_json(body), own).run(left),
-    "pareto": lambda body, own, left: ParetoTask(ParetoRequest.model_validate_json(body), own, "json").run(left),
-    "compare": lambda body, own, left: CompareTask(CompareRequest.model_validate_json(body), own).run(left),
-    "whatif": lambda body, own, left: WhatifTask(WhatifRequest.model_validate_json(body), own).run(left),
+    "optimize": lambda body, own, left: OptimizeTask(
+        OptimizeRequest.model_validate_json(body), own
+    ).run(left),
+    "pareto": lambda body, own, left: ParetoTask(
+        ParetoRequest.model_validate_json(body), own, "json"
+    ).run(left),
+    "compare": lambda body, own, left: CompareTask(
+        CompareRequest.model_validate_json(body), own
+    ).run(left),
+    "whatif": lambda body, own, left: WhatifTask(WhatifRequest.model_validate_json(body), own).run(
+        left
+    ),
     "evaluate": _evaluate,
 }

@@ -1,4 +1,6 @@
-"""Kept answers that a task needs: those that its request names, and the moves of a cycle among them."""
+"""Kept answers that a task needs: those that its request names, and the moves of a cycle among
+them.
+"""
 
 from __future__ import annotations
 
@@ -17,12 +19,16 @@ _KEPT: ContextVar[Mapping[str, bytes] | None] = ContextVar("kept answers", defau
 
 
 def answers_given(kept: Mapping[str, bytes]) -> AbstractContextManager[None]:
-    """Within the context, and its thread, requests may name these answers (JSON), by their ids or paths."""
+    """Within the context, and its thread, requests may name these answers (JSON), by their ids or
+    paths.
+    """
     return at_hand(_KEPT, kept)
 
 
 def kept_answers(names: list[str]) -> list[Any]:
-    """The kept answers of these names. Raises PartsNeeded with those that are not at hand, and InvalidRequest."""
+    """The kept answers of these names. Raises PartsNeeded with those that are not at hand, and
+    InvalidRequest.
+    """
     kept = _KEPT.get() or {}
     missing = [name for name in names if name not in kept]
     if missing:

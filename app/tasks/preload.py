@@ -22,6 +22,7 @@ with importing():
     # whose fields messages about large bodies name
     import_module("joulepath.app.schemas.studies")
 
-# SIGTERM from a service manager reaches every process of the service. This one ends with its parent, and its end would
-# end the workers, which must last until the requests in flight are answered.
+# SIGTERM from a service manager reaches every process of the service. This one ends with its
+# parent, and its end would end the workers, which must last until the requests in flight are
+# answered.
 signal.signal(signal.SIGTERM, signal.SIG_IGN)

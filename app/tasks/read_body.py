@@ -1,4 +1,6 @@
-"""Reads and validates a large JSON body in a worker: it would hold up every other request in the service's process."""
+"""Reads and validates a large JSON body in a worker: it would hold up every other request in the
+service's process.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ _SMALL = 1024
 
 
 class HeldBody:
-    """A validated body that stays pickled until it comes to a worker, as part of a task: there it is the model itself.
+    """A validated body that stays pickled until it comes to a worker, as part of a task: there it
+    is the model itself.
 
     Small fields can be read here. Others are an ellipsis: one can only see that they are not None.
     """
@@ -46,9 +49,13 @@ class ReadBodyTask:
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """The content of a HeldBody. `deadline` is not watched: it takes a second at most. Raises InvalidRequest."""
+        """The content of a HeldBody. `deadline` is not watched: it takes a second at most. Raises
+        InvalidRequest.
+        """
         try:
-            read = self.model.model_validate(parsed_json(b"".join(self.parts)), from_attributes=True)  # as FastAPI does
+            read = self.model.model_validate(
+                parsed_json(b"".join(self.parts)), from_attributes=True
+            )  # as FastAPI does
         except ValidationError as error:
             raise invalid_request(error, "body") from None
         return TaskResult(pickle.dumps(pickled_body(read)), "application/x-python-pickle")
@@ -57,7 +64,9 @@ class ReadBodyTask:
 def pickled_body(read: BaseModel) -> tuple[bytes, dict[str, Any], set[str]]:
     """The content of a HeldBody."""
     fields = {name: getattr(read, name) for name in type(read).model_fields}
-    seen = {name: value if len(pickle.dumps(value)) <= _SMALL else ... for name, value in fields.items()}
+    seen = {
+        name: value if len(pickle.dumps(value)) <= _SMALL else ... for name, value in fields.items()
+    }
     return pickle.dumps(read), seen, read.model_fields_set
 
 

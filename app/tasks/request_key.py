@@ -20,8 +20,8 @@ _CELL = set(ArmRequest.model_fields) - {"payload"}
 
 
 def meaning_of(kind: str, body: Any) -> Meaning:
-    """What a validated request to the endpoint `kind` means: the order of fields, defaults that are spelled out, and
-    its deadline do not matter."""
+    """What a validated request to the endpoint `kind` means: the order of fields, defaults that are
+    spelled out, and its deadline do not matter."""
     assert isinstance(body, BaseModel)
     content = [__version__, _FORM, kind, body.model_dump(mode="json", exclude={"deadline"})]
     base = (body.optimize or body.evaluate) if isinstance(body, WhatifRequest) else body
@@ -32,11 +32,14 @@ def meaning_of(kind: str, body: Any) -> Meaning:
 
 
 def cell_of(body: CycleRequest) -> str:
-    """What a cycle says of the arm and its cell: cycles that agree in it may have moves in common."""
+    """What a cycle says of the arm and its cell: cycles that agree in it may have moves in
+    common."""
     return _hash([__version__, body.model_dump(mode="json", include=_CELL)])
 
 
-def key_of(meaning: Meaning, owner: str | None, own_robot: dict[str, Any] | None, job_id: str | None = None) -> str:
+def key_of(
+    meaning: Meaning, owner: str | None, own_robot: dict[str, Any] | None, job_id: str | None = None
+) -> str:
     """The key of a request of `owner`; `own_robot` are the figures of a robot that a user added.
 
     With a `job_id`, it is equal to none of another job.

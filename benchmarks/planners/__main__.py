@@ -1,4 +1,5 @@
-"""One planner on the seeded joint-to-joint tasks, in a process of its own. Its motions are replayed on the fine grid.
+"""One planner on the seeded joint-to-joint tasks, in a process of its own. Its motions are replayed
+on the fine grid.
 
 python -m benchmarks.planners drake --count 20
 """
@@ -35,12 +36,16 @@ REACHED = 1e-6  # largest joint error at start and goal [rad]
 def planner_of(name: str) -> Planner:
     """The planner of this name, for a UR5e. Raises ImportError if its packages are missing."""
     module, kind = PLANNERS[name].split(":")
-    planner: Planner = getattr(import_module(f"benchmarks.planners.{module}"), kind)(load_robot("ur5e"))
+    planner: Planner = getattr(import_module(f"benchmarks.planners.{module}"), kind)(
+        load_robot("ur5e")
+    )
     return planner
 
 
 def attempt(planner: Planner, task: Move) -> tuple[float, Replay | None]:
-    """Wall time [s] and the replayed motion of a task; None without a motion or after an exception of the planner."""
+    """Wall time [s] and the replayed motion of a task; None without a motion or after an exception
+    of the planner.
+    """
     began = time.perf_counter()
     try:
         motion = planner.plan(task.q_start, task.q_goal)
@@ -51,7 +56,11 @@ def attempt(planner: Planner, task: Move) -> tuple[float, Replay | None]:
     if motion is None:
         return wall, None
     found = replay(
-        Problem(arm=Arm(robot=load_robot("ur5e"), collisions=False), start=task.q_start, goal=task.q_goal),
+        Problem(
+            arm=Arm(robot=load_robot("ur5e"), collisions=False),
+            start=task.q_start,
+            goal=task.q_goal,
+        ),
         motion,
         task.q_start,
         task.q_goal,

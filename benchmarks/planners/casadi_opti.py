@@ -1,4 +1,6 @@
-"""A plain CasADi script: a B-spline transcribed with `Opti`, solved by IPOPT with exact derivatives."""
+"""A plain CasADi script: a B-spline transcribed with `Opti`, solved by IPOPT with exact
+derivatives.
+"""
 
 from __future__ import annotations
 
@@ -17,23 +19,32 @@ from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 
 WIDTH = 0.5  # width of the smoothed corners of the power [W]
 KNEE = 0.02  # speed range of the smoothed friction reversal [rad/s]
-RETIMED = 1.5  # duration of the initial guess / shortest duration within the limits on speed, acceleration and jerk
+# duration of the initial guess / shortest duration within the limits on speed, acceleration and
+# jerk
+RETIMED = 1.5
 RESTING = 3  # coinciding control points at each end: standstill
-GRID = np.linspace(0.0, 1.0, 61)  # points at which limits are constraints if the hull does not imply them
+GRID = np.linspace(
+    0.0, 1.0, 61
+)  # points at which limits are constraints if the hull does not imply them
 OPTIONS: dict[str, Any] = {"print_time": False}
 IPOPT: dict[str, Any] = {"print_level": 0, "sb": "yes", "max_iter": 300, "tol": 1e-6}
 
 
 class CasadiOpti:
-    """The NLP is built once with the two configurations as parameters, as one would for many solves.
+    """The NLP is built once with the two configurations as parameters, as one would for many
+    solves.
 
-    Torque limits are constraints at the Gauss-Legendre nodes of the cost. Limits on speed, acceleration and jerk are
-    constraints on the control points of the derivatives, whose hull contains the derivatives everywhere.
+    Torque limits are constraints at the Gauss-Legendre nodes of the cost. Limits on speed,
+    acceleration and jerk are constraints on the control points of the derivatives, whose hull
+    contains the derivatives everywhere.
     """
 
     title = "CasADi Opti with IPOPT, hull bounds"
     packages: tuple[str, ...] = ("casadi",)
-    what = "B-spline of 13 control points on 32 nodes, duration free, the same dynamics and energy, hull bounds"
+    what = (
+        "B-spline of 13 control points on 32 nodes, duration free, the same dynamics and "
+        "energy, hull bounds"
+    )
     hull = True
 
     def __init__(self, robot: Robot, n: int = CONTROL_POINTS, nodes: int = NODES) -> None:
@@ -50,7 +61,11 @@ class CasadiOpti:
         opti.minimize(self.duration * (power @ basis.weights))
         opti.subject_to(opti.bounded(-1, ca.vec(tau / _wide(limits.tau_max, len(basis.nodes))), 1))
         for order, most in enumerate((limits.v_max, limits.a_max, limits.j_max), start=1):
-            inner = derivative_points(basis.knots, order) if self.hull else basis_matrix(basis.knots, GRID, order)
+            inner = (
+                derivative_points(basis.knots, order)
+                if self.hull
+                else basis_matrix(basis.knots, GRID, order)
+            )
             rate = self.points @ inner.T / self.duration**order
             opti.subject_to(opti.bounded(-1, ca.vec(rate / _wide(most, len(inner))), 1))
         lower, upper = _wide(limits.q_min, columns), _wide(limits.q_max, columns)
@@ -58,14 +73,20 @@ class CasadiOpti:
         opti.subject_to(opti.bounded(0.01, self.duration, 600.0))
         opti.solver("ipopt", OPTIONS, IPOPT)
 
-    def plan(self, q_start: Array, q_goal: Array, perturbation: Array | None = None) -> SplineMotion | None:
-        """See `Planner.plan`. `perturbation` (n - 6, nq) [rad] is added to the initial guess's free control points."""
+    def plan(
+        self, q_start: Array, q_goal: Array, perturbation: Array | None = None
+    ) -> SplineMotion | None:
+        """See `Planner.plan`. `perturbation` (n - 6, nq) [rad] is added to the initial guess's free
+        control points.
+        """
         opti, basis = self.opti, self.basis
         free = q_start + np.outer(basis.quintic[RESTING:-RESTING], q_goal - q_start)
         opti.set_value(self.q_start, q_start)
         opti.set_value(self.q_goal, q_goal)
         opti.set_initial(self.free, (free if perturbation is None else free + perturbation).T)
-        opti.set_initial(self.duration, RETIMED * float(shortest_duration(q_goal - q_start, self.robot.limits)))
+        opti.set_initial(
+            self.duration, RETIMED * float(shortest_duration(q_goal - q_start, self.robot.limits))
+        )
         try:
             solution = opti.solve()
         except RuntimeError:  # what Opti raises when the solver gives up
@@ -75,10 +96,14 @@ class CasadiOpti:
 
 
 class CasadiOptiGrid(CasadiOpti):
-    """The same, with limits on speed, acceleration and jerk on a grid: less conservative, and violated in between."""
+    """The same, with limits on speed, acceleration and jerk on a grid: less conservative, and
+    violated in between.
+    """
 
     title = "CasADi Opti with IPOPT, bounds on a grid"
-    what = "as before, with bounds on speed, acceleration and jerk at 61 points instead of the hull's"
+    what = (
+        "as before, with bounds on speed, acceleration and jerk at 61 points instead of the hull's"
+    )
     hull = False
 
 
@@ -99,15 +124,25 @@ def _wide(limit: Array, columns: int) -> Array:
 
 
 def _node(robot: Robot) -> ca.Function:
-    """(q, v, a) → power drawn from the supply [W] and motor torque (nq,) [N·m], with smoothed corners."""
+    """(q, v, a) → power drawn from the supply [W] and motor torque (nq,) [N·m], with smoothed
+    corners.
+    """
     q, v, a = (ca.SX.sym(name, robot.nq) for name in "qva")
     no_payload = SymbolicPayload(ca.SX(0), ca.SX(3, 1), ca.SX(6, 1))
     tau = inverse_dynamics(
-        robot.model, q, v, a, no_payload, ca.SX(robot.model.gravity.linear), ca.SX(robot.drives.rotor_inertia)
+        robot.model,
+        q,
+        v,
+        a,
+        no_payload,
+        ca.SX(robot.model.gravity.linear),
+        ca.SX(robot.drives.rotor_inertia),
     )
     law = robot.friction
     friction = FrictionLaw(law.name, law.coulomb, law.curved, law.speed, law.viscous, KNEE)
     flow = power_flow(tau, v, a, robot.drives, friction, 0.1 * WIDTH, ca)
     electronics = robot.electronics
     net = electronics.idle_power + electronics.controller_power + ca.sum1(flow.joints)
-    return ca.Function("node", [q, v, a], [drawn_power(net, electronics.regeneration, WIDTH, ca), flow.tau_motor])
+    return ca.Function(
+        "node", [q, v, a], [drawn_power(net, electronics.regeneration, WIDTH, ca), flow.tau_motor]
+    )

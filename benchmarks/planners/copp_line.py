@@ -1,4 +1,6 @@
-"""copp: a time scaling of the straight line with least idle energy, copper loss and friction, by conic programming."""
+"""copp: a time scaling of the straight line with least idle energy, copper loss and friction, by
+conic programming.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,8 @@ FLOOR = 1e-3  # least speed at which friction work is linearised / largest speed
 
 
 class CoppMotion:
-    """A line with the profile a = (ds/dt)², b = d²s/dt² over stations; b is linear in s between stations.
+    """A line with the profile a = (ds/dt)², b = d²s/dt² over stations; b is linear in s between
+    stations.
 
     In the first and the last interval, which begin or end at rest, jerk is constant over time.
     """
@@ -47,7 +50,13 @@ class CoppMotion:
         first, last = self.profile.num_stationary
         for sign, inside, distance, span, since in (
             (1.0, at < s[first], s[first], self.times[first], t),
-            (-1.0, at > s[-1 - last], 1 - s[-1 - last], self.duration - self.times[-1 - last], self.duration - t),
+            (
+                -1.0,
+                at > s[-1 - last],
+                1 - s[-1 - last],
+                self.duration - self.times[-1 - last],
+                self.duration - t,
+            ),
         ):
             if inside.any():
                 constant = 6 * distance / span**3
@@ -60,15 +69,16 @@ class CoppMotion:
 class CoppLine:
     """∫ (idle power + copper loss + viscous friction) dt along the straight line.
 
-    The first two are copp's own objectives. Viscous work is concave in its variables and linearised around the last
-    profile, as copp advises for such terms. The work of dry friction does not depend on the time scaling; it enters the
-    torques only.
+    The first two are copp's own objectives. Viscous work is concave in its variables and linearised
+    around the last profile, as copp advises for such terms. The work of dry friction does not
+    depend on the time scaling; it enters the torques only.
     """
 
     title = "copp, thermal line"
     packages: tuple[str, ...] = ("copp-py",)
     what = (
-        "straight line in joint space, least idle energy, copper loss and friction under all limits, by cone programs"
+        "straight line in joint space, least idle energy, copper loss and friction under all "
+        "limits, by cone programs"
     )
 
     def __init__(self, robot: Robot) -> None:
@@ -81,7 +91,9 @@ class CoppLine:
         arm = self._arm(q_start, travel)
         last = (len(STATIONS) - 1, (0.0, 0.0))
         try:
-            fastest = copp.solver.topp2_ra.Problem(arm.constraints, idx_s_interval=(0, last[0]), a_boundary=last[1])
+            fastest = copp.solver.topp2_ra.Problem(
+                arm.constraints, idx_s_interval=(0, last[0]), a_boundary=last[1]
+            )
             around, slope = copp.solver.topp2_ra.solve(fastest), None
             for _ in range(ROUNDS):
                 problem = copp.solver.copp3_socp.Problem(
@@ -114,7 +126,9 @@ class CoppLine:
         arm = copp.Robot(robot.nq, capacity=count, inverse_dynamics=torque)
         arm.append_s(STATIONS)
         none = np.zeros((count, robot.nq))
-        arm.set_q(q_start + np.outer(STATIONS, travel), np.tile(travel, (count, 1)), none, 0, dddq=none)
+        arm.set_q(
+            q_start + np.outer(STATIONS, travel), np.tile(travel, (count, 1)), none, 0, dddq=none
+        )
         for add, limit in (
             (arm.add_velocity_limits, limits.v_max),
             (arm.add_acceleration_limits, limits.a_max),

@@ -1,4 +1,6 @@
-"""Drake's KinematicTrajectoryOptimization with SNOPT, the electrical energy added as a cost with exact gradients."""
+"""Drake's KinematicTrajectoryOptimization with SNOPT, the electrical energy added as a cost with
+exact gradients.
+"""
 
 from __future__ import annotations
 
@@ -23,19 +25,30 @@ from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 
 WIDTH = 0.5  # width of the smoothed corners of the power [W]
 KNEE = 0.02  # speed range of the smoothed friction reversal [rad/s]
-RETIMED = 1.5  # duration of the initial guess / shortest duration within the limits on speed, acceleration and jerk
-OPTIONS = {"Major optimality tolerance": 1e-5, "Major feasibility tolerance": 1e-6, "Major iterations limit": 500}
+# duration of the initial guess / shortest duration within the limits on speed, acceleration and
+# jerk
+RETIMED = 1.5
+OPTIONS = {
+    "Major optimality tolerance": 1e-5,
+    "Major feasibility tolerance": 1e-6,
+    "Major iterations limit": 500,
+}
 
 
 class DrakeTrajectory:
-    """Hull bounds on speed, acceleration and jerk, and effort bounds at the nodes, as Drake offers them.
+    """Hull bounds on speed, acceleration and jerk, and effort bounds at the nodes, as Drake offers
+    them.
 
-    Drake's plant has no friction of this kind: effort bounds are tightened by the largest friction torque.
+    Drake's plant has no friction of this kind: effort bounds are tightened by the largest friction
+    torque.
     """
 
     title = "Drake with SNOPT"
     packages: tuple[str, ...] = ("drake",)
-    what = "KinematicTrajectoryOptimization, B-spline of 13 control points on 32 nodes, duration free, hull bounds"
+    what = (
+        "KinematicTrajectoryOptimization, B-spline of 13 control points on 32 nodes, duration "
+        "free, hull bounds"
+    )
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
@@ -53,7 +66,8 @@ class DrakeTrajectory:
         knots = self.basis.knots
         guess = q_start + np.outer(self.basis.quintic, q_goal - q_start)
         trajectory = BsplineTrajectory(
-            BsplineBasis(DEGREE + 1, (knots * duration).tolist()), [point[:, None] for point in guess]
+            BsplineBasis(DEGREE + 1, (knots * duration).tolist()),
+            [point[:, None] for point in guess],
         )
         program = KinematicTrajectoryOptimization(trajectory)
         none = np.zeros(nq)
@@ -80,8 +94,9 @@ class DrakeTrajectory:
 class _Energy:
     """Drawn electrical energy [J, in hundreds] of control points row by row and a duration.
 
-    Torques and their derivatives come from the plant by automatic differentiation over the 3 nq states of a node; from
-    there to power and to the variables by the chain rule, which is far cheaper than 79 derivatives all the way.
+    Torques and their derivatives come from the plant by automatic differentiation over the 3 nq
+    states of a node; from there to power and to the variables by the chain rule, which is far
+    cheaper than 79 derivatives all the way.
     """
 
     SCALE = 1e-2
@@ -108,7 +123,10 @@ class _Energy:
         cost = duration * float(weights @ power)
         weighted = slopes * (duration * weights)[None, :, None]
         by_points = np.einsum("d,dkn,dkj->nj", rates, self.basis.at_nodes, weighted)
-        by_duration = cost / duration - float((weighted * states * np.arange(3)[:, None, None]).sum()) / duration
+        by_duration = (
+            cost / duration
+            - float((weighted * states * np.arange(3)[:, None, None]).sum()) / duration
+        )
         return self.SCALE * cost, self.SCALE * np.append(by_points.ravel(), by_duration)
 
     def _power(self, states: Array) -> tuple[Array, Array]:
@@ -122,10 +140,18 @@ class _Energy:
         motor = tau + friction
         i = motor / drives.torque_constant
         size = np.hypot(i, 0.1 * WIDTH)
-        loss = drives.copper * i**2 + drives.inverter_linear * size + drives.inverter_quadratic * i**2
-        by_current = 2 * (drives.copper + drives.inverter_quadratic) * i + drives.inverter_linear * i / size
+        loss = (
+            drives.copper * i**2 + drives.inverter_linear * size + drives.inverter_quadratic * i**2
+        )
+        by_current = (
+            2 * (drives.copper + drives.inverter_quadratic) * i + drives.inverter_linear * i / size
+        )
         by_motor = v + by_current / drives.torque_constant
-        base = electronics.idle_power + electronics.controller_power + float(drives.inverter_constant.sum())
+        base = (
+            electronics.idle_power
+            + electronics.controller_power
+            + float(drives.inverter_constant.sum())
+        )
         net = base + (motor * v + loss).sum(axis=1)
         soft = np.hypot(net, WIDTH)
         recovered = electronics.regeneration
@@ -156,7 +182,9 @@ def _plant(robot: Robot) -> MultibodyPlant:
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base"))
     limits = robot.limits
     effort = limits.tau_max - robot.friction.torque(limits.v_max)
-    for name, most, inertia in zip(robot.joint_names, effort, robot.drives.rotor_inertia, strict=True):
+    for name, most, inertia in zip(
+        robot.joint_names, effort, robot.drives.rotor_inertia, strict=True
+    ):
         actuator = plant.AddJointActuator(f"{name} drive", plant.GetJointByName(name), float(most))
         actuator.set_default_gear_ratio(1.0)
         actuator.set_default_rotor_inertia(float(inertia))

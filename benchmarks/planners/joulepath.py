@@ -1,4 +1,6 @@
-"""joulepath itself: one candidate, the whole answer, and the straight line with an optimised time scaling."""
+"""joulepath itself: one candidate, the whole answer, and the straight line with an optimised time
+scaling.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,10 @@ class Candidate:
 
     title = "joulepath, one candidate"
     packages: tuple[str, ...] = ()
-    what = "B-spline of 13 control points, duration free, least electrical energy; within limits between the nodes, too"
+    what = (
+        "B-spline of 13 control points, duration free, least electrical energy; within limits "
+        "between the nodes, too"
+    )
 
     def __init__(self, robot: Robot) -> None:
         _prepare(robot)
@@ -30,7 +35,9 @@ class Candidate:
 
     def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
         """See `Planner.plan`."""
-        task = PreparedProblem.of(Problem(arm=Arm(robot=self.robot, collisions=False), start=q_start, goal=q_goal))
+        task = PreparedProblem.of(
+            Problem(arm=Arm(robot=self.robot, collisions=False), start=q_start, goal=q_goal)
+        )
         return _motion(solver_for(task, q_start, q_goal, Deadline.after(PATIENCE)).solve().spline)
 
 
@@ -39,7 +46,10 @@ class Answer:
 
     title = "joulepath, whole answer"
     packages: tuple[str, ...] = ()
-    what = "one candidate, refined over more control points, compared with all baselines, and certified"
+    what = (
+        "one candidate, refined over more control points, compared with all baselines, and "
+        "certified"
+    )
 
     def __init__(self, robot: Robot) -> None:
         _prepare(robot)
@@ -62,7 +72,10 @@ class Line:
 
     title = "joulepath, time-scaled line"
     packages: tuple[str, ...] = ()
-    what = "straight line in joint space, time scaling by a B-spline of least electrical energy, duration free"
+    what = (
+        "straight line in joint space, time scaling by a B-spline of least electrical energy, "
+        "duration free"
+    )
 
     def __init__(self, robot: Robot) -> None:
         _prepare(robot)
@@ -71,7 +84,12 @@ class Line:
     def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
         """See `Planner.plan`."""
         task = PreparedProblem.of(
-            Problem(arm=Arm(robot=self.robot, collisions=False), start=q_start, goal=q_goal, method="time_scaling")
+            Problem(
+                arm=Arm(robot=self.robot, collisions=False),
+                start=q_start,
+                goal=q_goal,
+                method="time_scaling",
+            )
         )
         return _motion(solver_for(task, q_start, q_goal, Deadline.after(PATIENCE)).solve().spline)
 
@@ -82,4 +100,6 @@ def _prepare(robot: Robot) -> None:
 
 
 def _motion(spline: Spline | None) -> SplineMotion | None:
-    return None if spline is None else SplineMotion(spline.knots, spline.control_points, spline.degree)
+    return (
+        None if spline is None else SplineMotion(spline.knots, spline.control_points, spline.degree)
+    )

@@ -13,9 +13,11 @@ CONTROL_POINTS, NODES = 13, 31
 
 
 class Planner(Protocol):
-    """Plans motions from standstill to standstill under all limits of a robot. Only `plan` is timed.
+    """Plans motions from standstill to standstill under all limits of a robot. Only `plan` is
+    timed.
 
-    `title` is the planner's name, `packages` are the packages that it uses, `what` describes its method and limits.
+    `title` is the planner's name, `packages` are the packages that it uses, `what` describes its
+    method and limits.
     """
 
     title: str

@@ -25,7 +25,9 @@ class RuckigMotion:
     def sample(self, t: Array) -> tuple[Array, Array, Array, Array | None]:
         """See `Motion.sample`."""
         states = np.array([self.trajectory.at_time(instant) for instant in t.tolist()])
-        before = np.array([self.trajectory.at_time(max(instant - INSTANT, 0.0))[2] for instant in t.tolist()])
+        before = np.array(
+            [self.trajectory.at_time(max(instant - INSTANT, 0.0))[2] for instant in t.tolist()]
+        )
         jerk = (states[:, 2] - before) / INSTANT
         return states[:, 0], states[:, 1], states[:, 2], jerk
 
@@ -35,7 +37,10 @@ class RuckigFastest:
 
     title = "ruckig, time-optimal"
     packages: tuple[str, ...] = ("ruckig",)
-    what = "least time under limits of speed, acceleration and jerk, all joints end together; no limit on torque"
+    what = (
+        "least time under limits of speed, acceleration and jerk, all joints end together; no "
+        "limit on torque"
+    )
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
@@ -50,4 +55,8 @@ class RuckigFastest:
         given.max_jerk = limits.j_max.tolist()
         found = ruckig.Trajectory(self.robot.nq)
         result = self.generator.calculate(given, found)
-        return RuckigMotion(found) if result in (ruckig.Result.Working, ruckig.Result.Finished) else None
+        return (
+            RuckigMotion(found)
+            if result in (ruckig.Result.Working, ruckig.Result.Finished)
+            else None
+        )

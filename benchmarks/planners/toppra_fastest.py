@@ -1,4 +1,6 @@
-"""toppra: the time-optimal time scaling of the straight line under limits on speed, acceleration and torque."""
+"""toppra: the time-optimal time scaling of the straight line under limits on speed, acceleration
+and torque.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,10 @@ class ToppraFastest:
 
     title = "toppra, time-optimal line"
     packages: tuple[str, ...] = ("toppra",)
-    what = "straight line in joint space, least time under limits of speed, acceleration and torque; no limit on jerk"
+    what = (
+        "straight line in joint space, least time under limits of speed, acceleration and "
+        "torque; no limit on jerk"
+    )
 
     def __init__(self, robot: Robot) -> None:
         self.model = robot.model
@@ -54,14 +59,19 @@ class ToppraFastest:
         ]
 
     def _torque(self, q: Array, v: Array, a: Array) -> Array:
-        # viscous friction is left out: toppra takes torque to be affine in the acceleration and the square of the speed
+        # viscous friction is left out: toppra takes torque to be affine in the acceleration and the
+        # square of the speed
         return np.asarray(pin.rnea(self.model, self.data, q, v, a))
 
     def plan(self, q_start: Array, q_goal: Array) -> Motion | None:
         """See `Planner.plan`."""
         travel = q_goal - q_start
-        path = toppra.SimplePath(np.array([0.0, 1.0]), np.array([q_start, q_goal]), np.array([travel, travel]))
-        instance = algorithm.TOPPRA(self.constraints, path, gridpoints=GRID, parametrizer="ParametrizeConstAccel")
+        path = toppra.SimplePath(
+            np.array([0.0, 1.0]), np.array([q_start, q_goal]), np.array([travel, travel])
+        )
+        instance = algorithm.TOPPRA(
+            self.constraints, path, gridpoints=GRID, parametrizer="ParametrizeConstAccel"
+        )
         trajectory = instance.compute_trajectory(0.0, 0.0)
         return None if trajectory is None else ToppraMotion(trajectory)
 

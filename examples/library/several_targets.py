@@ -33,8 +33,14 @@ solution = optimize(problem)
 
 clearance = solution.certificate.clearance
 assert clearance is not None  # the scene has an obstacle
-print(f"{solution.status}: place {solution.goal.target + 1} of {len(places)}, by branch {solution.goal.label}")
+print(
+    f"{solution.status}: place {solution.goal.target + 1} of {len(places)}, by branch "
+    f"{solution.goal.label}"
+)
 print(f"{solution.energy.electrical.total:.1f} J in {solution.duration:.2f} s")
-print(f"proven clearance beyond the margins: {1000 * clearance.min_clearance:.1f} mm, {' and '.join(clearance.pair)}")
+print(
+    f"proven clearance beyond the margins: {1000 * clearance.min_clearance:.1f} mm, "
+    f"{' and '.join(clearance.pair)}"
+)
 solved = [candidate for candidate in solution.candidates if candidate.status == "solved"]
 print(f"{len(solved)} of {len(solution.candidates)} candidates solved, the others ruled out")

@@ -1,4 +1,6 @@
-"""The smallest capsule around points: it is convex, so that it holds the hull of a mesh if it holds its vertices."""
+"""The smallest capsule around points: it is convex, so that it holds the hull of a mesh if it holds
+its vertices.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,8 @@ STEPS, CONVERGED = 1500, 1e-5
 def capsule_around(points: Array, checkpoint: Checkpoint = unwatched) -> tuple[Array, float]:
     """Ends (2, 3) [m] of the axis and radius [m] of a small capsule that holds points (n, 3) [m].
 
-    Its volume is least as far as a direct search from each principal axis finds. The radius is exact.
+    Its volume is least as far as a direct search from each principal axis finds. The radius is
+    exact.
     """
     points = _outermost(points, checkpoint)
     centre = points.mean(axis=0)
@@ -29,19 +32,30 @@ def capsule_around(points: Array, checkpoint: Checkpoint = unwatched) -> tuple[A
     for direction in np.linalg.svd(points - centre, full_matrices=False)[2]:
         along = (points - centre) @ direction
         radius = float(np.linalg.norm(points - centre - along[:, None] * direction, axis=1).max())
-        middle, half = (along.max() + along.min()) / 2, max((along.max() - along.min()) / 2 - radius, 0.0)
+        middle, half = (
+            (along.max() + along.min()) / 2,
+            max((along.max() - along.min()) / 2 - radius, 0.0),
+        )
         start = np.concatenate([centre + (middle + side * half) * direction for side in (-1, 1)])
         found.append(
             minimize(
-                _volume, start, (points, checkpoint), "Nelder-Mead", options={"maxiter": STEPS, "xatol": CONVERGED}
+                _volume,
+                start,
+                (points, checkpoint),
+                "Nelder-Mead",
+                options={"maxiter": STEPS, "xatol": CONVERGED},
             )
         )
-    axis = np.round(min(found, key=lambda each: float(each.fun)).x.reshape(2, 3) / DIGIT) * DIGIT + 0.0
+    axis = (
+        np.round(min(found, key=lambda each: float(each.fun)).x.reshape(2, 3) / DIGIT) * DIGIT + 0.0
+    )
     return axis, float(np.ceil(_reach(axis, points) / DIGIT) * DIGIT)
 
 
 def _outermost(points: Array, checkpoint: Checkpoint) -> Array:
-    """The corners of the hull, or all points if they are flat. Of very many points some more: those of parts' hulls."""
+    """The corners of the hull, or all points if they are flat. Of very many points some more: those
+    of parts' hulls.
+    """
     parts = np.array_split(points, -(-len(points) // HULL))
     if len(parts) > 1:
         points = np.concatenate([_outermost(part, checkpoint) for part in parts])

@@ -1,6 +1,7 @@
 """Figures of the links' shapes: capsules, and the pairs of links that are not compared.
 
-A link that has neither capsules of the user nor shapes in the URDF gets a capsule from joint to joint.
+A link that has neither capsules of the user nor shapes in the URDF gets a capsule from joint to
+joint.
 """
 
 from __future__ import annotations
@@ -34,9 +35,12 @@ def collision_figures(
     warnings: list[str],
     checkpoint: Checkpoint,
 ) -> dict[str, Any]:
-    """Figures of the section `collision`; `links` are the names of the moving links. Shapes that are not read are added
-    to `warnings`."""
-    shapes, radius = LinkShapes.of(description, chain, upright, checkpoint), _radius(description, upright)
+    """Figures of the section `collision`; `links` are the names of the moving links. Shapes that
+    are not read are added to `warnings`."""
+    shapes, radius = (
+        LinkShapes.of(description, chain, upright, checkpoint),
+        _radius(description, upright),
+    )
     capsules, guessed, figures = list[Rows](), list[bool](), {}
     for k, name in enumerate([BASE, *links]):
         own = shapes.rows(k)
@@ -50,14 +54,18 @@ def collision_figures(
     if pairs is None:
         often = pairs_that_meet(chain, upright, capsules, guessed, checkpoint)
         note = (
-            "Pairs whose capsules meet in 95 % of 300 random configurations, or in 30 % if one is from joint to joint."
+            "Pairs whose capsules meet in 95 % of 300 random configurations, or in 30 % if one "
+            "is from joint to joint."
         )
         figures["never_meet"] = assumed(often, "1", note)
     else:
-        figures["never_meet"] = stated(description, pairs, "1", "Numbers of links, 0 for the base. Not proven.")
+        figures["never_meet"] = stated(
+            description, pairs, "1", "Numbers of links, 0 for the base. Not proven."
+        )
     if shapes.missing:
         warnings.append(
-            f"Meshes that were not given, or are no STL or OBJ, count as nothing: {_listed(shapes.missing)}."
+            "Meshes that were not given, or are no STL or OBJ, count as nothing: "
+            f"{_listed(shapes.missing)}."
         )
     if shapes.unknown:
         warnings.append(f"Shapes that are not read count as nothing: {_listed(shapes.unknown)}.")
@@ -82,7 +90,9 @@ def _listed(names: list[str]) -> str:
 
 
 def _between_joints(upright: UprightChain, k: int, radius: float) -> Rows:
-    """A capsule from the link's joint to the next one, or to the flange; a ball where both are at one place."""
+    """A capsule from the link's joint to the next one, or to the flange; a ball where both are at
+    one place.
+    """
     end = (*upright.placements, upright.flange)[k].translation
     length = float(np.linalg.norm(end))
     # as far from both joints as its radius, so that it ends where the next link's begins
@@ -90,16 +100,25 @@ def _between_joints(upright: UprightChain, k: int, radius: float) -> Rows:
     return [[*(share * end).tolist(), *((1 - share) * end).tolist(), radius]]
 
 
-def _given_pairs(description: Description, chain: Chain, checkpoint: Checkpoint) -> list[list[int]] | None:
-    """Pairs of links that the user does not want compared, in words of their own or in an SRDF; None for no word."""
+def _given_pairs(
+    description: Description, chain: Chain, checkpoint: Checkpoint
+) -> list[list[int]] | None:
+    """Pairs of links that the user does not want compared, in words of their own or in an SRDF;
+    None for no word.
+    """
     number = {link: k for k, rigid in enumerate(chain.rigid) for link in rigid}
     own, srdf = description.collision.never_meet, description.srdf
     for link in (each for pair in own or () for each in pair):
         if link not in number:
-            raise InvalidArm("collision.never_meet", f"The arm has no link {link!r} from base to tip.")
+            raise InvalidArm(
+                "collision.never_meet", f"The arm has no link {link!r} from base to tip."
+            )
     if own is None and srdf is None:
         return None
     # an SRDF may be that of a larger machine
     given = [*(own or ()), *(() if srdf is None else disabled_pairs(srdf, checkpoint))]
     known = [(number[a], number[b]) for a, b in given if a in number and b in number]
-    return [list(pair) for pair in sorted({(min(pair), max(pair)) for pair in known if abs(pair[0] - pair[1]) > 1})]
+    return [
+        list(pair)
+        for pair in sorted({(min(pair), max(pair)) for pair in known if abs(pair[0] - pair[1]) > 1})
+    ]

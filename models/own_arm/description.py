@@ -21,7 +21,9 @@ LONGEST_NAME = 200
 
 
 class InvalidArm(ValueError):
-    """A description or URDF that makes no robot. `field` is the place in the description, e.g. `drives.copper`."""
+    """A description or URDF that makes no robot. `field` is the place in the description, e.g.
+    `drives.copper`.
+    """
 
     def __init__(self, field: str, message: str) -> None:
         super().__init__(message)
@@ -36,8 +38,8 @@ class Drives:
     """Joint-side figures of motors and gears; what is None follows from the torque limits
     (`joulepath.models.own_arm.rules`).
 
-    `rotor_inertia` [kg·m²], `coulomb` [N·m] and `viscous` [N·m·s/rad] friction, `copper` [W/(N·m)²]: copper loss over
-    the square of the motor torque.
+    `rotor_inertia` [kg·m²], `coulomb` [N·m] and `viscous` [N·m·s/rad] friction, `copper`
+    [W/(N·m)²]: copper loss over the square of the motor torque.
     """
 
     rotor_inertia: PerJoint | None = None
@@ -48,7 +50,9 @@ class Drives:
 
 @dataclass(frozen=True)
 class Electronics:
-    """Power [W] of the arm's electronics, and the share of surplus power that the supply takes back (0 … 1)."""
+    """Power [W] of the arm's electronics, and the share of surplus power that the supply takes back
+    (0 … 1).
+    """
 
     idle_power: float | None = None
     controller_power: float | None = None
@@ -57,8 +61,9 @@ class Electronics:
 
 @dataclass(frozen=True)
 class Collision:
-    """Shape of the links. `capsules` by the name of a link; links without get those of the URDF's own shapes, or one
-    of `radius` [m] from joint to joint. `never_meet`: pairs of links that are not compared."""
+    """Shape of the links. `capsules` by the name of a link; links without get those of the URDF's
+    own shapes, or one of `radius` [m] from joint to joint. `never_meet`: pairs of links that are
+    not compared."""
 
     capsules: Mapping[str, tuple[CapsuleRow, ...]] | None = None
     radius: float | None = None
@@ -67,7 +72,9 @@ class Collision:
 
 @dataclass(frozen=True)
 class Motion:
-    """The controller's default motion: speed [rad/s] and acceleration [rad/s²] of the leading joint."""
+    """The controller's default motion: speed [rad/s] and acceleration [rad/s²] of the leading
+    joint.
+    """
 
     velocity: float
     acceleration: float
@@ -75,12 +82,14 @@ class Motion:
 
 @dataclass(frozen=True)
 class Description:
-    """An arm of a user's own: the URDF's text, the link `tip` at its end, and what a URDF does not say.
+    """An arm of a user's own: the URDF's text, the link `tip` at its end, and what a URDF does not
+    say.
 
-    `acceleration` [rad/s²], `payload` [kg]. `base` is the link whose frame is the world frame (default: the root).
-    `velocity` [rad/s] and `torque` [N·m] replace the URDF's limits; `torque_side` is what the latter are for; `jerk`
-    [rad/s³]. `locked` has a position [rad] or [m] for each joint that is held. `source` says where the URDF is from,
-    `trust` how good it is. `srdf` is the text of an SRDF, whose disabled collisions are not compared. `meshes` has the
+    `acceleration` [rad/s²], `payload` [kg]. `base` is the link whose frame is the world frame
+    (default: the root). `velocity` [rad/s] and `torque` [N·m] replace the URDF's limits;
+    `torque_side` is what the latter are for; `jerk` [rad/s³]. `locked` has a position [rad] or [m]
+    for each joint that is held. `source` says where the URDF is from, `trust` how good it is.
+    `srdf` is the text of an SRDF, whose disabled collisions are not compared. `meshes` has the
     content of mesh files by their paths.
     """
 

@@ -26,17 +26,28 @@ def drives(description: Description, joints: tuple[str, ...], tau_max: Array) ->
         "gear_ratio": assumed(100.0 * ones, "1", NOTES["gear_ratio"]),
         # not a guess but a scale: with a copper loss of the user's own, nothing rests on it
         "torque_constant": either(
-            description, None if copper is None else constant, constant, "N·m/A", (NOTES["torque_constant"],) * 2
+            description,
+            None if copper is None else constant,
+            constant,
+            "N·m/A",
+            (NOTES["torque_constant"],) * 2,
         ),
         "rotor_inertia": either(
-            description, inertia, rules.ROTOR_INERTIA * tau_max, "kg·m²", (_PLAIN, NOTES["rotor_inertia"])
+            description,
+            inertia,
+            rules.ROTOR_INERTIA * tau_max,
+            "kg·m²",
+            (_PLAIN, NOTES["rotor_inertia"]),
         ),
         "copper": either(
             description,
             None if copper is None else scale * copper,
             scale * rules.COPPER / tau_max,
             "W/A²",
-            ("Copper loss over the torque's square, times the square of the torque constant.", NOTES["copper"]),
+            (
+                "Copper loss over the torque's square, times the square of the torque constant.",
+                NOTES["copper"],
+            ),
         ),
         **{
             f"inverter_{part}": assumed(0.0 * ones, unit, NOTES["inverter"])
@@ -51,15 +62,27 @@ def electronics(description: Description, nq: int) -> dict[str, Any]:
     for name, most in (("idle_power", np.inf), ("controller_power", np.inf), ("regeneration", 1.0)):
         value = getattr(given, name)
         if value is not None and not 0 <= value <= most:
-            raise InvalidArm(f"electronics.{name}", f"electronics.{name} must be 0 or more{_most(most)}.")
+            raise InvalidArm(
+                f"electronics.{name}", f"electronics.{name} must be 0 or more{_most(most)}."
+            )
     return {
         "idle_power": either(
-            description, given.idle_power, rules.IDLE_POWER * nq, "W", ("Arm at rest.", NOTES["idle_power"])
+            description,
+            given.idle_power,
+            rules.IDLE_POWER * nq,
+            "W",
+            ("Arm at rest.", NOTES["idle_power"]),
         ),
         "controller_power": either(
-            description, given.controller_power, 0.0, "W", ("Control box.", NOTES["controller_power"])
+            description,
+            given.controller_power,
+            0.0,
+            "W",
+            ("Control box.", NOTES["controller_power"]),
         ),
-        "regeneration": either(description, given.regeneration, 0.0, "1", ("Of surplus power.", NOTES["regeneration"])),
+        "regeneration": either(
+            description, given.regeneration, 0.0, "1", ("Of surplus power.", NOTES["regeneration"])
+        ),
     }
 
 
@@ -71,12 +94,22 @@ def friction(description: Description, joints: tuple[str, ...], tau_max: Array) 
     zeros, ones = np.zeros(len(joints)), np.ones(len(joints))
     is_given = coulomb is not None and viscous is not None
     return {
-        "coulomb": either(description, coulomb, rules.COULOMB * tau_max, "N·m", (_PLAIN, NOTES["coulomb"])),
-        "curved": either(description, zeros if is_given else None, zeros, "N·m", ("Not in this law.",) * 2),
-        "speed": either(
-            description, ones if is_given else None, ones, "rad/s", ("Without effect, as `curved` is zero.",) * 2
+        "coulomb": either(
+            description, coulomb, rules.COULOMB * tau_max, "N·m", (_PLAIN, NOTES["coulomb"])
         ),
-        "viscous": either(description, viscous, rules.VISCOUS * tau_max, "N·m·s/rad", (_PLAIN, NOTES["viscous"])),
+        "curved": either(
+            description, zeros if is_given else None, zeros, "N·m", ("Not in this law.",) * 2
+        ),
+        "speed": either(
+            description,
+            ones if is_given else None,
+            ones,
+            "rad/s",
+            ("Without effect, as `curved` is zero.",) * 2,
+        ),
+        "viscous": either(
+            description, viscous, rules.VISCOUS * tau_max, "N·m·s/rad", (_PLAIN, NOTES["viscous"])
+        ),
     }
 
 

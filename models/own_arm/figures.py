@@ -1,4 +1,6 @@
-"""The figures of a robot, as a bundled robot's file has them, from the description of a user's own arm."""
+"""The figures of a robot, as a bundled robot's file has them, from the description of a user's own
+arm.
+"""
 
 from __future__ import annotations
 
@@ -27,9 +29,11 @@ _PLACEMENT = "x, y, z, roll, pitch, yaw"
 def own_figures(
     name: str, description: Description, checkpoint: Checkpoint = unwatched
 ) -> tuple[dict[str, Any], list[str]]:
-    """Figures of a robot with this name; and warnings: what is hardly real, and which figures are defaults.
+    """Figures of a robot with this name; and warnings: what is hardly real, and which figures are
+    defaults.
 
-    Raises InvalidArm, which names the field of the description, and the link or joint, and what `checkpoint` raises.
+    Raises InvalidArm, which names the field of the description, and the link or joint, and what
+    `checkpoint` raises.
     """
     chain = chain_of(description, checkpoint)
     upright, links = UprightChain.of(chain), _link_names(chain)
@@ -44,18 +48,29 @@ def own_figures(
         "collision": collision_figures(description, chain, upright, links, warnings, checkpoint),
         "drives": drives(description, chain.joints, tau_max),
         "electronics": electronics(description, chain.nq),
-        "friction_table": {"knee": assumed(rules.KNEE, "rad/s", "Coulomb friction's step is spread over this speed.")},
+        "friction_table": {
+            "knee": assumed(
+                rules.KNEE, "rad/s", "Coulomb friction's step is spread over this speed."
+            )
+        },
         "friction_laws": {"coulomb_viscous": friction(description, chain.joints, tau_max)},
     }
     if (motion := description.default_motion) is not None:
         if min(motion.velocity, motion.acceleration) <= 0:
-            raise InvalidArm("default_motion", "default_motion must have a speed and an acceleration above 0.")
+            raise InvalidArm(
+                "default_motion", "default_motion must have a speed and an acceleration above 0."
+            )
         figures["default_motion"] = {
             "velocity": stated(description, motion.velocity, "rad/s", "Of the leading joint."),
-            "acceleration": stated(description, motion.acceleration, "rad/s²", "Of the leading joint."),
+            "acceleration": stated(
+                description, motion.acceleration, "rad/s²", "Of the leading joint."
+            ),
         }
     defaults = ", ".join(_assumed(figures))
-    return figures, [*warnings, f"Engineering defaults, see their notes: {defaults}."] if defaults else warnings
+    return figures, [
+        *warnings,
+        f"Engineering defaults, see their notes: {defaults}.",
+    ] if defaults else warnings
 
 
 def _link_names(chain: Chain) -> list[str]:
@@ -68,14 +83,24 @@ def _link_names(chain: Chain) -> list[str]:
     return names
 
 
-def _kinematics(description: Description, chain: Chain, upright: UprightChain, links: list[str]) -> dict[str, Any]:
-    frame = f"{_PLACEMENT} of each joint's frame in that of the link before, turned so that the joint turns about z."
+def _kinematics(
+    description: Description, chain: Chain, upright: UprightChain, links: list[str]
+) -> dict[str, Any]:
+    frame = (
+        f"{_PLACEMENT} of each joint's frame in that of the link before, turned so that the "
+        "joint turns about z."
+    )
     figures = {
         "joint_names": stated(description, list(chain.joints), "1", "From base to flange."),
         "link_names": stated(description, links, "1", "The link that each joint moves."),
-        "joint_origin": stated(description, [_row(each) for each in upright.placements], "m, rad", frame),
+        "joint_origin": stated(
+            description, [_row(each) for each in upright.placements], "m, rad", frame
+        ),
         "flange_origin": stated(
-            description, _row(upright.flange), "m, rad", f"{_PLACEMENT} of the tip in the frame of the last link."
+            description,
+            _row(upright.flange),
+            "m, rad",
+            f"{_PLACEMENT} of the tip in the frame of the last link.",
         ),
     }
     if (ros_base := chain.T_base_base_link) is not None:
@@ -88,7 +113,9 @@ def _row(placement: pin.SE3) -> list[float]:
     return [*placement.translation.tolist(), *pin.rpy.matrixToRpy(placement.rotation).tolist()]
 
 
-def _inertials(description: Description, chain: Chain, upright: UprightChain, warnings: list[str]) -> dict[str, Any]:
+def _inertials(
+    description: Description, chain: Chain, upright: UprightChain, warnings: list[str]
+) -> dict[str, Any]:
     """Of each moving link with all that is fixed to it."""
     ends = [*upright.placements[1:], upright.flange]
     for link, body, end in zip(chain.links, upright.inertias, ends, strict=True):
@@ -100,8 +127,12 @@ def _inertials(description: Description, chain: Chain, upright: UprightChain, wa
     about = "ixx, ixy, ixz, iyy, iyz, izz about the centre of mass, in the link frame."
     return {
         "mass": stated(description, [body.mass for body in bodies], "kg", of_all),
-        "center_of_mass": stated(description, [body.lever.tolist() for body in bodies], "m", in_link),
-        "inertia_frame_rpy": stated(description, [[0.0] * 3] * chain.nq, "rad", "Axes of the link frame."),
+        "center_of_mass": stated(
+            description, [body.lever.tolist() for body in bodies], "m", in_link
+        ),
+        "inertia_frame_rpy": stated(
+            description, [[0.0] * 3] * chain.nq, "rad", "Axes of the link frame."
+        ),
         "inertia": stated(description, tensors, "kg·m²", about),
     }
 
@@ -112,34 +143,50 @@ _ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 def _check_body(link: str, body: pin.Inertia, length: float, warnings: list[str]) -> None:
     """Whether a body can be real; a warning where it hardly is. `length` [m] to the next joint."""
     if not body.mass > 0:
-        raise InvalidArm("urdf", f"Link {link!r}, with what is fixed to it, has no mass: give it an <inertial>.")
-    if not (np.abs([body.mass, *body.lever, *body.inertia.ravel()]) <= HEAVIEST).all() or not length <= LONGEST:
+        raise InvalidArm(
+            "urdf", f"Link {link!r}, with what is fixed to it, has no mass: give it an <inertial>."
+        )
+    if (
+        not (np.abs([body.mass, *body.lever, *body.inertia.ravel()]) <= HEAVIEST).all()
+        or not length <= LONGEST
+    ):
         raise InvalidArm(
             "urdf",
-            f"Link {link!r} must be lighter than {HEAVIEST:g} kg and shorter than {LONGEST:g} m: are its units SI?",
+            f"Link {link!r} must be lighter than {HEAVIEST:g} kg and shorter than {LONGEST:g} m: "
+            "are its units SI?",
         )
     moments = np.linalg.eigvalsh(body.inertia)
     if moments[0] < -rules.ROUNDED * abs(moments[2]):
-        raise InvalidArm("urdf", f"Link {link!r} has an inertia with a negative principal moment of {moments[0]:.3g}.")
+        raise InvalidArm(
+            "urdf",
+            f"Link {link!r} has an inertia with a negative principal moment of {moments[0]:.3g}.",
+        )
     excess = moments[2] / max(moments[0] + moments[1], 1e-300) - 1
     if moments[2] > 0 and excess > rules.IMPOSSIBLE:
         raise InvalidArm(
             "urdf",
-            f"Link {link!r} has an impossible inertia: the principal moment {moments[2]:.3g} kg·m² is more than the "
+            f"Link {link!r} has an impossible inertia: the principal moment {moments[2]:.3g} kg·m² "
+            "is more than the "
             f"sum of the others, {moments[0] + moments[1]:.3g} kg·m².",
         )
     if moments[2] > 0 and excess > rules.ROUNDED:
-        warnings.append(f"Link {link!r}: a principal moment is {excess:.1%} above the sum of the others.")
+        warnings.append(
+            f"Link {link!r}: a principal moment is {excess:.1%} above the sum of the others."
+        )
     least = rules.LEAST_GYRATION * length / np.sqrt(12)
     gyration = float(np.sqrt(max(moments[2], 0.0) / body.mass))
     if gyration < least:
         warnings.append(
-            f"Link {link!r}: its radius of gyration of {gyration:.3g} m is less than {least:.3g} m, 0.7 of that of a "
+            f"Link {link!r}: its radius of gyration of {gyration:.3g} m is less than {least:.3g} "
+            "m, 0.7 of that of a "
             "rod to the next joint."
         )
 
 
-_SIDE = "What the torque limit is for: the motor, friction and rotor included, or the link, without them."
+_SIDE = (
+    "What the torque limit is for: the motor, friction and rotor included, or the link, "
+    "without them."
+)
 
 
 def _limits(description: Description, chain: Chain) -> dict[str, Any]:
@@ -155,7 +202,9 @@ def _limits(description: Description, chain: Chain) -> dict[str, Any]:
         for joint, value in zip(chain.joints, of_urdf, strict=True):
             if values is None and not value > 0:
                 raise InvalidArm(
-                    field, f"Joint {joint!r} has no limit `{part}` above 0 in the URDF: correct it, or give `{field}`."
+                    field,
+                    f"Joint {joint!r} has no limit `{part}` above 0 in the URDF: correct it, or "
+                    f"give `{field}`.",
                 )
         found[field] = per_joint(field, tuple(of_urdf), chain.joints) if values is None else values
     if not 0 <= description.payload <= HEAVIEST:
@@ -163,13 +212,27 @@ def _limits(description: Description, chain: Chain) -> dict[str, Any]:
     if max(np.abs([chain.q_min, chain.q_max]).ravel()) > FARTHEST_TURN:
         raise InvalidArm("urdf", f"A joint's limits must be within {FARTHEST_TURN:g} rad.")
     return {
-        "position_min": stated(description, chain.q_min, "rad", "A joint without end has one turn to either side."),
-        "position_max": stated(description, chain.q_max, "rad", "A joint without end has one turn to either side."),
+        "position_min": stated(
+            description, chain.q_min, "rad", "A joint without end has one turn to either side."
+        ),
+        "position_max": stated(
+            description, chain.q_max, "rad", "A joint without end has one turn to either side."
+        ),
         "velocity": stated(description, found["velocity"], "rad/s", "Symmetric."),
         "acceleration": stated(description, acceleration, "rad/s²", "Symmetric."),
-        "jerk": either(description, jerk, rules.JERK * acceleration, "rad/s³", ("Symmetric.", rules.NOTES["jerk"])),
-        "torque": stated(description, found["torque"], "N·m", "At the joint, behind the gear: see torque_side."),
-        "torque_side": either(description, description.torque_side, "motor", "1", (_SIDE, rules.NOTES["torque_side"])),
+        "jerk": either(
+            description,
+            jerk,
+            rules.JERK * acceleration,
+            "rad/s³",
+            ("Symmetric.", rules.NOTES["jerk"]),
+        ),
+        "torque": stated(
+            description, found["torque"], "N·m", "At the joint, behind the gear: see torque_side."
+        ),
+        "torque_side": either(
+            description, description.torque_side, "motor", "1", (_SIDE, rules.NOTES["torque_side"])
+        ),
         "rated_payload": stated(description, description.payload, "kg", "Greatest payload."),
     }
 

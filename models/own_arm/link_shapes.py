@@ -1,7 +1,7 @@
 """Capsules of a URDF's links, in the frames of the links that they move with.
 
-A link has the capsules that the user gives, else one around each of its `<collision>` shapes, meshes included as far as
-their files were given.
+A link has the capsules that the user gives, else one around each of its `<collision>` shapes,
+meshes included as far as their files were given.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from joulepath.models.robot import Array
 from joulepath.models.shape_sizes import WrongSize, check_lengths, check_scale, check_surface
 from joulepath.models.uploads.limits import LIMITS, Checkpoint
 
-# largest mesh of a link, and farthest place of a shape from its joint [m]: files in millimetres need a scale
+# largest mesh of a link, and farthest place of a shape from its joint [m]: files in millimetres
+# need a scale
 LARGEST, FARTHEST = 5.0, 50.0
 
 Rows = list[list[float]]
@@ -35,8 +36,8 @@ Around = tuple[Array, float]
 
 @dataclass(frozen=True)
 class LinkShapes:
-    """The links of a chain; `missing` are the files of meshes that were asked for and not given, and `unknown` the
-    kinds of shapes that are not read."""
+    """The links of a chain; `missing` are the files of meshes that were asked for and not given,
+    and `unknown` the kinds of shapes that are not read."""
 
     chain: Chain
     upright: UprightChain
@@ -49,17 +50,28 @@ class LinkShapes:
     _made: dict[tuple[str, str | None], Around] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, description: Description, chain: Chain, upright: UprightChain, checkpoint: Checkpoint) -> LinkShapes:
-        """The links of a description. Raises InvalidArm for capsules of a link that the arm does not have."""
+    def of(
+        cls, description: Description, chain: Chain, upright: UprightChain, checkpoint: Checkpoint
+    ) -> LinkShapes:
+        """The links of a description. Raises InvalidArm for capsules of a link that the arm does
+        not have.
+        """
         given = description.collision.capsules or {}
         if unknown := [name for name in given if not any(name in rigid for rigid in chain.rigid)]:
-            raise InvalidArm("collision.capsules", f"The arm has no link {unknown[0]!r} from base to tip.")
+            raise InvalidArm(
+                "collision.capsules", f"The arm has no link {unknown[0]!r} from base to tip."
+            )
         return cls(chain, upright, given, description.meshes or {}, checkpoint)
 
     def rows(self, k: int) -> Rows:
         """Capsules of all that moves with link k, 0 for the base. Raises InvalidArm."""
         given = [row for link in self.chain.rigid[k] for row in self._given(k, link)]
-        of_urdf = [row for link in self.chain.rigid[k] if link not in self.capsules for row in self._of_urdf(k, link)]
+        of_urdf = [
+            row
+            for link in self.chain.rigid[k]
+            if link not in self.capsules
+            for row in self._of_urdf(k, link)
+        ]
         return given + of_urdf
 
     def _given(self, k: int, link: str) -> Rows:
@@ -69,7 +81,9 @@ class LinkShapes:
             self._count("collision.capsules", link)
             with _of_field("collision.capsules"):
                 check_lengths(f"The radius of a capsule of {link!r}", row[6], WIDEST)
-        return [_placed(self._frame(k, link), (np.array(row[:6]).reshape(2, 3), row[6])) for row in rows]
+        return [
+            _placed(self._frame(k, link), (np.array(row[:6]).reshape(2, 3), row[6])) for row in rows
+        ]
 
     def _of_urdf(self, k: int, link: str) -> Rows:
         """A capsule around each collision shape of a URDF link."""
@@ -85,7 +99,9 @@ class LinkShapes:
         return rows
 
     def _around(self, geometry: Element, where: str) -> Around | None:
-        """The capsule around a shape, in its frame; None for a shape that is not known, or not there."""
+        """The capsule around a shape, in its frame; None for a shape that is not known, or not
+        there.
+        """
         for kind in ("sphere", "cylinder", "capsule", "box", "mesh"):
             element = geometry.find(kind)
             if element is None:
@@ -111,7 +127,9 @@ class LinkShapes:
             if points is None:
                 self.missing.append(name)
                 return None
-            self._made[name, scaled] = self._around_points(points, numbers(mesh, "scale", where, "1 1 1"), where)
+            self._made[name, scaled] = self._around_points(
+                points, numbers(mesh, "scale", where, "1 1 1"), where
+            )
         return self._made[name, scaled]
 
     def _around_points(self, points: Array, scale: Array, where: str) -> Around:
@@ -120,7 +138,9 @@ class LinkShapes:
             check_scale(f"{where} with a `scale` that", scale, points)
         points = points * scale
         if not np.ptp(points, axis=0).max() < LARGEST:
-            raise InvalidArm("meshes", f"{where} larger than {LARGEST:g} m: has the URDF its `scale`?")
+            raise InvalidArm(
+                "meshes", f"{where} larger than {LARGEST:g} m: has the URDF its `scale`?"
+            )
         with _of_field("meshes"):
             check_surface(f"{where} that", points)
         return capsule_around(points, self.checkpoint)
@@ -132,7 +152,8 @@ class LinkShapes:
         if len(self._seen) > LIMITS.shapes:
             raise InvalidArm(
                 field,
-                f"With those of link {link!r}, the arm has more than {LIMITS.shapes} shapes: give fewer capsules.",
+                f"With those of link {link!r}, the arm has more than {LIMITS.shapes} shapes: give "
+                "fewer capsules.",
             )
 
     def _frame(self, k: int, link: str) -> pin.SE3:
@@ -144,13 +165,19 @@ class LinkShapes:
 
 
 def check_near(name: str, rows: Rows) -> None:
-    """Raises InvalidArm for capsules of a link that are far away, or nowhere: the origin of a joint or a shape is."""
+    """Raises InvalidArm for capsules of a link that are far away, or nowhere: the origin of a joint
+    or a shape is.
+    """
     if not (np.abs(np.array(rows)) < FARTHEST).all():
-        raise InvalidArm("urdf", f"The shape of link {name!r} is farther than {FARTHEST:g} m from its joint.")
+        raise InvalidArm(
+            "urdf", f"The shape of link {name!r} is farther than {FARTHEST:g} m from its joint."
+        )
 
 
 def _lengths(element: Element, part: str, where: str, count: int = 1) -> Array:
-    """Lengths (count,) [m] in an attribute of a shape. Raises InvalidArm unless they are those of a body."""
+    """Lengths (count,) [m] in an attribute of a shape. Raises InvalidArm unless they are those of a
+    body.
+    """
     found = numbers(element, part, where, count=count)
     with _of_field("urdf"):
         check_lengths(f"{where}, whose `{part}`", found)

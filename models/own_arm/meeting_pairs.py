@@ -1,4 +1,6 @@
-"""Pairs of links whose capsules are hardly ever apart: to compare them would make every motion a collision."""
+"""Pairs of links whose capsules are hardly ever apart: to compare them would make every motion a
+collision.
+"""
 
 from __future__ import annotations
 
@@ -14,50 +16,75 @@ from joulepath.models.own_arm.urdf_chain import Chain
 from joulepath.models.robot import Array
 from joulepath.models.uploads.limits import Checkpoint
 
-# random configurations over which pairs are looked at, and the share of them from which on two links cannot be apart.
-# Joints have the ranges that links leave them: a pair that meets this often with a guessed capsule says that it is too
-# thick there
+# random configurations over which pairs are looked at, and the share of them from which on two
+# links cannot be apart. Joints have the ranges that links leave them: a pair that meets this often
+# with a guessed capsule says that it is too thick there
 SAMPLES, ALWAYS, OFTEN = 300, 0.95, 0.3
 # m: what rounding may take from a ball around a capsule
 ROUNDING = 1e-9
 
 
 def pairs_that_meet(
-    chain: Chain, upright: UprightChain, capsules: list[Rows], guessed: list[bool], checkpoint: Checkpoint
+    chain: Chain,
+    upright: UprightChain,
+    capsules: list[Rows],
+    guessed: list[bool],
+    checkpoint: Checkpoint,
 ) -> list[list[int]]:
-    """Pairs of links, next but one or farther, whose capsules meet in nearly every configuration, or often if one of
-    them is `guessed`."""
+    """Pairs of links, next but one or farther, whose capsules meet in nearly every configuration,
+    or often if one of them is `guessed`."""
     pairs = [(a, b) for a, b in combinations(range(chain.nq + 1), 2) if a + 1 < b]
     meets = np.zeros(len(pairs))
-    shapes = [[(coal.Capsule(row[6], _length(row)), _middle(row)) for row in rows] for rows in capsules]
+    shapes = [
+        [(coal.Capsule(row[6], _length(row)), _middle(row)) for row in rows] for rows in capsules
+    ]
     balls = [_balls(rows) for rows in capsules]
     request = coal.CollisionRequest()
     for q in np.random.default_rng(0).uniform(chain.q_min, chain.q_max, (SAMPLES, chain.nq)):
         frames = [pin.SE3.Identity()]
         for angle, placement in zip(q, upright.placements, strict=True):
-            frames.append(frames[-1] * placement * pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, angle), np.zeros(3)))
+            frames.append(
+                frames[-1] * placement * pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, angle), np.zeros(3))
+            )
         for k, pair in enumerate(pairs):
             checkpoint()
-            (T_a, first, around_a), (T_b, second, around_b) = ((frames[i], shapes[i], balls[i]) for i in pair)
+            (T_a, first, around_a), (T_b, second, around_b) = (
+                (frames[i], shapes[i], balls[i]) for i in pair
+            )
             meets[k] += any(
                 coal.collide(
-                    first[i][0], _pose(T_a * first[i][1]), second[j][0], _pose(T_b * second[j][1]),
-                    request, coal.CollisionResult(),
+                    first[i][0],
+                    _pose(T_a * first[i][1]),
+                    second[j][0],
+                    _pose(T_b * second[j][1]),
+                    request,
+                    coal.CollisionResult(),
                 )
                 for i, j in _close(T_a, around_a, T_b, around_b)
-            )  # fmt: skip
+            )
     share = [OFTEN if guessed[a] or guessed[b] else ALWAYS for a, b in pairs]
-    return [list(pair) for pair, count, least in zip(pairs, meets, share, strict=True) if count >= least * SAMPLES]
+    return [
+        list(pair)
+        for pair, count, least in zip(pairs, meets, share, strict=True)
+        if count >= least * SAMPLES
+    ]
 
 
 def _balls(rows: Rows) -> Array:
     """Centre and radius (n, 4) [m] of the ball around each capsule."""
-    return np.array([[*((np.array(row[:3]) + row[3:6]) / 2), row[6] + _length(row) / 2 + ROUNDING] for row in rows])
+    return np.array(
+        [
+            [*((np.array(row[:3]) + row[3:6]) / 2), row[6] + _length(row) / 2 + ROUNDING]
+            for row in rows
+        ]
+    )
 
 
 def _close(T_a: pin.SE3, first: Array, T_b: pin.SE3, second: Array) -> list[list[int]]:
     """Which of balls (n, 4) and (m, 4) [m], in their frames, overlap: indices of each pair."""
-    a, b = (balls[:, :3] @ T.rotation.T + T.translation for T, balls in ((T_a, first), (T_b, second)))
+    a, b = (
+        balls[:, :3] @ T.rotation.T + T.translation for T, balls in ((T_a, first), (T_b, second))
+    )
     apart = np.linalg.norm(a[:, None] - b[None], axis=2) - first[:, None, 3] - second[None, :, 3]
     return np.argwhere(apart <= 0).tolist()
 

@@ -1,4 +1,6 @@
-"""Mesh files of a user's own arm: in a folder or a zip, found by the end of their paths, read by trimesh."""
+"""Mesh files of a user's own arm: in a folder or a zip, found by the end of their paths, read by
+trimesh.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,10 @@ def in_zip(content: bytes, checkpoint: Checkpoint = unwatched) -> dict[str, byte
         raise _no_zip(error) from error
     entries = [each for each in archive.infolist() if _kind(each.filename) in KINDS]
     if len(entries) > LIMITS.mesh_files:
-        raise InvalidArm("meshes", f"The zip has {len(entries)} mesh files: at most {LIMITS.mesh_files} are read.")
+        raise InvalidArm(
+            "meshes",
+            f"The zip has {len(entries)} mesh files: at most {LIMITS.mesh_files} are read.",
+        )
     left, found = LIMITS.mesh_bytes, {}
     for entry in entries:
         pieces = list[bytes]()
@@ -62,7 +67,9 @@ def _no_zip(error: Exception) -> InvalidArm:
 
 
 def in_folder(folder: Path, urdf: str) -> dict[str, bytes]:
-    """The mesh files that the text of a URDF names, as far as they are in a folder; none for a text that is no XML."""
+    """The mesh files that the text of a URDF names, as far as they are in a folder; none for a text
+    that is no XML.
+    """
     try:
         named = (each.get("filename", "") for each in xml_tree(urdf).iter("mesh"))
     except UnreadableFile:
@@ -70,13 +77,20 @@ def in_folder(folder: Path, urdf: str) -> dict[str, bytes]:
     found = {}
     for reference in islice(dict.fromkeys(named), LIMITS.mesh_files):
         file = next((each for each in _below(folder, reference) if each.is_file()), None)
-        if file is not None and _kind(reference) in KINDS and file.stat().st_size <= LIMITS.mesh_bytes:
+        if (
+            file is not None
+            and _kind(reference) in KINDS
+            and file.stat().st_size <= LIMITS.mesh_bytes
+        ):
             found[reference] = file.read_bytes()
     return found
 
 
-def corners(meshes: Mapping[str, bytes], reference: str, checkpoint: Checkpoint = unwatched) -> Array | None:
-    """Corners (n, 3) of the mesh that a URDF names, in its own units; None if it is not among the files.
+def corners(
+    meshes: Mapping[str, bytes], reference: str, checkpoint: Checkpoint = unwatched
+) -> Array | None:
+    """Corners (n, 3) of the mesh that a URDF names, in its own units; None if it is not among the
+    files.
 
     Raises InvalidArm for a file that is none, or if several files fit.
     """
@@ -89,7 +103,10 @@ def corners(meshes: Mapping[str, bytes], reference: str, checkpoint: Checkpoint 
     except UnreadableFile as error:
         raise InvalidArm("meshes", f"{reference[:LONGEST_NAME]!r} {error}") from error
     if len(found) < 4 or not np.isfinite(found).all():
-        raise InvalidArm("meshes", f"{reference[:LONGEST_NAME]!r} must have from 4 to {most.corners} finite corners.")
+        raise InvalidArm(
+            "meshes",
+            f"{reference[:LONGEST_NAME]!r} must have from 4 to {most.corners} finite corners.",
+        )
     return found
 
 
@@ -99,12 +116,17 @@ def _file_of(meshes: Mapping[str, bytes], reference: str) -> str | None:
 
     def agreement(path: str) -> int:
         pairs = zip(wanted, _parts(path)[::-1], strict=False)
-        return next((k for k, (a, b) in enumerate(pairs) if a != b), min(len(wanted), len(_parts(path))))
+        return next(
+            (k for k, (a, b) in enumerate(pairs) if a != b), min(len(wanted), len(_parts(path)))
+        )
 
     best = max(map(agreement, meshes), default=0)
     fitting = [path for path in meshes if best and agreement(path) == best]
     if len(fitting) > 1 and len({meshes[path] for path in fitting}) > 1:
-        raise InvalidArm("meshes", f"Several files fit {reference[:LONGEST_NAME]!r}: {', '.join(sorted(fitting)[:3])}.")
+        raise InvalidArm(
+            "meshes",
+            f"Several files fit {reference[:LONGEST_NAME]!r}: {', '.join(sorted(fitting)[:3])}.",
+        )
     return fitting[0] if fitting else None
 
 

@@ -10,7 +10,14 @@ from typing import Any
 import yaml
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from joulepath.models.own_arm.description import Collision, Description, Drives, Electronics, InvalidArm, Motion
+from joulepath.models.own_arm.description import (
+    Collision,
+    Description,
+    Drives,
+    Electronics,
+    InvalidArm,
+    Motion,
+)
 from joulepath.models.own_arm.mesh_files import in_folder, in_zip
 
 # no conversion of types, no unknown fields
@@ -22,7 +29,8 @@ _DESCRIPTION = TypeAdapter(Description)
 def read_description(path: Path) -> Description:
     """The description in a YAML file, whose `urdf` is the path of the URDF, relative to the file.
 
-    `meshes` is the path of a folder or zip with mesh files; without it, they are looked for beside the URDF.
+    `meshes` is the path of a folder or zip with mesh files; without it, they are looked for beside
+    the URDF.
 
     Raises InvalidArm, which names the field; OSError if there is no such file.
     """
@@ -37,22 +45,31 @@ def read_description(path: Path) -> Description:
         raise _first(error) from None
     urdf = path.parent / found.urdf
     if not urdf.is_file():
-        raise InvalidArm("urdf", f"There is no file {urdf}: give the path of the URDF, relative to {path.name}.")
+        raise InvalidArm(
+            "urdf", f"There is no file {urdf}: give the path of the URDF, relative to {path.name}."
+        )
     text = urdf.read_text(encoding="utf-8", errors="replace")
     if found.srdf is not None:
         srdf = path.parent / found.srdf
         if not srdf.is_file():
-            raise InvalidArm("srdf", f"There is no file {srdf}: give the path of the SRDF, relative to {path.name}.")
+            raise InvalidArm(
+                "srdf",
+                f"There is no file {srdf}: give the path of the SRDF, relative to {path.name}.",
+            )
         found = replace(found, srdf=srdf.read_text(encoding="utf-8", errors="replace"))
     return replace(found, urdf=text, meshes=_meshes(path.parent, place, urdf.parent, text))
 
 
 def _meshes(folder: Path, place: Any, beside: Path, urdf: str) -> dict[str, bytes]:
-    """The mesh files at a place relative to the folder of the description, or beside the URDF if there is none."""
+    """The mesh files at a place relative to the folder of the description, or beside the URDF if
+    there is none.
+    """
     if place is None:
         return in_folder(beside, urdf)
     if not isinstance(place, str) or not (folder / place).exists():
-        raise InvalidArm("meshes", "meshes must be the path of a folder or a zip, relative to the description.")
+        raise InvalidArm(
+            "meshes", "meshes must be the path of a folder or a zip, relative to the description."
+        )
     at = folder / place
     return in_folder(at, urdf) if at.is_dir() else in_zip(at.read_bytes())
 

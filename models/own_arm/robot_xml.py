@@ -20,15 +20,20 @@ def robot_element(text: str, field: str, checkpoint: Checkpoint) -> Element:
     except UnreadableFile as error:
         raise InvalidArm(field, f"The {kind} {error}") from None
     if root.tag != "robot":
-        raise InvalidArm(field, f"The root element of {'an' if kind == 'SRDF' else 'a'} {kind} is <robot>.")
+        raise InvalidArm(
+            field, f"The root element of {'an' if kind == 'SRDF' else 'a'} {kind} is <robot>."
+        )
     return root
 
 
-def numbers(element: Element | None, part: str, where: str, default: str = "", count: int = 3) -> Array:
-    """The numbers (count,) of an attribute, or of `default` where element or attribute is not there.
+def numbers(
+    element: Element | None, part: str, where: str, default: str = "", count: int = 3
+) -> Array:
+    """The numbers (count,) of an attribute, or of `default` where element or attribute is not
+    there.
 
-    Raises InvalidArm unless there are `count`, all finite; its message starts with `where`, e.g. "Joint 'a' has an
-    <axis>".
+    Raises InvalidArm unless there are `count`, all finite; its message starts with `where`, e.g.
+    "Joint 'a' has an <axis>".
     """
     text = default if element is None else element.get(part, default)
     words = text.split(maxsplit=count)

@@ -22,7 +22,8 @@ def _content(name: str, figures: dict[str, Any]) -> tuple[str, bytes]:
 
 @cached(LRUCache(MOST_ROBOTS), key=_content, lock=threading.Lock())
 def own_robot(name: str, figures: dict[str, Any]) -> Robot:
-    """The robot of these figures: the same object for the same name and content. Raises ValueError."""
+    """The robot of these figures: the same object for the same name and content. Raises
+    ValueError."""
     return robot_of(name, figures)
 
 

@@ -1,12 +1,15 @@
-"""What is assumed of an arm whose figures nobody has told: rules over joints of known arms, each with its range.
+"""What is assumed of an arm whose figures nobody has told: rules over joints of known arms, each
+with its range.
 
-Rotor inertia through twelve joints of UR arms, FR3 and iiwa (rms factor 1.6, worst 2.5), friction through the strain-
-wave joints of UR arms, copper loss through UR5e and UR3e. tau_max is the greatest torque of the joint [N·m].
+Rotor inertia through twelve joints of UR arms, FR3 and iiwa (rms factor 1.6, worst 2.5), friction
+through the strain- wave joints of UR arms, copper loss through UR5e and UR3e. tau_max is the
+greatest torque of the joint [N·m].
 """
 
 from __future__ import annotations
 
-# rotor inertia behind the gear [kg·m²], Coulomb friction [N·m] and viscous friction [N·m·s/rad], over tau_max
+# rotor inertia behind the gear [kg·m²], Coulomb friction [N·m] and viscous friction [N·m·s/rad],
+# over tau_max
 ROTOR_INERTIA, COULOMB, VISCOUS = 0.0117, 0.06, 0.055
 # copper loss [W/(N·m)²] times tau_max
 COPPER = 0.5
@@ -18,9 +21,11 @@ TORQUE_CONSTANT = 10.0
 KNEE = 1e-3
 # radius of a link without a shape over the sum of the distances between joints
 RADIUS = 0.045
-# least radius of gyration over that of a thin rod between the joints; below it, a link's inertia is hardly real
+# least radius of gyration over that of a thin rod between the joints; below it, a link's inertia is
+# hardly real
 LEAST_GYRATION = 0.7
-# relative excess of a principal moment over the sum of the others: a rounded figure, and an impossible one
+# relative excess of a principal moment over the sum of the others: a rounded figure, and an
+# impossible one
 ROUNDED, IMPOSSIBLE = 1e-3, 0.1
 
 NOTES = {

@@ -12,4 +12,6 @@ def disabled_pairs(text: str, checkpoint: Checkpoint) -> list[tuple[str, str]]:
     Such lists are found by sampling: they are taken as the user's word.
     """
     root = robot_element(text, "srdf", checkpoint)
-    return [(each.get("link1", ""), each.get("link2", "")) for each in root.iter("disable_collisions")]
+    return [
+        (each.get("link1", ""), each.get("link2", "")) for each in root.iter("disable_collisions")
+    ]

@@ -13,8 +13,9 @@ from joulepath.models.robot import Array
 
 @dataclass(frozen=True)
 class UprightChain:
-    """`R` (nq + 1, 3, 3): axes of each link's frame in the URDF's, the base first. `placements`: each joint's frame in
-    the one before; `flange`: the tip in the last; `inertias` of the moving links, in their frames."""
+    """`R` (nq + 1, 3, 3): axes of each link's frame in the URDF's, the base first. `placements`:
+    each joint's frame in the one before; `flange`: the tip in the last; `inertias` of the moving
+    links, in their frames."""
 
     R: Array
     placements: tuple[pin.SE3, ...]
@@ -32,7 +33,10 @@ class UprightChain:
             R,
             tuple(turns[k].inverse() * each * turns[k + 1] for k, each in enumerate(placements)),
             turns[-1].inverse() * pin.SE3(chain.T_tip),
-            tuple(turn.actInv(body) for turn, body in zip(turns[1:], list(chain.model.inertias)[1:], strict=True)),
+            tuple(
+                turn.actInv(body)
+                for turn, body in zip(turns[1:], list(chain.model.inertias)[1:], strict=True)
+            ),
         )
 
 

@@ -1,1 +1,3 @@
-"""How well a robot's figures are known: the document of those identified on one arm, and what their errors may be."""
+"""How well a robot's figures are known: the document of those identified on one arm, and what their
+errors may be.
+"""

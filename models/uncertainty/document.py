@@ -1,9 +1,11 @@
-"""A document of figures: those of a robot, some of them identified on one arm, with their covariance.
+"""A document of figures: those of a robot, some of them identified on one arm, with their
+covariance.
 
-It has the form of the robot's `figures.yaml`. `robot` names the robot. A figure that was identified has `sd` beside its
-value. At the top, `covariance` has the names and the matrix of all identified parameters, `session_sd` [1] is how much
-friction differs from day to day, and `move_sd` [W] what the model cannot express of a motion, as a mean power. Only the
-figures of `REPLACEABLE` may differ from the robot's own.
+It has the form of the robot's `figures.yaml`. `robot` names the robot. A figure that was identified
+has `sd` beside its value. At the top, `covariance` has the names and the matrix of all identified
+parameters, `session_sd` [1] is how much friction differs from day to day, and `move_sd` [W] what
+the model cannot express of a motion, as a mean power. Only the figures of `REPLACEABLE` may differ
+from the robot's own.
 """
 
 from __future__ import annotations
@@ -18,8 +20,8 @@ from joulepath.models.robot import Array
 from joulepath.models.uncertainty.parameters import BASE_POWER, DRIVES, FRICTION, LINKS
 
 TOP = ("covariance", "session_sd", "move_sd")
-# parts of a friction law, of which `load` may be left out, and figures of the other sections, with their least and
-# greatest value
+# parts of a friction law, of which `load` may be left out, and figures of the other sections, with
+# their least and greatest value
 LAW: dict[str, tuple[float, float]] = {
     "coulomb": (0.0, 1e5),
     "curved": (0.0, 1e5),
@@ -36,7 +38,11 @@ REPLACEABLE: dict[str, dict[str, tuple[float, float]]] = {
         "inverter_linear": (0.0, 1e3),
         "inverter_quadratic": (0.0, 1e3),
     },
-    "electronics": {"idle_power": (0.0, 1e5), "controller_power": (0.0, 1e5), "regeneration": (0.0, 1.0)},
+    "electronics": {
+        "idle_power": (0.0, 1e5),
+        "controller_power": (0.0, 1e5),
+        "regeneration": (0.0, 1.0),
+    },
     "inertials": {
         "mass": (1e-6, 1e5),
         "center_of_mass": (-1e3, 1e3),
@@ -61,9 +67,10 @@ class InvalidFigures(ValueError):
 
 @dataclass(frozen=True)
 class Covariance:
-    """Covariance `matrix` (n, n) of the identified parameters; see the module. A name is the path of a figure, with the
-    index of the joint where it has one value each: `friction_laws.identified.coulomb.0`, `electronics.idle_power`.
-    Links have the parameters that their torques are linear in: `inertials.mx.1`."""
+    """Covariance `matrix` (n, n) of the identified parameters; see the module. A name is the path
+    of a figure, with the index of the joint where it has one value each:
+    `friction_laws.identified.coulomb.0`, `electronics.idle_power`. Links have the parameters that
+    their torques are linear in: `inertials.mx.1`."""
 
     names: tuple[str, ...]
     matrix: Array
@@ -71,7 +78,9 @@ class Covariance:
     move_sd: float
 
     def place_of(self, name: str, law: str) -> tuple[str, int] | None:
-        """The figure of `parameters` and the joint that a name stands for; None for one of another friction law."""
+        """The figure of `parameters` and the joint that a name stands for; None for one of another
+        friction law.
+        """
         parts = name.split(".")
         if parts[0] == "electronics":
             return BASE_POWER, 0
@@ -98,7 +107,8 @@ def covariance_of(figures: dict[str, Any]) -> Covariance | None:
 
 
 def replaced_in(robot: str, figures: dict[str, Any], document: Any) -> dict[str, Any]:
-    """What a document puts in the place of the own `figures` of the robot of this name: sections, figures, covariance.
+    """What a document puts in the place of the own `figures` of the robot of this name: sections,
+    figures, covariance.
 
     All of it is checked. Raises InvalidFigures, which names the place.
     """
@@ -119,9 +129,11 @@ def replaced_in(robot: str, figures: dict[str, Any], document: Any) -> dict[str,
                 replaced[section] = changed
         else:
             raise InvalidFigures(
-                section, "differs from the robot's own. Identified figures may replace only friction_laws, "
+                section,
+                "differs from the robot's own. Identified figures may replace only "
+                "friction_laws, "
                 f"{', '.join(REPLACEABLE)}.",
-            )  # fmt: skip
+            )
     whole = merged(figures, replaced)
     if "inertials" in replaced:
         _check_bodies(whole["inertials"])
@@ -141,7 +153,9 @@ def merged(figures: dict[str, Any], replaced: dict[str, Any]) -> dict[str, Any]:
             result[section] = content
         elif section == "friction_laws":
             # the document's laws come first: the first one is the default
-            result[section] = content | {n: law for n, law in figures[section].items() if n not in content}
+            result[section] = content | {
+                n: law for n, law in figures[section].items() if n not in content
+            }
         else:
             result[section] = figures[section] | content
     return result
@@ -149,17 +163,27 @@ def merged(figures: dict[str, Any], replaced: dict[str, Any]) -> dict[str, Any]:
 
 def _laws(own: dict[str, Any], content: Any, nq: int) -> dict[str, Any]:
     if not isinstance(content, dict) or not 0 < len(content) <= MOST_LAWS:
-        raise InvalidFigures("friction_laws", f"must be a mapping of 1 to {MOST_LAWS} laws by name.")
+        raise InvalidFigures(
+            "friction_laws", f"must be a mapping of 1 to {MOST_LAWS} laws by name."
+        )
     laws = {}
     for name, law in content.items():
         if not isinstance(name, str) or not name.isidentifier() or len(name) > 64:
-            raise InvalidFigures("friction_laws", "Names of laws are letters, digits and underscores, at most 64.")
+            raise InvalidFigures(
+                "friction_laws", "Names of laws are letters, digits and underscores, at most 64."
+            )
         if law == own.get(name):
             continue
         where = f"friction_laws.{name}"
         if not isinstance(law, dict) or not set(LAW) - {"load"} <= set(law) <= set(LAW):
-            raise InvalidFigures(where, f"must have the figures {', '.join(LAW)}, of which load may be left out.")
-        laws[name] = {part: _figure(f"{where}.{part}", law[part], LAW[part], (nq,)) for part in LAW if part in law}
+            raise InvalidFigures(
+                where, f"must have the figures {', '.join(LAW)}, of which load may be left out."
+            )
+        laws[name] = {
+            part: _figure(f"{where}.{part}", law[part], LAW[part], (nq,))
+            for part in LAW
+            if part in law
+        }
     return laws
 
 
@@ -173,20 +197,28 @@ def _section(section: str, own: dict[str, Any], content: Any, nq: int) -> dict[s
         where = f"{section}.{name}"
         if name not in REPLACEABLE[section]:
             raise InvalidFigures(where, "differs from the robot's own and cannot be identified.")
-        shape = () if section == "electronics" else (nq, _WIDTHS[name]) if name in _WIDTHS else (nq,)
+        shape = (
+            () if section == "electronics" else (nq, _WIDTHS[name]) if name in _WIDTHS else (nq,)
+        )
         changed[name] = _figure(where, figure, REPLACEABLE[section][name], shape)
     return changed
 
 
-def _figure(where: str, figure: Any, allowed: tuple[float, float], shape: tuple[int, ...]) -> dict[str, Any]:
+def _figure(
+    where: str, figure: Any, allowed: tuple[float, float], shape: tuple[int, ...]
+) -> dict[str, Any]:
     """The figure, with nothing in it but what is known. Raises InvalidFigures."""
     if not isinstance(figure, dict) or not {"value", "unit", "source", "trust"} <= set(figure):
         raise InvalidFigures(where, "must have value, unit, source and trust.")
     if unknown := set(figure) - {"value", "sd", *_WORDS}:
-        raise InvalidFigures(where, f"has fields that no figure has: {', '.join(sorted(map(str, unknown)))[:200]}.")
+        raise InvalidFigures(
+            where, f"has fields that no figure has: {', '.join(sorted(map(str, unknown)))[:200]}."
+        )
     for word in _WORDS:
         if word in figure and (not isinstance(figure[word], str) or len(figure[word]) > MOST_WORD):
-            raise InvalidFigures(f"{where}.{word}", f"must be a text of at most {MOST_WORD} characters.")
+            raise InvalidFigures(
+                f"{where}.{word}", f"must be a text of at most {MOST_WORD} characters."
+            )
     if figure["trust"] not in ("A", "B", "C", "T", "E"):
         raise InvalidFigures(f"{where}.trust", "must be one of A, B, C, T, E.")
     result = {name: figure[name] for name in _WORDS if name in figure}
@@ -216,7 +248,9 @@ def _check_bodies(inertials: dict[str, Any]) -> None:
         moments = np.linalg.eigvalsh([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
         slack = ROUNDED * abs(float(moments[-1]))
         if moments[0] < -slack or moments[2] > moments[0] + moments[1] + slack:
-            raise InvalidFigures(f"inertials.inertia.{k}", "belongs to no body: see its principal moments.")
+            raise InvalidFigures(
+                f"inertials.inertia.{k}", "belongs to no body: see its principal moments."
+            )
 
 
 def _uncertainty(document: dict[str, Any], figures: dict[str, Any], nq: int) -> dict[str, Any]:
@@ -231,7 +265,11 @@ def _uncertainty(document: dict[str, Any], figures: dict[str, Any], nq: int) -> 
     given = document.get("covariance")
     if given is None:
         return result
-    if not isinstance(given, dict) or set(given) != {"names", "matrix"} or not isinstance(given["names"], list):
+    if (
+        not isinstance(given, dict)
+        or set(given) != {"names", "matrix"}
+        or not isinstance(given["names"], list)
+    ):
         raise InvalidFigures("covariance", "must have names and matrix, and nothing else.")
     names = given["names"]
     if not 0 < len(names) <= MOST_PARAMETERS or len(set(map(str, names))) != len(names):
@@ -240,15 +278,22 @@ def _uncertainty(document: dict[str, Any], figures: dict[str, Any], nq: int) -> 
         if not _is_parameter(name, figures, nq):
             raise InvalidFigures(
                 f"covariance.names.{k}",
-                "is no parameter of these figures: use paths like friction_laws.LAW.coulomb.0, drives.copper.2 or "
-                f"electronics.idle_power, of {', '.join((*FRICTION, *DRIVES))} and idle_power, or inertials.m.1 with "
+                "is no parameter of these figures: use paths like friction_laws.LAW.coulomb.0, "
+                "drives.copper.2 or "
+                f"electronics.idle_power, of {', '.join((*FRICTION, *DRIVES))} and idle_power, or "
+                "inertials.m.1 with "
                 f"one of {', '.join(LINKS)}.",
             )
     matrix = numbers("covariance.matrix", given["matrix"], (len(names), len(names)))
     scale = float(np.abs(matrix).max())
     if scale > MOST_VARIANCE:
-        raise InvalidFigures("covariance.matrix", f"must have entries of at most {MOST_VARIANCE:g}.")
-    if np.abs(matrix - matrix.T).max() > 1e-9 * scale or np.linalg.eigvalsh(matrix)[0] < -1e-9 * scale:
+        raise InvalidFigures(
+            "covariance.matrix", f"must have entries of at most {MOST_VARIANCE:g}."
+        )
+    if (
+        np.abs(matrix - matrix.T).max() > 1e-9 * scale
+        or np.linalg.eigvalsh(matrix)[0] < -1e-9 * scale
+    ):
         raise InvalidFigures("covariance.matrix", "must be symmetric and positive semidefinite.")
     return result | {"covariance": {"names": list(names), "matrix": matrix.tolist()}}
 

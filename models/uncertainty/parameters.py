@@ -8,13 +8,22 @@ import numpy as np
 
 from joulepath.models.robot import Array, Drives, FrictionLaw
 
-# power of the electronics [W], then those with one value per joint; friction as in FrictionLaw, the rest as in Drives
+# power of the electronics [W], then those with one value per joint; friction as in FrictionLaw, the
+# rest as in Drives
 BASE_POWER = "base_power"
 FRICTION = ("coulomb", "curved", "speed", "viscous", "load")
-DRIVES = ("torque_constant", "rotor_inertia", "copper", "inverter_constant", "inverter_linear", "inverter_quadratic")
+DRIVES = (
+    "torque_constant",
+    "rotor_inertia",
+    "copper",
+    "inverter_constant",
+    "inverter_linear",
+    "inverter_quadratic",
+)
 PER_JOINT = FRICTION + DRIVES
-# of each link: mass [kg], first moments [kg·m] and inertia [kg·m²] in the frame of its joint, in Pinocchio's order.
-# They stand behind the others, link by link, and only where a document has errors of them
+# of each link: mass [kg], first moments [kg·m] and inertia [kg·m²] in the frame of its joint, in
+# Pinocchio's order. They stand behind the others, link by link, and only where a document has
+# errors of them
 LINKS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 
 
@@ -41,7 +50,9 @@ def index(name: str, joint: int, nq: int) -> int:
 
 
 def values(law: FrictionLaw, drives: Drives, base_power: float) -> Array:
-    """The vector of an arm with this friction law, these drives and this power [W] of its electronics."""
+    """The vector of an arm with this friction law, these drives and this power [W] of its
+    electronics.
+    """
     nq = len(law.coulomb)
     load = np.zeros(nq) if law.load is None else law.load
     friction = {name: load if name == "load" else getattr(law, name) for name in FRICTION}

@@ -23,13 +23,17 @@ ENGINEERING = "E"
 @cache
 def default_ranges() -> dict[str, Any]:
     """The entries of the file, by name."""
-    text = (files("joulepath.models.uncertainty") / "default_ranges.yaml").read_text(encoding="utf-8")
+    text = (files("joulepath.models.uncertainty") / "default_ranges.yaml").read_text(
+        encoding="utf-8"
+    )
     ranges: dict[str, Any] = yaml.safe_load(text)
     return ranges
 
 
 def range_of(name: str, letters: AbstractSet[str] = frozenset()) -> tuple[float, float]:
-    """P5 and P95 of a factor on the robot's own value, or of a value, for figures with these trust letters."""
+    """P5 and P95 of a factor on the robot's own value, or of a value, for figures with these trust
+    letters.
+    """
     entry = default_ranges()[name]
     if ENGINEERING in letters:
         entry = entry.get("engineering_default", entry)
@@ -38,7 +42,9 @@ def range_of(name: str, letters: AbstractSet[str] = frozenset()) -> tuple[float,
 
 
 def lognormal(low: float, high: float) -> tuple[float, float]:
-    """Mean and standard deviation of the logarithm of a positive figure whose P5 and P95 are `low` and `high`."""
+    """Mean and standard deviation of the logarithm of a positive figure whose P5 and P95 are `low`
+    and `high`.
+    """
     return float(np.log([low, high]).mean()), float(np.log(high / low) / (2 * P95))
 
 

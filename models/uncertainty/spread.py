@@ -1,9 +1,10 @@
 """What the errors of a robot's figures may be: draws of them, and the covariance of each source.
 
-Identified figures have the covariance of their document. The others have the ranges of `default_ranges.yaml`: lognormal
-where they are factors or positive values, and evenly spread from zero on. Figures of one kind of motor err together:
-the large joints share a factor, and so do the small ones. The draws are a Latin hypercube of fixed seed: the same
-figures have the same draws everywhere.
+Identified figures have the covariance of their document. The others have the ranges of
+`default_ranges.yaml`: lognormal where they are factors or positive values, and evenly spread from
+zero on. Figures of one kind of motor err together: the large joints share a factor, and so do the
+small ones. The draws are a Latin hypercube of fixed seed: the same figures have the same draws
+everywhere.
 """
 
 from __future__ import annotations
@@ -32,12 +33,14 @@ _DRY = ("coulomb", "curved", "viscous")
 
 @dataclass(frozen=True)
 class Spread:
-    """Errors of the figures of `parameters.values`, and of the links' if the robot's document has such errors.
+    """Errors of the figures of `parameters.values`, and of the links' if the robot's document has
+    such errors.
 
-    `mean` (p,) are the means of the deviations from the robot's own figures, `draws` (n, p) are about these means.
-    `covariances` (p, p) are those of each source, by name: a figure to measure, or `session`. `root` (p, r) makes their
-    sum of independent standard normal factors. `move_draws` (2, n) [W] are independent draws of what the model cannot
-    express of a motion, as a mean power, and `move_sd` [W] is their standard deviation.
+    `mean` (p,) are the means of the deviations from the robot's own figures, `draws` (n, p) are
+    about these means. `covariances` (p, p) are those of each source, by name: a figure to measure,
+    or `session`. `root` (p, r) makes their sum of independent standard normal factors. `move_draws`
+    (2, n) [W] are independent draws of what the model cannot express of a motion, as a mean power,
+    and `move_sd` [W] is their standard deviation.
     """
 
     mean: Array
@@ -50,7 +53,9 @@ class Spread:
 
 @lru_cache(MOST_SPREADS)
 def spread_of(robot: Robot, law: str, known: tuple[str, ...] = ()) -> Spread:
-    """The spread of a robot's figures with the friction law of this name. Those of `known` have no error."""
+    """The spread of a robot's figures with the friction law of this name. Those of `known` have no
+    error.
+    """
     return _Sources(robot, law, known).spread()
 
 
@@ -71,7 +76,9 @@ class _Sources:
     @cached_property
     def _size(self) -> int:
         """Length p of the vector."""
-        links = self._known is not None and not set(LINKS).isdisjoint(name for name, _ in self._known.places(self.law))
+        links = self._known is not None and not set(LINKS).isdisjoint(
+            name for name, _ in self._known.places(self.law)
+        )
         return count(self.robot.nq, links)
 
     def spread(self) -> Spread:
@@ -90,7 +97,9 @@ class _Sources:
             masks = dict[str, Array]()
             for name in sorted({figure for figure, _ in known.places(self.law)}):
                 source = INERTIALS if name in LINKS else name
-                masks.setdefault(source, np.zeros(len(covariance)))[place(name, self.robot.nq)] = 1.0
+                masks.setdefault(source, np.zeros(len(covariance)))[place(name, self.robot.nq)] = (
+                    1.0
+                )
             for source, mask in masks.items():
                 # what is shared with other figures counts half for each
                 covariances[source] = covariance * (mask[:, None] + mask) / 2
@@ -99,11 +108,18 @@ class _Sources:
         certain = np.ones(self._size)
         for name in self.given:
             certain[place(name, self.robot.nq)] = 0.0
-        covariances = {name: each * np.outer(certain, certain) for name, each in covariances.items()}
+        covariances = {
+            name: each * np.outer(certain, certain) for name, each in covariances.items()
+        }
         mean = draws.mean(axis=0) * certain
         moves = move_sd * np.stack([self._normal(), self._normal()])
         return Spread(
-            mean, draws * certain - mean, _root(np.sum(list(covariances.values()), axis=0)), covariances, moves, move_sd
+            mean,
+            draws * certain - mean,
+            _root(np.sum(list(covariances.values()), axis=0)),
+            covariances,
+            moves,
+            move_sd,
         )
 
     @property
@@ -114,7 +130,9 @@ class _Sources:
         return values(law, robot.drives, power)
 
     def _normal(self) -> Array:
-        """A standard normal column (n,): one value of each of n strips of equal probability, in random order."""
+        """A standard normal column (n,): one value of each of n strips of equal probability, in
+        random order.
+        """
         self._columns += 1
         order = np.random.default_rng([SEED, self._columns]).permutation(DRAWS)
         return np.asarray(ndtri((order + 0.5) / DRAWS))
@@ -167,12 +185,18 @@ class _Sources:
             first, second = (self._factor(each, letters)[:, None] for each in ranges)
             self._add(name, name, nominal[place(name, nq)] * (np.where(large, first, second) - 1))
         if "inverter_linear" not in identified and not nominal[place("inverter_linear", nq)].any():
-            self._add("inverter_linear", "inverter_linear", np.tile(self._factor("inverter_linear")[:, None], nq))
+            self._add(
+                "inverter_linear",
+                "inverter_linear",
+                np.tile(self._factor("inverter_linear")[:, None], nq),
+            )
 
     def _identified(self, known: Covariance) -> tuple[Array, Array]:
         """Draws (n, p) of the figures of the document's covariance, and this (p, p)."""
         nq = self.robot.nq
-        chosen = [k for k, name in enumerate(known.names) if known.place_of(name, self.law) is not None]
+        chosen = [
+            k for k, name in enumerate(known.names) if known.place_of(name, self.law) is not None
+        ]
         at = [index(name, joint, nq) for name, joint in known.places(self.law)]
         covariance = np.zeros((self._size, self._size))
         covariance[np.ix_(at, at)] = known.matrix[np.ix_(chosen, chosen)]
@@ -193,7 +217,9 @@ class _Sources:
 
 
 def _root(covariance: Array) -> Array:
-    """A matrix (p, r) whose product with its transpose is the covariance (p, p), without what is rounding."""
+    """A matrix (p, r) whose product with its transpose is the covariance (p, p), without what is
+    rounding.
+    """
     # figures have different units: each is scaled by its own standard deviation
     sd = np.sqrt(np.diag(covariance))
     scale = np.where(sd > 0, sd, 1.0)

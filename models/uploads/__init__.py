@@ -1,1 +1,2 @@
-"""Readers of files that users upload: they count what they read, and can be stopped while they do."""
+"""Readers of files that users upload: they count what they read, and can be stopped while they
+do."""

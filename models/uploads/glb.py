@@ -1,4 +1,5 @@
-"""What a GLB asks for: more than it has bytes, where accessors have no data or meshes are repeated."""
+"""What a GLB asks for: more than it has bytes, where accessors have no data or meshes are
+repeated."""
 
 from __future__ import annotations
 
@@ -11,26 +12,42 @@ from joulepath.models.uploads.mesh_text import MeshSize
 
 _MAGIC, _JSON = b"glTF", 0x4E4F534A
 _TRIANGLES = 4
-"""Mode of a primitive whose corners are taken by threes; of strips and fans, each corner makes a triangle."""
+"""Mode of a primitive whose corners are taken by threes; of strips and fans, each corner makes a
+triangle.
+"""
 
 
 def check_glb(content: bytes, most: MeshSize) -> None:
-    """Raises UnreadableFile for a GLB that would take more memory or time than its own size allows for."""
+    """Raises UnreadableFile for a GLB that would take more memory or time than its own size allows
+    for.
+    """
     try:
         header = _header(content)
-        accessors, nodes, meshes = (header.get(part, []) for part in ("accessors", "nodes", "meshes"))
-        complete = bool(header) and all("bufferView" in each and "sparse" not in each for each in accessors)
+        accessors, nodes, meshes = (
+            header.get(part, []) for part in ("accessors", "nodes", "meshes")
+        )
+        complete = bool(header) and all(
+            "bufferView" in each and "sparse" not in each for each in accessors
+        )
         counts = sum(int(each["count"]) for each in accessors)
-        primitives = [[_triangles(each, accessors) for each in mesh["primitives"]] for mesh in meshes]
+        primitives = [
+            [_triangles(each, accessors) for each in mesh["primitives"]] for mesh in meshes
+        ]
         copies = [primitives[node["mesh"]] for node in nodes if "mesh" in node]
         depth = _depth([node.get("children", []) for node in nodes])
     except (struct.error, ValueError, TypeError, LookupError, AttributeError, RecursionError):
         raise UnreadableFile("is no glb file that can be read: export the mesh again.") from None
     most.check(0, sum(map(sum, copies)))
     entries = max(len(accessors), len(nodes), sum(map(len, primitives)), sum(map(len, copies)))
-    if not complete or counts > len(content) or entries > LIMITS.glb_entries or depth > LIMITS.glb_depth:
+    if (
+        not complete
+        or counts > len(content)
+        or entries > LIMITS.glb_entries
+        or depth > LIMITS.glb_depth
+    ):
         raise UnreadableFile(
-            "is no plain glb file (accessors without data, repeated or deeply nested nodes, too many entries): export "
+            "is no plain glb file (accessors without data, repeated or deeply nested nodes, too "
+            "many entries): export "
             "the mesh alone, without compression, animation or materials."
         )
 
@@ -51,7 +68,9 @@ def _triangles(primitive: dict[str, Any], accessors: list[dict[str, Any]]) -> in
 
 
 def _depth(children: list[list[int]]) -> int:
-    """Most nodes below one another; more than LIMITS allow for nodes that are repeated or below themselves."""
+    """Most nodes below one another; more than LIMITS allow for nodes that are repeated or below
+    themselves.
+    """
     below = [child for each in children for child in each]
     if len(below) != len(set(below)):
         return LIMITS.glb_depth + 1

@@ -18,9 +18,11 @@ _STL_HEAD, _STL_TRIANGLE = 84, 50  # bytes
 def read_mesh(
     kind: str, content: bytes, most: MeshSize, checkpoint: Checkpoint = unwatched
 ) -> tuple[Array, npt.NDArray[np.int64]]:
-    """Corners (n, 3) in the units of a file, and triangles (m, 3) by their numbers; all bodies of it as one.
+    """Corners (n, 3) in the units of a file, and triangles (m, 3) by their numbers; all bodies of
+    it as one.
 
-    `kind` is `stl`, `obj` or `glb`; of a GLB, the caller checks what it asks for. Raises UnreadableFile.
+    `kind` is `stl`, `obj` or `glb`; of a GLB, the caller checks what it asks for. Raises
+    UnreadableFile.
     """
     if kind == "obj":
         content = plain_obj(content, most, checkpoint)
@@ -30,19 +32,27 @@ def read_mesh(
 
     checkpoint()
     try:
-        mesh = trimesh.load_mesh(BytesIO(content), file_type=kind, resolver=None, process=False, skip_materials=True)
+        mesh = trimesh.load_mesh(
+            BytesIO(content), file_type=kind, resolver=None, process=False, skip_materials=True
+        )
         corners = np.asarray(mesh.vertices, dtype=float).reshape(-1, 3)
         triangles = np.asarray(getattr(mesh, "faces", ()), dtype=np.int64).reshape(-1, 3)
     except Exception as error:  # trimesh raises many kinds for broken files
-        raise UnreadableFile(f"is no {kind} file that can be read: export the mesh again.") from error
+        raise UnreadableFile(
+            f"is no {kind} file that can be read: export the mesh again."
+        ) from error
     most.check(len(corners), len(triangles))
     return corners, triangles
 
 
 def _is_binary_stl(content: bytes, most: MeshSize) -> bool:
-    """Whether the length is that of as many triangles as the head says. Raises UnreadableFile for too many, or where
-    it is less and the file is no text."""
-    count = struct.unpack("<I", content[_STL_HEAD - 4 : _STL_HEAD])[0] if len(content) >= _STL_HEAD else 0
+    """Whether the length is that of as many triangles as the head says. Raises UnreadableFile for
+    too many, or where it is less and the file is no text."""
+    count = (
+        struct.unpack("<I", content[_STL_HEAD - 4 : _STL_HEAD])[0]
+        if len(content) >= _STL_HEAD
+        else 0
+    )
     length = _STL_HEAD + _STL_TRIANGLE * count
     if len(content) == length:
         most.check(3 * count, count)

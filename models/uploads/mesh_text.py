@@ -1,7 +1,7 @@
 """Corners and faces of mesh files in text, without all else that such files may hold.
 
-trimesh keeps groups, materials and solids apart, and its time grows with the square of their number. They do not matter
-here: each file becomes one of corners and triangles alone.
+trimesh keeps groups, materials and solids apart, and its time grows with the square of their
+number. They do not matter here: each file becomes one of corners and triangles alone.
 """
 
 from __future__ import annotations
@@ -52,7 +52,9 @@ def plain_obj(content: bytes, most: MeshSize, checkpoint: Checkpoint) -> bytes:
 
 
 def _index(word: bytes, corners: int) -> int:
-    """The number of a face's corner, from 1; negative ones count back from the last corner above the face."""
+    """The number of a face's corner, from 1; negative ones count back from the last corner above
+    the face.
+    """
     try:
         index = int(word.partition(b"/")[0])
     except ValueError:

@@ -1,7 +1,8 @@
 """XML from users as a tree of elements, by expat with handlers that count what a document holds.
 
-Prefixes of names stay as they are written, declared or not: readers of URDF know no namespaces. A document type is
-refused, so that there are no entities to expand and nothing outside the document to read.
+Prefixes of names stay as they are written, declared or not: readers of URDF know no namespaces. A
+document type is refused, so that there are no entities to expand and nothing outside the document
+to read.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from joulepath.models.uploads.limits import LIMITS, Checkpoint, UnreadableFile, 
 
 
 def xml_tree(text: str, checkpoint: Checkpoint = unwatched) -> Element:
-    """The root element of an XML document. Raises UnreadableFile, also for more than LIMITS allow."""
+    """The root element of an XML document. Raises UnreadableFile, also for more than LIMITS
+    allow."""
     counted = _Counted()
     try:
         data = text.encode()
@@ -30,7 +32,9 @@ def xml_tree(text: str, checkpoint: Checkpoint = unwatched) -> Element:
 
 
 class _Counted:
-    """A parser that builds a tree, and raises UnreadableFile as soon as the document holds too much."""
+    """A parser that builds a tree, and raises UnreadableFile as soon as the document holds too
+    much.
+    """
 
     def __init__(self) -> None:
         self.tree = TreeBuilder()
@@ -51,7 +55,9 @@ class _Counted:
         if self._depth > LIMITS.xml_depth:
             raise UnreadableFile(f"has elements on more than {LIMITS.xml_depth} levels.")
         if len(attributes) > LIMITS.xml_attributes:
-            raise UnreadableFile(f"has an element with more than {LIMITS.xml_attributes} attributes.")
+            raise UnreadableFile(
+                f"has an element with more than {LIMITS.xml_attributes} attributes."
+            )
         self.tree.start(tag, dict(attributes))
 
     def _end(self, tag: str) -> None:

@@ -1,17 +1,22 @@
-"""Gravity torques and joint-space inertia of n configurations at once, and bounds on their derivatives that hold for
-every configuration.
+"""Gravity torques and joint-space inertia of n configurations at once, and bounds on their
+derivatives that hold for every configuration.
 
-With the axis z_j and the origin o_j of joint j, the mass m_i and the centre c_i of link i, and S_j = Σ_{i≥j} m_i (c_i
-- o_j), the derivative of the potential energy U by joints k_1 ≤ … ≤ k_n is -g · (z_k1 × (… (z_kn × S_kn))): a joint
-turns everything beyond it, so that derivatives act from the last joint inwards. Its absolute value is at most |g ×
-z_k1| · |S_kn|, where |S_kn| ≤ Σ_{i≥kn} m_i · (lengths from o_kn to c_i), and |g × z_k1| is |g| but for the first
+With the axis z_j and the origin o_j of joint j, the mass m_i and the centre c_i of link i, and S_j
+= Σ_{i≥j} m_i (c_i
+- o_j), the derivative of the potential energy U by joints k_1 ≤ … ≤ k_n is -g · (z_k1 × (… (z_kn ×
+  S_kn))): a joint
+turns everything beyond it, so that derivatives act from the last joint inwards. Its absolute value
+is at most |g ×
+z_k1| · |S_kn|, where |S_kn| ≤ Σ_{i≥kn} m_i · (lengths from o_kn to c_i), and |g × z_k1| is |g| but
+for the first
 joint, whose axis stands still.
 
-M_jk = Σ_i (m_i J_ij · J_ik + z_j · I_i z_k) with J_ij = z_j × (c_i - o_j). By the same rule a derivative of J_ij is
-no longer than ρ_i of the last of its joints, with ρ_i(k) ≥ |c_i - o_k|. In z_j · I_i z_k the rotation of a joint
-occurs at most twice, and its derivatives of any order have norm 1: n derivatives are at most 2^n times the greatest
-principal moment. M_jk does not change with the joints up to the first of j, k: they turn all that it depends on. The
-bounds of `inertia_spectrum` are mostly lower.
+M_jk = Σ_i (m_i J_ij · J_ik + z_j · I_i z_k) with J_ij = z_j × (c_i - o_j). By the same rule a
+derivative of J_ij is no longer than ρ_i of the last of its joints, with ρ_i(k) ≥ |c_i - o_k|. In
+z_j · I_i z_k the rotation of a joint occurs at most twice, and its derivatives of any order have
+norm 1: n derivatives are at most 2^n times the greatest principal moment. M_jk does not change with
+the joints up to the first of j, k: they turn all that it depends on. The bounds of
+`inertia_spectrum` are mostly lower.
 """
 
 from __future__ import annotations
@@ -49,7 +54,9 @@ class _Chain(ctypes.Structure):
 
 def _digest(chain: ChainDerivatives) -> bytes:
     """What the inertia depends on."""
-    return b"".join(each.tobytes() for each in (chain.placements, chain.mass, chain.lever, chain.inertia))
+    return b"".join(
+        each.tobytes() for each in (chain.placements, chain.mass, chain.lever, chain.inertia)
+    )
 
 
 def _by_order(chain: ChainDerivatives, order: int) -> tuple[int, bytes]:
@@ -61,8 +68,9 @@ def _by_order(chain: ChainDerivatives, order: int) -> tuple[int, bytes]:
 class ChainDerivatives:
     """A serial chain with payload, in its gravity.
 
-    `placements` (nq, 4, 4) of the joints in the frames before them, `mass` (nq,) [kg], `lever` (nq, 3) [m] and
-    `inertia` (nq, 3, 3) [kg·m²] of the links, about their centres of mass; `rotor` (nq,) [kg·m²].
+    `placements` (nq, 4, 4) of the joints in the frames before them, `mass` (nq,) [kg], `lever` (nq,
+    3) [m] and `inertia` (nq, 3, 3) [kg·m²] of the links, about their centres of mass; `rotor` (nq,)
+    [kg·m²].
     """
 
     placements: Array
@@ -99,7 +107,9 @@ class ChainDerivatives:
 
     @cached_property
     def _reach(self) -> Array:
-        """Greatest distance (nq, nq) [m] of the centre of mass of link i from the origin of joint j ≤ i."""
+        """Greatest distance (nq, nq) [m] of the centre of mass of link i from the origin of joint j
+        ≤ i.
+        """
         lengths = np.append(np.linalg.norm(self.placements[1:, :3, 3], axis=1), 0.0)
         reach = np.zeros((self.nq, self.nq))
         for i, j in product(range(self.nq), repeat=2):
@@ -109,7 +119,8 @@ class ChainDerivatives:
 
     @cached(LRUCache(_BOUNDS_KEPT), key=_by_order, lock=threading.Lock())
     def potential_bound(self, order: int) -> Array:
-        """Bounds (nq,) * order [J] on the derivatives of the potential energy by that many joints."""
+        """Bounds (nq,) * order [J] on the derivatives of the potential energy by that many
+        joints."""
         moments = np.array([self.mass[j:] @ self._reach[j:, j] for j in range(self.nq)])
         leading = np.full(self.nq, np.linalg.norm(self.gravity))
         leading[0] = np.linalg.norm(np.cross(self.gravity, self.placements[0, :3, 2]))
@@ -118,7 +129,8 @@ class ChainDerivatives:
 
     @cached(LRUCache(_BOUNDS_KEPT), key=_by_order, lock=threading.Lock())
     def inertia_bound(self, order: int) -> Array:
-        """Bounds (nq,) * order + (nq, nq) [kg·m²] on the derivatives of M_jk by `order` ≥ 1 joints."""
+        """Bounds (nq,) * order + (nq, nq) [kg·m²] on the derivatives of M_jk by `order` ≥ 1
+        joints."""
         joints = np.indices((self.nq,) * (order + 2))
         by, j, k = joints[:order], joints[order], joints[order + 1]
         changes = by.min(axis=0) > np.minimum(j, k)
@@ -137,7 +149,9 @@ class ChainDerivatives:
                 products += self._reach[i][first] * self._reach[i][second]
             own = self.mass[i] * products + 2.0**order * principal[i]
             bound += np.where(changes & (last <= i), own, 0.0)
-        return _shared(bound if self._spectrum is None else np.minimum(bound, self._spectrum.bound(order)))
+        return _shared(
+            bound if self._spectrum is None else np.minimum(bound, self._spectrum.bound(order))
+        )
 
     @cached_property
     def _spectrum(self) -> InertiaSpectrum | None:
@@ -153,17 +167,26 @@ class ChainDerivatives:
         return -levers @ self.gravity, _symmetric(-across @ levers.transpose(0, 2, 1))
 
     def joint_inertia(self, q: Array) -> Array:
-        """M (n, nq, nq) [kg·m²] at q (n, nq) [rad], rotors included: momenta of unit speeds about the base."""
+        """M (n, nq, nq) [kg·m²] at q (n, nq) [rad], rotors included: momenta of unit speeds about
+        the base.
+        """
         q, M = np.ascontiguousarray(q, dtype=float), np.empty((len(q), self.nq, self.nq))
         library.joint_inertias(ctypes.addressof(self.as_c[0]), len(q), address(q), address(M))
         return M
 
     def _frames(self, q: Array) -> tuple[Array, Array, Array, Array]:
-        """Axes and origins (n, nq, 3) of the joints, rotations (n, nq, 3, 3) and centres of mass (n, nq, 3)."""
+        """Axes and origins (n, nq, 3) of the joints, rotations (n, nq, 3, 3) and centres of mass
+        (n, nq, 3).
+        """
         frames = link_frames(self.placements, q)[:, 1:]
         rotations = frames[..., :3, :3]
         centres = frames[..., :3, 3] + (rotations @ self.lever[:, :, None])[..., 0]
-        return np.ascontiguousarray(rotations[..., 2]), np.ascontiguousarray(frames[..., :3, 3]), rotations, centres
+        return (
+            np.ascontiguousarray(rotations[..., 2]),
+            np.ascontiguousarray(frames[..., :3, 3]),
+            rotations,
+            centres,
+        )
 
 
 @cached(LRUCache(_MOST_KEPT), key=_digest, lock=threading.Lock())

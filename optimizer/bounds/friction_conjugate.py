@@ -1,4 +1,6 @@
-"""The greatest value over a joint's speed of what a multiplier gains and friction takes, bounded from above."""
+"""The greatest value over a joint's speed of what a multiplier gains and friction takes, bounded
+from above.
+"""
 
 from __future__ import annotations
 
@@ -18,11 +20,12 @@ _MOST_KNEE = 0.01
 
 @dataclass(frozen=True)
 class FrictionConjugate:
-    """A concave friction torque between nodes of speed, per interval (k, nq): first and last speed [rad/s], the chord's
-    value at speed 0 and slope, and how far the torque rises above its chord at most [N·m].
+    """A concave friction torque between nodes of speed, per interval (k, nq): first and last speed
+    [rad/s], the chord's value at speed 0 and slope, and how far the torque rises above its chord at
+    most [N·m].
 
-    The C of `speed_conjugate` computes the greatest values. The torque is that of unloaded joints. `load` (nq,) is the
-    share of the carried torque that is lost, too; None for a law without it.
+    The C of `speed_conjugate` computes the greatest values. The torque is that of unloaded joints.
+    `load` (nq,) is the share of the carried torque that is lost, too; None for a law without it.
     """
 
     first: Array
@@ -34,15 +37,23 @@ class FrictionConjugate:
 
     @classmethod
     def of(cls, law: FrictionLaw, v_max: Array) -> FrictionConjugate | None:
-        """The intervals up to v_max (nq,); None for a law that is not concave: one with a negative coefficient."""
-        if min(law.coulomb.min(), law.curved.min(), law.viscous.min()) < 0 or law.knee <= 0 or law.speed.min() <= 0:
+        """The intervals up to v_max (nq,); None for a law that is not concave: one with a negative
+        coefficient.
+        """
+        if (
+            min(law.coulomb.min(), law.curved.min(), law.viscous.min()) < 0
+            or law.knee <= 0
+            or law.speed.min() <= 0
+        ):
             return None
         if law.load is not None and not ((law.load >= 0) & (law.load < 1)).all():
             return None
         knees = np.outer(_IN_KNEES, np.minimum(law.knee, _MOST_KNEE / _IN_KNEES[-1] * v_max))
         v = np.concatenate([np.zeros((1, len(v_max))), knees, np.outer(_SHARES, v_max)])
         torque, step = law.unloaded.torque(v), np.diff(v, axis=0)
-        rate = law.coulomb * law.knee**2 / (v * v + law.knee**2) ** 1.5 + law.curved / np.hypot(v, law.speed)
+        rate = law.coulomb * law.knee**2 / (v * v + law.knee**2) ** 1.5 + law.curved / np.hypot(
+            v, law.speed
+        )
         rate = rate + law.viscous
         slope = np.diff(torque, axis=0) / step
         # between two nodes the torque is below its tangents at both, which meet `at` from the first
@@ -58,7 +69,11 @@ class FrictionConjugate:
         return tuple(np.ascontiguousarray(each.T) for each in intervals)
 
     def stiffness(self, law: FrictionLaw) -> Array:
-        """About the least second derivative (nq,) of v tau_f(v) beyond Coulomb friction's step; a choice, no bound."""
+        """About the least second derivative (nq,) of v tau_f(v) beyond Coulomb friction's step; a
+        choice, no bound.
+        """
         v = self.last
         bent = np.hypot(v, law.speed)
-        return np.asarray((2 * (law.curved / bent + law.viscous) - law.curved * v * v / bent**3).min(axis=0))
+        return np.asarray(
+            (2 * (law.curved / bent + law.viscous) - law.curved * v * v / bent**3).min(axis=0)
+        )

@@ -1,8 +1,8 @@
 """The cells of a grid over two joints around a path.
 
-A value at a point of a cell is at least the least value at the cell's corners, less Σ h² / 8 · (bound on the second
-derivative along the side h) over both sides: interpolation along one side errs by no more than that, and does not
-increase the other's second derivatives.
+A value at a point of a cell is at least the least value at the cell's corners, less Σ h² / 8 ·
+(bound on the second derivative along the side h) over both sides: interpolation along one side errs
+by no more than that, and does not increase the other's second derivatives.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from joulepath.optimizer.native.shared_library import address, library
 
 @dataclass(frozen=True)
 class Curvature:
-    """Bounds on a term's change that its corners do not show: `along` (S, ...) is 1/8 of the second derivative over a
-    step, `across` (S, 2, ...) the second derivatives by the grid's joints [1/rad²]."""
+    """Bounds on a term's change that its corners do not show: `along` (S, ...) is 1/8 of the second
+    derivative over a step, `across` (S, 2, ...) the second derivatives by the grid's joints
+    [1/rad²]."""
 
     along: Array
     across: Array
@@ -27,7 +28,9 @@ class Curvature:
 
 @dataclass(frozen=True)
 class Spacing:
-    """Distance of the points next to the path [rad], and its growth from one interval to the next outwards."""
+    """Distance of the points next to the path [rad], and its growth from one interval to the next
+    outwards.
+    """
 
     first: float = 0.16
     growth: float = 1.25
@@ -44,7 +47,9 @@ class Spacing:
 
 @dataclass(frozen=True)
 class GridCells:
-    """The grid of two `axes` (n,) and (m,) [rad]: values of n · m points, and of (n - 1) · (m - 1) cells, in rows."""
+    """The grid of two `axes` (n,) and (m,) [rad]: values of n · m points, and of (n - 1) · (m - 1)
+    cells, in rows.
+    """
 
     axes: tuple[Array, Array]
 
@@ -62,25 +67,34 @@ class GridCells:
         """Positions (n · m, 2) [rad]."""
         return np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1).reshape(-1, 2)
 
-    def deviation(self, value: Array, mean: Array, curvature: Curvature, joints: Sequence[int]) -> Array:
-        """Bounds (S, 2, cells, k) on how far values of k joints are from their means (S, nq), in each cell and along
-        each step; `value` (S, 2, points, nq) has those of both ends of a step."""
+    def deviation(
+        self, value: Array, mean: Array, curvature: Curvature, joints: Sequence[int]
+    ) -> Array:
+        """Bounds (S, 2, cells, k) on how far values of k joints are from their means (S, nq), in
+        each cell and along each step; `value` (S, 2, points, nq) has those of both ends of a step.
+        """
         at = np.array(joints)
         S, nq = mean.shape
         result = np.empty((S, 2, self.count, len(at)))
         given = *self.axes, at, value, mean, curvature.along, curvature.across
         plain = [np.ascontiguousarray(each) for each in given]
-        library.cell_deviation(S, nq, *map(len, self.axes), len(at), *map(address, (*plain, result)))
+        library.cell_deviation(
+            S, nq, *map(len, self.axes), len(at), *map(address, (*plain, result))
+        )
         return result
 
     def beyond(self, half: Array) -> Array:
-        """inf for the cells (S, cells) beyond boxes of these half sides (S, 2) [rad], where no motion is, else 0."""
+        """inf for the cells (S, cells) beyond boxes of these half sides (S, 2) [rad], where no
+        motion is, else 0.
+        """
         nearest = [np.minimum(np.abs(axis[:-1]), np.abs(axis[1:])) for axis in self.axes]
         outside = (nearest[0] > half[:, :1])[:, :, None] | (nearest[1] > half[:, 1:])[:, None]
         return np.where(outside, np.inf, 0.0).reshape(len(half), -1)
 
     def needed(self, half: Array) -> Mask:
-        """The points (S + 1, points) that are corners of a cell within the boxes of a step beside a node."""
+        """The points (S + 1, points) that are corners of a cell within the boxes of a step beside a
+        node.
+        """
         n, m = map(len, self.axes)
         within = (self.beyond(half) == 0).reshape(len(half), n - 1, m - 1)
         near = np.zeros((len(half) + 1, n, m), dtype=bool)

@@ -1,4 +1,5 @@
-"""The least value Ψ of a dual bound's terms of position in each step; the proof is in `dual_bound`."""
+"""The least value Ψ of a dual bound's terms of position in each step; the proof is in
+`dual_bound`."""
 
 from __future__ import annotations
 
@@ -29,9 +30,23 @@ class LeastPotential:
         terms, (at_terms, _) = self.terms, self._as_c
         S, nq = terms.half.shape
         result = np.empty((len(fast), S))
-        own = self._cross(weights), _hold(weights), _weight(weights), fast, slow, _excess(fast, slow), result
+        own = (
+            self._cross(weights),
+            _hold(weights),
+            _weight(weights),
+            fast,
+            slow,
+            _excess(fast, slow),
+            result,
+        )
         library.least_potential(
-            len(fast), S, nq, *map(len, terms.cells.axes), *at_terms, weights.scale, *map(address, own)
+            len(fast),
+            S,
+            nq,
+            *map(len, terms.cells.axes),
+            *at_terms,
+            weights.scale,
+            *map(address, own),
         )
         return result
 
@@ -40,19 +55,34 @@ class LeastPotential:
         """Addresses of the terms as the C has them, in its order, and the arrays themselves."""
         terms = self.terms
         given = (
-            *terms.cells.axes, terms.half, terms.gravity, terms.kinetic, terms.slope, terms.deviation, terms.steepness,
-            terms.gravity_curvature.along, terms.gravity_curvature.across,
-            terms.kinetic_curvature.along, terms.kinetic_curvature.across,
-            terms.gravity_others, terms.kinetic_others,
-        )  # fmt: skip
-        arrays = [np.array([*terms.grid, *terms.others]), *(np.ascontiguousarray(each) for each in given)]
+            *terms.cells.axes,
+            terms.half,
+            terms.gravity,
+            terms.kinetic,
+            terms.slope,
+            terms.deviation,
+            terms.steepness,
+            terms.gravity_curvature.along,
+            terms.gravity_curvature.across,
+            terms.kinetic_curvature.along,
+            terms.kinetic_curvature.across,
+            terms.gravity_others,
+            terms.kinetic_others,
+        )
+        arrays = [
+            np.array([*terms.grid, *terms.others]),
+            *(np.ascontiguousarray(each) for each in given),
+        ]
         return [address(each) for each in arrays], arrays
 
     def _cross(self, weights: Weights) -> Array:
-        """What the square of the momentum's change takes from the stiffness (S, others) of the joints beside the grid,
-        by 1 / T²."""
+        """What the square of the momentum's change takes from the stiffness (S, others) of the
+        joints beside the grid, by 1 / T²."""
         moved = weights.scale * self.terms.momentum_others
-        return np.asarray((1 + 1 / _TAU) * ((moved / weights.mixing) * moved.sum(axis=1, keepdims=True)).sum(axis=-1))
+        return np.asarray(
+            (1 + 1 / _TAU)
+            * ((moved / weights.mixing) * moved.sum(axis=1, keepdims=True)).sum(axis=-1)
+        )
 
 
 def _hold(weights: Weights) -> Array:
@@ -66,5 +96,7 @@ def _weight(weights: Weights) -> Array:
 
 
 def _excess(fast: Array, slow: Array) -> Array:
-    """How far (B,) β Γ' exceeds the slope that it has at both ends of a cell, as a share of it; see `dual_bound`."""
+    """How far (B,) β Γ' exceeds the slope that it has at both ends of a cell, as a share of it; see
+    `dual_bound`.
+    """
     return np.asarray((fast - slow) ** 2 / (4 * fast * slow))

@@ -18,11 +18,17 @@ STEP = 1e-5
 class PathCurvature:
     """Bounds on derivatives of the terms in each step of a path.
 
-    The steps are dx (S, nq) [rad] long, of either sign; multipliers ω (S + 1, nq) are linear on them.
+    The steps are dx (S, nq) [rad] long, of either sign; multipliers ω (S + 1, nq) are linear on
+    them.
     """
 
     def __init__(
-        self, chain: ChainDerivatives, dx: Array, omega: Array, grid: tuple[int, ...], others: tuple[int, ...]
+        self,
+        chain: ChainDerivatives,
+        dx: Array,
+        omega: Array,
+        grid: tuple[int, ...],
+        others: tuple[int, ...],
     ) -> None:
         self.dx, self.grid, self.others = np.abs(dx), list(grid), list(others)
         self.change = np.abs(np.diff(omega, axis=0))
@@ -36,7 +42,9 @@ class PathCurvature:
         # N, a derivative of M along ω, is a difference; what it misses is a second derivative
         missed = STEP / 2 * _along_each(self.most, self.D2_most)
         # second derivative of N over a step: ω changes, and so does ∂M
-        self.N_along = (_along_each(self.dx, D3_step) + 2 * _along_each(self.change, D2_step)) / 8 + missed
+        self.N_along = (
+            _along_each(self.dx, D3_step) + 2 * _along_each(self.change, D2_step)
+        ) / 8 + missed
 
     def gravity(self) -> Curvature:
         """Curvature of ω · g [W]."""
@@ -53,11 +61,18 @@ class PathCurvature:
         return Curvature(along / 8, np.stack(across, axis=1))
 
     def inertia(self, omega_rate: Array, x_rate: Array) -> tuple[Curvature, Curvature]:
-        """Curvatures of `kinetic` and `momentum`; the difference quotient's error is in the one along the path."""
-        M, N = (np.stack([each[g, g] for g in self.grid]) for each in (self.D2, self.D3_most.transpose(1, 2, 0, 3, 4)))
+        """Curvatures of `kinetic` and `momentum`; the difference quotient's error is in the one
+        along the path.
+        """
+        M, N = (
+            np.stack([each[g, g] for g in self.grid])
+            for each in (self.D2, self.D3_most.transpose(1, 2, 0, 3, 4))
+        )
         own, other = self.M_along @ omega_rate[..., None], self.N_along @ x_rate[..., None]
         own_across, other_across = M[:, None] @ omega_rate[..., None], N @ x_rate[..., None]
-        momentum = Curvature((own + other)[..., 0], (own_across + other_across)[..., 0].transpose(1, 0, 2))
+        momentum = Curvature(
+            (own + other)[..., 0], (own_across + other_across)[..., 0].transpose(1, 0, 2)
+        )
         kinetic = Curvature(
             ((own + other / 2)[..., 0] * x_rate).sum(axis=-1),
             ((own_across + other_across / 2)[..., 0] * x_rate).sum(axis=-1).T,
@@ -65,7 +80,9 @@ class PathCurvature:
         return kinetic, momentum
 
     def others_of(self, omega_rate: Array, x_rate: Array) -> tuple[Array, Array, Array]:
-        """The bounds on derivatives by the joints beside the grid's: of the gradient's rows, `kinetic`, `momentum`."""
+        """The bounds on derivatives by the joints beside the grid's: of the gradient's rows,
+        `kinetic`, `momentum`.
+        """
         others = self.others
         gravity = _along(self.most, self.U3)[:, others][:, :, others].sum(axis=-1)
         own = (self.D1[others] @ omega_rate[:, None, :, None])[..., 0]
@@ -73,19 +90,31 @@ class PathCurvature:
         return gravity, ((own + other / 2) * x_rate[:, None]).sum(axis=-1), own + other
 
     def spread(self, rows: Array, spacing: Array, half: Array) -> Array:
-        """Bounds (S, nq) on Σ_jk N_jk w_j w_k by w_j² from `rows` (S + 1, nq), their greatest at the points of a node.
+        """Bounds (S, nq) on Σ_jk N_jk w_j w_k by w_j² from `rows` (S + 1, nq), their greatest at
+        the points of a node.
 
-        The sum is at most Σ_j (max(N_jj, 0) + Σ_{k≠j} |N_jk|) w_j². This is convex in N, so that its greatest value at
-        the corners bounds it for what interpolation gives; the rest is added row by row.
+        The sum is at most Σ_j (max(N_jj, 0) + Σ_{k≠j} |N_jk|) w_j². This is convex in N, so that
+        its greatest value at the corners bounds it for what interpolation gives; the rest is added
+        row by row.
         """
-        across = sum(self.D3_most[:, g, g].sum(axis=-1) * h**2 for g, h in zip(self.grid, spacing, strict=True)) / 8
+        across = (
+            sum(
+                self.D3_most[:, g, g].sum(axis=-1) * h**2
+                for g, h in zip(self.grid, spacing, strict=True)
+            )
+            / 8
+        )
         beside = _along_each(half[:, self.others], self.D2_most[:, self.others]).sum(axis=-1)
-        return np.asarray(np.maximum(rows[:-1], rows[1:]) + across + self.N_along.sum(axis=-1) + beside)
+        return np.asarray(
+            np.maximum(rows[:-1], rows[1:]) + across + self.N_along.sum(axis=-1) + beside
+        )
 
 
 def _along(direction: Array, bound: Array) -> Array:
     """A bound (nq, ...) on derivatives by joints, along directions (S, nq): (S, ...)."""
-    return np.asarray((direction @ bound.reshape(len(bound), -1)).reshape(len(direction), *bound.shape[1:]))
+    return np.asarray(
+        (direction @ bound.reshape(len(bound), -1)).reshape(len(direction), *bound.shape[1:])
+    )
 
 
 def _along_each(direction: Array, bound: Array) -> Array:

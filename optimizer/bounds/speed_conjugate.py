@@ -1,4 +1,6 @@
-"""The greatest values H of a dual bound's terms of speed, over a motion; the proof is in `dual_bound`."""
+"""The greatest values H of a dual bound's terms of speed, over a motion; the proof is in
+`dual_bound`.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,8 @@ class _Friction(ctypes.Structure):
     """The `Friction` of the C."""
 
     _fields_ = [(name, ctypes.c_long) for name in ("intervals", "nq")] + [
-        (name, ctypes.c_void_p) for name in ("first", "last", "constant", "slope", "sagitta", "load")
+        (name, ctypes.c_void_p)
+        for name in ("first", "last", "constant", "slope", "sagitta", "load")
     ]
 
 
@@ -49,7 +52,9 @@ class _Parts(ctypes.Structure):
 
 @dataclass(frozen=True)
 class SpeedConjugate:
-    """Σ_j ∫ H_j ds of motions of `duration` (E,) [s], which grow, with a path's terms; `loss` (nq,) is c."""
+    """Σ_j ∫ H_j ds of motions of `duration` (E,) [s], which grow, with a path's terms; `loss` (nq,)
+    is c.
+    """
 
     friction: FrictionConjugate
     limits: Limits
@@ -66,9 +71,13 @@ class SpeedConjugate:
         stiffness, slowness = weights.confinement + weights.mixing, self._slowness(weights)
         result = np.empty_like(self.duration), np.empty_like(self.duration)
         library.speed_conjugate(
-            *map(ctypes.addressof, structures), weights.scale, weights.work, _BISECTIONS, len(self.duration),
+            *map(ctypes.addressof, structures),
+            weights.scale,
+            weights.work,
+            _BISECTIONS,
+            len(self.duration),
             *map(address, (stiffness, slowness, self.duration, *result)),
-        )  # fmt: skip
+        )
         return result
 
     @cached_property
@@ -79,7 +88,13 @@ class SpeedConjugate:
             np.ascontiguousarray(each)
             for each in (terms.spread, self._costate, terms.momentum, terms.x_rate, terms.omega)
         ]
-        times: list[NDArray[Any]] = [parts.step, parts.within, parts.length, parts.speed, self._mean]
+        times: list[NDArray[Any]] = [
+            parts.step,
+            parts.within,
+            parts.length,
+            parts.speed,
+            self._mean,
+        ]
         times = [np.ascontiguousarray(each) for each in times]
         load = None if friction.load is None else address(friction.load)
         structures = (
@@ -96,14 +111,18 @@ class SpeedConjugate:
 
     @cached_property
     def _mean(self) -> Array:
-        """The means by step (2, S, nq) [rad/s] of the greatest speeds for the first and the last duration."""
+        """The means by step (2, S, nq) [rad/s] of the greatest speeds for the first and the last
+        duration.
+        """
         return self._parts.mean_speed(np.array([0, -1]))
 
     @cached_property
     def _costate(self) -> Array:
         """Γ / T (S + 1, nq) at the nodes, for multipliers as they are."""
         slope = self.terms.slope
-        return np.concatenate([np.zeros((1, slope.shape[1])), np.cumsum(slope, axis=0) / len(slope)])
+        return np.concatenate(
+            [np.zeros((1, slope.shape[1])), np.cumsum(slope, axis=0) / len(slope)]
+        )
 
     def _slowness(self, weights: Weights) -> Array:
         """η / c (nq,)."""

@@ -1,7 +1,8 @@
-"""Gravity torques along straight lines, by samples, with what these may miss: for `holding`, whose names are used here.
+"""Gravity torques along straight lines, by samples, with what these may miss: for `holding`, whose
+names are used here.
 
-The trapezoid's mean errs by 1 / 12 of the second derivative over a step, Γ at the nodes by as much of that of A, and
-between them, where it is taken as linear, by 1 / 8 of the first of A.
+The trapezoid's mean errs by 1 / 12 of the second derivative over a step, Γ at the nodes by as much
+of that of A, and between them, where it is taken as linear, by 1 / 8 of the first of A.
 """
 
 from __future__ import annotations
@@ -20,11 +21,12 @@ NODES = 16
 
 @dataclass(frozen=True)
 class Line:
-    """Gravity along straight lines of displacements d (P, nq) [rad]: the means of g (P, nq) [N·m] and their errors.
+    """Gravity along straight lines of displacements d (P, nq) [rad]: the means of g (P, nq) [N·m]
+    and their errors.
 
-    By joints i and l (P, nq, nq) [N·m]: `error` of Γ, mean size `odd` of the odd part of A, `gradient` of the mean of g
-    by the goal and its error. `product` (P, nq, nq, nq) has ∫ (Γ - mean) of i times that of j, for l. All are for
-    ω_i = 1, by the share of the duration.
+    By joints i and l (P, nq, nq) [N·m]: `error` of Γ, mean size `odd` of the odd part of A,
+    `gradient` of the mean of g by the goal and its error. `product` (P, nq, nq, nq) has ∫ (Γ -
+    mean) of i times that of j, for l. All are for ω_i = 1, by the share of the duration.
     """
 
     d: Array

@@ -9,7 +9,9 @@ from joulepath.models.robot import Array
 
 @dataclass(frozen=True)
 class Weights:
-    """The multipliers' factor `scale` and, per joint (nq,) [N·m·s/rad], κ and μ of `dual_bound`; `work` is η."""
+    """The multipliers' factor `scale` and, per joint (nq,) [N·m·s/rad], κ and μ of `dual_bound`;
+    `work` is η.
+    """
 
     scale: float
     confinement: Array

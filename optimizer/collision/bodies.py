@@ -1,4 +1,6 @@
-"""Bodies that can collide: convex cores fixed to the links, to the flange (tool, payload) and to the base (scene)."""
+"""Bodies that can collide: convex cores fixed to the links, to the flange (tool, payload) and to
+the base (scene).
+"""
 
 from __future__ import annotations
 
@@ -21,8 +23,9 @@ from joulepath.optimizer.problem.scene import Attachment, Obstacle
 class Body:
     """A core at `T_link_core` (4, 4) in the frame of a link; the base and the scene have link 0.
 
-    Other bodies must stay at least `margin` [m] away from it. `touches` are the links that it touches by design.
-    A body with a `cloud` is its `patch`: then the core is only a box around it, with the radius of its parts.
+    Other bodies must stay at least `margin` [m] away from it. `touches` are the links that it
+    touches by design. A body with a `cloud` is its `patch`: then the core is only a box around it,
+    with the radius of its parts.
     """
 
     name: str
@@ -47,17 +50,27 @@ class Body:
     @cached_property
     def ball_radius(self) -> float:
         """Radius [m] of that ball; the core's own radius is not included."""
-        return float(np.linalg.norm(self.points - self.ball_centre, axis=1).max()) + self.core.disc_radius
+        return (
+            float(np.linalg.norm(self.points - self.ball_centre, axis=1).max())
+            + self.core.disc_radius
+        )
 
     @property
     def is_segment(self) -> bool:
         """Whether the core is a point or a segment."""
         core = self.core
-        return self.cloud is None and len(core.points) <= 2 and core.disc_radius == 0 and not core.is_half_space
+        return (
+            self.cloud is None
+            and len(core.points) <= 2
+            and core.disc_radius == 0
+            and not core.is_half_space
+        )
 
 
 def bodies_of(arm: Arm) -> tuple[Body, ...]:
-    """Bodies of an arm: the capsules of the robot, then tool and payload, then the obstacles of the scene."""
+    """Bodies of an arm: the capsules of the robot, then tool and payload, then the obstacles of the
+    scene.
+    """
     robot, last, names = arm.robot, arm.robot.nq, arm.robot.link_names
     T_last_flange = robot.T_last_flange
     links = [
@@ -68,7 +81,13 @@ def bodies_of(arm: Arm) -> tuple[Body, ...]:
     if arm.payload.shape is not None:
         parts.append((PAYLOAD, arm.payload.shape))
     attached = [
-        Body(name, last, core_of(p.shape), T_last_flange @ p.T_flange_shape, touches=_touched(p, robot))
+        Body(
+            name,
+            last,
+            core_of(p.shape),
+            T_last_flange @ p.T_flange_shape,
+            touches=_touched(p, robot),
+        )
         for name, p in parts
     ]
     obstacles = [body for obstacle in arm.scene.obstacles for body in _bodies_of_obstacle(obstacle)]
@@ -96,6 +115,10 @@ def _bodies_of_obstacle(obstacle: Obstacle) -> list[Body]:
 
 
 def _touched(part: Attachment, robot: Robot) -> frozenset[int]:
-    """The links that a tool or payload touches by design: those declared, else the one that carries the flange."""
+    """The links that a tool or payload touches by design: those declared, else the one that carries
+    the flange.
+    """
     names = robot.link_names
-    return frozenset([robot.nq] if part.touches is None else [names.index(name) for name in part.touches])
+    return frozenset(
+        [robot.nq] if part.touches is None else [names.index(name) for name in part.touches]
+    )

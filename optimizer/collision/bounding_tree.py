@@ -1,8 +1,9 @@
-"""A tree of bounding balls over many small parts: which of them are near a segment, for many segments at once.
+"""A tree of bounding balls over many small parts: which of them are near a segment, for many
+segments at once.
 
-The parts are halved three times per level, at the median along the longest extent of their centres. The search goes
-down the tree level by level, for all queries together. Its effort per query grows with the logarithm of the number of
-parts, unless many parts are equally near.
+The parts are halved three times per level, at the median along the longest extent of their centres.
+The search goes down the tree level by level, for all queries together. Its effort per query grows
+with the logarithm of the number of parts, unless many parts are equally near.
 """
 
 from __future__ import annotations
@@ -39,7 +40,9 @@ class BoundingTree:
         self._node_centres, self._node_radii = self._balls()
 
     def patches(self, most: int) -> list[int]:
-        """At most `most` nodes that together hold every part, each once: the root, or nodes of one depth and leaves."""
+        """At most `most` nodes that together hold every part, each once: the root, or nodes of one
+        depth and leaves.
+        """
         nodes = [0]
         while True:
             finer = [child for node in nodes for child in (range(*self._children[node]) or [node])]
@@ -57,11 +60,14 @@ class BoundingTree:
     ) -> tuple[Indices, Indices]:
         """All (query, part) (m,) whose distance may be at most `within` (k,) [m].
 
-        A query is a body inside the capsule around `segments` (k, 2, 3) with radius `reach` (k,) [m]; it asks for parts
-        below the node `root` (k,). `nearest`: parts that cannot be the nearest one of the query are left out, too.
+        A query is a body inside the capsule around `segments` (k, 2, 3) with radius `reach` (k,)
+        [m]; it asks for parts below the node `root` (k,). `nearest`: parts that cannot be the
+        nearest one of the query are left out, too.
         """
         found = [
-            self._near(segments[block], reach[block], within[block], root[block], nearest, block.start)
+            self._near(
+                segments[block], reach[block], within[block], root[block], nearest, block.start
+            )
             for block in (slice(low, low + AT_ONCE) for low in range(0, len(segments), AT_ONCE))
         ]
         none = np.zeros(0, dtype=np.intp)
@@ -71,7 +77,13 @@ class BoundingTree:
         )
 
     def _near(
-        self, segments: Array, reach: Array, within: Array, root: Indices, nearest: bool, offset: int
+        self,
+        segments: Array,
+        reach: Array,
+        within: Array,
+        root: Indices,
+        nearest: bool,
+        offset: int,
     ) -> tuple[Indices, Indices]:
         checkpoint()
         within = within + ROUNDING
@@ -79,7 +91,15 @@ class BoundingTree:
         node = root
         leaves: list[tuple[Indices, Indices]] = []
         while len(query):
-            keep = self._kept(segments, reach, within, query, self._node_centres[node], self._node_radii[node], nearest)
+            keep = self._kept(
+                segments,
+                reach,
+                within,
+                query,
+                self._node_centres[node],
+                self._node_radii[node],
+                nearest,
+            )
             query, node = query[keep], node[keep]
             inner = self._children[node, 1] > 0
             leaves.append((query[~inner], node[~inner]))
@@ -87,16 +107,26 @@ class BoundingTree:
         query = np.concatenate([each for each, _ in leaves])
         query, place = _expanded(query, self._spans[np.concatenate([each for _, each in leaves])])
         part = self.order[place]
-        keep = self._kept(segments, reach, within, query, self.centres[part], self.radii[part], nearest)
+        keep = self._kept(
+            segments, reach, within, query, self.centres[part], self.radii[part], nearest
+        )
         if nearest:
             # once more: the limits have shrunk over all parts of a query
             query, part = query[keep], part[keep]
-            keep = self._kept(segments, reach, within, query, self.centres[part], self.radii[part], nearest)
+            keep = self._kept(
+                segments, reach, within, query, self.centres[part], self.radii[part], nearest
+            )
         return query[keep] + offset, part[keep]
 
     @staticmethod
     def _kept(
-        segments: Array, reach: Array, within: Array, query: Indices, centres: Array, radii: Array, nearest: bool
+        segments: Array,
+        reach: Array,
+        within: Array,
+        query: Indices,
+        centres: Array,
+        radii: Array,
+        nearest: bool,
     ) -> Indices:
         """Indices of the balls that may hold a part in question.
 
@@ -128,7 +158,10 @@ class BoundingTree:
         node, place = _expanded(np.arange(len(self._spans)), self._spans)
         first = np.append(0, np.cumsum(np.diff(self._spans)[:-1]))
         c, r = self.centres[self.order[place]], self.radii[self.order[place]]
-        low, high = np.minimum.reduceat(c - r[:, None], first), np.maximum.reduceat(c + r[:, None], first)
+        low, high = (
+            np.minimum.reduceat(c - r[:, None], first),
+            np.maximum.reduceat(c + r[:, None], first),
+        )
         centres = (low + high) / 2
         return centres, np.maximum.reduceat(np.linalg.norm(c - centres[node], axis=1) + r, first)
 

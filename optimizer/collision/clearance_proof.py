@@ -1,30 +1,34 @@
 """Lower bound on the clearance of a motion, proven over continuous time.
 
-For a unit vector n fixed in the frame of a pair's first body, sep_n(t) = min n·x over the second body - max n·x over
-the first never exceeds the signed distance. Relative to the first body, the acceleration of a point of the second body
-is at most
+For a unit vector n fixed in the frame of a pair's first body, sep_n(t) = min n·x over the second
+body - max n·x over the first never exceeds the signed distance. Relative to the first body, the
+acceleration of a point of the second body is at most
 
     A = Σ_k lever_k (|a_k| + v_k² + 2 |v_k| Σ_{j<k} |v_j|)        over the joints between the two,
 
-where lever_k [m] bounds its distance from the axis of joint k. Over an interval of length h [s], n·x(t) is therefore at
-least its chord less A h² / 8, and
+where lever_k [m] bounds its distance from the axis of joint k. Over an interval of length h [s],
+n·x(t) is therefore at least its chord less A h² / 8, and
 
     distance(t) ≥ min(sep_n(begin), sep_n(end)) - A h² / 8.
 
-The Bernstein coefficients of the spline's polynomial in a knot span bound |v_k| and |a_k|. n is the normal at one of
-the two ends of the interval, whichever gives the higher bound. The bound holds for every n: a poor normal makes it
-weaker, not wrong. An interval whose bound is too far below the least sampled distance is halved.
+The Bernstein coefficients of the spline's polynomial in a knot span bound |v_k| and |a_k|. n is the
+normal at one of the two ends of the interval, whichever gives the higher bound. The bound holds for
+every n: a poor normal makes it weaker, not wrong. An interval whose bound is too far below the
+least sampled distance is halved.
 
-An obstacle of many parts has no such normal as a whole. Its distance changes no faster than L (below), so that
+An obstacle of many parts has no such normal as a whole. Its distance changes no faster than L
+(below), so that
 
     distance(t) ≥ (distance(begin) + distance(end) - L h) / 2.
 
-Once an interval is so short that L h ≤ EXPANDED, the parts that can come within the least sampled distance there take
-the place of the obstacle: each is convex. The distance of all others stays above the least sampled one.
+Once an interval is so short that L h ≤ EXPANDED, the parts that can come within the least sampled
+distance there take the place of the obstacle: each is convex. The distance of all others stays
+above the least sampled one.
 
-Pairs that are far apart are removed first: the relative speed of a point of the second body is at most
-L = Σ_k lever_k |v_k|. If ball(t) bounds the distance from below by that of the bodies' enclosing balls, the distance is
-at least (ball(begin) + ball(end) - L h) / 2 throughout the interval.
+Pairs that are far apart are removed first: the relative speed of a point of the second body is at
+most L = Σ_k lever_k |v_k|. If ball(t) bounds the distance from below by that of the bodies'
+enclosing balls, the distance is at least (ball(begin) + ball(end) - L h) / 2 throughout the
+interval.
 """
 
 from __future__ import annotations
@@ -42,12 +46,15 @@ from joulepath.optimizer.collision.pair_distance import WitnessPoints
 from joulepath.optimizer.result.certificate import Clearance
 from joulepath.optimizer.trajectories.spline import Spline
 
-# an interval is done if its bound is this near to the least sampled distance: absolutely [m], or relative to it
+# an interval is done if its bound is this near to the least sampled distance: absolutely [m], or
+# relative to it
 GAP, RELATIVE_GAP = 1e-4, 0.01
 LEAST_INTERVALS = 32
-# the proof ends with the bound reached so far after this many halvings, or checks of a pair over an interval
+# the proof ends with the bound reached so far after this many halvings, or checks of a pair over an
+# interval
 MOST_LEVELS, MOST_CHECKS = 20, 400_000
-# distances of whole clouds are not computed if they are greater than the least sampled one by this [m]
+# distances of whole clouds are not computed if they are greater than the least sampled one by this
+# [m]
 BEYOND = 0.1
 # travel [m] of a body over an interval below which the parts of a cloud are checked one by one
 EXPANDED = 0.02
@@ -61,14 +68,18 @@ class _Instants:
     frames: Array
 
     def with_more(self, more: _Instants) -> _Instants:
-        return _Instants(np.concatenate([self.t, more.t]), np.concatenate([self.frames, more.frames]))
+        return _Instants(
+            np.concatenate([self.t, more.t]), np.concatenate([self.frames, more.frames])
+        )
 
 
 @dataclass(frozen=True)
 class _Checks:
-    """Pairs over intervals (k,): indices of the pair and of the instants at both ends, and the distances there.
+    """Pairs over intervals (k,): indices of the pair and of the instants at both ends, and the
+    distances there.
 
-    `part` (k,) is the part of the first body if that is a patch of a cloud, -1 for all of its parts.
+    `part` (k,) is the part of the first body if that is a patch of a cloud, -1 for all of its
+    parts.
     """
 
     pair: Indices
@@ -99,7 +110,9 @@ class _Checks:
         )
 
     def distinct_intervals(self) -> tuple[Indices, Indices]:
-        """The different intervals (m, 2), as indices of instants, and which of them each check (k,) is about."""
+        """The different intervals (m, 2), as indices of instants, and which of them each check (k,)
+        is about.
+        """
         # as one number each: rows of two are sorted much more slowly
         base = int(self.end.max(initial=0)) + 1
         codes, which = np.unique(self.begin * base + self.end, return_inverse=True)
@@ -107,29 +120,35 @@ class _Checks:
 
 
 def proven_clearance(model: CollisionModel, spline: Spline) -> Clearance | None:
-    """Proven and sampled clearance of a motion, margins subtracted; None if the model checks no pair."""
+    """Proven and sampled clearance of a motion, margins subtracted; None if the model checks no
+    pair.
+    """
     if not len(model.pairs):
         return None
     found = _Proof(model, spline).run()
     if found.min_clearance < 0 and found.sampled >= GAP:
         # the limits on the effort ended it: less effort shows that the margins hold
-        found = replace(found, min_clearance=max(found.min_clearance, _Proof(model, spline, wanted=GAP).bound()))
+        found = replace(
+            found, min_clearance=max(found.min_clearance, _Proof(model, spline, wanted=GAP).bound())
+        )
     return found
 
 
 def is_proven_clear(model: CollisionModel, spline: Spline) -> bool:
     """Whether the clearance is proven to be GAP or more: `proven_clearance` is then not negative.
 
-    It takes far fewer intervals than to know how great the clearance is. False may also mean that more are needed.
+    It takes far fewer intervals than to know how great the clearance is. False may also mean that
+    more are needed.
     """
     return not len(model.pairs) or _Proof(model, spline, wanted=GAP).bound() >= GAP
 
 
 class _Proof:
-    """The proof for one motion. `least` [m] is the least distance sampled so far, of `closest`: pair and time [s].
+    """The proof for one motion. `least` [m] is the least distance sampled so far, of `closest`:
+    pair and time [s].
 
-    Without `wanted` [m] the bound comes near to the least distance; else the proof ends once the bound is as high, or
-    a sample is lower.
+    Without `wanted` [m] the bound comes near to the least distance; else the proof ends once the
+    bound is as high, or a sample is lower.
     """
 
     def __init__(self, model: CollisionModel, spline: Spline, wanted: float | None = None) -> None:
@@ -147,7 +166,8 @@ class _Proof:
         return Clearance(proven, self.least, self.model.names(pair), t, points)
 
     def bound(self) -> float:
-        """Lower bound [m]: halves intervals until all are proven, or the limits on the effort are reached.
+        """Lower bound [m]: halves intervals until all are proven, or the limits on the effort are
+        reached.
 
         -inf if a sample is lower than what is `wanted`.
         """
@@ -159,33 +179,47 @@ class _Proof:
         for level in range(MOST_LEVELS):
             checked += len(checks.pair)
             bound = self.bounds(instants, checks)
-            enough = self.least - max(GAP, RELATIVE_GAP * abs(self.least)) if self.wanted is None else self.wanted
+            enough = (
+                self.least - max(GAP, RELATIVE_GAP * abs(self.least))
+                if self.wanted is None
+                else self.wanted
+            )
             is_last = level == MOST_LEVELS - 1 or checked > MOST_CHECKS or self.least < enough
             is_open = np.zeros(len(bound), dtype=bool) if is_last else bound < enough
             proven = min(proven, float(bound[~is_open].min(initial=np.inf)))
             if not is_open.any():
                 break
-            instants, checks = self.halved(instants, self.expanded(instants, checks[np.flatnonzero(is_open)]))
+            instants, checks = self.halved(
+                instants, self.expanded(instants, checks[np.flatnonzero(is_open)])
+            )
         # rounding may put a bound that is exact above the sample
         return min(proven, self.least)
 
     def sampled(self) -> tuple[_Instants, Array]:
-        """Instants (n,) with all knots, and lower bounds (n, p) [m] on the distances of all pairs there.
+        """Instants (n,) with all knots, and lower bounds (n, p) [m] on the distances of all pairs
+        there.
 
         The pair of the least bound is sampled at each of them.
         """
         spans = np.unique(self.spline.knots)
         longest = self.spline.duration / LEAST_INTERVALS
-        parts = [np.linspace(a, b, math.ceil((b - a) / longest), endpoint=False) for a, b in pairwise(spans)]
+        parts = [
+            np.linspace(a, b, math.ceil((b - a) / longest), endpoint=False)
+            for a, b in pairwise(spans)
+        ]
         t = np.concatenate([*parts, spans[-1:]])
         instants = self.instants(t)
         # those of half-spaces, which no ball encloses, are exact
         distances = self.model.pair_distances(instants.frames, within=-np.inf).distance
-        self.sample_normals(instants, np.arange(len(t)), distances.argmin(axis=1), np.full(len(t), -1))
+        self.sample_normals(
+            instants, np.arange(len(t)), distances.argmin(axis=1), np.full(len(t), -1)
+        )
         return instants, distances
 
     def initial_checks(self, instants: _Instants, distances: Array) -> _Checks:
-        """The pairs that may be the closest between two instants, of all intervals; with lower bounds `distances`."""
+        """The pairs that may be the closest between two instants, of all intervals; with lower
+        bounds `distances`.
+        """
         n, p = distances.shape
         v, _, h = self.rate_bounds(instants.t[:-1], instants.t[1:])
         travel = (v * h[:, None]) @ self.levers.T
@@ -200,26 +234,32 @@ class _Proof:
         row[instant, pair] = np.arange(len(pair))
         begin, pair = np.nonzero(is_open)
         part = np.full(len(pair), -1)
-        return _Checks(pair, part, begin, begin + 1, found[row[begin, pair]], found[row[begin + 1, pair]])
+        return _Checks(
+            pair, part, begin, begin + 1, found[row[begin, pair]], found[row[begin + 1, pair]]
+        )
 
     def may_be_closest(self, bounds: Array, travel: Array) -> Mask:
-        """Which pairs (n - 1, p) may be nearer than what is known or wanted over the intervals between n instants.
+        """Which pairs (n - 1, p) may be nearer than what is known or wanted over the intervals
+        between n instants.
 
-        `bounds` (n, p) [m] are lower bounds on their distances at the instants, which change over an interval by no
-        more than the `travel` (n - 1, p) [m].
+        `bounds` (n, p) [m] are lower bounds on their distances at the instants, which change over
+        an interval by no more than the `travel` (n - 1, p) [m].
         """
         limit = self.least if self.wanted is None else min(self.least, self.wanted)
         return np.asarray((bounds[:-1] + bounds[1:] - travel) / 2 < limit)
 
     def expanded(self, instants: _Instants, checks: _Checks) -> _Checks:
-        """The checks, with those of clouds over short intervals replaced by checks of the parts that may be nearest."""
+        """The checks, with those of clouds over short intervals replaced by checks of the parts
+        that may be nearest.
+        """
         of_cloud = self.model.geometry.is_cloud[checks.pair] & (checks.part < 0)
         if not of_cloud.any():
             return checks
         travel = self.travels(instants, checks)
         chosen = np.flatnonzero(of_cloud & (travel <= EXPANDED))
         whole = checks[chosen]
-        # a part that is farther away at the begin stays farther away than the least sampled distance
+        # a part that is farther away at the begin stays farther away than the least sampled
+        # distance
         case, part = self.geometry.near_parts(
             instants.frames, whole.begin, whole.pair, np.maximum(self.least, 0.0) + travel[chosen]
         )
@@ -243,8 +283,12 @@ class _Proof:
         first = replace(checks, end=middle, at_end=found)
         return instants, first.with_more(replace(checks, begin=middle, at_begin=found))
 
-    def sample_normals(self, instants: _Instants, instant: Indices, pair: Indices, part: Indices) -> WitnessPoints:
-        """Distances and normals of pairs (k,) at instants (k,). They update the least sampled distance."""
+    def sample_normals(
+        self, instants: _Instants, instant: Indices, pair: Indices, part: Indices
+    ) -> WitnessPoints:
+        """Distances and normals of pairs (k,) at instants (k,). They update the least sampled
+        distance.
+        """
         within = max(self.least, 0.0) + BEYOND
         found = self.geometry.witness_points(instants.frames, instant, pair, within, part)
         # patches of a cloud that are farther away: a lower bound is enough
@@ -252,7 +296,10 @@ class _Proof:
         if len(pair):
             k = int(found.distance.argmin())
             if found.distance[k] < self.least:
-                self.least, self.closest = float(found.distance[k]), (int(pair[k]), float(instants.t[instant[k]]))
+                self.least, self.closest = (
+                    float(found.distance[k]),
+                    (int(pair[k]), float(instants.t[instant[k]])),
+                )
         return found
 
     def bounds(self, instants: _Instants, checks: _Checks) -> Array:
@@ -262,14 +309,18 @@ class _Proof:
             whole, convex = checks[np.flatnonzero(of_cloud)], checks[np.flatnonzero(~of_cloud)]
             result = np.empty(len(of_cloud))
             result[~of_cloud] = self.convex_bounds(instants, convex)
-            result[of_cloud] = (whole.at_begin.distance + whole.at_end.distance - self.travels(instants, whole)) / 2
+            result[of_cloud] = (
+                whole.at_begin.distance + whole.at_end.distance - self.travels(instants, whole)
+            ) / 2
             return result
         return self.convex_bounds(instants, checks)
 
     def convex_bounds(self, instants: _Instants, checks: _Checks) -> Array:
         """The same for convex bodies and parts."""
         normals = checks.at_begin.normal, checks.at_end.normal
-        best = self.geometry.separations(instants.frames, checks.begin, checks.end, checks.pair, normals, checks.part)
+        best = self.geometry.separations(
+            instants.frames, checks.begin, checks.end, checks.pair, normals, checks.part
+        )
         return best - self.chord_errors(instants, checks)
 
     def travels(self, instants: _Instants, checks: _Checks) -> Array:
@@ -284,21 +335,30 @@ class _Proof:
         v, a, h = self.rate_bounds(*instants.t[intervals].T)
         before = np.cumsum(v, axis=1) - v
         between = self.model.joints_between[checks.pair]
-        # joints below the first body move both bodies alike: their speeds are taken out of the running sum
+        # joints below the first body move both bodies alike: their speeds are taken out of the
+        # running sum
         below = np.where(between, 0.0, v[which]).cumsum(axis=1)
         lower = before[which] - np.where(between, below, 0.0)
         v, a = v[which], a[which]
-        acceleration = (self.levers[checks.pair] * (a + v**2 + 2 * v * np.maximum(lower, 0.0))).sum(axis=1)
+        acceleration = (self.levers[checks.pair] * (a + v**2 + 2 * v * np.maximum(lower, 0.0))).sum(
+            axis=1
+        )
         return np.asarray(acceleration * h[which] ** 2 / 8)
 
     def rate_bounds(self, begin: Array, end: Array) -> tuple[Array, Array, Array]:
-        """Bounds on |v| [rad/s] and |a| [rad/s²] (k, nq) over intervals (k,) [s], and the intervals' lengths (k,) [s].
+        """Bounds on |v| [rad/s] and |a| [rad/s²] (k, nq) over intervals (k,) [s], and the
+        intervals' lengths (k,) [s].
 
         Each interval must lie within a knot span.
         """
         h, degree = end - begin, self.spline.degree
         # the polynomial of each interval in powers of the elapsed fraction of it
-        powers = np.stack([self.curve(begin, d) * (h**d / math.factorial(d))[:, None] for d in range(1, degree + 1)])
+        powers = np.stack(
+            [
+                self.curve(begin, d) * (h**d / math.factorial(d))[:, None]
+                for d in range(1, degree + 1)
+            ]
+        )
         orders = np.arange(1, degree + 1)[:, None, None]
         v = np.abs(_bernstein(powers * orders)).max(axis=0) / h[:, None]
         a = np.abs(_bernstein((powers * orders * (orders - 1))[1:])).max(axis=0) / h[:, None] ** 2
@@ -310,16 +370,24 @@ class _Proof:
 
 
 def _at_ends(intervals: Mask) -> Mask:
-    """Which pairs (n, p) are needed at n instants for those of the intervals (n - 1, p) between them."""
+    """Which pairs (n, p) are needed at n instants for those of the intervals (n - 1, p) between
+    them.
+    """
     none = np.zeros_like(intervals[:1])
     return np.asarray(np.concatenate([intervals, none]) | np.concatenate([none, intervals]))
 
 
 def _bernstein(powers: Array) -> Array:
-    """Bernstein coefficients (d + 1, …) on [0, 1] of polynomials with coefficients (d + 1, …), lowest power first.
+    """Bernstein coefficients (d + 1, …) on [0, 1] of polynomials with coefficients (d + 1, …),
+    lowest power first.
 
     The values of a polynomial lie within the convex hull of its Bernstein coefficients.
     """
     degree = len(powers) - 1
-    matrix = np.array([[math.comb(i, k) / math.comb(degree, k) for k in range(degree + 1)] for i in range(degree + 1)])
+    matrix = np.array(
+        [
+            [math.comb(i, k) / math.comb(degree, k) for k in range(degree + 1)]
+            for i in range(degree + 1)
+        ]
+    )
     return np.tensordot(matrix, powers, axes=1)

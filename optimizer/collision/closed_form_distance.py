@@ -1,8 +1,10 @@
-"""Signed distances of segments from segments, boxes and triangles, in closed form for many pairs at once.
+"""Signed distances of segments from segments, boxes and triangles, in closed form for many pairs at
+once.
 
-The signed distance of two convex bodies a and b is the maximum over unit vectors n of min n·x over b - max n·x over a.
-If they are apart, it is their distance; if they overlap, minus the length of the shortest translation that separates
-them. The n that attains the maximum is the unit normal, from a to b.
+The signed distance of two convex bodies a and b is the maximum over unit vectors n of min n·x over
+b - max n·x over a. If they are apart, it is their distance; if they overlap, minus the length of
+the shortest translation that separates them. The n that attains the maximum is the unit normal,
+from a to b.
 """
 
 from __future__ import annotations
@@ -20,7 +22,8 @@ NONE = 1e-24
 
 
 def segment_segment(a: Array, b: Array) -> tuple[Array, Array, Array]:
-    """Distance (k,) [m], normal (k, 3) from a to b, and witness points (k, 3) [m] of b, of segments a, b (k, 2, 3) [m].
+    """Distance (k,) [m], normal (k, 3) from a to b, and witness points (k, 3) [m] of b, of segments
+    a, b (k, 2, 3) [m].
 
     If the segments cross, the distance is 0 and the normal is the common perpendicular.
     """
@@ -28,9 +31,11 @@ def segment_segment(a: Array, b: Array) -> tuple[Array, Array, Array]:
 
 
 def box_segment(half_size: Array, b: Array) -> tuple[Array, Array, Array]:
-    """Signed distance (k,) [m], normal (k, 3) from box to segment, and the witness point (k, 3) [m] of the segment.
+    """Signed distance (k,) [m], normal (k, 3) from box to segment, and the witness point (k, 3) [m]
+    of the segment.
 
-    half_size (k, 3) [m]: half of the edges of boxes about the origin; b (k, 2, 3) [m]: segments in the boxes' frames.
+    half_size (k, 3) [m]: half of the edges of boxes about the origin; b (k, 2, 3) [m]: segments in
+    the boxes' frames.
     """
     return _by_library(library.box_segments, half_size, b)
 
@@ -44,21 +49,30 @@ def _by_library(function: Any, first: Array, segments: Array) -> tuple[Array, Ar
 
 
 def triangle_segment(triangles: Array, b: Array) -> tuple[Array, Array, Array]:
-    """Signed distance (k,) [m], normal (k, 3) from triangle to segment, and witness point (k, 3) [m] of the segment.
+    """Signed distance (k,) [m], normal (k, 3) from triangle to segment, and witness point (k, 3)
+    [m] of the segment.
 
-    triangles (k, 3, 3) [m]: corners; b (k, 2, 3) [m]: segments. Unless they cross, the nearest points are on an edge,
-    or one of them is an end of the segment above the triangle. The candidates for the normal of a segment that crosses
-    are those of the facets of the triangle swept along the segment.
+    triangles (k, 3, 3) [m]: corners; b (k, 2, 3) [m]: segments. Unless they cross, the nearest
+    points are on an edge, or one of them is an end of the segment above the triangle. The
+    candidates for the normal of a segment that crosses are those of the facets of the triangle
+    swept along the segment.
     """
     corner, edge = triangles, np.roll(triangles, -1, axis=1) - triangles
     face = cross(edge[:, 0], edge[:, 1])
     face = face / np.maximum(np.linalg.norm(face, axis=1), 1e-300)[:, None]
-    found = [segment_segment(np.stack([corner[:, i], corner[:, i] + edge[:, i]], axis=1), b) for i in range(3)]
+    found = [
+        segment_segment(np.stack([corner[:, i], corner[:, i] + edge[:, i]], axis=1), b)
+        for i in range(3)
+    ]
     heights = np.einsum("kei,ki->ke", b - corner[:, :1], face)
     inward = cross(face[:, None], edge)
-    above = [(np.einsum("kci,kci->kc", b[:, e, None] - corner, inward) >= 0).all(axis=1) for e in range(2)]
+    above = [
+        (np.einsum("kci,kci->kc", b[:, e, None] - corner, inward) >= 0).all(axis=1)
+        for e in range(2)
+    ]
     distances = np.stack(
-        [d for d, _, _ in found] + [np.where(above[e], np.abs(heights[:, e]), np.inf) for e in range(2)]
+        [d for d, _, _ in found]
+        + [np.where(above[e], np.abs(heights[:, e]), np.inf) for e in range(2)]
     )
     up = [np.where(heights[:, e, None] >= 0, face, -face) for e in range(2)]
     normals = np.stack([n for _, n, _ in found] + up)
@@ -79,8 +93,12 @@ def triangle_segment(triangles: Array, b: Array) -> tuple[Array, Array, Array]:
     return distance, normal, point
 
 
-def _crossing(triangles: Array, edge: Array, face: Array, b: Array, on_edges: Array) -> tuple[Array, Array, Array]:
-    """The same for segments that cross the triangle; `on_edges` (3, k, 3) are their points nearest to the edges."""
+def _crossing(
+    triangles: Array, edge: Array, face: Array, b: Array, on_edges: Array
+) -> tuple[Array, Array, Array]:
+    """The same for segments that cross the triangle; `on_edges` (3, k, 3) are their points nearest
+    to the edges.
+    """
     sideways = cross(edge, (b[:, 1] - b[:, 0])[:, None])
     length = np.linalg.norm(sideways, axis=2, keepdims=True)
     sideways = np.where(length > NONE, sideways / np.maximum(length, NONE), face[:, None])

@@ -1,7 +1,8 @@
-"""Signed distances between patches of clouds and moving bodies, for many pairs at many configurations at once.
+"""Signed distances between patches of clouds and moving bodies, for many pairs at many
+configurations at once.
 
-Index arrays (k,) select the cases: a row `configuration` of `frames` (n, nq + 1, 4, 4), and the bodies `first` (the
-patch, on link 0) and `second`. Radii and margins are not subtracted.
+Index arrays (k,) select the cases: a row `configuration` of `frames` (n, nq + 1, 4, 4), and the
+bodies `first` (the patch, on link 0) and `second`. Radii and margins are not subtracted.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from joulepath.optimizer.collision.clouds import Cloud, ConvexAgainstCloud, Witn
 class _Batch:
     """Cases (m,) of one obstacle and, unless they are all segments, of one moving body.
 
-    `chosen` (m,) indexes the cases, `root` (m,) are their patches. Either `segments` (m, 2, 3) or the poses T (m, 4, 4)
-    of the core, in the frame of the cloud, are given.
+    `chosen` (m,) indexes the cases, `root` (m,) are their patches. Either `segments` (m, 2, 3) or
+    the poses T (m, 4, 4) of the core, in the frame of the cloud, are given.
     """
 
     chosen: Indices
@@ -39,9 +40,14 @@ class CloudPairs:
     def __init__(self, bodies: Sequence[Body]) -> None:
         self._bodies = bodies
         # obstacles of one content share a cloud, but each has a pose
-        keys = [None if body.cloud is None else (id(body.cloud), body.T_link_core.tobytes()) for body in bodies]
+        keys = [
+            None if body.cloud is None else (id(body.cloud), body.T_link_core.tobytes())
+            for body in bodies
+        ]
         known = list(dict.fromkeys(key for key in keys if key is not None))
-        self._group = np.array([-1 if key is None else known.index(key) for key in keys], dtype=np.intp)
+        self._group = np.array(
+            [-1 if key is None else known.index(key) for key in keys], dtype=np.intp
+        )
         self._patch = np.array([body.patch for body in bodies], dtype=np.intp)
         self._is_segment = np.array([body.is_segment for body in bodies], dtype=bool)
         self._links = np.array([body.link for body in bodies], dtype=np.intp)
@@ -49,9 +55,16 @@ class CloudPairs:
         self._convex: dict[tuple[int, int], ConvexAgainstCloud] = {}
 
     def witness_points(
-        self, frames: Array, configuration: Indices, first: Indices, second: Indices, within: Array, part: Indices
+        self,
+        frames: Array,
+        configuration: Indices,
+        first: Indices,
+        second: Indices,
+        within: Array,
+        part: Indices,
     ) -> Witness:
-        """Distance (k,), normal (k, 3) and point (k, 3) of the nearest part, or of `part` (k,) where not negative.
+        """Distance (k,), normal (k, 3) and point (k, 3) of the nearest part, or of `part` (k,)
+        where not negative.
 
         The distance of a nearest part above `within` (k,) [m] is infinite.
         """
@@ -117,7 +130,10 @@ class CloudPairs:
             T_link = frames[configuration[k], self._links[second[k]]]
             batch = _Batch(k, cloud, self._patch[first[k]], T_base_cloud)
             if moving < 0:
-                ends = self._ends[second[k]] @ T_link[:, :3, :3].swapaxes(1, 2) + T_link[:, None, :3, 3]
+                ends = (
+                    self._ends[second[k]] @ T_link[:, :3, :3].swapaxes(1, 2)
+                    + T_link[:, None, :3, 3]
+                )
                 yield replace(batch, segments=(ends - origin) @ R)
             else:
                 T = T_link @ self._bodies[moving].T_link_core

@@ -1,6 +1,8 @@
-"""Signed distances of obstacles of many parts: balls, voxels and triangles, each part exact, found by a bounding tree.
+"""Signed distances of obstacles of many parts: balls, voxels and triangles, each part exact, found
+by a bounding tree.
 
-Everything is in the frame of the obstacle's shape. A closed mesh is solid: a body within it has a negative distance.
+Everything is in the frame of the obstacle's shape. A closed mesh is solid: a body within it has a
+negative distance.
 """
 
 from __future__ import annotations
@@ -15,20 +17,27 @@ from cachetools import LRUCache, cached
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.bounding_tree import ROUNDING, BoundingTree, point_segment
-from joulepath.optimizer.collision.closed_form_distance import box_segment, segment_segment, triangle_segment
+from joulepath.optimizer.collision.closed_form_distance import (
+    box_segment,
+    segment_segment,
+    triangle_segment,
+)
 from joulepath.optimizer.collision.coal_distance import ConvexPairs
 from joulepath.optimizer.collision.cores import Core, Indices, box_corners, least_height
 from joulepath.optimizer.problem.clouds import Cloud as Shape
 from joulepath.optimizer.problem.clouds import Points, TriangleMesh, Voxels, parts_of
 
-# trees that are kept for the next request with the same obstacle: of so many parts in all [1]. A part takes up to 200
-# bytes
+# trees that are kept for the next request with the same obstacle: of so many parts in all [1]. A
+# part takes up to 200 bytes
 MOST_KEPT_PARTS = 400_000
-# patches of an obstacle at most. Each is a body of its own: the optimiser bounds the distance of each
+# patches of an obstacle at most. Each is a body of its own: the optimiser bounds the distance of
+# each
 MOST_PATCHES = 8
-# longest edge [m] of the triangles that a tree holds, and the number of them at which the division ends
+# longest edge [m] of the triangles that a tree holds, and the number of them at which the division
+# ends
 LONGEST_EDGE, MOST_DIVIDED = 0.05, 200_000
-# direction of the rays that tell the inside of a closed mesh: along no edge or face that a design would have
+# direction of the rays that tell the inside of a closed mesh: along no edge or face that a design
+# would have
 RAY = np.array([0.5657, 0.6213, 0.5422])
 
 Witness = tuple[Array, Array, Array]
@@ -64,12 +73,15 @@ class Cloud:
         return box_corners(*self._box(self.tree.parts(patch)))
 
     def nearest(self, segments: Array, root: Indices, within: Array) -> Witness:
-        """Distance (k,), normal (k, 3) and point (k, 3) of segments (k, 2, 3), from the part nearest to each.
+        """Distance (k,), normal (k, 3) and point (k, 3) of segments (k, 2, 3), from the part
+        nearest to each.
 
-        The normal leads to the segment, on which the point is. `root` (k,) are patches. A distance above `within` (k,)
-        [m] is infinite, except within a solid.
+        The normal leads to the segment, on which the point is. `root` (k,) are patches. A distance
+        above `within` (k,) [m] is infinite, except within a solid.
         """
-        may_be_inside = ((segments[:, 0] >= self._low) & (segments[:, 0] <= self._high)).all(axis=1) & self.is_solid
+        may_be_inside = ((segments[:, 0] >= self._low) & (segments[:, 0] <= self._high)).all(
+            axis=1
+        ) & self.is_solid
         within = np.where(may_be_inside, np.inf, within)
         query, part = self.tree.near(segments, np.zeros(len(segments)), within, root, nearest=True)
         query, part = self._promising(segments, query, part)
@@ -82,7 +94,8 @@ class Cloud:
         return found
 
     def _promising(self, segments: Array, query: Indices, part: Indices) -> tuple[Indices, Indices]:
-        """Those (query, part) that may be nearer than the part of each query whose ball is nearest."""
+        """Those (query, part) that may be nearer than the part of each query whose ball is
+        nearest."""
         if not self.tree.radii.any():
             return query, part
         least = point_segment(self.tree.centres[part], segments[query]) - self.tree.radii[part]
@@ -94,7 +107,9 @@ class Cloud:
         return query[kept], part[kept]
 
     def to_segments(self, part: Indices, segments: Array) -> Witness:
-        """Signed distance (k,), normal (k, 3) and point (k, 3) of segments (k, 2, 3) from parts (k,)."""
+        """Signed distance (k,), normal (k, 3) and point (k, 3) of segments (k, 2, 3) from parts
+        (k,).
+        """
         if self.corners is not None:
             return triangle_segment(self.corners[part], segments)
         centres = self.tree.centres[part]
@@ -109,18 +124,28 @@ class Cloud:
         if self.corners is not None:
             return np.asarray(np.einsum("kci,ki->kc", self.corners[part], direction).max(axis=1))
         height = np.einsum("ki,ki->k", self.tree.centres[part], direction)
-        return np.asarray(height if self.half_size is None else height + np.abs(direction) @ self.half_size)
+        return np.asarray(
+            height if self.half_size is None else height + np.abs(direction) @ self.half_size
+        )
 
     def inside(self, points: Array) -> Indices:
-        """Indices of the points (k, 3) that a closed mesh encloses: the crossings of a ray do not cancel out."""
+        """Indices of the points (k, 3) that a closed mesh encloses: the crossings of a ray do not
+        cancel out.
+        """
         assert self.corners is not None
         rays = np.stack([points, points + RAY * 2 * np.linalg.norm(self._high - self._low)], axis=1)
         none = np.zeros(len(points))
         query, part = self.tree.near(rays, none, none, np.zeros(len(points), dtype=np.intp))
         triangles, ray = self.corners[part], rays[query]
-        sides = [_volume(ray[:, 0], ray[:, 1], triangles[:, i], triangles[:, i - 2]) for i in range(3)]
-        forward, backward = (np.all([sign * side > 0 for side in sides], axis=0) for sign in (1, -1))
-        ends = [_volume(ray[:, e], triangles[:, 0], triangles[:, 1], triangles[:, 2]) for e in range(2)]
+        sides = [
+            _volume(ray[:, 0], ray[:, 1], triangles[:, i], triangles[:, i - 2]) for i in range(3)
+        ]
+        forward, backward = (
+            np.all([sign * side > 0 for side in sides], axis=0) for sign in (1, -1)
+        )
+        ends = [
+            _volume(ray[:, e], triangles[:, 0], triangles[:, 1], triangles[:, 2]) for e in range(2)
+        ]
         crosses = ends[0] * ends[1] < 0
         turns = np.zeros(len(points))
         np.add.at(turns, query, crosses * (forward.astype(float) - backward))
@@ -142,7 +167,9 @@ class ConvexAgainstCloud:
         self._cloud, self._core = cloud, core
         # a ball around the core, whose centre is in it
         self._centre = core.points.mean(axis=0)
-        self._radius = float(np.linalg.norm(core.points - self._centre, axis=1).max()) + core.disc_radius
+        self._radius = (
+            float(np.linalg.norm(core.points - self._centre, axis=1).max()) + core.disc_radius
+        )
         self._pairs = ConvexPairs(_Cores(cloud, core))
 
     def nearest(self, T: Array, root: Indices, within: Array) -> Witness:
@@ -156,7 +183,11 @@ class ConvexAgainstCloud:
         in_core = np.einsum("kij,ki->kj", R, cloud.tree.centres[part] - origin)
         least = least_height(self._core, in_core) - cloud.tree.radii[part]
         order = np.lexsort((least, query))
-        distance, normal, point = np.full(len(T), np.inf), np.tile([0.0, 0.0, 1.0], (len(T), 1)), balls[:, 0].copy()
+        distance, normal, point = (
+            np.full(len(T), np.inf),
+            np.tile([0.0, 0.0, 1.0], (len(T), 1)),
+            balls[:, 0].copy(),
+        )
         for k in order.tolist():
             q = int(query[k])
             # the parts of a query come in the order of their lower bounds
@@ -172,7 +203,8 @@ class ConvexAgainstCloud:
         return distance, normal, point
 
     def balls(self, T: Array) -> tuple[Array, Array]:
-        """Segments (k, 2, 3) of no length and radii (k,) [m]: balls around the core at T (k, 4, 4)."""
+        """Segments (k, 2, 3) of no length and radii (k,) [m]: balls around the core at T (k, 4,
+        4)."""
         centres = T[:, :3, :3] @ self._centre + T[:, :3, 3]
         return np.repeat(centres[:, None], 2, axis=1), np.full(len(T), self._radius)
 
@@ -185,7 +217,9 @@ class ConvexAgainstCloud:
 
 
 class _Cores(Sequence[Core]):
-    """The moving core, then the cores of the parts, each in its own frame: only those in use are made."""
+    """The moving core, then the cores of the parts, each in its own frame: only those in use are
+    made.
+    """
 
     def __init__(self, cloud: Cloud, core: Core) -> None:
         self._cloud, self._core = cloud, core
@@ -211,9 +245,11 @@ class _Cores(Sequence[Core]):
 
 
 def divided(triangles: Array) -> Array:
-    """Triangles (m, 3, 3) [m] whose union is that of triangles (k, 3, 3), without edges longer than LONGEST_EDGE.
+    """Triangles (m, 3, 3) [m] whose union is that of triangles (k, 3, 3), without edges longer than
+    LONGEST_EDGE.
 
-    Balls around long triangles would be mostly empty. The longest edges are halved; at MOST_DIVIDED triangles it ends.
+    Balls around long triangles would be mostly empty. The longest edges are halved; at MOST_DIVIDED
+    triangles it ends.
     """
     while True:
         edges = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
@@ -240,7 +276,11 @@ def _digest(shape: Shape) -> bytes:
     return hashlib.blake2b(b"".join(content)).digest()
 
 
-@cached(LRUCache(MOST_KEPT_PARTS, getsizeof=lambda cloud: cloud.count), key=_digest, lock=threading.Lock())
+@cached(
+    LRUCache(MOST_KEPT_PARTS, getsizeof=lambda cloud: cloud.count),
+    key=_digest,
+    lock=threading.Lock(),
+)
 def cloud_of(shape: Shape) -> Cloud:
     """The parts of an obstacle and their tree. Those of the last requests are kept, by content."""
     return Cloud(shape)
@@ -248,11 +288,17 @@ def cloud_of(shape: Shape) -> Cloud:
 
 def _least(found: Witness, query: Indices, count: int, within: Array) -> Witness:
     """The nearest of the parts of every query; infinitely far if there is none within its limit."""
-    distance, normal, point = np.full(count, np.inf), np.tile([0.0, 0.0, 1.0], (count, 1)), np.zeros((count, 3))
+    distance, normal, point = (
+        np.full(count, np.inf),
+        np.tile([0.0, 0.0, 1.0], (count, 1)),
+        np.zeros((count, 3)),
+    )
     order = np.lexsort((found[0], query))
     first = order[np.unique(query[order], return_index=True)[1]]
     first = first[found[0][first] <= within[query[first]]]
-    distance[query[first]], normal[query[first]], point[query[first]] = (each[first] for each in found)
+    distance[query[first]], normal[query[first]], point[query[first]] = (
+        each[first] for each in found
+    )
     return distance, normal, point
 
 

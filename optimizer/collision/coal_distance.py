@@ -13,11 +13,13 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.collision.cores import Core
 from joulepath.optimizer.deadline import checkpoint
 
-# tolerances of the distance [m], tried in turn. Coal's default of 1e-6 is too coarse for the line search of the
-# optimiser; deep inside a round body, EPA may not converge to the finest, and the next is tried
+# tolerances of the distance [m], tried in turn. Coal's default of 1e-6 is too coarse for the line
+# search of the optimiser; deep inside a round body, EPA may not converge to the finest, and the
+# next is tried
 TOLERANCES = (1e-10, 1e-6, 1e-4)
 MOST_ITERATIONS = 500
-# Coal needs bodies with a volume: a point or a segment is grown by this radius [m], which is added to the distance
+# Coal needs bodies with a volume: a point or a segment is grown by this radius [m], which is added
+# to the distance
 SKIN = 1e-2
 # Coal reports a failure by a distance beyond this [m]
 MOST_DISTANCE = 1e6
@@ -36,10 +38,12 @@ class ConvexPairs:
     def witness_points(
         self, first: Iterable[int], second: Iterable[int], T_first: Array, T_second: Array
     ) -> tuple[Array, Array, Array]:
-        """Signed distance (k,) [m], normal (k, 3) from first to second, and a point (k, 3) [m] of the second core.
+        """Signed distance (k,) [m], normal (k, 3) from first to second, and a point (k, 3) [m] of
+        the second core.
 
-        `first`, `second` (k,) are indices of cores, whose poses in the base frame are T_first, T_second (k, 4, 4). The
-        point is the witness point. If Coal does not converge, the distance is a lower bound.
+        `first`, `second` (k,) are indices of cores, whose poses in the base frame are T_first,
+        T_second (k, 4, 4). The point is the witness point. If Coal does not converge, the distance
+        is a lower bound.
         """
         count = len(T_first)
         distance, normal, point = np.empty(count), np.empty((count, 3)), np.empty((count, 3))
@@ -51,21 +55,32 @@ class ConvexPairs:
             for request in self._requests:
                 result = coal.DistanceResult()
                 found = coal.distance(a, pose_a, b, pose_b, request, result)
-                if abs(found) < MOST_DISTANCE and abs(float(result.normal @ result.normal) - 1) < 1e-6:
+                if (
+                    abs(found) < MOST_DISTANCE
+                    and abs(float(result.normal @ result.normal) - 1) < 1e-6
+                ):
                     distance[k], normal[k] = found + skin_a + skin_b, result.normal
                     point[k] = result.getNearestPoint2() + skin_b * result.normal
                     break
             else:
-                distance[k], normal[k], point[k] = _lower_bound(self._cores[i], T_first[k], self._cores[j], T_second[k])
+                distance[k], normal[k], point[k] = _lower_bound(
+                    self._cores[i], T_first[k], self._cores[j], T_second[k]
+                )
         return distance, normal, point
 
     def _shape(self, number: int) -> tuple[coal.CollisionGeometry, float, coal.Transform3s]:
         shape = self._shapes.get(number)
         # two threads may both make it; all of them go on with the first
-        return self._shapes.setdefault(number, coal_shape(self._cores[number])) if shape is None else shape
+        return (
+            self._shapes.setdefault(number, coal_shape(self._cores[number]))
+            if shape is None
+            else shape
+        )
 
 
-def _lower_bound(first: Core, T_first: Array, second: Core, T_second: Array) -> tuple[float, Array, Array]:
+def _lower_bound(
+    first: Core, T_first: Array, second: Core, T_second: Array
+) -> tuple[float, Array, Array]:
     """Lower bound [m] on the signed distance, with its direction and a point of the second core.
 
     It is the largest separation along the line of centres and the axes of both cores.
@@ -78,11 +93,17 @@ def _lower_bound(first: Core, T_first: Array, second: Core, T_second: Array) -> 
     lowest, which = _support(second, T_second, directions)
     gap = lowest + _support(first, T_first, -directions)[0]
     best = int(gap.argmax())
-    return float(gap[best]), directions[best], T_second[:3, :3] @ second.points[which[best]] + T_second[:3, 3]
+    return (
+        float(gap[best]),
+        directions[best],
+        T_second[:3, :3] @ second.points[which[best]] + T_second[:3, 3],
+    )
 
 
 def _support(core: Core, T: Array, directions: Array) -> tuple[Array, npt.NDArray[np.intp]]:
-    """min n·x (k,) [m] over a core at T (4, 4) for directions n (k, 3), and the index (k,) of its point there."""
+    """min n·x (k,) [m] over a core at T (4, 4) for directions n (k, 3), and the index (k,) of its
+    point there.
+    """
     in_core = directions @ T[:3, :3]
     heights = in_core @ core.points.T
     reach = core.disc_radius * np.hypot(in_core[:, 0], in_core[:, 1])
@@ -97,7 +118,8 @@ def _request(tolerance: float) -> coal.DistanceRequest:
 
 
 def coal_shape(core: Core) -> tuple[coal.CollisionGeometry, float, coal.Transform3s]:
-    """Coal's shape of a core, the radius [m] by which it is grown, and its pose in the frame of the core.
+    """Coal's shape of a core, the radius [m] by which it is grown, and its pose in the frame of the
+    core.
 
     A half-space has no such shape.
     """

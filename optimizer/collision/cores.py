@@ -1,7 +1,8 @@
 """Geometry of shapes for distances: every shape is a convex core grown by a radius.
 
-The core is a point or segment, a box, the two discs of a cylinder, or the hull of a mesh; the half-space is a case of
-its own. Signed distances are computed between cores, and the radii are subtracted at the end.
+The core is a point or segment, a box, the two discs of a cylinder, or the hull of a mesh; the
+half-space is a case of its own. Signed distances are computed between cores, and the radii are
+subtracted at the end.
 """
 
 from __future__ import annotations
@@ -22,10 +23,12 @@ Indices = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 
 @dataclass(frozen=True)
 class Core:
-    """The convex hull of `points` (m, 3) [m] in the frame of the shape, each point widened to a disc about z.
+    """The convex hull of `points` (m, 3) [m] in the frame of the shape, each point widened to a
+    disc about z.
 
-    `radius` [m] grows the hull, `disc_radius` [m] is that of the discs (0: points). `half_size` (3,) [m] is set for a
-    box: half of its edges. If `is_half_space`, the core is instead all that lies below its one point, z up.
+    `radius` [m] grows the hull, `disc_radius` [m] is that of the discs (0: points). `half_size`
+    (3,) [m] is set for a box: half of its edges. If `is_half_space`, the core is instead all that
+    lies below its one point, z up.
     """
 
     points: Array
@@ -36,12 +39,15 @@ class Core:
 
     @cached_property
     def planes(self) -> Array:
-        """Of a hull of points: its faces (f, 4), outward normals and offsets [m], `n · x + d <= 0` inside."""
+        """Of a hull of points: its faces (f, 4), outward normals and offsets [m], `n · x + d <= 0`
+        inside.
+        """
         return np.asarray(ConvexHull(self.points).equations)
 
 
 def core_of(shape: Shape) -> Core:
-    """Core of a shape, in the frame of the shape. Obstacles of many parts have none: see `clouds`."""
+    """Core of a shape, in the frame of the shape. Obstacles of many parts have none: see
+    `clouds`."""
     match shape:
         case Sphere():
             return Core(np.zeros((1, 3)), shape.radius)
@@ -68,7 +74,8 @@ def box_corners(low: Array, high: Array) -> Array:
 
 
 def least_height(core: Core, points: Array) -> Array:
-    """Lower bounds (k,) [m] on the distances of points (k, 3) [m], in the frame of the core, from it.
+    """Lower bounds (k,) [m] on the distances of points (k, 3) [m], in the frame of the core, from
+    it.
 
     The core is a box, a cylinder's discs or a hull with a volume: no half-space, point or segment.
     """
@@ -76,9 +83,13 @@ def least_height(core: Core, points: Array) -> Array:
         return np.asarray(np.linalg.norm(np.maximum(np.abs(points) - core.half_size, 0.0), axis=1))
     if core.disc_radius:
         half = np.abs(core.points[:, 2]).max()
-        outside = np.stack([np.abs(points[:, 2]) - half, np.hypot(points[:, 0], points[:, 1]) - core.disc_radius])
+        outside = np.stack(
+            [np.abs(points[:, 2]) - half, np.hypot(points[:, 0], points[:, 1]) - core.disc_radius]
+        )
         return np.asarray(np.linalg.norm(np.maximum(outside, 0.0), axis=0))
-    return np.asarray(np.maximum((points @ core.planes[:, :3].T + core.planes[:, 3]).max(axis=1), 0.0))
+    return np.asarray(
+        np.maximum((points @ core.planes[:, :3].T + core.planes[:, 3]).max(axis=1), 0.0)
+    )
 
 
 def _on_z_axis(length: float) -> Array:

@@ -30,14 +30,16 @@ class PairKind(IntEnum):
 class PairArrays:
     """Arrays of b bodies, in the frames of their links, and of p pairs.
 
-    `points` (b, m, 3) [m] are those of the cores, of which the first `counts` (b,) are their own. `axes` (b, 3) and
-    `disc_radii` (b,) [m] are those of cylinders, and `half_sizes` (b, 3) [m] those of boxes about `T_link_core`
-    (b, 4, 4); else zero. Balls about `ball_centres` (b, 3) [m], and beads about `bead_centres` (b, BEADS, 3) [m], cover
-    the cores without their `radii` (b,) [m].
+    `points` (b, m, 3) [m] are those of the cores, of which the first `counts` (b,) are their own.
+    `axes` (b, 3) and `disc_radii` (b,) [m] are those of cylinders, and `half_sizes` (b, 3) [m]
+    those of boxes about `T_link_core` (b, 4, 4); else zero. Balls about `ball_centres` (b, 3) [m],
+    and beads about `bead_centres` (b, BEADS, 3) [m], cover the cores without their `radii` (b,)
+    [m].
 
-    `pairs` (p, 2) are indices of bodies, and `growth` (p,) [m] what radii and margins take from their distance.
-    `formed` (p,) is the body of a pair whose form, of half size `form_sizes` (b, 3) [m] about z, is `is_cycle` (b,) or
-    a box; `beaded` (p,) is the other one. `formed` is negative where beads say nothing.
+    `pairs` (p, 2) are indices of bodies, and `growth` (p,) [m] what radii and margins take from
+    their distance. `formed` (p,) is the body of a pair whose form, of half size `form_sizes` (b, 3)
+    [m] about z, is `is_cycle` (b,) or a box; `beaded` (p,) is the other one. `formed` is negative
+    where beads say nothing.
     """
 
     links: Indices
@@ -74,21 +76,25 @@ class PairArrays:
         has_bound = (has_form[first] | has_form[second]) & ~unbounded[first]
         return PairArrays(
             links=np.array([body.link for body in bodies], dtype=np.intp),
-            # cores with fewer points repeat their last point. The box around a patch of a cloud stands for the patch:
-            # its separations are lower bounds
-            points=np.array([b.points[np.minimum(np.arange(most), len(b.points) - 1)] for b in bodies]).reshape(
-                -1, most, 3
-            ),
+            # cores with fewer points repeat their last point. The box around a patch of a cloud
+            # stands for the patch: its separations are lower bounds
+            points=np.array(
+                [b.points[np.minimum(np.arange(most), len(b.points) - 1)] for b in bodies]
+            ).reshape(-1, most, 3),
             counts=np.array([len(body.points) for body in bodies], dtype=np.intp),
             axes=np.array([body.T_link_core[:3, 2] for body in bodies]),
             disc_radii=np.array([core.disc_radius for core in cores]),
-            half_sizes=np.array([np.zeros(3) if core.half_size is None else core.half_size for core in cores]),
+            half_sizes=np.array(
+                [np.zeros(3) if core.half_size is None else core.half_size for core in cores]
+            ),
             T_link_core=np.array([body.T_link_core for body in bodies]),
             radii=radii,
             ball_centres=np.array([body.ball_centre for body in bodies]).reshape(-1, 3),
             ball_radii=np.array([body.ball_radius for body in bodies]),
             bead_centres=np.array([_bead_centres(body) for body in bodies]).reshape(-1, BEADS, 3),
-            bead_radii=np.array([body.ball_radius / (BEADS if body.is_segment else 1) for body in bodies]),
+            bead_radii=np.array(
+                [body.ball_radius / (BEADS if body.is_segment else 1) for body in bodies]
+            ),
             form_sizes=form_sizes,
             is_cycle=np.array([core.disc_radius > 0 for core in cores], dtype=bool),
             pairs=pairs,
@@ -112,13 +118,15 @@ def _kinds(bodies: Sequence[Body], pairs: Indices) -> Indices:
         PairKind.SEGMENT_BOX: segment[:, 0] & box[:, 1],
         PairKind.CLOUD: of_cloud[:, 0],
     }
-    return np.select(list(conditions.values()), [int(kind) for kind in conditions], int(PairKind.CONVEX)).astype(
-        np.intp
-    )
+    return np.select(
+        list(conditions.values()), [int(kind) for kind in conditions], int(PairKind.CONVEX)
+    ).astype(np.intp)
 
 
 def _bead_centres(body: Body) -> Array:
-    """Centres (BEADS, 3) [m] of the beads in the link frame; the beads of a body that is no segment coincide."""
+    """Centres (BEADS, 3) [m] of the beads in the link frame; the beads of a body that is no segment
+    coincide.
+    """
     if not body.is_segment:
         return np.tile(body.ball_centre, (BEADS, 1))
     fractions = (np.arange(BEADS) + 0.5) / BEADS

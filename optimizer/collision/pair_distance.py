@@ -1,8 +1,10 @@
-"""Signed distances and witness points of pairs of bodies: closed forms where they exist, Coal for the other pairs.
+"""Signed distances and witness points of pairs of bodies: closed forms where they exist, Coal for
+the other pairs.
 
-One call computes many pairs at many configurations. Index arrays (k,) select the computed cases: `configuration` is a
-row of `frames` (n, nq + 1, 4, 4), the T_base_link [m] of every link, and `pair` is a row of the pairs. All distances
-have the radii and the margins of both bodies subtracted.
+One call computes many pairs at many configurations. Index arrays (k,) select the computed cases:
+`configuration` is a row of `frames` (n, nq + 1, 4, 4), the T_base_link [m] of every link, and
+`pair` is a row of the pairs. All distances have the radii and the margins of both bodies
+subtracted.
 """
 
 from __future__ import annotations
@@ -22,9 +24,11 @@ from joulepath.optimizer.collision.pair_arrays import PairArrays, PairKind
 
 @dataclass(frozen=True)
 class WitnessPoints:
-    """Nearest points of k pairs: signed distance (k,) [m], unit normal (k, 3) from first to second body, and a point.
+    """Nearest points of k pairs: signed distance (k,) [m], unit normal (k, 3) from first to second
+    body, and a point.
 
-    `point` (k, 3) [m] lies on the line through the two nearest points, in the base frame like `normal`.
+    `point` (k, 3) [m] lies on the line through the two nearest points, in the base frame like
+    `normal`.
     """
 
     distance: Array
@@ -37,14 +41,19 @@ class WitnessPoints:
     def with_more(self, more: WitnessPoints) -> WitnessPoints:
         """These and others."""
         return WitnessPoints(
-            *(np.concatenate([getattr(self, name), getattr(more, name)]) for name in ("distance", "normal", "point"))
+            *(
+                np.concatenate([getattr(self, name), getattr(more, name)])
+                for name in ("distance", "normal", "point")
+            )
         )
 
 
 class PairGeometry:
-    """Bodies on the links of an arm of nq joints, and the `pairs` (p, 2) of them whose distances are computed.
+    """Bodies on the links of an arm of nq joints, and the `pairs` (p, 2) of them whose distances
+    are computed.
 
-    The first body of a pair is on the link nearer to the base. A half-space may only be first, and on link 0.
+    The first body of a pair is on the link nearer to the base. A half-space may only be first, and
+    on link 0.
     """
 
     def __init__(self, bodies: Sequence[Body], pairs: Indices, nq: int) -> None:
@@ -69,12 +78,17 @@ class PairGeometry:
         return self._compiled.bead_bounds(frames, configuration, pair)
 
     def witness_points(
-        self, frames: Array, configuration: Indices, pair: Indices, within: float = np.inf, part: Indices | None = None
+        self,
+        frames: Array,
+        configuration: Indices,
+        pair: Indices,
+        within: float = np.inf,
+        part: Indices | None = None,
     ) -> WitnessPoints:
         """Witness points of pairs (k,) at configurations (k,).
 
-        The distance of a patch of a cloud is that of its nearest part, infinite if above `within` [m]. Where `part`
-        (k,) is not negative, it is that of this part.
+        The distance of a patch of a cloud is that of its nearest part, infinite if above `within`
+        [m]. Where `part` (k,) is not negative, it is that of this part.
         """
         result = WitnessPoints(*self._compiled.witness_points(frames, configuration, pair))
         left = np.flatnonzero(~self.is_closed_form[pair])
@@ -86,7 +100,9 @@ class PairGeometry:
             if is_cloud:
                 parts = np.full(len(chosen), -1) if part is None else part[chosen]
                 beyond = within + self._arrays.growth[pair[chosen]]
-                found = self._clouds.witness_points(*case, *self._bodies(pair[chosen]), beyond, parts)
+                found = self._clouds.witness_points(
+                    *case, *self._bodies(pair[chosen]), beyond, parts
+                )
             else:
                 found = self._by_coal(*case, pair[chosen])
             result.distance[chosen], result.normal[chosen], result.point[chosen] = found
@@ -94,12 +110,17 @@ class PairGeometry:
         return result
 
     def surface_points(self, pair: Indices, found: WitnessPoints) -> Array:
-        """Nearest points (k, 2, 3) [m] of the first and the second body of pairs (k,), without margins."""
+        """Nearest points (k, 2, 3) [m] of the first and the second body of pairs (k,), without
+        margins.
+        """
         first, second = self._bodies(pair)
         gap = (found.distance + self._arrays.growth[pair])[:, None] * found.normal
         # the witness point is on the second core, apart from these pairs
         on_first = (self._arrays.kinds[pair] == PairKind.SEGMENT_BOX)[:, None]
-        cores = found.point - np.where(on_first, 0.0, gap), found.point + np.where(on_first, gap, 0.0)
+        cores = (
+            found.point - np.where(on_first, 0.0, gap),
+            found.point + np.where(on_first, gap, 0.0),
+        )
         radii = self._arrays.radii
         outward = radii[first][:, None] * found.normal, -radii[second][:, None] * found.normal
         return np.stack([core + out for core, out in zip(cores, outward, strict=True)], axis=1)
@@ -107,11 +128,14 @@ class PairGeometry:
     def near_parts(
         self, frames: Array, configuration: Indices, pair: Indices, within: Array
     ) -> tuple[Indices, Indices]:
-        """All (case, part) (m,) of clouds with distances of at most `within` (k,) [m], for pairs (k,) of patches.
+        """All (case, part) (m,) of clouds with distances of at most `within` (k,) [m], for pairs
+        (k,) of patches.
 
         A few that are farther away are among them.
         """
-        return self._clouds.near(frames, configuration, *self._bodies(pair), within + self._arrays.growth[pair])
+        return self._clouds.near(
+            frames, configuration, *self._bodies(pair), within + self._arrays.growth[pair]
+        )
 
     def separations(
         self,
@@ -122,18 +146,27 @@ class PairGeometry:
         normals: tuple[Array, Array],
         part: Indices,
     ) -> Array:
-        """See `CompiledDistances.separations`. Where `part` (k,) is not negative, the first body is this part of a
-        cloud, which does not move; else it is the box around the patch."""
+        """See `CompiledDistances.separations`. Where `part` (k,) is not negative, the first body is
+        this part of a cloud, which does not move; else it is the box around the patch."""
         result = self._compiled.separations(frames, begin, end, pair, normals)
         chosen = np.flatnonzero(part >= 0)
         if chosen.size:
             result[chosen] = self._of_parts(
-                frames, (begin[chosen], end[chosen]), pair[chosen], [each[chosen] for each in normals], part[chosen]
+                frames,
+                (begin[chosen], end[chosen]),
+                pair[chosen],
+                [each[chosen] for each in normals],
+                part[chosen],
             )
         return result
 
     def _of_parts(
-        self, frames: Array, at_both: tuple[Indices, Indices], pair: Indices, normals: Sequence[Array], part: Indices
+        self,
+        frames: Array,
+        at_both: tuple[Indices, Indices],
+        pair: Indices,
+        normals: Sequence[Array],
+        part: Indices,
     ) -> Array:
         """The separations (k,) [m] of parts of clouds."""
         first, second = self._bodies(pair)
@@ -144,7 +177,9 @@ class PairGeometry:
             best = np.maximum(best, np.minimum(*lowest) - highest)
         return np.asarray(best)
 
-    def gradients(self, frames: Array, configuration: Indices, pair: Indices, found: WitnessPoints) -> Array:
+    def gradients(
+        self, frames: Array, configuration: Indices, pair: Indices, found: WitnessPoints
+    ) -> Array:
         """See `CompiledDistances.gradients`."""
         return self._compiled.gradients(frames, configuration, pair, found.normal, found.point)
 
@@ -153,7 +188,13 @@ class PairGeometry:
         first, second = self._arrays.pairs[pair].T
         return first, second
 
-    def _by_coal(self, frames: Array, configuration: Indices, pair: Indices) -> tuple[Array, Array, Array]:
+    def _by_coal(
+        self, frames: Array, configuration: Indices, pair: Indices
+    ) -> tuple[Array, Array, Array]:
         T_link_core, bodies = self._arrays.T_link_core, self._bodies(pair)
-        T_first, T_second = (frames[configuration, self.links[body]] @ T_link_core[body] for body in bodies)
-        return self._convex.witness_points(bodies[0].tolist(), bodies[1].tolist(), T_first, T_second)
+        T_first, T_second = (
+            frames[configuration, self.links[body]] @ T_link_core[body] for body in bodies
+        )
+        return self._convex.witness_points(
+            bodies[0].tolist(), bodies[1].tolist(), T_first, T_second
+        )

@@ -1,7 +1,8 @@
-"""One search for a collision-free joint path by OMPL, which can be continued: RRT-Connect in a box of configurations.
+"""One search for a collision-free joint path by OMPL, which can be continued: RRT-Connect in a box
+of configurations.
 
-J. J. Kuffner, S. M. LaValle, "RRT-Connect: an efficient approach to single-query path planning", IEEE ICRA 2000, in the
-implementation of OMPL; OMPL's path simplifier shortens the path.
+J. J. Kuffner, S. M. LaValle, "RRT-Connect: an efficient approach to single-query path planning",
+IEEE ICRA 2000, in the implementation of OMPL; OMPL's path simplifier shortens the path.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from joulepath.optimizer.problem.arm import Arm
 
 # OMPL's range: maximum length [rad] of an edge of the trees, in weighted joints
 RANGE = 0.4
-# shortcuts tried on a path, and distance [rad], in weighted joints, between the states at which it is checked last
+# shortcuts tried on a path, and distance [rad], in weighted joints, between the states at which it
+# is checked last
 SHORTCUTS, LAST_STEP = 40, 0.02
 # least weight of a joint
 LEAST_WEIGHT = 0.1
@@ -30,8 +32,8 @@ LEAST_WEIGHT = 0.1
 
 @dataclass(frozen=True)
 class Box:
-    """The configurations (nq,) [rad] that a search samples, and the distance `step` [rad] between checked states of
-    an edge, in weighted joints."""
+    """The configurations (nq,) [rad] that a search samples, and the distance `step` [rad] between
+    checked states of an edge, in weighted joints."""
 
     lower: Array
     upper: Array
@@ -43,11 +45,13 @@ class Box:
 
 
 def joint_weights(arm: Arm, model: CollisionModel) -> Array:
-    """Weights (nq,) of the joints in the distances between configurations: at most 1, at least LEAST_WEIGHT.
+    """Weights (nq,) of the joints in the distances between configurations: at most 1, at least
+    LEAST_WEIGHT.
 
-    The weight is the square root of a joint's longest lever over the longest of all joints: a lever itself would make
-    wrists turn at will, equal weights would check a turn of the wrist as densely as one of the base. If a tool's axis
-    has to stay within a cone, wrists count as much as any joint.
+    The weight is the square root of a joint's longest lever over the longest of all joints: a lever
+    itself would make wrists turn at will, equal weights would check a turn of the wrist as densely
+    as one of the base. If a tool's axis has to stay within a cone, wrists count as much as any
+    joint.
     """
     levers = model.levers().max(axis=0, initial=0.0)
     if arm.tool_cone is not None or not levers.any():
@@ -56,9 +60,11 @@ def joint_weights(arm: Arm, model: CollisionModel) -> Array:
 
 
 class _Effort:
-    """State validity checks of one search, which pauses when its allowance is used up or at the deadline.
+    """State validity checks of one search, which pauses when its allowance is used up or at the
+    deadline.
 
-    It holds no reference to OMPL's objects, which hold one to it: a cycle through them would never be freed.
+    It holds no reference to OMPL's objects, which hold one to it: a cycle through them would never
+    be freed.
     """
 
     def __init__(self, checker: StateValidityChecker, weights: Array, deadline: Deadline) -> None:
@@ -81,10 +87,10 @@ class _Effort:
 class PathSearch:
     """A search in a box. `advance` goes on where it paused.
 
-    The path sought begins at the first point of `begin` (k, nq) [rad], which is a collision-free path, and leaves it at
-    any of its points. It ends at the last point of one of `ends`, and meets this path, (m, nq) each, at any of its
-    points. `last_checker` checks the path at short steps, with less reserve: what long steps cut must not be more than
-    that.
+    The path sought begins at the first point of `begin` (k, nq) [rad], which is a collision-free
+    path, and leaves it at any of its points. It ends at the last point of one of `ends`, and meets
+    this path, (m, nq) each, at any of its points. `last_checker` checks the path at short steps,
+    with less reserve: what long steps cut must not be more than that.
     """
 
     def __init__(
@@ -101,7 +107,9 @@ class PathSearch:
         self._effort = _Effort(checker, weights, deadline)
         space = ob.RealVectorStateSpace(len(weights))
         bounds = ob.RealVectorBounds(len(weights))
-        for joint, (low, high) in enumerate(zip(box.lower * weights, box.upper * weights, strict=True)):
+        for joint, (low, high) in enumerate(
+            zip(box.lower * weights, box.upper * weights, strict=True)
+        ):
             bounds.setLow(joint, float(low))
             bounds.setHigh(joint, float(high))
         space.setBounds(bounds)
@@ -140,7 +148,9 @@ class PathSearch:
         return self.is_solved
 
     def path(self) -> Array | None:
-        """The path found (k, nq) [rad], shortened; None if a state of it is in collision when it is checked densely."""
+        """The path found (k, nq) [rad], shortened; None if a state of it is in collision when it is
+        checked densely.
+        """
         path = self._whole(self._problem.getSolutionPath())
         # limited by counts, not by the clock, so that the same seed gives the same path
         simplifier = og.PathSimplifier(self._information)
@@ -148,7 +158,10 @@ class PathSearch:
         simplifier.partialShortcutPath(path, SHORTCUTS, SHORTCUTS)
         simplifier.reduceVertices(path, SHORTCUTS, SHORTCUTS)
         joints = range(len(self._weights))
-        points = np.array([[state[joint] for joint in joints] for state in path.getStates()]) / self._weights
+        points = (
+            np.array([[state[joint] for joint in joints] for state in path.getStates()])
+            / self._weights
+        )
         points = points[np.append(True, np.abs(np.diff(points, axis=0)).max(axis=1) > 0)]
         # without the rounding of the weights
         chosen, _ = _nearest([end[-1:] for end in self._ends], points[-1])
@@ -156,10 +169,13 @@ class PathSearch:
         return points if self._is_valid(points) else None
 
     def _whole(self, path: og.PathGeometric) -> og.PathGeometric:
-        """The path found, with the part of `begin` before it and the part of one of `ends` after it."""
+        """The path found, with the part of `begin` before it and the part of one of `ends` after
+        it.
+        """
         states = path.getStates()
         first, last = (
-            np.array([state[j] for j in range(len(self._weights))]) / self._weights for state in (states[0], states[-1])
+            np.array([state[j] for j in range(len(self._weights))]) / self._weights
+            for state in (states[0], states[-1])
         )
         _, left = _nearest([self._begin], first)
         chosen, met = _nearest(self._ends, last)
@@ -173,7 +189,10 @@ class PathSearch:
         """Whether states LAST_STEP apart along a path (k, nq) are valid."""
         for first, second in pairwise(points):
             count = int(np.linalg.norm((second - first) * self._weights) / LAST_STEP) + 1
-            if not all(self._last_checker.is_valid(q) for q in np.linspace(first, second, count, endpoint=False)):
+            if not all(
+                self._last_checker.is_valid(q)
+                for q in np.linspace(first, second, count, endpoint=False)
+            ):
                 return False
         return True
 

@@ -1,8 +1,9 @@
-"""What a tool and a payload that have no shape would touch: a rod up to the TCP and a ball stand in for them.
+"""What a tool and a payload that have no shape would touch: a rod up to the TCP and a ball stand in
+for them.
 
-Only links, given shapes and obstacles are kept apart. Where the flange carries a tool or a payload whose shape is not
-given, a motion can be certified although the gripper goes through the table. The stand-ins find this out on the final
-motion. They constrain nothing.
+Only links, given shapes and obstacles are kept apart. Where the flange carries a tool or a payload
+whose shape is not given, a motion can be certified although the gripper goes through the table. The
+stand-ins find this out on the final motion. They constrain nothing.
 """
 
 from __future__ import annotations
@@ -21,29 +22,36 @@ from joulepath.optimizer.result.certificate import Clearance
 
 @dataclass(frozen=True)
 class StandInSettings:
-    """Sizes of the bodies that stand in for what has no shape. They are small, so that the real body is hardly ever
-    smaller."""
+    """Sizes of the bodies that stand in for what has no shape. They are small, so that the real
+    body is hardly ever smaller."""
 
     tool_radius: float = 0.02
-    """Radius of the rod from the flange to the TCP [m]: slimmer than any gripper or torch that an arm carries, and as
-    slim as the suction cups."""
+    """Radius of the rod from the flange to the TCP [m]: slimmer than any gripper or torch that an
+    arm carries, and as slim as the suction cups."""
     payload_density: float = 1500.0
-    """Density [kg/m³] of the ball that has the payload's mass and centre: of plastics, or of metal parts with the
-    hollows that they have. Denser parts are smaller balls, but no part is as compact as a ball."""
+    """Density [kg/m³] of the ball that has the payload's mass and centre: of plastics, or of metal
+    parts with the hollows that they have. Denser parts are smaller balls, but no part is as compact
+    as a ball."""
     contact: float = 1e-3
-    """Depth [m] up to which a contact is not told: a TCP that is set down on a surface is that near to it."""
+    """Depth [m] up to which a contact is not told: a TCP that is set down on a surface is that near
+    to it.
+    """
 
 
 @dataclass(frozen=True)
 class StandIns:
-    """The collision model of the stand-ins of an arm and its obstacles, without margins and without the links."""
+    """The collision model of the stand-ins of an arm and its obstacles, without margins and without
+    the links.
+    """
 
     model: CollisionModel
     settings: StandInSettings
 
     @classmethod
     def of(cls, arm: Arm, settings: StandInSettings | None = None) -> StandIns | None:
-        """The stand-ins; None if there are no obstacles, if nothing lacks a shape, or if no collisions are checked."""
+        """The stand-ins; None if there are no obstacles, if nothing lacks a shape, or if no
+        collisions are checked.
+        """
         settings = StandInSettings() if settings is None else settings
         if not (arm.collisions and arm.scene.obstacles):
             return None
@@ -61,7 +69,9 @@ class StandIns:
         return cls(CollisionModel(alone), settings)
 
     def contacts(self, t: Array, q: Array) -> list[Clearance]:
-        """The deepest contact of each stand-in at samples q (k, nq) [rad] of a motion, at times t (k,) [s]."""
+        """The deepest contact of each stand-in at samples q (k, nq) [rad] of a motion, at times t
+        (k,) [s].
+        """
         distance = self.model.along(q, 0.0)
         found = dict[str, Clearance]()
         for column in np.argsort(distance.min(axis=0), kind="stable"):
@@ -75,7 +85,9 @@ class StandIns:
 
 
 def _rod(arm: Arm, radius: float) -> Attachment | None:
-    """The rod that begins at the flange and ends at the TCP; None for an arm with a tool, or with no TCP of its own."""
+    """The rod that begins at the flange and ends at the TCP; None for an arm with a tool, or with
+    no TCP of its own.
+    """
     tcp = arm.T_flange_tcp[:3, 3]
     length = float(np.linalg.norm(tcp))
     if arm.tool or not 2 * SIZES.smallest <= length <= SIZES.largest:
@@ -85,7 +97,9 @@ def _rod(arm: Arm, radius: float) -> Attachment | None:
 
 
 def _ball(arm: Arm, density: float) -> Attachment | None:
-    """The ball about the payload's centre of mass; None for one without mass, or with a shape of its own."""
+    """The ball about the payload's centre of mass; None for one without mass, or with a shape of
+    its own.
+    """
     payload = arm.payload
     radius = float(np.cbrt(3 * payload.mass / (4 * np.pi * density)))
     if (

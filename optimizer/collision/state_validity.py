@@ -1,7 +1,8 @@
 """State validity checking for the path planner: one configuration at a time, by Pinocchio and Coal.
 
-`CollisionModel` computes distances at many configurations at once. A planner checks one configuration after the other,
-and only needs to know whether it is valid: that takes tens of microseconds here.
+`CollisionModel` computes distances at many configurations at once. A planner checks one
+configuration after the other, and only needs to know whether it is valid: that takes tens of
+microseconds here.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from joulepath.optimizer.problem.arm import Arm
 
 
 class StateValidityChecker:
-    """Checks that all bodies keep their margins and `reserve` [m] more, and that the tool axis is within its cone.
+    """Checks that all bodies keep their margins and `reserve` [m] more, and that the tool axis is
+    within its cone.
 
     `model` is the collision model of the arm.
     """
@@ -35,7 +37,11 @@ class StateValidityChecker:
         self._axis = None if self._cone is None else T_last_tcp(arm)[:3, :3] @ self._cone.axis
         self._geometry = pin.GeometryModel()
         skins = [self._add(number, body) for number, body in enumerate(model.bodies)]
-        self._clouds, self._model, self._reserve = np.flatnonzero(model.geometry.is_cloud), model, reserve
+        self._clouds, self._model, self._reserve = (
+            np.flatnonzero(model.geometry.is_cloud),
+            model,
+            reserve,
+        )
         pairs = model.pairs[~model.geometry.is_cloud].tolist()
         for first, second in pairs:
             self._geometry.addCollisionPair(pin.CollisionPair(first, second))
@@ -44,8 +50,8 @@ class StateValidityChecker:
             growth = [model.bodies[k].core.radius + model.bodies[k].margin - skins[k] for k in pair]
             request.security_margin = sum(growth) + reserve
             request.enable_contact = False
-        # of hundreds of pairs a few are near: a tree of the bodies' bounding boxes leaves out the others. It takes the
-        # security margins as they are when it is made
+        # of hundreds of pairs a few are near: a tree of the bodies' bounding boxes leaves out the
+        # others. It takes the security margins as they are when it is made
         self._manager = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(
             self._robot, self._geometry, self._geometry_data
         )
@@ -63,13 +69,16 @@ class StateValidityChecker:
         return bool(tool_axis @ self._cone.direction >= math.cos(self._cone.half_angle))
 
     def _hits_cloud(self, q: Array) -> bool:
-        """Whether a body comes nearer to a part of a cloud than allowed: by the cloud's own tree."""
+        """Whether a body comes nearer to a part of a cloud than allowed: by the cloud's own
+        tree."""
         frames = self._model.frames(q[None])
         least = self._model.pair_distances(frames, self._clouds, self._reserve).distance.min()
         return bool(least < self._reserve)
 
     def _add(self, number: int, body: Body) -> float:
-        """Add a body to the geometry. Returns the radius [m] by which Coal's shape is grown beyond the core."""
+        """Add a body to the geometry. Returns the radius [m] by which Coal's shape is grown beyond
+        the core.
+        """
         T, skin = np.eye(4), 0.0
         shape: coal.CollisionGeometry
         if body.cloud is not None:
@@ -82,13 +91,17 @@ class StateValidityChecker:
             T[:3, :3], T[:3, 3] = transform.getRotation(), transform.getTranslation()
         # Pinocchio needs distinct names; those of bodies may repeat
         placement = pin.SE3(body.T_link_core @ T)
-        self._geometry.addGeometryObject(pin.GeometryObject(str(number), body.link, placement, shape))
+        self._geometry.addGeometryObject(
+            pin.GeometryObject(str(number), body.link, placement, shape)
+        )
         return skin
 
 
 @dataclass(frozen=True)
 class ValidityCheckers:
-    """The checkers of an arm by their reserves, each made when it is first asked for: that takes milliseconds."""
+    """The checkers of an arm by their reserves, each made when it is first asked for: that takes
+    milliseconds.
+    """
 
     arm: Arm
     model: CollisionModel

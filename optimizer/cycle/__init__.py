@@ -1,1 +1,3 @@
-"""Cycles of many stops: which configuration at each, found as a shortest path through proven bounds."""
+"""Cycles of many stops: which configuration at each, found as a shortest path through proven
+bounds.
+"""

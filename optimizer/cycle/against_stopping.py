@@ -1,4 +1,6 @@
-"""The same cycle with a rest at every stop that it passes: what passing starts from, and what it is compared with."""
+"""The same cycle with a rest at every stop that it passes: what passing starts from, and what it is
+compared with.
+"""
 
 from __future__ import annotations
 
@@ -27,8 +29,9 @@ SAME = 1e-9
 
 @dataclass(frozen=True)
 class Rested:
-    """The cycle with rests, `solution`, and its `nodes` in a search of the cycle that passes: none if it goes over
-    other configurations. `known` is its energy, motions that stand for one that passes taken as one: as ours are."""
+    """The cycle with rests, `solution`, and its `nodes` in a search of the cycle that passes: none
+    if it goes over other configurations. `known` is its energy, motions that stand for one that
+    passes taken as one: as ours are."""
 
     solution: CycleSolution
     nodes: list[int]
@@ -64,15 +67,20 @@ def start_from(search: CycleSearch, stopping: CycleSolution) -> Rested:
     return Rested(stopping, chain, replace(known, energy=energy))
 
 
-def as_passed(search: CycleSearch, rested: Rested, better: bool = True) -> tuple[list[Solution], dict[int, Wait]]:
-    """The motions of the cycle with rests, `better` ones where they pass if there are any, and its waits after moves.
+def as_passed(
+    search: CycleSearch, rested: Rested, better: bool = True
+) -> tuple[list[Solution], dict[int, Wait]]:
+    """The motions of the cycle with rests, `better` ones where they pass if there are any, and its
+    waits after moves.
 
     Raises the errors of `optimize`.
     """
     found, waits = list[Solution](), dict[int, Wait]()
     groups = moves_between_rests(search.asked, rested.solution)
     for key, moves in zip(search.pairs(rested.nodes), groups, strict=True):
-        found.append(search.as_stopping(*key, better) if key in search.stopping else moves[0].solution)
+        found.append(
+            search.as_stopping(*key, better) if key in search.stopping else moves[0].solution
+        )
         if moves[-1].wait > 0:
             waits[key[0]] = moves[-1].wait, moves[-1].wait_energy
     return found, waits
@@ -99,6 +107,9 @@ def _of_rested(rested: Rested) -> Needed:
 
 
 def _needed(baseline: CycleBaseline, rested: Rested) -> Needed:
-    """What a baseline needs: what the cycle with rests does, if it is this cycle by another name."""
-    is_same = np.isclose(baseline.electrical, rested.solution.needed.electrical.energy, rtol=SAME, atol=0)
+    """What a baseline needs: what the cycle with rests does, if it is this cycle by another
+    name."""
+    is_same = np.isclose(
+        baseline.electrical, rested.solution.needed.electrical.energy, rtol=SAME, atol=0
+    )
     return _of_rested(rested) if is_same else baseline.needed

@@ -10,10 +10,12 @@ from joulepath.models.robot import Array
 
 
 class LeastChain:
-    """The least chain through legs whose costs only rise from one question to the next, but for what `lower` says.
+    """The least chain through legs whose costs only rise from one question to the next, but for
+    what `lower` says.
 
-    `costs` are matrices (n_k, n_k+1) [J] of one leg each. A `closed` chain ends in the node in which it starts: each of
-    these has a least chain of its own, which is looked for again only while what was found for it before is the least.
+    `costs` are matrices (n_k, n_k+1) [J] of one leg each. A `closed` chain ends in the node in
+    which it starts: each of these has a least chain of its own, which is looked for again only
+    while what was found for it before is the least.
     """
 
     def __init__(self, costs: Sequence[Array], closed: bool) -> None:
@@ -54,13 +56,16 @@ class LeastChain:
             if not len(rows):
                 return np.inf, []
             all_rows = len(rows) == len(cost)
-            total = reached[-1][:, None] + cost if all_rows else reached[-1][rows, None] + cost[rows]
+            total = (
+                reached[-1][:, None] + cost if all_rows else reached[-1][rows, None] + cost[rows]
+            )
             reached.append(total.min(axis=0))
         node = int(reached[-1].argmin()) if last is None else last
         if not np.isfinite(reached[-1][node]):
             return np.inf, []
         nodes = [node]
         for before, cost in zip(reached[-2::-1], self.costs[::-1], strict=True):
-            # where each node came from is asked on one chain alone: several times less than for all of them
+            # where each node came from is asked on one chain alone: several times less than for all
+            # of them
             nodes.append(int((before + cost[:, nodes[-1]]).argmin()))
         return float(reached[-1][node]), nodes[::-1]

@@ -28,7 +28,8 @@ from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.sliding import FIXED
 
-# singular values below this share of the largest do not count: next to a singularity, steps stay short
+# singular values below this share of the largest do not count: next to a singularity, steps stay
+# short
 SINGULAR = 1e-2
 # configurations that differ by less in every joint are the same [rad]
 SAME = 1e-3
@@ -44,7 +45,8 @@ def beside(asked: Cycle, found: CycleSolution, step: float) -> Cycle:
     """
     at, around = _visited(found), _neighbours(found)
     stops = [
-        stop if stop.path else _beside_stop(asked, stop, at[stop.name], around[stop.name], step) for stop in asked.stops
+        stop if stop.path else _beside_stop(asked, stop, at[stop.name], around[stop.name], step)
+        for stop in asked.stops
     ]
     return replace(asked, stops=stops)
 
@@ -60,7 +62,9 @@ def _is_free(arm: Arm, stop: Stop) -> bool:
     if arm.robot.nq > FIXED:
         return True
     kinematics = required_inverse_kinematics(arm.robot, stop.name)
-    found = kinematics.solve(stop.target.T, arm.T_flange_tcp, arm.active_limits, windings=False, target=stop.name)
+    found = kinematics.solve(
+        stop.target.T, arm.T_flange_tcp, arm.active_limits, windings=False, target=stop.name
+    )
     return any(each.self_motion is not None for each in found)
 
 
@@ -97,7 +101,9 @@ def _neighbours(found: CycleSolution) -> Mapping[str, list[Array]]:
     return around
 
 
-def _beside(arm: Arm, pose: ConeOrientedPose, q: Array, around: list[Array], step: float) -> list[Array]:
+def _beside(
+    arm: Arm, pose: ConeOrientedPose, q: Array, around: list[Array], step: float
+) -> list[Array]:
     """The configuration q (nq,) [rad], and different ones beside it that reach the pose."""
     manifold, weights = GoalManifold.of(arm, pose), 1 / arm.active_limits.v_max
     R, J = tcp_pose(arm, q)[:3, :3], tcp_jacobian(arm, q)
@@ -110,7 +116,8 @@ def _beside(arm: Arm, pose: ConeOrientedPose, q: Array, around: list[Array], ste
 
 
 def _along_curve(arm: Arm, q: Array, turned_to: list[Array], step: float) -> list[Array]:
-    """Configurations (nq,) [rad] on the curve that holds the pose of q: q and a `step` to each side.
+    """Configurations (nq,) [rad] on the curve that holds the pose of q: q and a `step` to each
+    side.
 
     Each is there also with the full turns that bring it nearest to one of `turned_to`.
     """

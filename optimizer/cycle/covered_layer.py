@@ -1,9 +1,12 @@
-"""All configurations of a stop that leaves the angle of the tool free, known or not, in boxes of joint positions.
+"""All configurations of a stop that leaves the angle of the tool free, known or not, in boxes of
+joint positions.
 
-There is a box for each branch of the arm and each cell of the angle (`kinematics.turned_pose_boxes`). At first it holds
-the configurations of the cell but for full turns. Where it matters, a cell is halved; and once it is small, it is
-replaced by one for every full turn of its joints that brings a part of the box within the limits. Then the boxes have
-their places. Of a joint that is nearly free in the box, like those of a stretched wrist, any full turn counts for good.
+There is a box for each branch of the arm and each cell of the angle
+(`kinematics.turned_pose_boxes`). At first it holds the configurations of the cell but for full
+turns. Where it matters, a cell is halved; and once it is small, it is replaced by one for every
+full turn of its joints that brings a part of the box within the limits. Then the boxes have their
+places. Of a joint that is nearly free in the box, like those of a stretched wrist, any full turn
+counts for good.
 """
 
 from __future__ import annotations
@@ -22,20 +25,21 @@ from joulepath.optimizer.kinematics.turned_pose_boxes import BRANCHES, TurnedPos
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.least_displacement import ROUNDING
 
-# cells of the angle at first, and the half width [rad] below which one is not halved; nor if no side of its box is
-# longer than another one
+# cells of the angle at first, and the half width [rad] below which one is not halved; nor if no
+# side of its box is longer than another one
 CELLS, SMALLEST, SMALL_BOX = 48, 1e-5, 0.003
-# half width [rad] of a cell from which on the full turns of its joints are told apart, and half side of the box [rad]
-# of a joint that has them
+# half width [rad] of a cell from which on the full turns of its joints are told apart, and half
+# side of the box [rad] of a joint that has them
 TURNED, NARROW = 0.04, 1.0
 
 
 @dataclass(frozen=True)
 class Cells:
-    """Cells (n,) of the angle, of half `width` about `angle` [rad], on a `branch`; the boxes that hold their
-    configurations, of middles `centre` and half sides `half` (n, nq) [rad]; and for each of some arms the least and the
-    greatest potential energy in them, `levels` (n, arms, 2) [J]. Joints that are `placed` (n, nq) are within the box,
-    others with any full turns; `turned` (n,): whether full turns have been told apart."""
+    """Cells (n,) of the angle, of half `width` about `angle` [rad], on a `branch`; the boxes that
+    hold their configurations, of middles `centre` and half sides `half` (n, nq) [rad]; and for each
+    of some arms the least and the greatest potential energy in them, `levels` (n, arms, 2) [J].
+    Joints that are `placed` (n, nq) are within the box, others with any full turns; `turned` (n,):
+    whether full turns have been told apart."""
 
     angle: Array
     width: Array
@@ -51,38 +55,58 @@ class Cells:
 
     def joined(self, other: Cells) -> Cells:
         """These cells, then the others."""
-        return Cells(*(np.concatenate([getattr(b, each.name) for b in (self, other)]) for each in fields(self)))
+        return Cells(
+            *(
+                np.concatenate([getattr(b, each.name) for b in (self, other)])
+                for each in fields(self)
+            )
+        )
 
 
 class CoveredLayer:
-    """The `cells` of a pose that is turned about its free axis, with boxes that hold all of its configurations.
+    """The `cells` of a pose that is turned about its free axis, with boxes that hold all of its
+    configurations.
 
-    Their levels are those of the arms of `prepared`, the problems of the moves to it and from it, which may carry
-    different payloads.
+    Their levels are those of the arms of `prepared`, the problems of the moves to it and from it,
+    which may carry different payloads.
     """
 
     def __init__(
-        self, turned: TurnedPose, prepared: Sequence[PreparedProblem], nearest: bool = False, is_turned: bool = True
+        self,
+        turned: TurnedPose,
+        prepared: Sequence[PreparedProblem],
+        nearest: bool = False,
+        is_turned: bool = True,
     ) -> None:
         self._turned, limits = turned, prepared[0].arm.active_limits
         middle, reach = (limits.q_min + limits.q_max) / 2, np.pi if nearest else np.inf
-        self._range = np.maximum(limits.q_min, middle - reach), np.minimum(limits.q_max, middle + reach)
+        self._range = (
+            np.maximum(limits.q_min, middle - reach),
+            np.minimum(limits.q_max, middle + reach),
+        )
         arms = [each.arm for each in prepared]
         # the highest that an arm can be is the lowest under gravity turned cycle
         upside_down = [replace(arm, gravity=-np.asarray(arm.gravity)) for arm in arms]
-        self._shapes = [[PoseBoxes(arm, turned.pose) for arm in both] for both in zip(arms, upside_down, strict=True)]
+        self._shapes = [
+            [PoseBoxes(arm, turned.pose) for arm in both]
+            for both in zip(arms, upside_down, strict=True)
+        ]
         count, half = (CELLS, np.pi / CELLS) if is_turned else (1, 0.0)
         number, branch = (each.ravel() for each in np.indices((count, BRANCHES)))
-        self.cells, _ = self._held(np.asarray(half * 2.0 * number), np.full(number.shape, half), branch)
+        self.cells, _ = self._held(
+            np.asarray(half * 2.0 * number), np.full(number.shape, half), branch
+        )
 
     @staticmethod
     def of(layer: Layer, prepared: Sequence[PreparedProblem], nearest: bool) -> CoveredLayer | None:
-        """The cells of a layer that is around a pose; None for an arm, or a pose, of which not all configurations can
-        be covered."""
+        """The cells of a layer that is around a pose; None for an arm, or a pose, of which not all
+        configurations can be covered."""
         if layer.around is None:
             return None
         turned = TurnedPose.of(prepared[0].arm, layer.around, layer.given)
-        return None if turned is None else CoveredLayer(turned, prepared, nearest, layer.given is None)
+        return (
+            None if turned is None else CoveredLayer(turned, prepared, nearest, layer.given is None)
+        )
 
     def _held(self, angle: Array, width: Array, branch: Indices) -> tuple[Cells, Indices]:
         """Those of some cells that may hold any configuration, and their numbers."""
@@ -90,10 +114,19 @@ class CoveredLayer:
         centre[held], half[held], held[held] = self._shapes[0][0].narrowed(centre[held], half[held])
         rows = np.flatnonzero(held)
         centre, half = centre[rows], half[rows]
-        levels = [[up.least_potential(centre, half), -down.least_potential(centre, half)] for up, down in self._shapes]
+        levels = [
+            [up.least_potential(centre, half), -down.least_potential(centre, half)]
+            for up, down in self._shapes
+        ]
         told = np.zeros(centre.shape, dtype=bool), np.zeros(len(centre), dtype=bool)
         return Cells(
-            angle[rows], width[rows], branch[rows], centre, half, np.array(levels).transpose(2, 0, 1), *told
+            angle[rows],
+            width[rows],
+            branch[rows],
+            centre,
+            half,
+            np.array(levels).transpose(2, 0, 1),
+            *told,
         ), rows
 
     def keep(self, rows: Indices) -> None:
@@ -101,10 +134,11 @@ class CoveredLayer:
         self.cells = self.cells[rows]
 
     def split(self, chosen: Mask) -> tuple[Indices, Indices]:
-        """Put parts of the cells that are `chosen` (n,) in their place: both halves, but of the smallest; or one for
-        every full turn.
+        """Put parts of the cells that are `chosen` (n,) in their place: both halves, but of the
+        smallest; or one for every full turn.
 
-        The number (n,) of the cell that each cell was, or was part of; and the numbers of those that are new.
+        The number (n,) of the cell that each cell was, or was part of; and the numbers of those
+        that are new.
         """
         cells = self.cells
         turns = chosen & ~cells.turned & (cells.width < TURNED)
@@ -115,7 +149,9 @@ class CoveredLayer:
         self.cells = cells[kept]
         for new, _ in parts:
             self.cells = self.cells.joined(new)
-        return np.concatenate([kept, *(of for _, of in parts)]), np.arange(len(kept), len(self.cells.angle))
+        return np.concatenate([kept, *(of for _, of in parts)]), np.arange(
+            len(kept), len(self.cells.angle)
+        )
 
     def _halves(self, split: Indices) -> tuple[Cells, Indices]:
         """Both halves of some cells, and the number of the cell that each is part of."""
@@ -129,7 +165,9 @@ class CoveredLayer:
         return replace(new, centre=centre, placed=whole.placed, turned=whole.turned), part_of[rows]
 
     def _with_turns(self, split: Indices) -> tuple[Cells, Indices]:
-        """Some cells with every full turn within the limits, and the number of the cell that each was."""
+        """Some cells with every full turn within the limits, and the number of the cell that each
+        was.
+        """
         cells, (lowest, highest) = self.cells[split], self._range
         placed = cells.half < NARROW
         centre = np.where(placed, wrapped(cells.centre), cells.centre)
@@ -139,11 +177,16 @@ class CoveredLayer:
             least, most = lowest[j] - ROUNDING, highest[j] + ROUNDING
             reach = int(np.ceil(max(-least, most) / (2 * np.pi))) + 1
             turns = 2 * np.pi * np.arange(-reach, reach + 1)
-            at, half = (centre[part, j] + shift[:, j])[:, None] + turns, cells.half[part, j][:, None]
+            at, half = (
+                (centre[part, j] + shift[:, j])[:, None] + turns,
+                cells.half[part, j][:, None],
+            )
             inside = (at - half <= most) & (at + half >= least)
             inside = np.where(placed[part, j][:, None], inside, turns == 0)
             row, turn = np.nonzero(inside)
             part, shift = part[row], shift[row]
             shift[:, j] = turns[turn]
         told = np.ones(len(part), dtype=bool)
-        return replace(cells[part], centre=centre[part] + shift, placed=placed[part], turned=told), split[part]
+        return replace(
+            cells[part], centre=centre[part] + shift, placed=placed[part], turned=told
+        ), split[part]

@@ -1,4 +1,6 @@
-"""The search for the cycle of least energy in its own time, which certifies its moves as `optimize` does."""
+"""The search for the cycle of least energy in its own time, which certifies its moves as `optimize`
+does.
+"""
 
 from __future__ import annotations
 
@@ -33,13 +35,14 @@ from joulepath.optimizer.search.attempts import settled, solve
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.trajectories.spline import Spline
 
-# shares of the deadline that the search leaves to the motions of its answer, and these to certify a simpler cycle that
-# needs less
+# shares of the deadline that the search leaves to the motions of its answer, and these to certify a
+# simpler cycle that needs less
 RESERVED, KEPT = 0.3, 0.08
 # routes through passes that are tried for a pair at most, and while none has a motion
 MOST_ROUTES, MOST_FAILED = 3, 10
-# stops beyond which the proof that no chain is better is worth less than its time: a pair that is not solved weighs so
-# much more than its bound then, of the 17 % more that motions need in the median
+# stops beyond which the proof that no chain is better is worth less than its time: a pair that is
+# not solved weighs so much more than its bound then, of the 17 % more that motions need in the
+# median
 MANY_STOPS, LIKELY_MORE = 40, 0.1
 # mean times of a first motion that one may take in any case
 MANY_TIMES = 4
@@ -52,7 +55,11 @@ class CycleSearch(LazySearch):
     """
 
     def __init__(
-        self, asked: Cycle, clock: Clock, moves: Sequence[PlannedMove] | None = None, tell: Tell = nobody
+        self,
+        asked: Cycle,
+        clock: Clock,
+        moves: Sequence[PlannedMove] | None = None,
+        tell: Tell = nobody,
     ) -> None:
         self.asked, self.clock = asked, clock
         self.moves = asked.moves if moves is None else moves
@@ -72,7 +79,9 @@ class CycleSearch(LazySearch):
                 legs = [self._leg(move, layers) for move in self.moves]
         except DeadlinePassed:
             raise DeadlineExceeded([]) from None
-        self._is_rough = (asked.rough or len(asked.stops) > MANY_STOPS) and asked.objective == "electrical"
+        self._is_rough = (
+            asked.rough or len(asked.stops) > MANY_STOPS
+        ) and asked.objective == "electrical"
         for leg in legs:
             if self._is_rough and not isinstance(leg, PassingLeg):
                 leg.weigh_more(LIKELY_MORE)
@@ -85,7 +94,9 @@ class CycleSearch(LazySearch):
         self._first = [0, *accumulate(len(leg.pair) for leg in legs)]
         tell(CandidatesFound(self._first[-1]))
         known = all(leg.closed for leg in legs) and tell is not nobody
-        self._proven = LeastChain([leg.least_costs for leg in legs], asked.closed).find()[0] if known else None
+        self._proven = (
+            LeastChain([leg.least_costs for leg in legs], asked.closed).find()[0] if known else None
+        )
 
     def _leg(self, move: PlannedMove, layers: Mapping[str, Layer]) -> Leg:
         start, *between, goal = (layers[place] for place in (move.start, *move.through, move.goal))
@@ -101,7 +112,8 @@ class CycleSearch(LazySearch):
     def run(self) -> list[int]:
         """The nodes of the chain of least energy, whose motions are all in `solutions`.
 
-        Once the time is up, of the chains whose motions are. Raises NoSequence, or DeadlineExceeded if there are none.
+        Once the time is up, of the chains whose motions are. Raises NoSequence, or DeadlineExceeded
+        if there are none.
         """
         while True:
             try:
@@ -115,18 +127,30 @@ class CycleSearch(LazySearch):
                 raise
 
     def _finish(self, nodes: list[int]) -> bool:
-        """Finish the moves of a chain; whether some were not in `solutions`. Raises DeadlineExceeded."""
-        # what has no motion yet may take all the time that is left, the others a share of it in a long cycle
-        fresh = sorted((each for each in self.pairs(nodes) if each not in self.solutions), key=self._runs.__contains__)
+        """Finish the moves of a chain; whether some were not in `solutions`. Raises
+        DeadlineExceeded.
+        """
+        # what has no motion yet may take all the time that is left, the others a share of it in a
+        # long cycle
+        fresh = sorted(
+            (each for each in self.pairs(nodes) if each not in self.solutions),
+            key=self._runs.__contains__,
+        )
         for done, each in enumerate(fresh):
             shared = self._is_rough and each in self._runs
             self.finish(*each, share=1 / (len(fresh) - done) if shared else 1.0)
         return bool(fresh)
 
     def attempt(self, k: int, s: int, g: int) -> float | None:
-        """Objective [J] of a first motion of a pair, whose run is kept; inf if none is found, None if too late."""
+        """Objective [J] of a first motion of a pair, whose run is kept; inf if none is found, None
+        if too late.
+        """
         leg = self.legs[k]
-        energy = self._attempt_routes(leg, k, s, g) if isinstance(leg, PassingLeg) else self._attempt(k, s, g)
+        energy = (
+            self._attempt_routes(leg, k, s, g)
+            if isinstance(leg, PassingLeg)
+            else self._attempt(k, s, g)
+        )
         if energy is not None:
             kind, solved = int(self.legs[k].kind[s, g]), bool(np.isfinite(energy))
             self._tell(
@@ -140,7 +164,9 @@ class CycleSearch(LazySearch):
         return energy
 
     def chain_tried(self, nodes: list[int]) -> None:
-        """Tells the cycle of this chain, if all of it is solved and it takes a time that is asked for."""
+        """Tells the cycle of this chain, if all of it is solved and it takes a time that is asked
+        for.
+        """
         if self._tell is nobody:
             return
         energy, motions = self.cost(nodes), [self.motion(*each) for each in self.pairs(nodes)]
@@ -154,7 +180,9 @@ class CycleSearch(LazySearch):
             self._tell(Improved(energy, own, self._proven))
 
     def _attempt_routes(self, leg: PassingLeg, k: int, s: int, g: int) -> float | None:
-        """The least of `_attempt` over the likeliest routes of a pair, first the one along which a motion is known."""
+        """The least of `_attempt` over the likeliest routes of a pair, first the one along which a
+        motion is known.
+        """
         key, best, kept = (k, s, g), None, None
         first = [(-np.inf, self.stopping[key][0])] if key in self.stopping else []
         others = (each for each in leg.best_routes(s, g) if not first or each[1] != first[0][1])
@@ -162,7 +190,10 @@ class CycleSearch(LazySearch):
             known = np.inf if best is None else best
             if np.isfinite(known) and bound >= known:
                 break
-            if tried >= (MOST_ROUTES if np.isfinite(known) else MOST_FAILED) or LIKELY * bound >= known:
+            if (
+                tried >= (MOST_ROUTES if np.isfinite(known) else MOST_FAILED)
+                or LIKELY * bound >= known
+            ):
                 self.routes_left = True
                 break
             leg.routes[s, g] = route
@@ -185,7 +216,11 @@ class CycleSearch(LazySearch):
         first = isinstance(self.legs[k], PassingLeg) and not self.legs[k].solved
         # near the end of the search, a share of what is left is less than any motion takes
         left, usual = self.search_end.left, MANY_TIMES * float(np.mean(self._spent or [0.0]))
-        time = self._shared(k, self.search_end).left if first else max(SHARE_OF_A_LEG * left, min(usual, left))
+        time = (
+            self._shared(k, self.search_end).left
+            if first
+            else max(SHARE_OF_A_LEG * left, min(usual, left))
+        )
         run = self._run(k, self._problem_of(k, s, g, time))
         try:
             run.prepare()
@@ -201,7 +236,9 @@ class CycleSearch(LazySearch):
         if candidate.energy is None:
             motions, key = self._known_motions, self._known_motions.key("tried", run.problem)
             known = motions.recall(key)
-            candidate.attempt = result = solve(incumbent, candidate) if known is None else known.result
+            candidate.attempt = result = (
+                solve(incumbent, candidate) if known is None else known.result
+            )
             if result.spline is not None and not incumbent.cut_short:
                 motions.keep(key, KnownMotion(result.spline, result.stationarity))
             if result.status is SolveStatus.OUT_OF_TIME:
@@ -218,8 +255,8 @@ class CycleSearch(LazySearch):
 
     @property
     def leaves_better(self) -> bool:
-        """Whether some chain has a bound below the best one, where legs weigh more than their bounds: through passes,
-        and in a rough cycle or one of many stops."""
+        """Whether some chain has a bound below the best one, where legs weigh more than their
+        bounds: through passes, and in a rough cycle or one of many stops."""
         if self.routes_left or not (self.asked.passes or self._is_rough):
             return self.routes_left
         return self.leaves_chains
@@ -233,10 +270,15 @@ class CycleSearch(LazySearch):
         """Whether the certificate confirms a motion of a pair."""
         leg = self.legs[k]
         problem = self._problem_of(k, s, g, self.asked.deadline)
-        return certify(problem, spline, leg.start.q[s], leg.goal.q[g], leg.prepared.energy(spline)).valid
+        return certify(
+            problem, spline, leg.start.q[s], leg.goal.q[g], leg.prepared.energy(spline)
+        ).valid
 
-    def solve_in(self, k: int, s: int, g: int, duration: float, begin: Sequence[Spline] = ()) -> Solution:
-        """The certified motion of a pair in a given duration [s], from known motions if there are any to `begin` with.
+    def solve_in(
+        self, k: int, s: int, g: int, duration: float, begin: Sequence[Spline] = ()
+    ) -> Solution:
+        """The certified motion of a pair in a given duration [s], from known motions if there are
+        any to `begin` with.
 
         Raises the errors of `optimize`.
         """
@@ -244,13 +286,17 @@ class CycleSearch(LazySearch):
         fixed = replace(problem, duration_min=duration, duration_max=duration)
         own, known = self.solutions.get((k, s, g)), [*self._known(k, s, g), *begin]
         if own is not None and self.moves[k].tool_path is not None:
-            # a path that is followed as fast as it can be is not followed so fast again without a guess
+            # a path that is followed as fast as it can be is not followed so fast again without a
+            # guess
             known.append(own.trajectory.spline)
         key = self._known_motions.key("finished", fixed, known)
-        return self._recalled(k, key, fixed) or self._kept(key, self._run(k, fixed, known).solution())
+        return self._recalled(k, key, fixed) or self._kept(
+            key, self._run(k, fixed, known).solution()
+        )
 
     def finish(self, k: int, s: int, g: int, share: float = 1.0) -> None:
-        """Optimise the motion of a pair to the end, in this share of the time that is left, and certify it.
+        """Optimise the motion of a pair to the end, in this share of the time that is left, and
+        certify it.
 
         Raises DeadlineExceeded if no time is left.
         """
@@ -284,7 +330,9 @@ class CycleSearch(LazySearch):
     def _kept(self, key: str, found: Solution) -> Solution:
         """A solution, whose motion is kept if no more time would make it better."""
         if found.status == "optimal":
-            self._known_motions.keep(key, KnownMotion(found.trajectory.spline, found.solver.stationarity))
+            self._known_motions.keep(
+                key, KnownMotion(found.trajectory.spline, found.solver.stationarity)
+            )
         return found
 
     def _recalled(self, k: int, key: str, problem: Problem) -> Solution | None:
@@ -299,18 +347,23 @@ class CycleSearch(LazySearch):
             return None
 
     def _end_of(self, k: int, kept: float = 0.0) -> Deadline:
-        """The deadline of the motion of a leg, with time [s] kept. Raises DeadlineExceeded if none is left."""
+        """The deadline of the motion of a leg, with time [s] kept. Raises DeadlineExceeded if none
+        is left.
+        """
         end = self.end.earlier_by(kept)
         if end.passed:
             raise DeadlineExceeded([])
         return self._shared(k, end) if isinstance(self.legs[k], PassingLeg) else end
 
     def _shared(self, k: int, end: Deadline) -> Deadline:
-        """The end of what a leg through passes may take of the time until `end`: it may take all that it gets.
+        """The end of what a leg through passes may take of the time until `end`: it may take all
+        that it gets.
 
         It leaves as much for each that comes after it, and for the other legs.
         """
-        return end.within(end.left / (1 + sum(isinstance(leg, PassingLeg) for leg in self.legs[k:])))
+        return end.within(
+            end.left / (1 + sum(isinstance(leg, PassingLeg) for leg in self.legs[k:]))
+        )
 
     def _known(self, k: int, s: int, g: int) -> list[Spline]:
         """The motion that rests at the passes of a pair, if one is known along its route."""
@@ -321,7 +374,8 @@ class CycleSearch(LazySearch):
         return [spline] if leg.route(s, g) == route else []
 
     def as_stopping(self, k: int, s: int, g: int, better: bool) -> Solution:
-        """The motion of a pair that rests at its passes; a `better` one of the same duration if there is one.
+        """The motion of a pair that rests at its passes; a `better` one of the same duration if
+        there is one.
 
         Raises the errors of `optimize`.
         """
@@ -334,7 +388,9 @@ class CycleSearch(LazySearch):
         return self.as_it_is(k, s, g, motion)
 
     def as_it_is(self, k: int, s: int, g: int, motion: Spline) -> Solution:
-        """The solution that a motion of a pair is. Raises NoTrajectory if it is not certified, or DeadlineExceeded."""
+        """The solution that a motion of a pair is. Raises NoTrajectory if it is not certified, or
+        DeadlineExceeded.
+        """
         return self._run(k, self._problem_of(k, s, g, self.end.left)).as_it_is(motion)
 
     def _run(self, k: int, problem: Problem, known: Sequence[Spline] = ()) -> Run:

@@ -39,10 +39,11 @@ from joulepath.optimizer.result.solution import Solution
 class CycleMove:
     """One move as it was `planned`, with its `solution` and its `passes` through stops.
 
-    It begins at `t0` [s] of the cycle. The dwell after it draws `dwell_energy` [J]; then it waits for `wait` [s], which
-    draws `wait_energy` [J]. `pairs` of configurations were possible, of so many `kinds`, of which so many were
-    `solved`. `sensitivity` is that of the energy of all three. `charges` [J] are those of an energy storage on the
-    bus when the move begins, when it ends, after the dwell and after the wait; none without one.
+    It begins at `t0` [s] of the cycle. The dwell after it draws `dwell_energy` [J]; then it waits
+    for `wait` [s], which draws `wait_energy` [J]. `pairs` of configurations were possible, of so
+    many `kinds`, of which so many were `solved`. `sensitivity` is that of the energy of all three.
+    `charges` [J] are those of an energy storage on the bus when the move begins, when it ends,
+    after the dwell and after the wait; none without one.
     """
 
     planned: PlannedMove
@@ -112,7 +113,9 @@ class CycleMove:
 
 @dataclass(frozen=True)
 class Needed:
-    """What a cycle needs: electrical energy, how well that is known, and the mechanical work of its moves [J]."""
+    """What a cycle needs: electrical energy, how well that is known, and the mechanical work of its
+    moves [J].
+    """
 
     electrical: Known
     mechanical: float
@@ -135,18 +138,19 @@ CycleBaselineName = Literal[
 
 @dataclass(frozen=True, kw_only=True)
 class CycleBaseline:
-    """The same stops with the same payloads and dwells, in another way, and in the `time` that is asked
-    for."""
+    """The same stops with the same payloads and dwells, in another way, and in the `time` that is
+    asked for."""
 
     name: CycleBaselineName
-    """`stopping`: the best cycle that rests at the stops with `via`, too; the others then rest there as
-    well. `move_by_move`: at each stop the move that needs the least energy by itself, as successive
-    calls of `POST /optimize` choose it. `controller_default`: to the nearest configuration each time,
-    by the robot's own controller with its default speed and acceleration. Where `time` changes the
-    cycle: `same_factor`, every move slowed or sped up alike; `fastest_then_wait`, the fastest cycle,
-    in configurations of its own, and a wait. With a free order, where it is allowed: `given_order`,
-    the best cycle in the order of `stops`. With an energy storage on the bus: `without_storage`, the
-    best cycle on the same bus without it, beside `move_by_move` alone."""
+    """`stopping`: the best cycle that rests at the stops with `via`, too; the others then rest
+    there as well. `move_by_move`: at each stop the move that needs the least energy by itself, as
+    successive calls of `POST /optimize` choose it. `controller_default`: to the nearest
+    configuration each time, by the robot's own controller with its default speed and acceleration.
+    Where `time` changes the cycle: `same_factor`, every move slowed or sped up alike;
+    `fastest_then_wait`, the fastest cycle, in configurations of its own, and a wait. With a free
+    order, where it is allowed: `given_order`, the best cycle in the order of `stops`. With an
+    energy storage on the bus: `without_storage`, the best cycle on the same bus without it, beside
+    `move_by_move` alone."""
     duration: Seconds
     """Duration of this cycle."""
     electrical: Joules = field(init=False)
@@ -171,12 +175,12 @@ class CycleBaseline:
 
 @dataclass(frozen=True)
 class CycleSolution:
-    """The cycle of least energy. No cycle over these stops, of any configurations and shapes, with rests at the stops
-    that it does not pass, needs less than `lower_bound` [J] of the objective.
+    """The cycle of least energy. No cycle over these stops, of any configurations and shapes, with
+    rests at the stops that it does not pass, needs less than `lower_bound` [J] of the objective.
 
-    `status` is `optimal` if no chain of configurations has a bound below what was found, and every move converged.
-    `storage` is what an energy storage on the bus did; None without one. `price_of_time` [W] is what one more second
-    would save; negative where time is left over.
+    `status` is `optimal` if no chain of configurations has a bound below what was found, and every
+    move converged. `storage` is what an energy storage on the bus did; None without one.
+    `price_of_time` [W] is what one more second would save; negative where time is left over.
     """
 
     status: Literal["optimal", "feasible"]
@@ -201,7 +205,10 @@ class CycleSolution:
         energy = summed([move.solution for move in self.moves], resting)
         known = self.needed.electrical
         return with_interval(
-            replace(energy, storage=self.storage), known.sensitivity, known.duration, self.moves[0].planned.arm
+            replace(energy, storage=self.storage),
+            known.sensitivity,
+            known.duration,
+            self.moves[0].planned.arm,
         )
 
     @property
@@ -215,7 +222,10 @@ class CycleSolution:
         return [
             name
             for move in self.moves
-            for name in (*move.planned.through, *([move.planned.goal] if move.planned.at_stop else []))
+            for name in (
+                *move.planned.through,
+                *([move.planned.goal] if move.planned.at_stop else []),
+            )
         ]
 
     @property
@@ -237,7 +247,8 @@ class CycleSolution:
             joins=self.joins,
             pass_error=max(each.pass_error for each in certificates),
             energy_error=max(each.energy_error for each in certificates),
-            balance_error=abs(electrical.parts_sum - electrical.total) / abs(electrical.total or 1.0),
+            balance_error=abs(electrical.parts_sum - electrical.total)
+            / abs(electrical.total or 1.0),
             clearance=self._clearance,
         )
 
@@ -247,7 +258,9 @@ class CycleSolution:
         leg, nearest = 0, None
         for move in self.moves:
             clearance = move.solution.certificate.clearance
-            if clearance is not None and (nearest is None or clearance.min_clearance < nearest.min_clearance):
+            if clearance is not None and (
+                nearest is None or clearance.min_clearance < nearest.min_clearance
+            ):
                 nearest = CycleClearance(**vars(clearance), leg=leg)
             leg += len(move.legs(self.objective))
         return nearest
@@ -266,15 +279,23 @@ class CycleSolution:
 def needed_by(moves: Sequence[CycleMove]) -> Needed:
     """What moves and their rests need."""
     sensitivity = reduce(add, [move.sensitivity for move in moves])
-    known = Known(sum(move.energy for move in moves), sensitivity, sum(move.solution.duration for move in moves))
+    known = Known(
+        sum(move.energy for move in moves),
+        sensitivity,
+        sum(move.solution.duration for move in moves),
+    )
     return Needed(known, sum(move.solution.energy.mechanical.total for move in moves))
 
 
 def summed(solutions: Sequence[Solution], dwell: float) -> Energy:
-    """The energy of several motions, and of the dwells between them [J]; mean power is that of the motions."""
+    """The energy of several motions, and of the dwells between them [J]; mean power is that of the
+    motions.
+    """
     energies = [each.energy for each in solutions]
     parts = [part.name for part in fields(ElectricalEnergy) if part.name != "interval"]
-    electrical = ElectricalEnergy(**{part: sum(getattr(each.electrical, part) for each in energies) for part in parts})
+    electrical = ElectricalEnergy(
+        **{part: sum(getattr(each.electrical, part) for each in energies) for part in parts}
+    )
     moving = sum(each.duration for each in solutions)
     return Energy(
         electrical=electrical,

@@ -1,8 +1,10 @@
-"""Paths of stops that no configuration follows whole, divided by reconfigurations where these cost least.
+"""Paths of stops that no configuration follows whole, divided by reconfigurations where these cost
+least.
 
-The parts are as few as possible. Among divisions into as few, that one is taken whose reconfigurations have the least
-lower bounds together, by dynamic programming over places along the path and the strands on which the arm may be there
-(compare IKLink, Y. Wang, C. Sifferman, M. Gleicher, 2024). At the places found, the cycle chooses the configurations.
+The parts are as few as possible. Among divisions into as few, that one is taken whose
+reconfigurations have the least lower bounds together, by dynamic programming over places along the
+path and the strands on which the arm may be there (compare IKLink, Y. Wang, C. Sifferman, M.
+Gleicher, 2024). At the places found, the cycle chooses the configurations.
 """
 
 from __future__ import annotations
@@ -38,8 +40,8 @@ TINY = 1e-9
 
 
 def with_divided_paths(asked: Cycle) -> Cycle:
-    """The cycle; a stop with a path that is to be divided, and that no configuration follows whole, is one stop for
-    each part. The last one has its name, those before are called NAME/1, NAME/2, …
+    """The cycle; a stop with a path that is to be divided, and that no configuration follows whole,
+    is one stop for each part. The last one has its name, those before are called NAME/1, NAME/2, …
 
     Raises the errors of `layers_of_stop` for such stops.
     """
@@ -50,7 +52,9 @@ def with_divided_paths(asked: Cycle) -> Cycle:
         stops += parts
     if len(stops) == len(asked.stops):
         return asked
-    return replace(asked, stops=stops, order=None if asked.order is None else _order(asked.order, parts_of))
+    return replace(
+        asked, stops=stops, order=None if asked.order is None else _order(asked.order, parts_of)
+    )
 
 
 def _order(order: FreeOrder, parts_of: dict[str, list[str]]) -> FreeOrder:
@@ -79,35 +83,47 @@ def _parts(asked: Cycle, k: int) -> list[Stop]:
 
 def _divided(stop: Stop, places: Sequence[float]) -> list[Stop]:
     """One stop for each part between `places`."""
-    assert stop.path is not None and isinstance(stop.target, Pose) and isinstance(stop.path.goal, Pose)
+    assert (
+        stop.path is not None and isinstance(stop.target, Pose) and isinstance(stop.path.goal, Pose)
+    )
     course = ToolCourse.of(stop.path.path, stop.target.T, stop.path.goal.T)
     poses = [stop.target, *(Pose(T) for T in course.poses(np.array(places))), stop.path.goal]
     ends, parts = [0.0, *places, 1.0], list[Stop]()
     for n in range(len(poses) - 1):
         section = Section(stop.target, stop.path.goal, ends[n], ends[n + 1])
-        way = replace(stop.path, goal=poses[n + 1], path=replace(stop.path.path, section=section), split=False)
+        way = replace(
+            stop.path, goal=poses[n + 1], path=replace(stop.path.path, section=section), split=False
+        )
         part = replace(stop, target=poses[n], path=way)
         last = n == len(poses) - 2
-        parts.append(part if last else replace(part, name=f"{stop.name}/{n + 1}", dwell=0.0, payload=None))
+        parts.append(
+            part if last else replace(part, name=f"{stop.name}/{n + 1}", dwell=0.0, payload=None)
+        )
     return parts
 
 
 def _places(asked: Cycle, stop: Stop) -> list[float] | None:
     """The fractions at which a stop's path is divided; None if it cannot be followed so either."""
-    assert stop.path is not None and isinstance(stop.target, Pose) and isinstance(stop.path.goal, Pose)
+    assert (
+        stop.path is not None and isinstance(stop.target, Pose) and isinstance(stop.path.goal, Pose)
+    )
     (arm, *_) = (move.arm for move in asked.moves if move.goal == stop.name and move.kind == "path")
     course = ToolCourse.of(replace(stop.path.path, about=None), stop.target.T, stop.path.goal.T)
     strands = strands_of(arm, course, stop.branch)
     if not strands:
         return None
-    rests = [Problem(arm=each, start=stop.target, goal=stop.target) for each in arms_at(asked, stop.name)]
+    rests = [
+        Problem(arm=each, start=stop.target, goal=stop.target) for each in arms_at(asked, stop.name)
+    ]
     free = PreparedProblem.of(Problem(arm=asked.arm, start=stop.target, goal=stop.target))
     return _cheapest(strands, *_costs(free, [PreparedProblem.of(each) for each in rests], strands))
 
 
-def _costs(free: PreparedProblem, rests: Sequence[PreparedProblem], strands: Sequence[Strand]) -> tuple[Mask, Array]:
-    """Where the arm may follow each strand (p, s); and lower bounds (p, s, s) [J] of reconfigurations from one to
-    another, infinite where the arm cannot rest."""
+def _costs(
+    free: PreparedProblem, rests: Sequence[PreparedProblem], strands: Sequence[Strand]
+) -> tuple[Mask, Array]:
+    """Where the arm may follow each strand (p, s); and lower bounds (p, s, s) [J] of
+    reconfigurations from one to another, infinite where the arm cannot rest."""
     on = np.stack([strand.covers(PLACES) for strand in strands], axis=1)
     q = np.stack([strand.configurations(PLACES) for strand in strands], axis=1)
     rest = on.copy()
@@ -120,26 +136,41 @@ def _costs(free: PreparedProblem, rests: Sequence[PreparedProblem], strands: Seq
         levels = np.zeros(on.shape)
         levels[rest] = [free.potential(each) for each in q[rest]]
         gain = levels[place, second] - levels[place, first]
-        shift = _nearest(q[place, second] - q[place, first], _turns(free.arm.active_limits, strands), first, second)
+        shift = _nearest(
+            q[place, second] - q[place, first],
+            _turns(free.arm.active_limits, strands),
+            first,
+            second,
+        )
         cost[place, first, second] = lower_bounds(free, shift, gain)[0]
     return on, cost
 
 
 def _turns(limits: Limits, strands: Sequence[Strand]) -> Array:
     """Least and greatest number (2, s, nq) of full turns by which all of a strand may be turned."""
-    low, high = (np.array([bound(strand.q, axis=0) for strand in strands]) for bound in (np.min, np.max))
+    low, high = (
+        np.array([bound(strand.q, axis=0) for strand in strands]) for bound in (np.min, np.max)
+    )
     turn = 2 * np.pi
-    return np.stack([np.ceil((limits.q_min - low) / turn - TINY), np.floor((limits.q_max - high) / turn + TINY)])
+    return np.stack(
+        [np.ceil((limits.q_min - low) / turn - TINY), np.floor((limits.q_max - high) / turn + TINY)]
+    )
 
 
-def _nearest(shift: Array, turns: Array, first: npt.NDArray[np.intp], second: npt.NDArray[np.intp]) -> Array:
-    """Displacements (n, nq) [rad] by the full turns that make them least, of those that both strands allow."""
+def _nearest(
+    shift: Array, turns: Array, first: npt.NDArray[np.intp], second: npt.NDArray[np.intp]
+) -> Array:
+    """Displacements (n, nq) [rad] by the full turns that make them least, of those that both
+    strands allow.
+    """
     least, most = turns[0, second] - turns[1, first], turns[1, second] - turns[0, first]
     return np.asarray(shift + 2 * np.pi * np.clip(np.round(-shift / (2 * np.pi)), least, most))
 
 
 def _cheapest(strands: Sequence[Strand], on: Mask, cost: Array) -> list[float] | None:
-    """The places at which the arm changes from one strand to another: as few as possible, and the cheapest of these."""
+    """The places at which the arm changes from one strand to another: as few as possible, and the
+    cheapest of these.
+    """
     reached = np.where(on[0], 0.0, np.inf)
     changed: list[npt.NDArray[np.intp]] = []
     for place in range(1, len(PLACES)):

@@ -16,7 +16,10 @@ class NoSequence(JoulepathError):
     through all of them."""
 
     title = "No sequence of arm configurations"
-    remedy = "Move `stop` or the stop before it, relax a limit, leave `branch` out or set `windings` to true."
+    remedy = (
+        "Move `stop` or the stop before it, relax a limit, leave `branch` out or set "
+        "`windings` to true."
+    )
 
     stop: str
     """The first stop to which no motion was found: `start`, or `stops/` and a name."""
@@ -30,15 +33,19 @@ class NoSequence(JoulepathError):
     def __str__(self) -> str:
         cause = f" Why one was not found: {self.cause}." if self.cause else ""
         return (
-            "The arm can be at every stop, but no cycle was found: from no configuration to which the moves before "
-            f"lead was a motion within the limits found to {self.stop}. Move this stop or the one before it, relax a "
+            "The arm can be at every stop, but no cycle was found: from no configuration to which "
+            "the moves before "
+            f"lead was a motion within the limits found to {self.stop}. Move this stop or the one "
+            "before it, relax a "
             f"limit, leave `branch` out or set `windings` true.{cause}"
         )
 
 
 @dataclass(eq=False)
 class CycleTooShort(JoulepathError):
-    """No cycle was found that is as fast as `time` asks for: the fastest one found takes `shortest`."""
+    """No cycle was found that is as fast as `time` asks for: the fastest one found takes
+    `shortest`.
+    """
 
     title = "Dwell too short"
     remedy = "Allow at least `shortest`."
@@ -50,6 +57,7 @@ class CycleTooShort(JoulepathError):
 
     def __str__(self) -> str:
         return (
-            f"The fastest cycle found takes {rounded_up(self.shortest)} s, of which it dwells {self.dwells:.4g} s: "
+            f"The fastest cycle found takes {rounded_up(self.shortest)} s, of which it dwells "
+            f"{self.dwells:.4g} s: "
             "allow at least as much."
         )

@@ -1,13 +1,15 @@
 """Cycles with stops, or ends of their paths, that leave the orientation or the posture free.
 
-At given orientations a cycle is one of stops with several targets; a path leads from each of them to a pose of its own.
-So the orientations are chosen with the configurations, for the whole cycle. Near those that are found, others are tried
-in the same way, so that no answer needs more than the one before.
+At given orientations a cycle is one of stops with several targets; a path leads from each of them
+to a pose of its own. So the orientations are chosen with the configurations, for the whole cycle.
+Near those that are found, others are tried in the same way, so that no answer needs more than the
+one before.
 
-Every orientation at a stop brings all its full turns with it. So that they do not multiply, the orientations of stops
-without a path are looked for without full turns first; these come with the orientations found. Then the configurations
-at these stops move (`configurations_beside`). So do those at poses that leave the posture free: they
-begin from what moves by themselves choose, or from the samples of a cycle.
+Every orientation at a stop brings all its full turns with it. So that they do not multiply, the
+orientations of stops without a path are looked for without full turns first; these come with the
+orientations found. Then the configurations at these stops move (`configurations_beside`). So do
+those at poses that leave the posture free: they begin from what moves by themselves choose, or from
+the samples of a cycle.
 """
 
 from __future__ import annotations
@@ -37,7 +39,10 @@ from joulepath.optimizer.exceptions import (
     UnreachablePose,
     UnreachableTargets,
 )
-from joulepath.optimizer.kinematics.orientation_tolerance import nearest_orientation, sample_orientations
+from joulepath.optimizer.kinematics.orientation_tolerance import (
+    nearest_orientation,
+    sample_orientations,
+)
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.pose import Pose
@@ -46,31 +51,33 @@ from joulepath.optimizer.problem.targets import AnyOf, PosesAround
 
 # angles [rad] about an axis at first, and orientations that are free otherwise
 ALL_AROUND, SPREAD = tuple(np.arange(12) * (np.pi / 6)), 24
-# steps [rad] between the orientations that are tried near the best ones; and more of them where no path is free, each
-# of which takes long to solve
+# steps [rad] between the orientations that are tried near the best ones; and more of them where no
+# path is free, each of which takes long to solve
 STEPS, MORE = (np.pi / 12, np.pi / 24), (np.pi / 6, np.pi / 12, np.pi / 24, np.pi / 48, np.pi / 96)
-# shares of the deadline: for the orientations without full turns, and of what is left for the first cycle with them
+# shares of the deadline: for the orientations without full turns, and of what is left for the first
+# cycle with them
 ROUGH, FIRST = 0.35, 0.6
 # share of what is left then for the moves that are chosen one after the other
 FEW = 0.4
 # orientations of a stop that are tried with full turns
 TURNED = 3
-# so many steps are made; further ones as long as the last one gained more than this share of the energy
+# so many steps are made; further ones as long as the last one gained more than this share of the
+# energy
 AT_LEAST, LITTLE = 2, 2e-4
 
 Search = Callable[[Cycle], CycleSolution]
-# rotation vectors (3,) [rad], in the TCP frame, by which the tool is turned at a stop, or at the start of its path, and
-# at the end of the path
+# rotation vectors (3,) [rad], in the TCP frame, by which the tool is turned at a stop, or at the
+# start of its path, and at the end of the path
 Turns = tuple[Array, Array]
 NONE = np.zeros(3)
 
 
 def with_free_orientations(asked: Cycle, search: Search, clock: Clock) -> CycleSolution:
-    """The cycle of least energy at orientations that are chosen; `search` finds a cycle whose orientations are given in
-    full.
+    """The cycle of least energy at orientations that are chosen; `search` finds a cycle whose
+    orientations are given in full.
 
-    Raises the errors of `search`; UnreachablePose for a stop, or a path whose start, is out of reach at every
-    orientation that is tried.
+    Raises the errors of `search`; UnreachablePose for a stop, or a path whose start, is out of
+    reach at every orientation that is tried.
     """
     end = Deadline.after(asked.deadline, clock)
     free = {stop.name: stop for stop in asked.stops if any(stop.free_ends)}
@@ -85,40 +92,58 @@ def with_free_orientations(asked: Cycle, search: Search, clock: Clock) -> CycleS
         except UnreachableTargets as error:
             raise _at_any_angle(error, [f"stops/{stop.entry}" for stop in free.values()]) from None
         compared, at_paths = best.baselines, _found_at(best, tried)
-        plain = all(len(stop.places) == 1 and not isinstance(stop.target, AnyOf) for stop in asked.stops)
+        plain = all(
+            len(stop.places) == 1 and not isinstance(stop.target, AnyOf) for stop in asked.stops
+        )
         if _is_compared_once(asked) and plain:
-            best, compared = _with_successive_moves(asked, best, search, end.within(FEW * end.left), clock)
+            best, compared = _with_successive_moves(
+                asked, best, search, end.within(FEW * end.left), clock
+            )
         steps = MORE if all(stop.path is None for stop in free.values()) else STEPS
         gained = True
         for k, step in enumerate(steps):
             if end.left < LEAST_TIME or not (gained or k < AT_LEAST):
                 break
             before, gained = best.needed.of(asked.objective), False
-            tried = {name: _near(free[name], turns, step) for name, turns in at_paths.items() if free[name].path}
+            tried = {
+                name: _near(free[name], turns, step)
+                for name, turns in at_paths.items()
+                if free[name].path
+            }
             near = beside(_at(asked, tried), best, step)
             # in too short a time there may be none
             with suppress(JoulepathError):
-                near = replace(near, deadline=end.left / (len(steps) - k), compared=not _is_compared_once(asked))
+                near = replace(
+                    near,
+                    deadline=end.left / (len(steps) - k),
+                    compared=not _is_compared_once(asked),
+                )
                 found = search(near)
                 if found.needed.of(asked.objective) < before:
                     best = _better(found, best)
                     at_paths |= _found_at(found, tried)
                     gained = found.needed.of(asked.objective) < before * (1 - LITTLE)
     if _is_compared_once(asked):
-        best = replace(best, baselines=[compared_again(asked, each, best.needed) for each in compared])
-    places = {place for stop in asked.stops if not isinstance(stop.target, AnyOf) for place in stop.places}
+        best = replace(
+            best, baselines=[compared_again(asked, each, best.needed) for each in compared]
+        )
+    places = {
+        place for stop in asked.stops if not isinstance(stop.target, AnyOf) for place in stop.places
+    }
     return replace(best, moves=[_of_one_target(move, places) for move in best.moves])
 
 
 def _first(
     asked: Cycle, free: Mapping[str, Stop], search: Search, end: Deadline
 ) -> tuple[dict[str, list[Turns]], CycleSolution]:
-    """The cycle with full turns at some orientations of each stop, which has the bound over all of them, and these.
+    """The cycle with full turns at some orientations of each stop, which has the bound over all of
+    them, and these.
 
     If there is no time for it, the one without full turns.
     """
     all_around = {name: _all_around(stop) for name, stop in free.items()}
-    # many orientations need nearly the same energy: that none of those tried is better would take long to prove
+    # many orientations need nearly the same energy: that none of those tried is better would take
+    # long to prove
     asked = replace(asked, rough=any(stop.path is None for stop in free.values()))
     if not asked.windings or not asked.rough:
         return all_around, _bounded(asked, all_around, search, FIRST * end.left)
@@ -149,8 +174,12 @@ def _first(
     return all_around, replace(better, baselines=baselines)
 
 
-def _bounded(asked: Cycle, tried: Mapping[str, Sequence[Turns]], search: Search, time: float) -> CycleSolution:
-    """The cycle at some orientations of each stop, with the bound over all of them, in so much time [s]."""
+def _bounded(
+    asked: Cycle, tried: Mapping[str, Sequence[Turns]], search: Search, time: float
+) -> CycleSolution:
+    """The cycle at some orientations of each stop, with the bound over all of them, in so much time
+    [s].
+    """
     return search(replace(_at(asked, tried, bounded=True), deadline=max(time, LEAST_TIME)))
 
 
@@ -163,8 +192,8 @@ def _evenly_from(turns: Sequence[Turns], at: Turns) -> list[Turns]:
 def _with_successive_moves(
     asked: Cycle, best: CycleSolution, search: Search, end: Deadline, clock: Clock
 ) -> tuple[CycleSolution, list[CycleBaseline]]:
-    """The better one of a cycle and the one that moves choose one after the other, and the baselines: this one is that
-    of choosing move by move."""
+    """The better one of a cycle and the one that moves choose one after the other, and the
+    baselines: this one is that of choosing move by move."""
     chosen = successively_chosen(asked, end, clock)
     if chosen is None:
         return best, best.baselines
@@ -191,8 +220,8 @@ def _better(found: CycleSolution, than: CycleSolution) -> CycleSolution:
 
 
 def _is_compared_once(asked: Cycle) -> bool:
-    """Whether other ways to go round do not depend on the orientations near the best ones: they are those of the first
-    cycle."""
+    """Whether other ways to go round do not depend on the orientations near the best ones: they are
+    those of the first cycle."""
     plain = asked.order is None and asked.any_time and not asked.passes
     return plain and asked.arm.bus.mode != "storage"
 
@@ -234,7 +263,10 @@ def _found_at(found: CycleSolution, tried: Mapping[str, Sequence[Turns]]) -> dic
 
 def _at(asked: Cycle, tried: Mapping[str, Sequence[Turns]], bounded: bool = False) -> Cycle:
     """The cycle with some turns at each stop; `bounded`: with a bound over all orientations."""
-    stops = [_stop_at(stop, tried[stop.name], bounded) if stop.name in tried else stop for stop in asked.stops]
+    stops = [
+        _stop_at(stop, tried[stop.name], bounded) if stop.name in tried else stop
+        for stop in asked.stops
+    ]
     return replace(asked, stops=stops)
 
 
@@ -246,7 +278,9 @@ def _stop_at(stop: Stop, tried: Sequence[Turns], bounded: bool) -> Stop:
         poses = tuple(_turned(pose, reference, turn) for turn, _ in tried)
         return replace(stop, target=PosesAround(poses, pose if bounded else None))
     ends = [_ends(stop, *turns) for turns in tried]
-    start, goal = (ConeOrientedPose.about(end, _axis_of(stop)) if bounded else None for end in ends[0])
+    start, goal = (
+        ConeOrientedPose.about(end, _axis_of(stop)) if bounded else None for end in ends[0]
+    )
     goals = PosesAround(tuple(goal for _, goal in ends), goal)
     path = replace(stop.path, goal=ends[0][1], goals=goals)
     return replace(stop, target=PosesAround(tuple(start for start, _ in ends), start), path=path)
@@ -255,8 +289,8 @@ def _stop_at(stop: Stop, tried: Sequence[Turns], bounded: bool) -> Stop:
 def _ends(stop: Stop, at_start: Array, at_goal: Array) -> tuple[Pose, Pose]:
     """The poses at both ends of a stop's path.
 
-    At the start the tool is turned from an orientation that is always the same; at the goal from the one nearest to
-    that of the pose before.
+    At the start the tool is turned from an orientation that is always the same; at the goal from
+    the one nearest to that of the pose before.
     """
     start, path = stop.target, stop.path
     assert path is not None and isinstance(start, Pose | ConeOrientedPose)
@@ -283,13 +317,20 @@ def _at_any_angle(error: UnreachableTargets, stops: Sequence[str]) -> JoulepathE
     return UnreachablePose(
         error.target,
         None,
-        f"At none of {len(error.unreachable)} orientations of the tool is it in reach. At the first: {reason}",
+        f"At none of {len(error.unreachable)} orientations of the tool is it in reach. At the "
+        f"first: {reason}",
     )
 
 
 def _of_one_target(move: CycleMove, places: set[str]) -> CycleMove:
-    """The move, of which `places` have one target: its orientations are no targets that were asked for."""
+    """The move, of which `places` have one target: its orientations are no targets that were asked
+    for.
+    """
     ends = {"start": move.planned.start, "goal": move.planned.goal}
-    told = {name: replace(getattr(move.solution, name), target=0) for name, place in ends.items() if place in places}
+    told = {
+        name: replace(getattr(move.solution, name), target=0)
+        for name, place in ends.items()
+        if place in places
+    }
     passes = [replace(each, target=0) if each.stop in places else each for each in move.passes]
     return replace(move, solution=replace(move.solution, **told), passes=passes)

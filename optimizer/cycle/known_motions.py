@@ -1,8 +1,8 @@
-"""Motions of moves that were found before, by what was asked: a cycle of which one stop has changed does not solve its
-other moves again.
+"""Motions of moves that were found before, by what was asked: a cycle of which one stop has changed
+does not solve its other moves again.
 
-A motion is found again for exactly the same question only. So it changes no answer but the time until it is there; and
-every motion of an answer is certified anew.
+A motion is found again for exactly the same question only. So it changes no answer but the time
+until it is there; and every motion of an answer is certified anew.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.trajectories.spline import Spline
 
-# how a motion was looked for: as the search of a cycle tries it, to the end, at a price of time, or for its duration
+# how a motion was looked for: as the search of a cycle tries it, to the end, at a price of time, or
+# for its duration
 Stage = Literal["tried", "finished", "priced", "fastest"]
 # fields of a problem on which its best motion does not hang
 _ASIDE = ("arm", "sample_period", "deadline")
@@ -39,11 +40,15 @@ class KnownMotion:
     @property
     def result(self) -> SolveResult:
         """The result of having solved for it."""
-        return SolveResult(SolveStatus.SOLVED, "converged", spline=self.spline, stationarity=self.stationarity)
+        return SolveResult(
+            SolveStatus.SOLVED, "converged", spline=self.spline, stationarity=self.stationarity
+        )
 
 
 class KnownMotions:
-    """Motions by the keys of the questions that they answer. `used` are those that were asked for or found since."""
+    """Motions by the keys of the questions that they answer. `used` are those that were asked for
+    or found since.
+    """
 
     def __init__(self, before: Mapping[str, KnownMotion] | None = None) -> None:
         self._before = dict(before or {})
@@ -68,10 +73,16 @@ class KnownMotions:
         self.used.pop(key, None)
 
     def key(self, stage: Stage, problem: Problem, *more: Any) -> str:
-        """What tells a question from others: what is asked, and `more`; deadline and samples do not matter."""
+        """What tells a question from others: what is asked, and `more`; deadline and samples do not
+        matter.
+        """
         if id(problem.arm) not in self._arms:
             self._arms[id(problem.arm)] = problem.arm, _digest(problem.arm)
-        own = {each.name: getattr(problem, each.name) for each in fields(problem) if each.name not in _ASIDE}
+        own = {
+            each.name: getattr(problem, each.name)
+            for each in fields(problem)
+            if each.name not in _ASIDE
+        }
         return _digest([stage, self._arms[id(problem.arm)][1], own, more]).hex()
 
 
@@ -101,7 +112,8 @@ def _digest(value: Any) -> bytes:
 
 
 def _content(value: Any) -> Iterator[bytes]:
-    """Everything that a value is made of. Two values with the same content are the same question."""
+    """Everything that a value is made of. Two values with the same content are the same
+    question."""
     match value:
         case None | bool() | int() | float() | str() | bytes():
             yield repr(value).encode() + b";"
@@ -109,7 +121,10 @@ def _content(value: Any) -> Iterator[bytes]:
             # numbers that a caller took from an array
             yield from _content(value.item())
         case np.ndarray():
-            yield repr((value.dtype.str, value.shape)).encode() + np.ascontiguousarray(value).tobytes()
+            yield (
+                repr((value.dtype.str, value.shape)).encode()
+                + np.ascontiguousarray(value).tobytes()
+            )
         case pin.Model():
             yield value.saveToString().encode()
         case _ if is_dataclass(value):

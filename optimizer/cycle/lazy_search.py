@@ -1,8 +1,10 @@
-"""The lazy search of a least chain: bounds of all legs first, then a motion where the least chain goes.
+"""The lazy search of a least chain: bounds of all legs first, then a motion where the least chain
+goes.
 
-All legs weigh their proven bounds. The least chain through them is found, its legs are solved and weigh what was found,
-and so on until every leg of the least chain is solved: then no chain has a bound below it. After Dellin and Srinivasa,
-"A unifying formalism for shortest path problems with expensive edge evaluations" (2016).
+All legs weigh their proven bounds. The least chain through them is found, its legs are solved and
+weigh what was found, and so on until every leg of the least chain is solved: then no chain has a
+bound below it. After Dellin and Srinivasa, "A unifying formalism for shortest path problems with
+expensive edge evaluations" (2016).
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from joulepath.optimizer.trajectories.spline import Spline
 
-# share of the search's time left that one leg may take: among obstacles, one without a way would take all of it
+# share of the search's time left that one leg may take: among obstacles, one without a way would
+# take all of it
 SHARE_OF_A_LEG = 1 / 8
 # J: a chain is no better than another one by less
 SAME = 1e-9
@@ -28,8 +31,8 @@ SAME = 1e-9
 class LazySearch(ABC):
     """A search over `legs`, whose time is up at `search_end`.
 
-    `failed`: some leg has no motion and is not proven to have none. `cut_short`: for some leg the time was too short.
-    `causes` say why a leg's last attempt failed, by the number of the leg.
+    `failed`: some leg has no motion and is not proven to have none. `cut_short`: for some leg the
+    time was too short. `causes` say why a leg's last attempt failed, by the number of the leg.
     """
 
     def __init__(self, legs: Sequence[Leg], closed: bool, search_end: Deadline) -> None:
@@ -40,7 +43,9 @@ class LazySearch(ABC):
 
     @abstractmethod
     def attempt(self, k: int, s: int, g: int) -> float | None:
-        """What a motion of a pair needs [J], the dwell left out: inf if none is found, None once the time is up."""
+        """What a motion of a pair needs [J], the dwell left out: inf if none is found, None once
+        the time is up.
+        """
 
     @abstractmethod
     def motion(self, k: int, s: int, g: int) -> Spline | None:
@@ -49,25 +54,32 @@ class LazySearch(ABC):
     def try_kind(self, k: int, s: int, g: int) -> None:
         """Give the kind of a pair what its motion needs; leave it as it is once the time is up.
 
-        Where the range of a joint is in the way of a pair, the pair of its kind that is farthest from the limits is
-        tried, too: the first one has a value of its own then.
+        Where the range of a joint is in the way of a pair, the pair of its kind that is farthest
+        from the limits is tried, too: the first one has a value of its own then.
         """
         leg = self.legs[k]
         kind, before = int(leg.kind[s, g]), float(leg.cost[s, g])
         value = self.attempt(k, s, g)
         centre_s, centre_g = leg.pair[kind].tolist()
-        if value is not None and (s, g) != (centre_s, centre_g) and leg.is_near_a_limit(self.motion(k, s, g)):
+        if (
+            value is not None
+            and (s, g) != (centre_s, centre_g)
+            and leg.is_near_a_limit(self.motion(k, s, g))
+        ):
             if np.isfinite(value):
                 leg.set_pair(s, g, value)
             value = self.attempt(k, centre_s, centre_g)
         if value is not None:
             leg.set_kind(kind, value)
-        # some legs weigh more than their bounds before they are solved; the pair may have a value of its own
+        # some legs weigh more than their bounds before they are solved; the pair may have a value
+        # of its own
         least = min(float(leg.cost[s, g]), np.inf if value is None else value + float(leg.dwell[g]))
         self._chain.lower(max(before - least, 0.0))
 
     def late(self) -> float | None:
-        """What a leg for which the time was too short is worth: without its share of it, no other is tried."""
+        """What a leg for which the time was too short is worth: without its share of it, no other
+        is tried.
+        """
         self.cut_short = True
         return None if self.search_end.passed else np.inf
 
@@ -84,14 +96,17 @@ class LazySearch(ABC):
         return sum(float(self.legs[k].dwell[g]) for k, _, g in self.pairs(nodes))
 
     def least(self) -> list[int]:
-        """The nodes of the least chain, as far as motions and bounds tell by now; none if there is no chain."""
+        """The nodes of the least chain, as far as motions and bounds tell by now; none if there is
+        no chain.
+        """
         return self._chain.find()[1]
 
     def explore(self) -> list[int]:
-        """The nodes of the least chain, all of its legs solved; once the time is up, of the least solved one.
+        """The nodes of the least chain, all of its legs solved; once the time is up, of the least
+        solved one.
 
-        If none is solved by then, those of the least chain. Raises NoSequence, or DeadlineExceeded if some leg that
-        might close the gap was given too little time.
+        If none is solved by then, those of the least chain. Raises NoSequence, or DeadlineExceeded
+        if some leg that might close the gap was given too little time.
         """
         while True:
             nodes = self.least()
@@ -109,7 +124,9 @@ class LazySearch(ABC):
 
     @property
     def leaves_chains(self) -> bool:
-        """Whether some chain has a bound below the least one found: if unsolved legs weigh more than their bounds."""
+        """Whether some chain has a bound below the least one found: if unsolved legs weigh more
+        than their bounds.
+        """
         costs = [np.where(leg.is_solved, leg.cost, leg.least_costs) for leg in self.legs]
         return LeastChain(costs, self.closed).find()[0] < self._chain.find()[0] - SAME
 
@@ -123,7 +140,8 @@ class LazySearch(ABC):
         return LeastChain(costs, self.closed).find()[1]
 
     def least_through(self, pairs: Iterable[tuple[int, int, int]]) -> list[int]:
-        """The least chain of these pairs (leg, start node, goal node); no nodes if there is none."""
+        """The least chain of these pairs (leg, start node, goal node); no nodes if there is
+        none."""
         costs = [np.full(leg.cost.shape, np.inf) for leg in self.legs]
         for k, s, g in pairs:
             costs[k][s, g] = self.legs[k].cost[s, g]
@@ -141,6 +159,11 @@ class LazySearch(ABC):
             reached = after
         labels = [
             [layer.ends[k].label for k in sorted(set(layer.end[nodes].tolist()))]
-            for layer, nodes in ((leg.start, np.isfinite(reached)), (leg.goal, np.ones(len(leg.goal.q), dtype=bool)))
+            for layer, nodes in (
+                (leg.start, np.isfinite(reached)),
+                (leg.goal, np.ones(len(leg.goal.q), dtype=bool)),
+            )
         ]
-        return NoSequence(leg.goal.name, labels[0], labels[1], self.causes.get(self.legs.index(leg), ""))
+        return NoSequence(
+            leg.goal.name, labels[0], labels[1], self.causes.get(self.legs.index(leg), "")
+        )

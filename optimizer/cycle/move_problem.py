@@ -11,8 +11,11 @@ from joulepath.optimizer.problem.stops import PlannedMove
 LEAST_TIME = 1e-3
 
 
-def problem_of(asked: Cycle, move: PlannedMove, q_start: Array, q_goal: Array, time: float) -> Problem:
-    """The problem of a move of a cycle between joint positions (nq,) [rad], with `time` [s] for it."""
+def problem_of(
+    asked: Cycle, move: PlannedMove, q_start: Array, q_goal: Array, time: float
+) -> Problem:
+    """The problem of a move of a cycle between joint positions (nq,) [rad], with `time` [s] for
+    it."""
     return Problem(
         arm=move.arm,
         start=q_start,

@@ -36,7 +36,9 @@ def moves_of(
             CycleMove(
                 planned=asked.moves[k],
                 # between joint positions, the motion knows of no target
-                solution=replace(solution, start=_reached(leg.start, s), goal=_reached(leg.goal, g)),
+                solution=replace(
+                    solution, start=_reached(leg.start, s), goal=_reached(leg.goal, g)
+                ),
                 t0=t0,
                 dwell_energy=float(dwell_energies(asked, asked.moves[k], leg.goal)[g]),
                 wait=wait,
@@ -44,7 +46,8 @@ def moves_of(
                 pairs=int((leg.kind >= 0).sum()),
                 kinds=len(leg.pair),
                 solved=len(leg.solved.keys() | (sought[k] if sought else set())),
-                sensitivity=solution.sensitivity + rest_sensitivity(asked, asked.moves[k], rest, leg.goal.q[g]),
+                sensitivity=solution.sensitivity
+                + rest_sensitivity(asked, asked.moves[k], rest, leg.goal.q[g]),
                 passes=passes_of(leg, s, g, solution.trajectory.spline),
             )
         )

@@ -1,9 +1,11 @@
-"""The best order of the stops of a cycle: a tour of least energy over groups of stops, by dynamic programming.
+"""The best order of the stops of a cycle: a tour of least energy over groups of stops, by dynamic
+programming.
 
-Between two groups the arm carries the same whatever their order, so the cost of a move depends on its two ends alone. A
-tour is extended by one group at a time, from every subset of the groups and every configuration in which the last one
-is left (Held and Karp, "A dynamic programming approach to sequencing problems", 1962). As in `LazySearch`, moves weigh
-their proven bounds first; those of the least tour are solved, until no tour has a bound below it.
+Between two groups the arm carries the same whatever their order, so the cost of a move depends on
+its two ends alone. A tour is extended by one group at a time, from every subset of the groups and
+every configuration in which the last one is left (Held and Karp, "A dynamic programming approach to
+sequencing problems", 1962). As in `LazySearch`, moves weigh their proven bounds first; those of the
+least tour are solved, until no tour has a bound below it.
 """
 
 from __future__ import annotations
@@ -34,7 +36,8 @@ SHARE = 0.7
 
 
 class OrderSearch:
-    """The search for the order of the stops of a cycle; `bound` [J] holds for every order once it has `run`.
+    """The search for the order of the stops of a cycle; `bound` [J] holds for every order once it
+    has `run`.
 
     `exact`: no other order can be better. `tell` gets what is found of single moves.
     """
@@ -44,7 +47,9 @@ class OrderSearch:
         self.asked, self.order = asked, asked.order
         self.groups = groups_of(asked.order, asked.stops)
         self.moves, self.blocks = _all_moves(asked, self.groups)
-        self.search = CycleSearch(replace(asked, deadline=SHARE * asked.deadline), clock, self.moves, tell)
+        self.search = CycleSearch(
+            replace(asked, deadline=SHARE * asked.deadline), clock, self.moves, tell
+        )
         self.exact, self.bound, self.best = True, -np.inf, list[int]()
 
     def run(self) -> Cycle:
@@ -64,13 +69,17 @@ class OrderSearch:
         return replace(self.asked, stops=stops, order=None)
 
     def _explore(self) -> None:
-        """Find the least tour, all of its moves solved; `best` are its groups so far. The first one is the `bound`."""
+        """Find the least tour, all of its moves solved; `best` are its groups so far. The first one
+        is the `bound`.
+        """
         search, costs = self.search, [leg.cost for leg in self.search.legs]
         known = self.asked.objective == "electrical" and all(leg.closed for leg in search.legs)
         if not known:
             # moves weigh more than their bounds, or there are configurations that no node is
             legs = zip(self.moves, search.legs, strict=True)
-            self.bound = self._tours([bounded_costs(self.asked, *leg, search.end) for leg in legs]).least()[0]
+            self.bound = self._tours(
+                [bounded_costs(self.asked, *leg, search.end) for leg in legs]
+            ).least()[0]
         tours = self._tours(costs)
         while True:
             value, groups, ends = tours.least()
@@ -78,7 +87,11 @@ class OrderSearch:
             if not np.isfinite(value):
                 raise DeadlineExceeded([]) if search.cut_short else NoTrajectory([])
             self.best = groups
-            open_ = [each for each in self._moves_of(groups, ends) if not search.legs[each[0]].known(*each[1:])]
+            open_ = [
+                each
+                for each in self._moves_of(groups, ends)
+                if not search.legs[each[0]].known(*each[1:])
+            ]
             if not open_ or search.search_end.passed:
                 self.exact = not (open_ or search.failed or search.cut_short)
                 return
@@ -106,11 +119,13 @@ class OrderSearch:
                 if to not in inner:
                     inner[to] = reduce(_through, [costs[k] for k in others]) if others else None
                 rest = inner[to]
-                tours.put(origin, to, costs[first] if rest is None else _through(costs[first], rest))
+                tours.put(
+                    origin, to, costs[first] if rest is None else _through(costs[first], rest)
+                )
 
     def _moves_of(self, groups: list[int], ends: list[int]) -> list[tuple[int, int, int]]:
-        """Leg, start node and goal node of each move of a tour, which leaves the start and the groups by the nodes
-        `ends`, and comes to the last of these."""
+        """Leg, start node and goal node of each move of a tour, which leaves the start and the
+        groups by the nodes `ends`, and comes to the last of these."""
         places: list[int | None] = [None, *groups, *([None] if self.asked.closed else [])]
         found = list[tuple[int, int, int]]()
         for k, (first, last) in enumerate(pairwise(places)):
@@ -127,8 +142,8 @@ class OrderSearch:
 def _all_moves(
     asked: Cycle, groups: list[list[Stop]]
 ) -> tuple[list[PlannedMove], dict[tuple[int | None, int | None], list[int]]]:
-    """Every move that some order has; and their numbers from the exit of a group, None for the start, to that of
-    another one."""
+    """Every move that some order has; and their numbers from the exit of a group, None for the
+    start, to that of another one."""
     moves = list[PlannedMove]()
     blocks: dict[tuple[int | None, int | None], list[int]] = {}
     inside, exits = list[list[int]](), list[str]()
@@ -155,7 +170,9 @@ def _all_moves(
 
 
 def _ends(layer: Layer, nodes: int) -> npt.NDArray[np.intp]:
-    """The end (n,) of each node of a layer, ascending from 0; one more for a node that stands for those not known."""
+    """The end (n,) of each node of a layer, ascending from 0; one more for a node that stands for
+    those not known.
+    """
     ends = np.unique(layer.end, return_inverse=True)[1]
     return np.append(ends, np.full(nodes - len(ends), ends[-1] + 1))
 

@@ -1,8 +1,9 @@
-"""The legs that pass through stops: motions from one layer to another through the layers of the stops between them.
+"""The legs that pass through stops: motions from one layer to another through the layers of the
+stops between them.
 
-Such a motion depends on the configurations at all of its stops, a route. Its bound is the sum of the bounds on the
-travel from each to the next, or that of the motion from rest to rest between its ends if this is greater. The bound of
-a pair of ends is the least of all routes between them.
+Such a motion depends on the configurations at all of its stops, a route. Its bound is the sum of
+the bounds on the travel from each to the next, or that of the motion from rest to rest between its
+ends if this is greater. The bound of a pair of ends is the least of all routes between them.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ from joulepath.optimizer.trajectories.spline import Spline
 
 # pairs of ends of one leg, each of which has routes of its own
 MOST_PASSING_PAIRS = 500_000
-# what a motion needs is some quarter above its bound: a route that is not solved weighs so much more than its bound
+# what a motion needs is some quarter above its bound: a route that is not solved weighs so much
+# more than its bound
 LIKELY = 1.15
 
 Route = tuple[int, ...]
@@ -36,11 +38,12 @@ Route = tuple[int, ...]
 
 @dataclass(eq=False)
 class PassingLeg(Leg):
-    """All motions from one layer to the next through the layers `between`; every pair is a kind of its own.
+    """All motions from one layer to the next through the layers `between`; every pair is a kind of
+    its own.
 
-    `direct` is the leg without passes, and `travel` the bounds [J] on the parts, a matrix from each layer to the next.
-    Bounds are far below what is found, so that an unsolved pair weighs more than its bound in `cost`: by `beyond`
-    (s, g) [J]. `routes` are the best ones found, by pair.
+    `direct` is the leg without passes, and `travel` the bounds [J] on the parts, a matrix from each
+    layer to the next. Bounds are far below what is found, so that an unsolved pair weighs more than
+    its bound in `cost`: by `beyond` (s, g) [J]. `routes` are the best ones found, by pair.
     """
 
     between: list[Layer] = field(default_factory=list)
@@ -50,20 +53,33 @@ class PassingLeg(Leg):
     routes: dict[tuple[int, int], Route] = field(default_factory=dict)
 
     @classmethod
-    def through(cls, prepared: PreparedProblem, layers: Sequence[Layer], dwell: Array) -> PassingLeg:
-        """The leg from the first layer through the others to the last. Raises InvalidProblem if it has many pairs."""
+    def through(
+        cls, prepared: PreparedProblem, layers: Sequence[Layer], dwell: Array
+    ) -> PassingLeg:
+        """The leg from the first layer through the others to the last. Raises InvalidProblem if it
+        has many pairs.
+        """
         start, *between, goal = layers
-        if max(len(a.q) * len(b.q) for a, b in [*pairwise(layers), (start, goal)]) > MOST_PASSING_PAIRS:
+        if (
+            max(len(a.q) * len(b.q) for a, b in [*pairwise(layers), (start, goal)])
+            > MOST_PASSING_PAIRS
+        ):
             raise InvalidProblem(
                 "stops",
-                f"From {start.name} through {between[0].name} to {goal.name} there are more than {MOST_PASSING_PAIRS} "
+                f"From {start.name} through {between[0].name} to {goal.name} there are more than "
+                f"{MOST_PASSING_PAIRS} "
                 "pairs of arm configurations: give fewer targets, a `branch`, or `windings` false.",
             )
         return cls._of(Leg.of(prepared, start, goal, dwell), between, 0.0, LONGEST_DURATION)
 
     @classmethod
     def _of(
-        cls, direct: Leg, between: list[Layer], price: float, longest: float, beyond: Array | None = None
+        cls,
+        direct: Leg,
+        between: list[Layer],
+        price: float,
+        longest: float,
+        beyond: Array | None = None,
     ) -> PassingLeg:
         """The leg at a price of time [W], with motions of at most `longest` [s].
 
@@ -76,15 +92,30 @@ class PassingLeg(Leg):
         kind = np.arange(least.size).reshape(least.shape)
         beyond = (LIKELY - 1) * np.abs(least) if beyond is None else beyond
         return cls(
-            prepared, start, goal, kind, np.column_stack(np.unravel_index(np.arange(least.size), least.shape)),
-            np.zeros((0, start.q.shape[1])), np.zeros((0, 2)), least.ravel(), direct.dwell,
-            least + beyond + direct.dwell, between=between, direct=direct, travel=travel, beyond=beyond,
-        )  # fmt: skip
+            prepared,
+            start,
+            goal,
+            kind,
+            np.column_stack(np.unravel_index(np.arange(least.size), least.shape)),
+            np.zeros((0, start.q.shape[1])),
+            np.zeros((0, 2)),
+            least.ravel(),
+            direct.dwell,
+            least + beyond + direct.dwell,
+            between=between,
+            direct=direct,
+            travel=travel,
+            beyond=beyond,
+        )
 
     def priced(self, price: float, longest: float) -> PassingLeg:
-        """The same leg with what energy + price · duration needs, along the routes that are known; none solved."""
+        """The same leg with what energy + price · duration needs, along the routes that are known;
+        none solved.
+        """
         assert self.direct is not None
-        priced = self._of(self.direct.priced(price, longest), self.between, price, longest, self.beyond)
+        priced = self._of(
+            self.direct.priced(price, longest), self.between, price, longest, self.beyond
+        )
         priced.routes = self.routes
         return priced
 
@@ -128,16 +159,25 @@ class PassingLeg(Leg):
 
     def prepared_for(self, s: int, g: int) -> PreparedProblem:
         """The problem of a pair's motion."""
-        problem = replace(self.prepared.problem, start=self.start.q[s], goal=self.goal.q[g], passes=self.passes(s, g))
+        problem = replace(
+            self.prepared.problem,
+            start=self.start.q[s],
+            goal=self.goal.q[g],
+            passes=self.passes(s, g),
+        )
         return PreparedProblem.of(problem)
 
 
-def _travel(prepared: PreparedProblem, start: Layer, goal: Layer, price: float, longest: float) -> Array:
+def _travel(
+    prepared: PreparedProblem, start: Layer, goal: Layer, price: float, longest: float
+) -> Array:
     """Bounds (s, g) [J] on the travel from one layer to the next; see `travel_bounds`."""
     kind, pair = kinds_of(start, goal, prepared)
     displacement, levels = between(prepared, start, goal, pair)
     gain = levels[:, 1] - levels[:, 0]
-    bounds = bounds_of(lambda x, own: travel_bounds(prepared, x, own, price, longest), displacement, gain)
+    bounds = bounds_of(
+        lambda x, own: travel_bounds(prepared, x, own, price, longest), displacement, gain
+    )
     return np.asarray(bounds[kind])
 
 

@@ -39,9 +39,16 @@ class PricedMotion:
 
 
 def priced_motion(
-    leg: Leg, s: int, g: int, price: float, longest: float, deadline: Deadline, guess: Spline | None = None
+    leg: Leg,
+    s: int,
+    g: int,
+    price: float,
+    longest: float,
+    deadline: Deadline,
+    guess: Spline | None = None,
 ) -> PricedMotion | None:
-    """The motion of a pair of least objective + price · duration; None if none is found before the deadline.
+    """The motion of a pair of least objective + price · duration; None if none is found before the
+    deadline.
 
     `price` [W], `longest` [s]; `guess` is a motion of the same pair, of another duration perhaps.
     """
@@ -52,20 +59,30 @@ def priced_motion(
 
 
 class MoveOfALeg:
-    """The move of a pair, nodes `s` and `g` of a leg, at several prices of time; it lasts `longest` [s] at most.
+    """The move of a pair, nodes `s` and `g` of a leg, at several prices of time; it lasts `longest`
+    [s] at most.
 
     It begins with the motions `known`, to which it puts those that it finds.
     """
 
-    def __init__(self, leg: Leg, s: int, g: int, longest: float, deadline: Deadline, known: list[PricedMotion]) -> None:
+    def __init__(
+        self,
+        leg: Leg,
+        s: int,
+        g: int,
+        longest: float,
+        deadline: Deadline,
+        known: list[PricedMotion],
+    ) -> None:
         self.leg, self.s, self.g, self.longest, self.deadline = leg, s, g, longest, deadline
         self.known = known
 
     def at(self, price: float) -> PricedMotion:
-        """The motion of least objective + price · duration. Raises NoTrajectory, or DeadlineExceeded.
+        """The motion of least objective + price · duration. Raises NoTrajectory, or
+        DeadlineExceeded.
 
-        A solve begins from the best motion that is known, and may end in a worse one: where motions are long, a change
-        of duration hardly changes the objective + price · duration.
+        A solve begins from the best motion that is known, and may end in a worse one: where motions
+        are long, a change of duration hardly changes the objective + price · duration.
         """
         pair = (self.leg, self.s, self.g, price, self.longest, self.deadline)
         guess = min(self.known, key=lambda motion: motion.value(price), default=None)
@@ -82,11 +99,15 @@ class MoveOfALeg:
 class _FastestOfPair(FastestMotion):
     """The search for the fastest motion of a pair, nodes `s` and `g` of a leg."""
 
-    def __init__(self, leg: Leg, s: int, g: int, deadline: Deadline, known: Sequence[Spline]) -> None:
+    def __init__(
+        self, leg: Leg, s: int, g: int, deadline: Deadline, known: Sequence[Spline]
+    ) -> None:
         self._deadline = deadline
         super().__init__(leg.prepared_for(s, g), leg.start.q[s], leg.goal.q[g], known)
         problem = leg.prepared.problem
-        self.problem = replace(problem, start=self.q_start, goal=self.q_goal, passes=leg.passes(s, g))
+        self.problem = replace(
+            problem, start=self.q_start, goal=self.q_goal, passes=leg.passes(s, g)
+        )
 
     @property
     def deadline(self) -> Deadline:
@@ -96,10 +117,14 @@ class _FastestOfPair(FastestMotion):
         return solver_for(self.prepared, self.q_start, self.q_goal, self.deadline, interval)
 
     def confirms(self, spline: Spline) -> bool:
-        return certify(self.problem, spline, self.q_start, self.q_goal, self.prepared.energy(spline)).valid
+        return certify(
+            self.problem, spline, self.q_start, self.q_goal, self.prepared.energy(spline)
+        ).valid
 
 
-def fastest_motion(leg: Leg, s: int, g: int, deadline: Deadline, known: Sequence[Spline] = ()) -> PricedMotion | None:
+def fastest_motion(
+    leg: Leg, s: int, g: int, deadline: Deadline, known: Sequence[Spline] = ()
+) -> PricedMotion | None:
     """The motion of a pair of least duration, certified; None if none is found before the deadline.
 
     It is no slower than the motions `known` of this pair.
@@ -116,13 +141,22 @@ def fastest_motion(leg: Leg, s: int, g: int, deadline: Deadline, known: Sequence
 
 
 def _solved(
-    leg: Leg, s: int, g: int, interval: DurationInterval, deadline: Deadline, guess: Spline | None = None
+    leg: Leg,
+    s: int,
+    g: int,
+    interval: DurationInterval,
+    deadline: Deadline,
+    guess: Spline | None = None,
 ) -> PricedMotion | None:
-    problem = replace(leg.prepared.problem, start=leg.start.q[s], goal=leg.goal.q[g], passes=leg.passes(s, g))
+    problem = replace(
+        leg.prepared.problem, start=leg.start.q[s], goal=leg.goal.q[g], passes=leg.passes(s, g)
+    )
     motions, asked = known_motions(), (interval, None if guess is None else sampled(guess))
     key = motions.key("priced", problem, *asked)
     known = motions.recall(key)
-    result = known.result if known is not None else _looked_for(leg, s, g, interval, deadline, guess)
+    result = (
+        known.result if known is not None else _looked_for(leg, s, g, interval, deadline, guess)
+    )
     if result is None or result.spline is None:
         return None
     if not result.cut_short:
@@ -143,15 +177,21 @@ def _looked_for(
 
 
 class PricedSearch(LazySearch):
-    """The search of the least chain at a price of time [W]; `motions` are those found, by leg, start and goal node."""
+    """The search of the least chain at a price of time [W]; `motions` are those found, by leg,
+    start and goal node.
+    """
 
-    def __init__(self, legs: Sequence[Leg], closed: bool, price: float, longest: float, search_end: Deadline) -> None:
+    def __init__(
+        self, legs: Sequence[Leg], closed: bool, price: float, longest: float, search_end: Deadline
+    ) -> None:
         super().__init__([leg.priced(price, longest) for leg in legs], closed, search_end)
         self.price, self.longest = price, longest
         self.motions: dict[tuple[int, int, int], PricedMotion] = {}
 
     def attempt(self, k: int, s: int, g: int) -> float | None:
-        """Objective + price · duration of a pair's motion [J]; inf if none is found, None once the time is up."""
+        """Objective + price · duration of a pair's motion [J]; inf if none is found, None once the
+        time is up.
+        """
         deadline = self.search_end.within(SHARE_OF_A_LEG * self.search_end.left)
         found = priced_motion(self.legs[k], s, g, self.price, self.longest, deadline)
         if found is None and deadline.passed:
@@ -163,7 +203,9 @@ class PricedSearch(LazySearch):
         return found.value(self.price)
 
     def chain_tried(self, nodes: list[int]) -> None:
-        """Takes no note: at a price of time, what was found is no cycle of the time that is asked for."""
+        """Takes no note: at a price of time, what was found is no cycle of the time that is asked
+        for.
+        """
 
     def motion(self, k: int, s: int, g: int) -> Spline | None:
         """The motion of a pair; None if none was found."""

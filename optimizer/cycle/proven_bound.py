@@ -29,20 +29,26 @@ from joulepath.optimizer.search.self_motion_bound import self_motion_bound
 def proven_bound(asked: Cycle, legs: Sequence[Leg], deadline: Deadline) -> float:
     """Lower bound [J] on the objective of all rounds with rests at the stops.
 
-    Where configurations are samples of infinitely many, or some may be missing, one more stands for all that are not
-    known, with a bound that holds for each of them; where they are all around a pose, they are bounded together.
+    Where configurations are samples of infinitely many, or some may be missing, one more stands for
+    all that are not known, with a bound that holds for each of them; where they are all around a
+    pose, they are bounded together.
     """
-    single = [leg.direct if isinstance(leg, PassingLeg) and leg.direct is not None else leg for leg in legs]
+    single = [
+        leg.direct if isinstance(leg, PassingLeg) and leg.direct is not None else leg
+        for leg in legs
+    ]
     chain = FreeEndsChain.of(asked, single)
     if chain is not None:
         return chain.least(deadline)
     return LeastChain(
-        [bounded_costs(asked, *both, deadline) for both in zip(asked.moves, legs, strict=True)], asked.closed
+        [bounded_costs(asked, *both, deadline) for both in zip(asked.moves, legs, strict=True)],
+        asked.closed,
     ).find()[0]
 
 
 def bounded_costs(asked: Cycle, move: PlannedMove, leg: Leg, deadline: Deadline) -> Array:
-    """Lower bounds (s, g) [J] of the pairs of a leg, the dwell included, and of one more node where some are not known.
+    """Lower bounds (s, g) [J] of the pairs of a leg, the dwell included, and of one more node where
+    some are not known.
 
     That node comes last.
     """
@@ -66,23 +72,31 @@ def bounded_costs(asked: Cycle, move: PlannedMove, leg: Leg, deadline: Deadline)
 
 
 def _of_unknown(leg: Leg, enough: float, deadline: Deadline) -> float:
-    """Bound [J] on the motions of a leg of which an end is not known; no more than `enough` is needed of it."""
+    """Bound [J] on the motions of a leg of which an end is not known; no more than `enough` is
+    needed of it.
+    """
     if all(layer.complete and not layer.some for layer in leg.layers):
         return _of_curves(leg, deadline)
-    if all(layer.around is not None or (layer.complete and not layer.sampled) for layer in leg.layers):
+    if all(
+        layer.around is not None or (layer.complete and not layer.sampled) for layer in leg.layers
+    ):
         return _of_turned(leg, enough, deadline)
     return _of_any(leg)
 
 
 def _of_turned(leg: Leg, enough: float, deadline: Deadline) -> float:
-    """Bound [J] on the motions of a leg of which an end is in any configuration of a pose that is turned about an
-    axis."""
+    """Bound [J] on the motions of a leg of which an end is in any configuration of a pose that is
+    turned about an axis."""
     problem, start, goal = leg.prepared.freed(), leg.start, leg.goal
     if start.around is not None and goal.around is not None:
-        return bound_between(PreparedProblem.of(problem), start.around, goal.around, deadline, enough)
+        return bound_between(
+            PreparedProblem.of(problem), start.around, goal.around, deadline, enough
+        )
     if goal.around is not None:
         q = np.array([end.q for end in start.ends])
-        return family_bound(PreparedProblem.of(problem), goal.around, q, deadline=deadline, enough=enough)
+        return family_bound(
+            PreparedProblem.of(problem), goal.around, q, deadline=deadline, enough=enough
+        )
     assert start.around is not None
     back = PreparedProblem.of(backwards(problem, problem.goal, problem.start))
     q = np.array([end.q for end in goal.ends])
@@ -91,7 +105,10 @@ def _of_turned(leg: Leg, enough: float, deadline: Deadline) -> float:
 
 def _of_curves(leg: Leg, deadline: Deadline) -> float:
     """Bound [J] on the motions of a leg of which an end is any member of a self-motion."""
-    some = [next((end for end in layer.ends if end.sampled), layer.ends[0]) for layer in (leg.start, leg.goal)]
+    some = [
+        next((end for end in layer.ends if end.sampled), layer.ends[0])
+        for layer in (leg.start, leg.goal)
+    ]
     # paired with one on a curve, every end of the other side counts
     ends = [(leg.start.ends, some[1:]), (some[:1], leg.goal.ends)]
     pairs = [Candidate(s, g, s.q, g.q) for starts, goals in ends for s, g in product(starts, goals)]
@@ -99,8 +116,8 @@ def _of_curves(leg: Leg, deadline: Deadline) -> float:
 
 
 def _of_any(leg: Leg) -> float:
-    """Bound [J] on the motions of a leg between any two configurations: no joint need move, and the potential energy
-    falls as far as it can."""
+    """Bound [J] on the motions of a leg between any two configurations: no joint need move, and the
+    potential energy falls as far as it can."""
     (_, most), (least, _) = (_levels(leg, layer) for layer in (leg.start, leg.goal))
     still = np.zeros((1, leg.prepared.arm.robot.nq))
     return float(LeastBound(leg.prepared).of(still, np.array([least - most]))[0])
@@ -109,7 +126,8 @@ def _of_any(leg: Leg) -> float:
 def _levels(leg: Leg, layer: Layer) -> tuple[float, float]:
     """Least and greatest potential energy [J] of all configurations of a layer, known or not.
 
-    But for full turns, which change none, they differ from a known one by at most half a turn in each joint.
+    But for full turns, which change none, they differ from a known one by at most half a turn in
+    each joint.
     """
     known = [leg.prepared.potential(end.q) for end in layer.ends]
     if layer.complete and not layer.sampled:

@@ -16,7 +16,9 @@ from joulepath.optimizer.result.energy import Sensitivity
 
 
 def holding_powers(move: PlannedMove, goal: Layer) -> Array:
-    """Power (n,) [W] that holding the arm on its motors draws after a move, in each configuration of its goal."""
+    """Power (n,) [W] that holding the arm on its motors draws after a move, in each configuration
+    of its goal.
+    """
     arm = move.arm_after
     still = np.zeros((len(goal.ends), arm.robot.nq))
     tau = Plant(arm).torques(np.array([end.q for end in goal.ends]), still, still)
@@ -24,20 +26,26 @@ def holding_powers(move: PlannedMove, goal: Layer) -> Array:
 
 
 def long_wait_powers(asked: Cycle, move: PlannedMove, goal: Layer) -> Array:
-    """Power (n,) [W] of every further second of a long wait after a move, in each configuration of its goal."""
+    """Power (n,) [W] of every further second of a long wait after a move, in each configuration of
+    its goal.
+    """
     if asked.hold == "motors":
         return holding_powers(move, goal)
     return np.full(len(goal.q), brake_power(asked.waiting(1.0), move.arm_after))
 
 
 def least_holding_power(move: PlannedMove) -> float:
-    """Least power [W] that holding the arm draws after a move in any configuration: with no torque to hold."""
+    """Least power [W] that holding the arm draws after a move in any configuration: with no torque
+    to hold.
+    """
     arm = move.arm_after
     return float(holding_power(arm, np.zeros(arm.robot.nq)))
 
 
 def rest_energy(asked: Cycle, move: PlannedMove, length: float, hold: float) -> float:
-    """Energy [J] of a rest of `length` [s] after a move, where holding the arm on its motors draws `hold` [W]."""
+    """Energy [J] of a rest of `length` [s] after a move, where holding the arm on its motors draws
+    `hold` [W].
+    """
     return dwell_energy(asked.waiting(length), move.arm_after, hold, 0.0) if length > 0 else 0.0
 
 
@@ -59,11 +67,17 @@ def dwell_energies(asked: Cycle, move: PlannedMove, goal: Layer) -> Array:
     powers = holding_powers(move, goal)
     # full turns change nothing
     energies = np.zeros(len(goal.ends))
-    energies[goal.end[first]] = [rest_energy(asked, move, move.dwell, hold) for hold in powers[first].tolist()]
+    energies[goal.end[first]] = [
+        rest_energy(asked, move, move.dwell, hold) for hold in powers[first].tolist()
+    ]
     return energies[goal.end]
 
 
 def dwell_costs(asked: Cycle, move: PlannedMove, goal: Layer) -> Array:
-    """What the dwell after a move adds to the objective (n,) [J], in each configuration of its goal: standing still
-    needs no work."""
-    return dwell_energies(asked, move, goal) if asked.objective == "electrical" else np.zeros(len(goal.q))
+    """What the dwell after a move adds to the objective (n,) [J], in each configuration of its
+    goal: standing still needs no work."""
+    return (
+        dwell_energies(asked, move, goal)
+        if asked.objective == "electrical"
+        else np.zeros(len(goal.q))
+    )

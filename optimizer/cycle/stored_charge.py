@@ -1,8 +1,10 @@
-"""The charge of an energy storage over a cycle: it runs on from leg to leg, through dwells and waits.
+"""The charge of an energy storage over a cycle: it runs on from leg to leg, through dwells and
+waits.
 
-A step by a net surplus or demand takes a charge E to min(max(E + s, 0), capacity). One such step after the other is
-again of the form min(max(E + S, low), high), with the sum S of all steps. So a cycle that is repeated comes to a charge
-that it ends with as well: to that of a cycle begun full where S > 0, to that of one begun empty where S < 0.
+A step by a net surplus or demand takes a charge E to min(max(E + s, 0), capacity). One such step
+after the other is again of the form min(max(E + S, low), high), with the sum S of all steps. So a
+cycle that is repeated comes to a charge that it ends with as well: to that of a cycle begun full
+where S > 0, to that of one begun empty where S < 0.
 """
 
 from __future__ import annotations
@@ -36,8 +38,12 @@ class Demand:
         return cls(*plant.net_demand(spline))
 
     @classmethod
-    def of_rest(cls, asked: Cycle, move: PlannedMove, before: float, length: float, q: Array) -> Demand:
-        """That of `length` [s] of rest at q (nq,) [rad], `before` [s] after a move: by motors, then by brakes."""
+    def of_rest(
+        cls, asked: Cycle, move: PlannedMove, before: float, length: float, q: Array
+    ) -> Demand:
+        """That of `length` [s] of rest at q (nq,) [rad], `before` [s] after a move: by motors, then
+        by brakes.
+        """
         if length <= 0:
             return cls(np.zeros(0), np.zeros(0))
         arm, still = move.arm_after, np.zeros((1, len(q)))
@@ -57,7 +63,9 @@ def charges_of(bus: Bus, demands: Sequence[Demand], closed: bool) -> list[float]
 
     A `closed` cycle begins with the charge that it ends with.
     """
-    net, lengths = (np.concatenate([getattr(each, name) for each in demands]) for name in ("net", "lengths"))
+    net, lengths = (
+        np.concatenate([getattr(each, name) for each in demands]) for name in ("net", "lengths")
+    )
     ends = np.cumsum([0, *(len(each.net) for each in demands)])
     first = bus.initial
     if closed:
@@ -75,4 +83,8 @@ def flows(arm: Arm, demands: Sequence[Demand], charges: Sequence[float]) -> list
 
 def drawn(arm: Arm, demands: Sequence[Demand], charges: Sequence[float]) -> float:
     """Energy [J] that demands draw, the decrease of the charge included."""
-    return sum(float(each.drawn.sum()) for each in flows(arm, demands, charges)) + charges[0] - charges[-1]
+    return (
+        sum(float(each.drawn.sum()) for each in flows(arm, demands, charges))
+        + charges[0]
+        - charges[-1]
+    )

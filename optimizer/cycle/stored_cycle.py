@@ -1,10 +1,12 @@
 """Cycles with an energy storage on the bus, whose charge couples the legs.
 
-What the storage saves depends on the whole cycle, so no leg has a value of its own. The cycle is looked for on two
-buses where each has: on one that takes every surplus back as well as the storage would, and on the same bus without the
-storage. On the first, no cycle draws more than with the storage, which has limits: so its lower bound holds. Then each
-cycle is valued as one, with the exact charge, and so are the cycles that choose move by move. The best one counts.
-Where it has surplus that the storage does not take, its moves are optimised again, with the charge that they find.
+What the storage saves depends on the whole cycle, so no leg has a value of its own. The cycle is
+looked for on two buses where each has: on one that takes every surplus back as well as the storage
+would, and on the same bus without the storage. On the first, no cycle draws more than with the
+storage, which has limits: so its lower bound holds. Then each cycle is valued as one, with the
+exact charge, and so are the cycles that choose move by move. The best one counts. Where it has
+surplus that the storage does not take, its moves are optimised again, with the charge that they
+find.
 """
 
 from __future__ import annotations
@@ -36,9 +38,11 @@ from joulepath.optimizer.result.energy import StorageUse
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.trajectories.spline import Spline
 
-# shares of the deadline for the first search, and of what is left for the second one and for the moves
+# shares of the deadline for the first search, and of what is left for the second one and for the
+# moves
 FIRST, SECOND, REFINED = 0.5, 0.5, 0.5
-# J: less surplus than this need not be stored; and relative: energies that are the same but for quadrature
+# J: less surplus than this need not be stored; and relative: energies that are the same but for
+# quadrature
 SPILLED, SAME = 0.05, 1e-6
 # demands of a move: its motion, the dwell and the wait
 PARTS = 3
@@ -48,10 +52,11 @@ Search = Callable[[Cycle], CycleSolution]
 
 @dataclass(frozen=True)
 class Valued:
-    """A cycle as one: its `moves`, as they were found on another bus, and the `motions` that stand for theirs.
+    """A cycle as one: its `moves`, as they were found on another bus, and the `motions` that stand
+    for theirs.
 
-    Each motion has PARTS `demands`; `charges` [J] are those before each of them, and after the last. The objective is
-    `value` [J].
+    Each motion has PARTS `demands`; `charges` [J] are those before each of them, and after the
+    last. The objective is `value` [J].
     """
 
     moves: Sequence[CycleMove]
@@ -62,7 +67,8 @@ class Valued:
 
 
 def with_storage(asked: Cycle, search: Search, clock: Clock) -> CycleSolution:
-    """The cycle of least energy with the storage of its bus; `search` finds the cycle of a bus without storage.
+    """The cycle of least energy with the storage of its bus; `search` finds the cycle of a bus
+    without storage.
 
     Raises the errors of `search`.
     """
@@ -74,14 +80,22 @@ def with_storage(asked: Cycle, search: Search, clock: Clock) -> CycleSolution:
         with suppress(DeadlineExceeded):
             cycles.append(search(_on(_ordered(asked, stored), Bus(), SECOND * end.left)))
     valued = [_valued(asked, each.moves) for each in cycles]
-    others = [(each.name, _valued(asked, each.moves)) for one in cycles for each in one.baselines if each.moves]
+    others = [
+        (each.name, _valued(asked, each.moves))
+        for one in cycles
+        for each in one.baselines
+        if each.moves
+    ]
     best = min([*valued, *(each for _, each in others)], key=lambda each: each.value)
     best = _refined(asked, best, end.within(REFINED * end.left), clock)
     moves = _moves(asked, best, end, clock)
     needed = needed_by(moves)
     met = needed.of(asked.objective) <= stored.needed.of(asked.objective) * (1 + SAME)
     found = replace(
-        next((one for one, own in zip(cycles, valued, strict=True) if own.moves is best.moves), stored),
+        next(
+            (one for one, own in zip(cycles, valued, strict=True) if own.moves is best.moves),
+            stored,
+        ),
         status=stored.status if met else "feasible",
         moves=moves,
         lower_bound=min(stored.lower_bound, needed.of(asked.objective)),
@@ -89,7 +103,9 @@ def with_storage(asked: Cycle, search: Search, clock: Clock) -> CycleSolution:
         wall_time=clock() - began,
         storage=_use(asked, best),
     )
-    theirs: list[tuple[CycleBaselineName, Valued]] = [("without_storage", each) for each in valued[1:]]
+    theirs: list[tuple[CycleBaselineName, Valued]] = [
+        ("without_storage", each) for each in valued[1:]
+    ]
     theirs += [(name, each) for name, each in others if name == "move_by_move"][:1]
     return replace(found, baselines=[_baseline(asked, *each, needed) for each in theirs])
 
@@ -121,12 +137,21 @@ def _demands(asked: Cycle, move: CycleMove, motion: Spline) -> list[Demand]:
 
 
 def _valued(
-    asked: Cycle, moves: Sequence[CycleMove], motions: list[Spline] | None = None, demands: list[Demand] | None = None
+    asked: Cycle,
+    moves: Sequence[CycleMove],
+    motions: list[Spline] | None = None,
+    demands: list[Demand] | None = None,
 ) -> Valued:
-    """A cycle as one, with the exact charge; its motions are those of its moves unless given, with their demands."""
+    """A cycle as one, with the exact charge; its motions are those of its moves unless given, with
+    their demands.
+    """
     if motions is None or demands is None:
         motions = [move.solution.trajectory.spline for move in moves]
-        demands = [each for move, own in zip(moves, motions, strict=True) for each in _demands(asked, move, own)]
+        demands = [
+            each
+            for move, own in zip(moves, motions, strict=True)
+            for each in _demands(asked, move, own)
+        ]
     charges = charges_of(asked.arm.bus, demands, asked.closed)
     if asked.objective == "mechanical":
         value = sum(move.solution.energy.mechanical.total for move in moves)
@@ -136,12 +161,17 @@ def _valued(
 
 
 def _refined(asked: Cycle, best: Valued, end: Deadline, clock: Clock) -> Valued:
-    """The cycle with motions that spill less of what the storage has no room for, each in its charge and duration."""
+    """The cycle with motions that spill less of what the storage has no room for, each in its
+    charge and duration.
+    """
     if asked.objective == "mechanical" or not asked.arm.bus.capacity * asked.arm.bus.efficiency:
         return best
     for k, move in enumerate(best.moves):
         motion, own = best.motions[k], PARTS * k
-        if best.demands[own].flow(asked.arm, best.charges[own]).surplus.sum() <= SPILLED or end.passed:
+        if (
+            best.demands[own].flow(asked.arm, best.charges[own]).surplus.sum() <= SPILLED
+            or end.passed
+        ):
             continue
         problem = _problem(asked, _stored(asked, move.planned, best.charges[own]), move, end.left)
         fixed = replace(problem, duration_min=motion.duration, duration_max=motion.duration)
@@ -202,7 +232,8 @@ def _use(asked: Cycle, best: Valued) -> StorageUse:
 
 
 def _baseline(asked: Cycle, name: CycleBaselineName, theirs: Valued, ours: Needed) -> CycleBaseline:
-    """Another round, valued with the storage like ours; but for `without_storage`, which has none."""
+    """Another round, valued with the storage like ours; but for `without_storage`, which has
+    none."""
     needed = needed_by(theirs.moves)
     if name != "without_storage":
         needed = replace(needed, electrical=replace(needed.electrical, energy=theirs.value))

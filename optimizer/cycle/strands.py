@@ -1,7 +1,9 @@
-"""The strands of a tool path: in joint space, the curves along which an arm can follow some part of it.
+"""The strands of a tool path: in joint space, the curves along which an arm can follow some part of
+it.
 
-Every configuration at some points of the path is followed in both directions, as far as the arm reaches, no joint has
-to jump and none leaves its range. Where one strand ends, the arm can go on along another one after a reconfiguration.
+Every configuration at some points of the path is followed in both directions, as far as the arm
+reaches, no joint has to jump and none leaves its range. Where one strand ends, the arm can go on
+along another one after a reconfiguration.
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ from joulepath.optimizer.problem.branches import BranchFilter
 SEEDS = np.linspace(0.0, 1.0, 17)
 # rad: a configuration is on a strand that comes so near to it
 SAME = 1e-4
-# share of the path that is kept from where a strand ends at a singularity, or where the arm no longer reaches
+# share of the path that is kept from where a strand ends at a singularity, or where the arm no
+# longer reaches
 KEPT = 0.02
 
 
@@ -47,7 +50,11 @@ class Strand:
 
 def strands_of(arm: Arm, course: ToolCourse, branch: BranchFilter | None) -> list[Strand]:
     """The strands of a course that begin in allowed branches."""
-    kinematics, limits, found = required_inverse_kinematics(arm.robot, "path"), arm.active_limits, list[Strand]()
+    kinematics, limits, found = (
+        required_inverse_kinematics(arm.robot, "path"),
+        arm.active_limits,
+        list[Strand](),
+    )
     for seed in SEEDS.tolist():
         checkpoint()
         (T,) = course.poses(np.array([seed]))
@@ -55,7 +62,11 @@ def strands_of(arm: Arm, course: ToolCourse, branch: BranchFilter | None) -> lis
             solutions = kinematics.solve(T, arm.T_flange_tcp, limits, windings=False)
         except (UnreachablePose, SingularPose):
             continue
-        allowed = [each.q for each in solutions if branch is None or branch.allows(each.label, each.singular)]
+        allowed = [
+            each.q
+            for each in solutions
+            if branch is None or branch.allows(each.label, each.singular)
+        ]
         fresh = [q for q in allowed if not _is_on_any(found, seed, q)]
         if fresh:
             found += _through(arm, course, seed, np.array(fresh))
@@ -65,7 +76,8 @@ def strands_of(arm: Arm, course: ToolCourse, branch: BranchFilter | None) -> lis
 def _is_on_any(found: list[Strand], at: float, q: Array) -> bool:
     here = np.array([at])
     return any(
-        each.covers(here)[0] and np.abs(wrapped(each.configurations(here)[0] - q)).max() < SAME for each in found
+        each.covers(here)[0] and np.abs(wrapped(each.configurations(here)[0] - q)).max() < SAME
+        for each in found
     )
 
 
@@ -78,11 +90,18 @@ def _through(arm: Arm, course: ToolCourse, seed: float, q: Array) -> list[Strand
             sides.append([(np.zeros(0), np.zeros((0, q.shape[1])))] * len(q))
             continue
         followed = traces(arm, course.part(seed, end), q)
-        sides.append([_kept(seed + (end - seed) * each.at[1:], each.q[1:], each.obstacle is None) for each in followed])
+        sides.append(
+            [
+                _kept(seed + (end - seed) * each.at[1:], each.q[1:], each.obstacle is None)
+                for each in followed
+            ]
+        )
     strands = list[Strand]()
     for start, (before, q_before), (after, q_after) in zip(q, *sides, strict=True):
         at = np.concatenate([before[::-1], [seed], after])
-        strands.append(_within(limits, at, np.vstack([q_before[::-1], start, q_after]), len(before)))
+        strands.append(
+            _within(limits, at, np.vstack([q_before[::-1], start, q_after]), len(before))
+        )
     return strands
 
 
@@ -95,14 +114,16 @@ def _kept(at: Array, q: Array, whole: bool) -> tuple[Array, Array]:
 
 
 def _within(limits: Limits, at: Array, q: Array, seed: int) -> Strand:
-    """The part of a strand around its point `seed` that is within the joints' range, with the full turns of each joint
-    with which this part is longest."""
+    """The part of a strand around its point `seed` that is within the joints' range, with the full
+    turns of each joint with which this part is longest."""
     first, last, shift = 0, len(at) - 1, np.zeros(q.shape[1])
     for joint, course in enumerate(q.T):
         reaches = []
         for value in full_turn_alternatives(q[seed], limits.q_min, limits.q_max)[joint]:
             turned = course + (value - course[seed])
-            outside = np.flatnonzero((turned < limits.q_min[joint]) | (turned > limits.q_max[joint]))
+            outside = np.flatnonzero(
+                (turned < limits.q_min[joint]) | (turned > limits.q_max[joint])
+            )
             low = int(outside[outside < seed].max(initial=-1)) + 1
             high = int(outside[outside > seed].min(initial=len(at))) - 1
             reaches.append((high - low, -abs(value), low, high, value - course[seed]))

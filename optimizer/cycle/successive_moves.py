@@ -20,8 +20,8 @@ from joulepath.optimizer.search.run import Run
 
 
 def successively_chosen(asked: Cycle, end: Deadline, clock: Clock) -> Cycle | None:
-    """The cycle whose stops have the joint positions that the moves choose; None if one of them has no motion in its
-    share of the time.
+    """The cycle whose stops have the joint positions that the moves choose; None if one of them has
+    no motion in its share of the time.
 
     It is for cycles in their own time and order, with moves from stop to stop alone.
     """

@@ -1,8 +1,10 @@
-"""A cycle in a given time: the best chain at the price of time, its time shared, and a bound by the price.
+"""A cycle in a given time: the best chain at the price of time, its time shared, and a bound by the
+price.
 
-For any price λ of time, a cycle of duration D needs at least min Σ (E + λ T) - λ (D - dwells), the minimum over all
-chains and durations: so says Lagrangian duality. A wait is one more part of it, of power P: λ is not below -P then. At
-the price that shares the time exactly, the least chain is the best cycle of all.
+For any price λ of time, a cycle of duration D needs at least min Σ (E + λ T) - λ (D - dwells), the
+minimum over all chains and durations: so says Lagrangian duality. A wait is one more part of it, of
+power P: λ is not below -P then. At the price that shares the time exactly, the least chain is the
+best cycle of all.
 """
 
 from __future__ import annotations
@@ -18,7 +20,12 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.chains import LeastChain
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.errors import CycleTooShort, NoSequence
-from joulepath.optimizer.cycle.priced_search import MoveOfALeg, PricedMotion, PricedSearch, fastest_motion
+from joulepath.optimizer.cycle.priced_search import (
+    MoveOfALeg,
+    PricedMotion,
+    PricedSearch,
+    fastest_motion,
+)
 from joulepath.optimizer.cycle.rests import holding_powers, long_wait_powers, rest_energy
 from joulepath.optimizer.cycle.time_sharing import PRICES, Shared, TimeSharing, duration_of
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
@@ -36,10 +43,11 @@ _duration = attrgetter("duration")
 
 @dataclass(frozen=True)
 class Timed:
-    """A chain whose time is shared. It waits after move `at`, which draws `wait_energy` [J] beside the dwell there.
+    """A chain whose time is shared. It waits after move `at`, which draws `wait_energy` [J] beside
+    the dwell there.
 
-    The objective of the cycle is `energy` [J], nearly. However the time is shared, this chain needs `least` [J] or
-    more: see `Shared`.
+    The objective of the cycle is `energy` [J], nearly. However the time is shared, this chain needs
+    `least` [J] or more: see `Shared`.
     """
 
     nodes: list[int]
@@ -51,10 +59,11 @@ class Timed:
 
 
 class TimedSearch:
-    """The search for the cycle of least energy in a time [s], from the `search` of the cycle in its own time.
+    """The search for the cycle of least energy in a time [s], from the `search` of the cycle in its
+    own time.
 
-    `exact`: no other chain can be better, as far as the price tells. `sought` are the kinds of each leg for which a
-    motion was sought at some price.
+    `exact`: no other chain can be better, as far as the price tells. `sought` are the kinds of each
+    leg for which a motion was sought at some price.
     """
 
     def __init__(self, search: CycleSearch, duration: float) -> None:
@@ -64,13 +73,16 @@ class TimedSearch:
         # of the routes through passes, only those found in the cycle's own time are followed
         self.exact = not self.asked.passes
         # moves after which it may wait
-        self.places = [k for k, move in enumerate(self.asked.moves) if self.asked.may_wait_after(move)]
+        self.places = [
+            k for k, move in enumerate(self.asked.moves) if self.asked.may_wait_after(move)
+        ]
         self.sought = [set[int]() for _ in self.legs]
         self._fastest: dict[Pair, PricedMotion | None] = {}
         self._motions: dict[Pair, list[PricedMotion]] = {}
 
     def run(self, nodes: list[int] | None) -> Timed:
-        """The best cycle found from that of a chain on, whose motions are known, or from the fastest one.
+        """The best cycle found from that of a chain on, whose motions are known, or from the
+        fastest one.
 
         Raises CycleTooShort, NoTrajectory or DeadlineExceeded.
         """
@@ -81,7 +93,11 @@ class TimedSearch:
             for _ in range(MOST_CHAINS):
                 priced = self._priced(best.shared.price, self.longest)
                 chain = self._explored(priced)
-                unsure = priced.cut_short or priced.failed or (not self._rests_count and priced.leaves_chains)
+                unsure = (
+                    priced.cut_short
+                    or priced.failed
+                    or (not self._rests_count and priced.leaves_chains)
+                )
                 self.exact &= not unsure
                 if chain == best.nodes:
                     return best
@@ -94,7 +110,9 @@ class TimedSearch:
         return best
 
     def _of_the_own(self, nodes: list[int]) -> Timed | None:
-        """A chain whose motions are known, with its time shared; as they are, if that is not done in time."""
+        """A chain whose motions are known, with its time shared; as they are, if that is not done
+        in time.
+        """
         if self.search.search_end.passed and (known := self.as_it_is(nodes)) is not None:
             return known
         try:
@@ -104,9 +122,14 @@ class TimedSearch:
         return self.as_it_is(nodes) if found is None else found
 
     def as_it_is(self, nodes: list[int]) -> Timed | None:
-        """The motions of a chain as they are known, the time left over waited out; None if they take too long."""
+        """The motions of a chain as they are known, the time left over waited out; None if they
+        take too long.
+        """
         found = [self.search.solutions[each] for each in self.search.pairs(nodes)]
-        lengths, needed = [each.duration for each in found], sum(each.energy.of(self.asked.objective) for each in found)
+        lengths, needed = (
+            [each.duration for each in found],
+            sum(each.energy.of(self.asked.objective) for each in found),
+        )
         waited = self.time - sum(lengths)
         if waited < 0 or not self._rests_count:
             return None
@@ -135,15 +158,23 @@ class TimedSearch:
         return chain
 
     def in_hand(self, pair: Pair) -> list[PricedMotion]:
-        """The motions of a pair that are known, of any duration; what is found later is put to them."""
+        """The motions of a pair that are known, of any duration; what is found later is put to
+        them.
+        """
         if pair not in self._motions:
             own = self.search.solutions.get(pair)
             objective = self.asked.objective
-            self._motions[pair] = [] if own is None else [PricedMotion(own.trajectory.spline, own.energy.of(objective))]
+            self._motions[pair] = (
+                []
+                if own is None
+                else [PricedMotion(own.trajectory.spline, own.energy.of(objective))]
+            )
         return self._motions[pair]
 
     def _of_the_fastest(self) -> Timed:
-        """The chain that is nearly the fastest, with its time shared. Raises CycleTooShort or NoTrajectory."""
+        """The chain that is nearly the fastest, with its time shared. Raises CycleTooShort or
+        NoTrajectory.
+        """
         priced = self._fast_search
         chain = self._explored(priced)
         fast = self.fastest(chain)
@@ -153,7 +184,11 @@ class TimedSearch:
             if other is not None and (fast is None or duration_of(other[1]) < duration_of(fast)):
                 chain, fast = other
         if fast is None:
-            raise DeadlineExceeded([]) if priced.cut_short or self.search.search_end.passed else NoTrajectory([])
+            raise (
+                DeadlineExceeded([])
+                if priced.cut_short or self.search.search_end.passed
+                else NoTrajectory([])
+            )
         if duration_of(fast) > self.time:
             if priced.cut_short:
                 raise DeadlineExceeded([])
@@ -164,9 +199,11 @@ class TimedSearch:
         return found
 
     def fastest_cycle(self) -> tuple[list[int], list[PricedMotion]] | None:
-        """The chain that is nearly the fastest of all, and its moves as fast as they can be; None if it is not found.
+        """The chain that is nearly the fastest of all, and its moves as fast as they can be; None
+        if it is not found.
 
-        It is that by bounds; where one of its moves has no motion, as among obstacles, that of a search.
+        It is that by bounds; where one of its moves has no motion, as among obstacles, that of a
+        search.
         """
         if self.search.search_end.passed and "_fast_search" not in vars(self):
             # its bounds alone take the time that cycles in hand need for their certificates
@@ -180,7 +217,8 @@ class TimedSearch:
         return None
 
     def fastest(self, nodes: list[int]) -> list[PricedMotion] | None:
-        """The moves of a chain as fast as they can be, each no slower than any motion of it that is known.
+        """The moves of a chain as fast as they can be, each no slower than any motion of it that is
+        known.
 
         None if some are not found.
         """
@@ -208,7 +246,10 @@ class TimedSearch:
             return None
         beside = (self.longest, self.search.search_end)
         sharing = TimeSharing(
-            [MoveOfALeg(self.legs[k], s, g, *beside, self.in_hand((k, s, g))) for k, s, g in self.search.pairs(nodes)]
+            [
+                MoveOfALeg(self.legs[k], s, g, *beside, self.in_hand((k, s, g)))
+                for k, s, g in self.search.pairs(nodes)
+            ]
         )
         try:
             if self._rests_count:
@@ -220,7 +261,9 @@ class TimedSearch:
             return None
         at, wait = self.cheapest_wait(nodes, shared.waited)
         dwelling, waiting = self.search.dwells(nodes), wait if self._rests_count else 0.0
-        return Timed(nodes, shared, at, wait, shared.energy + dwelling + waiting, shared.least + dwelling)
+        return Timed(
+            nodes, shared, at, wait, shared.energy + dwelling + waiting, shared.least + dwelling
+        )
 
     @property
     def _rests_count(self) -> bool:
@@ -228,7 +271,8 @@ class TimedSearch:
         return self.asked.objective == "electrical"
 
     def cheapest_wait(self, nodes: list[int], waited: float) -> tuple[int, float]:
-        """The move after which a wait [s] draws least, and its energy [J] beside the dwell there."""
+        """The move after which a wait [s] draws least, and its energy [J] beside the dwell
+        there."""
         energies = {k: self._wait_energy(nodes, k, waited) for k in self.places}
         at = min(energies, key=energies.__getitem__)
         return at, energies[at]
@@ -250,11 +294,11 @@ class TimedSearch:
         return long_wait_powers(self.asked, self.asked.moves[move], self.legs[move].goal)
 
     def bound(self, price: float, ours: float) -> float:
-        """Lower bound [J] on all rounds in the time that is asked for, by a price [W] of time: not above what we found,
-        `ours` [J].
+        """Lower bound [J] on all rounds in the time that is asked for, by a price [W] of time: not
+        above what we found, `ours` [J].
 
-        At a price below 0 it holds for every longer time, too, and above 0 for every shorter one. -inf where some
-        configurations are not known.
+        At a price below 0 it holds for every longer time, too, and above 0 for every shorter one.
+        -inf where some configurations are not known.
         """
         if not all(leg.closed for leg in self.legs):
             return -np.inf
@@ -263,21 +307,25 @@ class TimedSearch:
         return min(self._least(price, longest) - price * self.time, ours)
 
     def _least_waiting(self) -> float:
-        """What a second of waiting adds to the objective at least [W]: neither on motors nor on brakes may a wait gain
-        by the price of time."""
+        """What a second of waiting adds to the objective at least [W]: neither on motors nor on
+        brakes may a wait gain by the price of time."""
         if not self._rests_count:
             return 0.0
         return min(
             float(power.min())
             for move, leg in zip(self.asked.moves, self.legs, strict=True)
-            for power in (holding_powers(move, leg.goal), long_wait_powers(self.asked, move, leg.goal))
+            for power in (
+                holding_powers(move, leg.goal),
+                long_wait_powers(self.asked, move, leg.goal),
+            )
         )
 
     def _longest_below(self, ours: float) -> float:
-        """Longest duration [s] of a move in any cycle that needs less than `ours` [J] and takes no longer than asked.
+        """Longest duration [s] of a move in any cycle that needs less than `ours` [J] and takes no
+        longer than asked.
 
-        Every second draws at least what the electronics do: a cycle with a move of duration T needs base · T more than
-        the least chain of Σ (E - base · T).
+        Every second draws at least what the electronics do: a cycle with a move of duration T needs
+        base · T more than the least chain of Σ (E - base · T).
         """
         longest = self.asked.longest_move
         base = self.asked.arm.base_power if self._rests_count else 0.0
@@ -287,6 +335,8 @@ class TimedSearch:
         return float(np.clip((ours - beside) / base, LEAST_DURATION, longest))
 
     def _least(self, price: float, longest: float) -> float:
-        """Least sum [J] of bounds on energy + price · duration of a chain's moves, each of at most `longest` [s]."""
+        """Least sum [J] of bounds on energy + price · duration of a chain's moves, each of at most
+        `longest` [s].
+        """
         costs = [leg.priced(price, longest).least_costs for leg in self.legs]
         return LeastChain(costs, self.asked.closed).find()[0]

@@ -1,8 +1,9 @@
 """Tours over groups, each once, by dynamic programming over their subsets.
 
-Nodes that differ in full turns alone are one configuration, an end. The least costs between ends make a problem with
-fewer nodes, whose least ways onward from every subset are found first: no way onward from a node of the end needs less.
-So a way that needs more than a limit with them is left out of the tours over all nodes.
+Nodes that differ in full turns alone are one configuration, an end. The least costs between ends
+make a problem with fewer nodes, whose least ways onward from every subset are found first: no way
+onward from a node of the end needs less. So a way that needs more than a limit with them is left
+out of the tours over all nodes.
 """
 
 from __future__ import annotations
@@ -25,8 +26,9 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class _Costs:
-    """Costs [J] from the start's nodes to those of all groups `first` (s, n), `between` (n, n) these, and `back` (n, s)
-    to the start. Group k has the nodes `own[k]`; `group` (n,) is that of each node."""
+    """Costs [J] from the start's nodes to those of all groups `first` (s, n), `between` (n, n)
+    these, and `back` (n, s) to the start. Group k has the nodes `own[k]`; `group` (n,) is that of
+    each node."""
 
     own: list[slice]
     group: npt.NDArray[np.intp]
@@ -44,7 +46,8 @@ class _Costs:
         return cls(own, group, first, np.full((nodes, nodes), np.inf), np.zeros((nodes, starts)))
 
     def put(self, a: int | None, b: int | None, cost: Array) -> None:
-        """Take the costs from the nodes in which group a is left to those of b; None is the start."""
+        """Take the costs from the nodes in which group a is left to those of b; None is the
+        start."""
         if a is None:
             assert b is not None
             self.first[:, self.own[b]] = cost
@@ -56,8 +59,9 @@ class _Costs:
 
 @dataclass(frozen=True)
 class _Tour:
-    """What tours from one node of the start have in common: costs [J] to all nodes `first` (n,), `back` (n,) from them,
-    and `onward` (2^groups, ends), the least between ends from each subset and the end in which it is left."""
+    """What tours from one node of the start have in common: costs [J] to all nodes `first` (n,),
+    `back` (n,) from them, and `onward` (2^groups, ends), the least between ends from each subset
+    and the end in which it is left."""
 
     first: Array
     back: Array
@@ -67,35 +71,50 @@ class _Tour:
 class Tours:
     """Tours from a node of the start over all groups, back to this node if `closed`.
 
-    `ends` has the end (n,) of each node in which a group is left, ascending from 0; None is the start. `earlier` are
-    the groups that come before each group. Costs are `put` between all of them before the first question.
+    `ends` has the end (n,) of each node in which a group is left, ascending from 0; None is the
+    start. `earlier` are the groups that come before each group. Costs are `put` between all of them
+    before the first question.
     """
 
-    def __init__(self, ends: Mapping[int | None, npt.NDArray[np.intp]], earlier: Sequence[set[int]], closed: bool):
+    def __init__(
+        self,
+        ends: Mapping[int | None, npt.NDArray[np.intp]],
+        earlier: Sequence[set[int]],
+        closed: bool,
+    ):
         self.count, self.closed = len(earlier), closed
         # the groups that may come next after those of each subset
         needed = [sum(1 << k for k in each) for each in earlier]
         self._may_follow = [
-            [k for k, before in enumerate(needed) if not subset >> k & 1 and subset & before == before]
+            [
+                k
+                for k, before in enumerate(needed)
+                if not subset >> k & 1 and subset & before == before
+            ]
             for subset in range(1 << self.count)
         ]
         groups, start = [ends[k] for k in range(self.count)], ends[None]
         self._nodes = _Costs.of(len(start), [len(each) for each in groups])
         self._ends = _Costs.of(int(start[-1]) + 1, [int(each[-1]) + 1 for each in groups])
         # the end of each node, among those of all groups, and of each node of the start
-        self._end = np.concatenate([own.start + each for own, each in zip(self._ends.own, groups, strict=True)])
+        self._end = np.concatenate(
+            [own.start + each for own, each in zip(self._ends.own, groups, strict=True)]
+        )
         self._end_of_start = start
         self._first_of_end = {k: np.unique(each, return_index=True)[1] for k, each in ends.items()}
 
     def put(self, a: int | None, b: int | None, cost: Array) -> None:
-        """Take the costs (n_a, n_b) [J] from the nodes in which group a is left to those in which b is left."""
+        """Take the costs (n_a, n_b) [J] from the nodes in which group a is left to those in which b
+        is left.
+        """
         self._nodes.put(a, b, cost)
         of_ends = np.minimum.reduceat(cost, self._first_of_end[a], axis=0)
         self._ends.put(a, b, np.minimum.reduceat(of_ends, self._first_of_end[b], axis=1))
 
     def least(self) -> tuple[float, list[int], list[int]]:
-        """Cost [J] of the least tour, its groups in their order, and the nodes in which the start and these are left;
-        for a closed one the start's node again. Inf and nothing if there is none."""
+        """Cost [J] of the least tour, its groups in their order, and the nodes in which the start
+        and these are left; for a closed one the start's node again. Inf and nothing if there is
+        none."""
         onward, group = self._onward(), self._nodes.group
         first, back = self._nodes.first, self._nodes.back
         after = onward[1 << group, :, self._end].T
@@ -107,7 +126,9 @@ class Tours:
         for s in np.argsort(bounds, kind="stable").tolist():
             if bounds[s] >= best:
                 break
-            tour = _Tour(first[s], back[:, s], onward[:, self._end_of_start[s] if self.closed else 0])
+            tour = _Tour(
+                first[s], back[:, s], onward[:, self._end_of_start[s] if self.closed else 0]
+            )
             value, found = self._from(tour, float(bounds[s]), best)
             if found:
                 best, nodes, start = value, found, s
@@ -120,8 +141,9 @@ class Tours:
         return best, groups, [start, *local, *([start] if self.closed else [])]
 
     def _onward(self) -> Array:
-        """Least costs (2^groups, starts, ends) [J] between ends, from each subset and the end in which it is left,
-        over all other groups and back to each end of the start; of one start if the tour is not closed."""
+        """Least costs (2^groups, starts, ends) [J] between ends, from each subset and the end in
+        which it is left, over all other groups and back to each end of the start; of one start if
+        the tour is not closed."""
         costs, whole = self._ends, (1 << self.count) - 1
         back = costs.back.T if self.closed else costs.back.T[:1]
         onward = np.full((1 << self.count, *back.shape), np.inf)
@@ -131,15 +153,19 @@ class Tours:
         for subset in range(whole - 1, 0, -1):
             checkpoint()
             following = sum(1 << k for k in self._may_follow[subset])
-            rows, columns = (np.flatnonzero(groups >> costs.group & 1) for groups in (subset, following))
+            rows, columns = (
+                np.flatnonzero(groups >> costs.group & 1) for groups in (subset, following)
+            )
             if len(columns):
                 then = onward[subset | 1 << costs.group[columns], :, columns]
-                onward[subset][:, rows] = (between[np.ix_(columns, rows)][:, None] + then[:, :, None]).min(axis=0)
+                onward[subset][:, rows] = (
+                    between[np.ix_(columns, rows)][:, None] + then[:, :, None]
+                ).min(axis=0)
         return onward
 
     def _from(self, tour: _Tour, bound: float, most: float) -> tuple[float, list[int]]:
-        """Cost [J] and nodes of the least tour, if it costs less than `most`; no tour costs less than `bound`. Inf and
-        nothing if there is none."""
+        """Cost [J] and nodes of the least tour, if it costs less than `most`; no tour costs less
+        than `bound`. Inf and nothing if there is none."""
         best, nodes = most, list[int]()
         for beyond in BEYOND:
             limit = min(bound + beyond * abs(bound) if np.isfinite(beyond) else np.inf, best)
@@ -151,7 +177,9 @@ class Tours:
         return (best, nodes) if nodes else (np.inf, [])
 
     def _within(self, tour: _Tour, limit: float) -> tuple[float, list[int]]:
-        """Cost [J] and nodes of the least tour of those of which every part has a bound within a limit [J]."""
+        """Cost [J] and nodes of the least tour of those of which every part has a bound within a
+        limit [J].
+        """
         costs, whole = self._nodes, (1 << self.count) - 1
         reached = {1 << k: self._row(k, tour.first[costs.own[k]]) for k in self._may_follow[0]}
         kept = dict[int, tuple[npt.NDArray[np.intp], Array]]()
@@ -160,7 +188,9 @@ class Tours:
                 continue
             checkpoint()
             row = reached.pop(subset)
-            nodes = np.flatnonzero(np.isfinite(row) & (row + tour.onward[subset, self._end] <= limit))
+            nodes = np.flatnonzero(
+                np.isfinite(row) & (row + tour.onward[subset, self._end] <= limit)
+            )
             if not len(nodes):
                 continue
             kept[subset] = nodes, row[nodes]
@@ -174,7 +204,11 @@ class Tours:
             return np.inf, []
         total = reached[whole] + tour.back
         last = int(total.argmin())
-        return (float(total[last]), self._traced(kept, last)) if np.isfinite(total[last]) else (np.inf, [])
+        return (
+            (float(total[last]), self._traced(kept, last))
+            if np.isfinite(total[last])
+            else (np.inf, [])
+        )
 
     def _row(self, group: int, cost: Array) -> Array:
         """Costs (n,) [J] to all nodes: to those of one group, inf to the others."""
@@ -182,7 +216,9 @@ class Tours:
         row[self._nodes.own[group]] = cost
         return row
 
-    def _traced(self, kept: Mapping[int, tuple[npt.NDArray[np.intp], Array]], last: int) -> list[int]:
+    def _traced(
+        self, kept: Mapping[int, tuple[npt.NDArray[np.intp], Array]], last: int
+    ) -> list[int]:
         """The nodes of the least way over all groups that ends in node `last`."""
         found, subset = [last], (1 << self.count) - 1
         while subset := subset ^ 1 << int(self._nodes.group[found[-1]]):

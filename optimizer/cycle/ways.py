@@ -1,7 +1,8 @@
-"""The layers of a stop with ways of the TCP that are given, lines and a path: the configurations from which the arm can
-follow all of them, and those to which they lead.
+"""The layers of a stop with ways of the TCP that are given, lines and a path: the configurations
+from which the arm can follow all of them, and those to which they lead.
 
-A way leads from each configuration to one other, so a node of one place has one node at each of the others.
+A way leads from each configuration to one other, so a node of one place has one node at each of the
+others.
 """
 
 from __future__ import annotations
@@ -40,7 +41,9 @@ ALONG = 1e-12
 
 @dataclass(frozen=True)
 class _Way:
-    """A way from the place `origin` of a stop to the place `end`: its path; or a line, on the side of the `sign`."""
+    """A way from the place `origin` of a stop to the place `end`: its path; or a line, on the side
+    of the `sign`.
+    """
 
     origin: str
     end: str
@@ -64,8 +67,8 @@ class _Way:
 
 
 def layers_of(asked: Cycle) -> dict[str, Layer]:
-    """The layers of all places of a cycle by their names, in their order. Raises the errors of `layer_of`, and
-    PathInfeasible."""
+    """The layers of all places of a cycle by their names, in their order. Raises the errors of
+    `layer_of`, and PathInfeasible."""
     layers = {START: layer_of(asked, START, "start", asked.start, asked.branch, asked.windings)}
     for k, stop in enumerate(asked.stops):
         layers |= zip(stop.places, layers_of_stop(asked, k), strict=True)
@@ -75,11 +78,12 @@ def layers_of(asked: Cycle) -> dict[str, Layer]:
 def layers_of_stop(asked: Cycle, k: int) -> list[Layer]:
     """The layers of the places of stop `k` in their order.
 
-    Raises the errors of `layer_of`; PathInfeasible if no configuration is left; InvalidProblem for a path through poses
-    that make none.
+    Raises the errors of `layer_of`; PathInfeasible if no configuration is left; InvalidProblem for
+    a path through poses that make none.
     """
     stop = asked.stops[k]
-    # along a path joints may move far: full turns count until it is known which of them can follow it
+    # along a path joints may move far: full turns count until it is known which of them can follow
+    # it
     windings = asked.windings or stop.path is not None
     at = layer_of(asked, stop.entry, f"stops.{k}.target", stop.target, stop.branch, windings)
     layers, kept = {stop.entry: at}, np.ones(len(at.q), dtype=bool)
@@ -103,7 +107,10 @@ def layers_of_stop(asked: Cycle, k: int) -> list[Layer]:
         return of_stop
     around, given = _poses_around(stop), dict[str, Pose | None]()
     if stop.path is not None and stop.path.goals is not None:
-        given = {stop.entry: _only_pose(stop.target.targets), stop.name: _only_pose(stop.path.goals.targets)}
+        given = {
+            stop.entry: _only_pose(stop.target.targets),
+            stop.name: _only_pose(stop.path.goals.targets),
+        }
     return [
         replace(layer, some=True, around=around.get(place), given=given.get(place))
         for place, layer in zip(stop.places, of_stop, strict=True)
@@ -111,8 +118,8 @@ def layers_of_stop(asked: Cycle, k: int) -> list[Layer]:
 
 
 def _poses_around(stop: Stop) -> dict[str, ConeOrientedPose | None]:
-    """The poses of which those at the places of a stop are some, as far as one pose of free orientation is all of
-    them."""
+    """The poses of which those at the places of a stop are some, as far as one pose of free
+    orientation is all of them."""
     assert isinstance(stop.target, PosesAround)
     around = {stop.entry: stop.target.around}
     if stop.path is not None and stop.path.goals is not None:
@@ -124,11 +131,14 @@ def _poses_around(stop: Stop) -> dict[str, ConeOrientedPose | None]:
 
 
 def _shifted(pose: ConeOrientedPose | None, line: Line, sign: float) -> ConeOrientedPose | None:
-    """The poses at the outer end of a line, of one in the base frame or along the only axis about which the tool may
-    turn; None otherwise."""
+    """The poses at the outer end of a line, of one in the base frame or along the only axis about
+    which the tool may turn; None otherwise."""
     if pose is None:
         return None
-    along = bool(np.linalg.norm(np.cross(line.direction, pose.axis)) <= ALONG * np.linalg.norm(line.direction))
+    along = bool(
+        np.linalg.norm(np.cross(line.direction, pose.axis))
+        <= ALONG * np.linalg.norm(line.direction)
+    )
     if line.frame == "tcp" and not (along and pose.freedom == 1):
         return None
     T = pose.with_orientation(sample_orientations(pose, 1)[0]).T
@@ -138,12 +148,16 @@ def _shifted(pose: ConeOrientedPose | None, line: Line, sign: float) -> ConeOrie
 def _only_pose(poses: Sequence[Target]) -> Pose | None:
     """The pose that all of them are; None if they differ."""
     first, *others = poses
-    same = isinstance(first, Pose) and all(isinstance(each, Pose) and (each.T == first.T).all() for each in others)
+    same = isinstance(first, Pose) and all(
+        isinstance(each, Pose) and (each.T == first.T).all() for each in others
+    )
     return first if isinstance(first, Pose) and same and others else None
 
 
 def _nearest_to_middle(asked: Cycle, at: Layer, kept: Mask) -> Mask:
-    """Of the nodes that are kept, the one of each configuration that is nearest to the middle of the joints' range."""
+    """Of the nodes that are kept, the one of each configuration that is nearest to the middle of
+    the joints' range.
+    """
     limits = asked.arm.active_limits
     away = np.where(kept, np.abs(at.q - (limits.q_min + limits.q_max) / 2).sum(axis=1), np.inf)
     nearest = np.zeros_like(kept)
@@ -177,34 +191,63 @@ def _followed(asked: Cycle, way: _Way, ends: list[EndConfiguration]) -> tuple[li
 
 
 def _end_of(asked: Cycle, origin: Layer, place: str, found: list[Trace]) -> Layer:
-    """The layer of the end of a way; a configuration whose way ends early has that of its last point."""
+    """The layer of the end of a way; a configuration whose way ends early has that of its last
+    point.
+    """
     q = np.array([trace.q[-1] for trace in found])
     ends = [
-        EndConfiguration(label_of(asked.arm.robot, reached), reached, [[x] for x in reached.tolist()], True, end.target)
+        EndConfiguration(
+            label_of(asked.arm.robot, reached),
+            reached,
+            [[x] for x in reached.tolist()],
+            True,
+            end.target,
+        )
         for reached, end in zip(q, origin.ends, strict=True)
     ]
     moved = (q - np.array([end.q for end in origin.ends]))[origin.end]
     complete = origin.complete and not origin.sampled
-    return replace(origin, name=f"stops/{place}", ends=ends, q=origin.q + moved, complete=complete, traces=tuple(found))
+    return replace(
+        origin,
+        name=f"stops/{place}",
+        ends=ends,
+        q=origin.q + moved,
+        complete=complete,
+        traces=tuple(found),
+    )
 
 
-def _nodes_that_follow(asked: Cycle, stop: Stop, origin: Layer, end: Layer, found: list[Trace]) -> tuple[Mask, Mask]:
-    """The nodes (n,) from which all of a way is followed; and the ends (e,) in which the arm cannot be."""
+def _nodes_that_follow(
+    asked: Cycle, stop: Stop, origin: Layer, end: Layer, found: list[Trace]
+) -> tuple[Mask, Mask]:
+    """The nodes (n,) from which all of a way is followed; and the ends (e,) in which the arm cannot
+    be.
+    """
     limits = asked.arm.active_limits
-    reach = np.array([[(trace.q - trace.q[0]).min(axis=0), (trace.q - trace.q[0]).max(axis=0)] for trace in found])
+    reach = np.array(
+        [
+            [(trace.q - trace.q[0]).min(axis=0), (trace.q - trace.q[0]).max(axis=0)]
+            for trace in found
+        ]
+    )
     low, high = origin.q + reach[origin.end, 0], origin.q + reach[origin.end, 1]
     inside = ((low >= limits.q_min) & (high <= limits.q_max)).all(axis=1)
     problems = [
-        Problem(arm=arm, start=stop.target, goal=stop.target) for arm in arms_at(asked, end.name.removeprefix("stops/"))
+        Problem(arm=arm, start=stop.target, goal=stop.target)
+        for arm in arms_at(asked, end.name.removeprefix("stops/"))
     ]
     q = np.array([each.q for each in end.ends])
     ruled = [check_configurations(PreparedProblem.of(problem), q) for problem in problems]
-    blocked = np.array([any(cause is not None for cause in causes) for causes in zip(*ruled, strict=True)])
+    blocked = np.array(
+        [any(cause is not None for cause in causes) for causes in zip(*ruled, strict=True)]
+    )
     whole = np.array([trace.obstacle is None for trace in found])
     return inside & (whole & ~blocked)[origin.end], blocked
 
 
-def _attempts(asked: Cycle, origin: Layer, found: list[Trace], blocked: Mask, follows: Mask) -> list[PathAttempt]:
+def _attempts(
+    asked: Cycle, origin: Layer, found: list[Trace], blocked: Mask, follows: Mask
+) -> list[PathAttempt]:
     """How far each configuration gets on a way, and what stops it there."""
     attempts = list[PathAttempt]()
     for k, (end, trace) in enumerate(zip(origin.ends, found, strict=True)):

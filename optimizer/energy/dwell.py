@@ -1,7 +1,8 @@
 """Energy drawn while the arm waits at the goal until its dwell ends.
 
-After Meike, Ribickis 2011; Meike, Pellicciari, Berselli 2014. The motors hold the gravity torque of the goal
-configuration; static friction would carry part of it and is ignored. With the duration T [s] of the motion:
+After Meike, Ribickis 2011; Meike, Pellicciari, Berselli 2014. The motors hold the gravity torque of
+the goal configuration; static friction would carry part of it and is ignored. With the duration T
+[s] of the motion:
 
 P_hold   = base + Σ_j (copper_j i_j² + inverter_j(i_j)) [W],  i = tau_gravity / torque_constant [A]
 dwell(T) = P_hold · min(time - T, brake_delay) + P_brake · max(time - T - brake_delay, 0) [J]
@@ -40,7 +41,9 @@ class LinearDwell:
 
 
 def linear_dwells(dwell: Dwell, arm: Arm, hold: Array) -> list[LinearDwell]:
-    """The intervals of [0, dwell.time] on which dwell(T) is linear, in order, for holding powers `hold` (...) [W]."""
+    """The intervals of [0, dwell.time] on which dwell(T) is linear, in order, for holding powers
+    `hold` (...) [W].
+    """
     if dwell.hold == "motors":
         return [LinearDwell(0.0, dwell.time, hold, hold * dwell.time)]
     brake, kink = np.full_like(hold, brake_power(dwell, arm)), dwell.time - dwell.brake_delay
@@ -66,7 +69,9 @@ def waits(dwell: Dwell, duration: float) -> tuple[float, float]:
 
 
 def holding_power(arm: Arm, tau: Array) -> Array:
-    """Power (...) [W] that the arm draws while its motors hold torques tau (..., nq) [N·m] at standstill."""
+    """Power (...) [W] that the arm draws while its motors hold torques tau (..., nq) [N·m] at
+    standstill.
+    """
     still = np.zeros_like(tau)
     joints = power_flow(tau, still, still, arm.drives, arm.friction_law).joints
     return np.asarray(arm.base_power + joints.sum(axis=-1))

@@ -1,7 +1,8 @@
 """How well a motion's energy is known, from the errors that the figures of the arm may have.
 
-The variance has three parts: that of the figures, by the gradient of the energy; what the model cannot express of a
-motion, a mean power times its duration; and the friction of another day. See `joulepath.models.uncertainty.spread`.
+The variance has three parts: that of the figures, by the gradient of the energy; what the model
+cannot express of a motion, a mean power times its duration; and the friction of another day. See
+`joulepath.models.uncertainty.spread`.
 """
 
 from __future__ import annotations
@@ -31,7 +32,9 @@ class Known:
 
 def arm_spread(arm: Arm) -> Spread:
     """The errors that the figures of an arm may have. What the request gives itself is known."""
-    known = tuple(f"inverter_{part}" for part in INVERTER_PARTS if getattr(arm.inverter, part) is not None)
+    known = tuple(
+        f"inverter_{part}" for part in INVERTER_PARTS if getattr(arm.inverter, part) is not None
+    )
     return spread_of(arm.robot, arm.friction_law.name, known)
 
 
@@ -45,16 +48,25 @@ def interval_of(known: Known, arm: Arm) -> EnergyInterval:
     """P5, P95, standard deviation [J], and each source's share of the variance."""
     spread, gradient = arm_spread(arm), known.sensitivity.gradient
     low, high = _ends(_drawn(spread, [known], 0))[:, 0].tolist()
-    parts = {name: float(gradient @ covariance @ gradient) for name, covariance in spread.covariances.items()}
+    parts = {
+        name: float(gradient @ covariance @ gradient)
+        for name, covariance in spread.covariances.items()
+    }
     if spread.move_sd:
         parts[MOVE] = (known.duration * spread.move_sd) ** 2
     total = sum(parts.values())
-    shares = {"idle_power" if n == BASE_POWER else n: part / total for n, part in parts.items()} if total else {}
+    shares = (
+        {"idle_power" if n == BASE_POWER else n: part / total for n, part in parts.items()}
+        if total
+        else {}
+    )
     return EnergyInterval(low, high, float(np.sqrt(total)), shares)
 
 
 def saving_interval(ours: Known, theirs: Known, arm: Arm) -> SavingInterval:
-    """P5, P95 and standard deviation of 1 - ours / theirs, with errors that both motions share; 0 where theirs is 0."""
+    """P5, P95 and standard deviation of 1 - ours / theirs, with errors that both motions share; 0
+    where theirs is 0.
+    """
     return saving_intervals(ours, [theirs], arm)[0]
 
 
@@ -75,7 +87,9 @@ def _drawn(spread: Spread, known: Sequence[Known], move: int) -> Array:
     means = np.array([each.energy + each.sensitivity.shift for each in known])
     gradients = np.stack([each.sensitivity.gradient for each in known], axis=1)
     durations = np.array([each.duration for each in known])
-    return np.asarray(means + spread.draws @ gradients + np.outer(spread.move_draws[move], durations))
+    return np.asarray(
+        means + spread.draws @ gradients + np.outer(spread.move_draws[move], durations)
+    )
 
 
 def _ends(draws: Array) -> Array:

@@ -16,8 +16,8 @@ _Z = ca.DM([0, 0, 1])
 class SymbolicPayload:
     """A body fixed to the flange, as symbols.
 
-    `mass` [kg], `com` (3,) [m] in the flange frame, `inertia` (6,) [kg·m²] ixx ixy ixz iyy iyz izz about the com, in
-    flange axes.
+    `mass` [kg], `com` (3,) [m] in the flange frame, `inertia` (6,) [kg·m²] ixx ixy ixz iyy iyz izz
+    about the com, in flange axes.
     """
 
     mass: ca.SX
@@ -26,7 +26,9 @@ class SymbolicPayload:
 
 
 def _tidy(matrix: np.ndarray) -> ca.DM:
-    """The matrix without the rounding of sines and cosines of right angles: CasADi drops the terms that are zero."""
+    """The matrix without the rounding of sines and cosines of right angles: CasADi drops the terms
+    that are zero.
+    """
     rounded = np.round(matrix)
     return ca.sparsify(ca.DM(np.where(np.abs(matrix - rounded) < 1e-12, rounded, matrix)))
 
@@ -51,34 +53,46 @@ def inverse_dynamics(
     rotor: ca.SX,
     link_mass_scale: ca.SX | None = None,
 ) -> ca.SX:
-    """Joint torques tau (nv,) [N·m] = M(q) a + C(q, v) v + g(q) + rotor · a, with the payload at the frame `flange`.
+    """Joint torques tau (nv,) [N·m] = M(q) a + C(q, v) v + g(q) + rotor · a, with the payload at
+    the frame `flange`.
 
-    q [rad], v [rad/s], a [rad/s²] (nv,). `gravity` (3,) [m/s²] is in the base frame, `rotor` (nv,) [kg·m²] the
-    reflected rotor inertia; armature and gravity of the model are not read. `link_mass_scale` (nv,) [1] multiplies mass
-    and inertia of the moving links, not of the payload; None: 1.
+    q [rad], v [rad/s], a [rad/s²] (nv,). `gravity` (3,) [m/s²] is in the base frame, `rotor` (nv,)
+    [kg·m²] the reflected rotor inertia; armature and gravity of the model are not read.
+    `link_mass_scale` (nv,) [1] multiplies mass and inertia of the moving links, not of the payload;
+    None: 1.
 
     Raises ValueError if a joint is not revolute about its z axis.
     """
     _check_chain(model)
-    scales: Sequence[ca.SX | int] = [1] * model.nv if link_mass_scale is None else ca.vertsplit(link_mass_scale)
+    scales: Sequence[ca.SX | int] = (
+        [1] * model.nv if link_mass_scale is None else ca.vertsplit(link_mass_scale)
+    )
     bodies = [_link(model, i, payload, scale) for i, scale in enumerate(scales, 1)]
     torques = body_torques(model, q, v, a, gravity, bodies)
     return ca.vertcat(*(torque + rotor[j] * a[j] for j, torque in enumerate(torques)))
 
 
 Body = tuple[ca.SX, ca.SX, ca.SX]
-"""Mass [kg], first moment (3,) [kg·m] and inertia (3, 3) [kg·m²] of a link about the origin of its joint frame."""
+"""Mass [kg], first moment (3,) [kg·m] and inertia (3, 3) [kg·m²] of a link about the origin of its
+joint frame.
+"""
 
 
-def body_torques(model: pin.Model, q: ca.SX, v: ca.SX, a: ca.SX, gravity: ca.SX, bodies: Sequence[Body]) -> list[ca.SX]:
-    """Torques [N·m] at every joint of rigid bodies on the links of the chain; inertias of the model are not read.
+def body_torques(
+    model: pin.Model, q: ca.SX, v: ca.SX, a: ca.SX, gravity: ca.SX, bodies: Sequence[Body]
+) -> list[ca.SX]:
+    """Torques [N·m] at every joint of rigid bodies on the links of the chain; inertias of the model
+    are not read.
 
-    Recursive Newton-Euler in link frames (Luh, Walker, Paul 1980; Featherstone 2008, ch. 5). The torques are linear in
-    what describes the bodies. Raises ValueError if a joint is not revolute about its z axis.
+    Recursive Newton-Euler in link frames (Luh, Walker, Paul 1980; Featherstone 2008, ch. 5). The
+    torques are linear in what describes the bodies. Raises ValueError if a joint is not revolute
+    about its z axis.
     """
     _check_chain(model)
     joints = range(1, model.njoints)
-    rotations = {i: _tidy(model.jointPlacements[i].rotation) @ _rotation_z(q[i - 1]) for i in joints}
+    rotations = {
+        i: _tidy(model.jointPlacements[i].rotation) @ _rotation_z(q[i - 1]) for i in joints
+    }
     offsets = {i: _tidy(model.jointPlacements[i].translation) for i in joints}
     forces: dict[int, ca.SX] = {}
     moments: dict[int, ca.SX] = {}
@@ -86,14 +100,20 @@ def body_torques(model: pin.Model, q: ca.SX, v: ca.SX, a: ca.SX, gravity: ca.SX,
     omega, alpha, acceleration = ca.SX(3, 1), ca.SX(3, 1), -gravity
     for i in joints:
         R, p = rotations[i], offsets[i]
-        acceleration = R.T @ (acceleration + ca.cross(alpha, p) + ca.cross(omega, ca.cross(omega, p)))
+        acceleration = R.T @ (
+            acceleration + ca.cross(alpha, p) + ca.cross(omega, ca.cross(omega, p))
+        )
         spin = _Z * v[i - 1]
         omega_parent = R.T @ omega
         omega = omega_parent + spin
         alpha = R.T @ alpha + _Z * a[i - 1] + ca.cross(omega_parent, spin)
         mass, moment, inertia = bodies[i - 1]
-        forces[i] = mass * acceleration + ca.cross(alpha, moment) + ca.cross(omega, ca.cross(omega, moment))
-        moments[i] = inertia @ alpha + ca.cross(omega, inertia @ omega) + ca.cross(moment, acceleration)
+        forces[i] = (
+            mass * acceleration + ca.cross(alpha, moment) + ca.cross(omega, ca.cross(omega, moment))
+        )
+        moments[i] = (
+            inertia @ alpha + ca.cross(omega, inertia @ omega) + ca.cross(moment, acceleration)
+        )
 
     tau = [ca.SX(0)] * model.nv
     force, torque = ca.SX(3, 1), ca.SX(3, 1)
@@ -108,12 +128,16 @@ def body_torques(model: pin.Model, q: ca.SX, v: ca.SX, a: ca.SX, gravity: ca.SX,
 
 def _check_chain(model: pin.Model) -> None:
     joints = range(1, model.njoints)
-    if any(model.joints[i].shortname() != "JointModelRZ" or model.parents[i] != i - 1 for i in joints):
+    if any(
+        model.joints[i].shortname() != "JointModelRZ" or model.parents[i] != i - 1 for i in joints
+    ):
         raise ValueError("the model must be a serial chain of joints that turn about their z axes")
 
 
 def _link(model: pin.Model, i: int, payload: SymbolicPayload, scale: ca.SX | int) -> Body:
-    """What describes link i. The last link includes the payload. `scale` multiplies the link's own part."""
+    """What describes link i. The last link includes the payload. `scale` multiplies the link's own
+    part.
+    """
     body = model.inertias[i]
     com = ca.SX(_tidy(body.lever))
     # constants first, then their factor: one product for each
@@ -125,7 +149,9 @@ def _link(model: pin.Model, i: int, payload: SymbolicPayload, scale: ca.SX | int
         R = _tidy(flange.rotation)
         load_com = R @ payload.com + _tidy(flange.translation)
         ixx, ixy, ixz, iyy, iyz, izz = ca.vertsplit(payload.inertia)
-        tensor = ca.vertcat(ca.horzcat(ixx, ixy, ixz), ca.horzcat(ixy, iyy, iyz), ca.horzcat(ixz, iyz, izz))
+        tensor = ca.vertcat(
+            ca.horzcat(ixx, ixy, ixz), ca.horzcat(ixy, iyy, iyz), ca.horzcat(ixz, iyz, izz)
+        )
         mass = mass + payload.mass
         moment = moment + payload.mass * load_com
         inertia = inertia + _about_origin(payload.mass, load_com, R @ tensor @ R.T)

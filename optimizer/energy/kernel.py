@@ -1,11 +1,14 @@
-"""The per-node functions of the NLP, ready to be called: compiled once per robot, evaluated from any thread.
+"""The per-node functions of the NLP, ready to be called: compiled once per robot, evaluated from
+any thread.
 
-`node` gives cost, limited torque and their first and second derivatives at one instant of a motion. Everything that a
-request may change (payload, gravity, drives, friction, objective) is a parameter. The functions are compiled by the
-system's C compiler and stored on disk: see `kernel_cache`. Until the compiled library exists, or if there is no
-compiler, CasADi's virtual machine evaluates the same expressions.
+`node` gives cost, limited torque and their first and second derivatives at one instant of a motion.
+Everything that a request may change (payload, gravity, drives, friction, objective) is a parameter.
+The functions are compiled by the system's C compiler and stored on disk: see `kernel_cache`. Until
+the compiled library exists, or if there is no compiler, CasADi's virtual machine evaluates the same
+expressions.
 
-`python -m joulepath.optimizer.energy.precompile` compiles the kernels of all robots, or of those named.
+`python -m joulepath.optimizer.energy.precompile` compiles the kernels of all robots, or of those
+named.
 """
 
 from __future__ import annotations
@@ -34,16 +37,20 @@ CHUNKS_PER_CHECK = 128
 
 
 class _Evaluations(threading.local):
-    """The calling thread's evaluations by function and number of nodes. They are freed when the thread ends."""
+    """The calling thread's evaluations by function and number of nodes. They are freed when the
+    thread ends.
+    """
 
     def __init__(self) -> None:
         self.known: dict[tuple[str, int], Evaluation] = {}
 
 
 class Kernel:
-    """A robot's functions on arrays of nodes. Any number of threads may call one kernel at the same time.
+    """A robot's functions on arrays of nodes. Any number of threads may call one kernel at the same
+    time.
 
-    Every thread has its own memory for arguments and results, because functions run without Python's global lock.
+    Every thread has its own memory for arguments and results, because functions run without
+    Python's global lock.
     """
 
     def __init__(self, robot: Robot, functions: Functions) -> None:
@@ -59,13 +66,16 @@ class Kernel:
         return known[key]
 
     def node(self, y: Array, multiplier: Array, weight: Array, p: Array) -> tuple[Array, ...]:
-        """Cost (N,), tau_limited (N, nq), gradient (N, 3nq), Jacobian (N, nq, 3nq), Hessian (N, 3nq, 3nq).
+        """Cost (N,), tau_limited (N, nq), gradient (N, 3nq), Jacobian (N, nq, 3nq), Hessian (N,
+        3nq, 3nq).
 
-        y (N, 3nq) = q, v, a; multiplier (N, nq); weight (N,); p packed `Parameters`. The results are views: the
-        thread's next call with as many nodes overwrites them.
+        y (N, 3nq) = q, v, a; multiplier (N, nq); weight (N,); p packed `Parameters`. The results
+        are views: the thread's next call with as many nodes overwrites them.
         """
         count, nq = len(y), self.nq
-        cost, tau, gradient, jacobian, hessian = self._evaluation("node", count)(y, multiplier, weight[:, None], p)
+        cost, tau, gradient, jacobian, hessian = self._evaluation("node", count)(
+            y, multiplier, weight[:, None], p
+        )
         return (
             cost[:, 0],
             tau,
@@ -75,7 +85,9 @@ class Kernel:
         )
 
     def value(self, y: Array, p: Array) -> tuple[Array, Array]:
-        """Cost (N,) and tau_limited (N, nq) [N·m]. Views: the thread's next call with as many nodes overwrites them."""
+        """Cost (N,) and tau_limited (N, nq) [N·m]. Views: the thread's next call with as many nodes
+        overwrites them.
+        """
         cost, tau = self._evaluation("value", len(y))(y, p)
         return cost[:, 0], tau
 
@@ -105,10 +117,11 @@ class Kernel:
 
 
 class _Loader:
-    """Loads a robot's kernel, for any number of threads: compiled as soon as the library exists, else interpreted.
+    """Loads a robot's kernel, for any number of threads: compiled as soon as the library exists,
+    else interpreted.
 
-    The interpreted kernel stays referenced after the compiled one has replaced it: other threads may still use it, and
-    expressions must be freed under `SYMBOLICS`.
+    The interpreted kernel stays referenced after the compiled one has replaced it: other threads
+    may still use it, and expressions must be freed under `SYMBOLICS`.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -128,7 +141,9 @@ class _Loader:
             return self._compiled or self._load()
 
     def _load(self) -> Kernel:
-        if self._interpreted is not None and not any(seal_path(path).exists() for path in self.paths):
+        if self._interpreted is not None and not any(
+            seal_path(path).exists() for path in self.paths
+        ):
             return self._interpreted
         found = next(filter(is_intact, self.paths), None)
         if found is not None:
@@ -138,7 +153,9 @@ class _Loader:
         if self._interpreted is None:
             self._interpreted = Kernel(self._robot, Interpreted(build(self._robot)))
         if self._compiling is None and compiler() is not None:
-            self._compiling = threading.Thread(target=self._compile, name="kernel-compiler", daemon=True)
+            self._compiling = threading.Thread(
+                target=self._compile, name="kernel-compiler", daemon=True
+            )
             self._compiling.start()
         return self._interpreted
 
@@ -146,7 +163,9 @@ class _Loader:
         try:
             compile_kernel(self._robot)
         except (RuntimeError, OSError) as error:
-            log.warning("kernel of %s not compiled, the virtual machine serves: %s", self._robot.name, error)
+            log.warning(
+                "kernel of %s not compiled, the virtual machine serves: %s", self._robot.name, error
+            )
 
 
 _LOADERS = threading.Lock()
@@ -158,7 +177,9 @@ def _loader(robot: Robot) -> _Loader:
 
 
 def kernel_for(robot: Robot) -> Kernel:
-    """The kernel of a robot: compiled if the library is on disk, else interpreted while the compiler runs."""
+    """The kernel of a robot: compiled if the library is on disk, else interpreted while the
+    compiler runs.
+    """
     # the cache lets two threads that miss at the same time both build: only one loader may compile
     with _LOADERS:
         loader = _loader(robot)

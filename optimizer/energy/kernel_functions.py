@@ -1,4 +1,6 @@
-"""A kernel's functions for a fixed number of nodes: by CasADi's virtual machine, or by a compiled library."""
+"""A kernel's functions for a fixed number of nodes: by CasADi's virtual machine, or by a compiled
+library.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,8 @@ from joulepath.optimizer.energy.kernel_expressions import SYMBOLICS, sizes
 class Evaluation:
     """A function of a fixed number of nodes, with its own memory: for one thread.
 
-    Arguments and results are numpy arrays that the function reads and writes in place, without copies or conversions.
+    Arguments and results are numpy arrays that the function reads and writes in place, without
+    copies or conversions.
     """
 
     arguments: list[Array]
@@ -28,8 +31,8 @@ class Evaluation:
     run: Callable[[], object]
 
     def __call__(self, *arguments: Array) -> list[Array]:
-        """Evaluate; row k of every argument belongs to node k, the last one to all. The next call overwrites the
-        results."""
+        """Evaluate; row k of every argument belongs to node k, the last one to all. The next call
+        overwrites the results."""
         for own, given in zip(self.arguments, arguments, strict=True):
             own[...] = given
         self.run()
@@ -67,14 +70,16 @@ class Interpreted:
 class Compiled:
     """The functions in a library that was compiled from `kernel_source`, of an arm of nq joints.
 
-    The library is unloaded when neither this nor any of its evaluations is left. Raises OSError if it cannot be loaded.
+    The library is unloaded when neither this nor any of its evaluations is left. Raises OSError if
+    it cannot be loaded.
     """
 
     compiled = True
 
     def __init__(self, path: Path, nq: int) -> None:
         self._library, self._nq = ctypes.CDLL(str(path)), nq
-        # ctypes itself never does: users may bring any number of arms. At the end of the process it may be in use
+        # ctypes itself never does: users may bring any number of arms. At the end of the process it
+        # may be in use
         weakref.finalize(self, _ctypes.dlclose, self._library._handle).atexit = False
 
     def evaluation(self, name: str, count: int) -> Evaluation:
@@ -110,7 +115,9 @@ class _Called(Evaluation):
         *own, shared = given
         self.arguments = [*(np.zeros((count, size)) for size in own), np.zeros(shared)]
         self.results = [np.zeros((count, size)) for size in found]
-        self.run = partial(function, ctypes.c_long(count), _addresses(self.arguments), _addresses(self.results))
+        self.run = partial(
+            function, ctypes.c_long(count), _addresses(self.arguments), _addresses(self.results)
+        )
 
 
 def _addresses(arrays: list[Array]) -> ctypes.Array[ctypes.c_void_p]:

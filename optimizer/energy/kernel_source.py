@@ -1,7 +1,8 @@
-"""The per-node functions as C that evaluates several nodes at once, one in each lane of the processor's vectors.
+"""The per-node functions as C that evaluates several nodes at once, one in each lane of the
+processor's vectors.
 
-CasADi's own C does one node after the other, and takes two to three times as long for the derivatives. The operations
-are the same and in the same order: so are the results, to the last bit.
+CasADi's own C does one node after the other, and takes two to three times as long for the
+derivatives. The operations are the same and in the same order: so are the results, to the last bit.
 """
 
 from __future__ import annotations
@@ -10,7 +11,8 @@ from pathlib import Path
 
 import casadi as ca
 
-# numbers per vector, and what the compiler must be told: for every processor of this kind, and for one with AVX2
+# numbers per vector, and what the compiler must be told: for every processor of this kind, and for
+# one with AVX2
 Vectors = tuple[int, tuple[str, ...]]
 PORTABLE: Vectors = (2, ())
 AVX2: Vectors = (4, ("-mavx2",))
@@ -31,9 +33,9 @@ _OPERATIONS = {
     ca.OP_ASSIGN: "{}",
     **{operation: f"lanes_{name}({{}})" for operation, name in (_INSTRUCTIONS | _CALLS).items()},
 }
-# Some functions of the C library are code for processors without AVX, which waits for the upper halves of vector
-# registers unless they are cleared: an asinh takes ten times as long. No vector may be in a register then, so the call
-# goes by memory and is never inlined
+# Some functions of the C library are code for processors without AVX, which waits for the upper
+# halves of vector registers unless they are cleared: an asinh takes ten times as long. No vector
+# may be in a register then, so the call goes by memory and is never inlined
 _HEAD = """#include <math.h>
 #ifdef __AVX__
 #define CLEAR_UPPER_HALVES __builtin_ia32_vzeroupper()
@@ -58,7 +60,11 @@ static inline void give(const lanes *y, long size, long first, long count, doubl
 def vectors() -> Vectors:
     """The longest vectors of this machine's processor."""
     try:
-        return AVX2 if " avx2 " in _CPU.read_text(encoding="utf-8", errors="replace").replace("\n", " ") else PORTABLE
+        return (
+            AVX2
+            if " avx2 " in _CPU.read_text(encoding="utf-8", errors="replace").replace("\n", " ")
+            else PORTABLE
+        )
     except OSError:
         return PORTABLE
 
@@ -66,8 +72,9 @@ def vectors() -> Vectors:
 def source(functions: list[ca.Function], count: int) -> str:
     """C for CasADi functions of scalar expressions, `count` nodes at once.
 
-    Each becomes `void name(long nodes, const double *const *x, double *const *y)`: all arguments but the last one, and
-    all results, have a row for each node; the last argument is the same for all.
+    Each becomes `void name(long nodes, const double *const *x, double *const *y)`: all arguments
+    but the last one, and all results, have a row for each node; the last argument is the same for
+    all.
 
     Raises NotImplementedError for an operation that is not known here.
     """
@@ -119,8 +126,14 @@ for (long first = 0; first < count; first += LANES) {{
 
 
 def _instruction(function: ca.Function, k: int) -> str:
-    """One step of a function's algorithm on its work variables w, as CasADi's virtual machine takes it."""
-    operation, given, found = function.instruction_id(k), function.instruction_input(k), function.instruction_output(k)
+    """One step of a function's algorithm on its work variables w, as CasADi's virtual machine takes
+    it.
+    """
+    operation, given, found = (
+        function.instruction_id(k),
+        function.instruction_input(k),
+        function.instruction_output(k),
+    )
     if operation == ca.OP_CONST:
         return f"w{found[0]} = every({function.instruction_constant(k)!r});"
     if operation == ca.OP_INPUT:
@@ -128,5 +141,7 @@ def _instruction(function: ca.Function, k: int) -> str:
     if operation == ca.OP_OUTPUT:
         return f"y{found[0]}[{found[1]}] = w{given[0]};"
     if operation not in _OPERATIONS:
-        raise NotImplementedError(f"{function.name()} has an operation that the C source does not know: {operation}")
+        raise NotImplementedError(
+            f"{function.name()} has an operation that the C source does not know: {operation}"
+        )
     return f"w{found[0]} = {_OPERATIONS[operation].format(*(f'w{i}' for i in given))};"

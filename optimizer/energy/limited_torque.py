@@ -1,7 +1,8 @@
-"""The torque that the limit on torque is for: that of the motor, or that of the link behind gear and bearings.
+"""The torque that the limit on torque is for: that of the motor, or that of the link behind gear
+and bearings.
 
-Makers mean one or the other: a limit of the drive holds with rotor and friction, that of a torque sensor at the link,
-or of what a link bears, without them.
+Makers mean one or the other: a limit of the drive holds with rotor and friction, that of a torque
+sensor at the link, or of what a link bears, without them.
 """
 
 from __future__ import annotations
@@ -13,11 +14,13 @@ from joulepath.optimizer.energy.losses import friction_torque
 from joulepath.optimizer.problem.arm import Arm
 
 
-def limited_parts(arm: Arm, tau: Array, v: Array, a: Array, lost: Array | None = None) -> tuple[Array, Array]:
+def limited_parts(
+    arm: Arm, tau: Array, v: Array, a: Array, lost: Array | None = None
+) -> tuple[Array, Array]:
     """The parts (k, nq) [N·m] of the limited torque that are smooth, and the friction in it.
 
-    `tau` is rigid body and rotor torque at speeds v [rad/s] and accelerations a [rad/s²], `lost` friction's torque if
-    it is known, all (k, nq).
+    `tau` is rigid body and rotor torque at speeds v [rad/s] and accelerations a [rad/s²], `lost`
+    friction's torque if it is known, all (k, nq).
     """
     if arm.robot.torque_side == "link":
         return tau - arm.drives.rotor_inertia * a, np.zeros_like(tau)
@@ -31,10 +34,11 @@ def limited_torque(arm: Arm, tau: Array, v: Array, a: Array, lost: Array | None 
 
 
 def greatest_smooth_part(arm: Arm) -> Array:
-    """The greatest absolute value (nq,) [N·m] that the smooth part of the limited torque has within the limits.
+    """The greatest absolute value (nq,) [N·m] that the smooth part of the limited torque has within
+    the limits.
 
-    Friction helps a motor that holds a load back. With f(v_max) that of an unloaded joint, |tau_link| ≤ |tau| +
-    rotor · a_max, and |tau| ≤ tau_max + f + load |tau_link|:
+    Friction helps a motor that holds a load back. With f(v_max) that of an unloaded joint,
+    |tau_link| ≤ |tau| + rotor · a_max, and |tau| ≤ tau_max + f + load |tau_link|:
 
         |tau| ≤ (tau_max + f(v_max) + load · rotor · a_max) / (1 - load).
     """

@@ -1,7 +1,8 @@
-"""Torques of an arm's rigid bodies, and their regressor: the torques are linear in the bodies' ten parameters each.
+"""Torques of an arm's rigid bodies, and their regressor: the torques are linear in the bodies' ten
+parameters each.
 
-Of a body: mass m, first moments m·c (3) and inertia about the joint's frame Ixx, Ixy, Iyy, Ixz, Iyz, Izz, in the frame
-of its joint (Pinocchio's order). Rotors are not in them.
+Of a body: mass m, first moments m·c (3) and inertia about the joint's frame Ixx, Ixy, Iyy, Ixz,
+Iyz, Izz, in the frame of its joint (Pinocchio's order). Rotors are not in them.
 """
 
 from __future__ import annotations
@@ -27,7 +28,9 @@ def rigid_torques(model: pin.Model, q: Array, v: Array, a: Array) -> Array:
 
 
 def rigid_regressor(model: pin.Model, q: Array, v: Array, a: Array) -> Array:
-    """The matrices (n, nq, 10 nq) whose products with the bodies' parameters are the rigid bodies' torques."""
+    """The matrices (n, nq, 10 nq) whose products with the bodies' parameters are the rigid bodies'
+    torques.
+    """
     data = model.createData()
     found = np.empty((len(q), model.nq, BODY * model.nq))
     for row in range(len(q)):

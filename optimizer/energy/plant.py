@@ -28,12 +28,13 @@ Found = TypeVar("Found")
 # quadrature weights (k,) [s], and q, v, a, torques and friction's torques (k, nq) of a motion
 ReportSamples = tuple[Array, Array, Array, Array, Array, Array]
 
-# smoothing in the optimiser's cost: the reversal of friction [rad/s], the corner of the load that friction grows with
-# as a share of the robot's torque limit, and the corners of |power| [W]
+# smoothing in the optimiser's cost: the reversal of friction [rad/s], the corner of the load that
+# friction grows with as a share of the robot's torque limit, and the corners of |power| [W]
 KNEE = 0.02
 BEND = 0.01
 WIDTH = 0.5
-# widths [W] of the solves that follow, one from the other, where every joint has a corner of its own
+# widths [W] of the solves that follow, one from the other, where every joint has a corner of its
+# own
 SHARPER_WIDTHS = (0.1, 0.02)
 # quadrature points per panel for reported energies
 REPORT_NODES = 8
@@ -42,7 +43,9 @@ LEAST_STEP = 1e-6
 
 
 def has_corners(objective: str, arm: Arm) -> bool:
-    """Whether every joint's power has a corner of its own in the objective: mechanical work, and an isolated bus."""
+    """Whether every joint's power has a corner of its own in the objective: mechanical work, and an
+    isolated bus.
+    """
     return objective == "mechanical" or (objective == "electrical" and arm.bus.mode == "isolated")
 
 
@@ -79,8 +82,8 @@ class Plant:
 
     @cached_property
     def _data(self) -> pin.Data:
-        # Threads may share it for functions that return a number: Pinocchio's calls hold Python's global lock, so that
-        # no other thread writes into the data before the number is returned.
+        # Threads may share it for functions that return a number: Pinocchio's calls hold Python's
+        # global lock, so that no other thread writes into the data before the number is returned.
         return self.model.createData()
 
     def parameters(
@@ -91,24 +94,39 @@ class Plant:
         regeneration: float | None = None,
         width: float = WIDTH,
     ) -> Array:
-        """Packed kernel parameters: the arm's, and weights of electrical and mechanical energy [1] and duration [W].
+        """Packed kernel parameters: the arm's, and weights of electrical and mechanical energy [1]
+        and duration [W].
 
-        `regeneration` [1] is the value of a joule of surplus, by default what the arm's supply takes back. The cost of
-        an instant cannot depend on a charge: with an energy storage, this value stands for it. `width` [W] smooths the
-        corners of the cost.
+        `regeneration` [1] is the value of a joule of surplus, by default what the arm's supply
+        takes back. The cost of an instant cannot depend on a charge: with an energy storage, this
+        value stands for it. `width` [W] smooths the corners of the cost.
         """
         return self._parameters(electrical, mechanical, time, regeneration, width).pack()
 
     @cached_property
     def frictionless_parameters(self) -> Array:
-        """Packed kernel parameters of a cost of zero, whose limited torque is that of rigid bodies and rotors."""
+        """Packed kernel parameters of a cost of zero, whose limited torque is that of rigid bodies
+        and rotors.
+        """
         parts, none = self._parameters(0.0, 0.0, 0.0, None, WIDTH), np.zeros(self.arm.robot.nq)
-        return replace(parts, coulomb=none, curved=none, viscous=none, load=none, link_side=0.0).pack()
+        return replace(
+            parts, coulomb=none, curved=none, viscous=none, load=none, link_side=0.0
+        ).pack()
 
     def _parameters(
-        self, electrical: float, mechanical: float, time: float, regeneration: float | None, width: float
+        self,
+        electrical: float,
+        mechanical: float,
+        time: float,
+        regeneration: float | None,
+        width: float,
     ) -> Parameters:
-        payload, friction, drives, nq = self.arm.payload, self.arm.friction_law, self.arm.drives, self.arm.robot.nq
+        payload, friction, drives, nq = (
+            self.arm.payload,
+            self.arm.friction_law,
+            self.arm.drives,
+            self.arm.robot.nq,
+        )
         return Parameters(
             mass=payload.mass,
             com=payload.com,
@@ -158,14 +176,18 @@ class Plant:
 
     def motor_torques(self, q: Array, v: Array, a: Array) -> Array:
         """Motor torques at the joint (k, nq) [N·m]: rigid body, rotor and friction."""
-        return np.asarray(power_flow(self.torques(q, v, a), v, a, self.arm.drives, self.friction).tau_motor)
+        return np.asarray(
+            power_flow(self.torques(q, v, a), v, a, self.arm.drives, self.friction).tau_motor
+        )
 
     def potential(self, q: Array) -> float:
         """Potential energy [J] of arm and payload."""
         return float(pin.computePotentialEnergy(self.model, self._data, q))
 
     def energy(self, spline: Spline) -> Energy:
-        """Energy [J] of a spline motion by Gauss-Legendre quadrature, with the exact, unsmoothed formulas."""
+        """Energy [J] of a spline motion by Gauss-Legendre quadrature, with the exact, unsmoothed
+        formulas.
+        """
         return self._last_energy.of(spline, self._computed_energy)
 
     def _computed_energy(self, spline: Spline) -> Energy:
@@ -189,7 +211,9 @@ class Plant:
         return weights, q, v, a, tau, friction_torque(self.friction, self.arm.drives, tau, v, a)
 
     def net_demand(self, spline: Spline) -> tuple[Array, Array]:
-        """Net demand (k,) [J] on the bus in the intervals of a motion's reported energy, and their lengths (k,) [s]."""
+        """Net demand (k,) [J] on the bus in the intervals of a motion's reported energy, and their
+        lengths (k,) [s].
+        """
         weights, _, v, _, tau, lost = self.report_samples(spline)
         joints = flow_with(lost, tau, v, self.arm.drives).joints
         return weights * (self.arm.base_power + joints.sum(axis=1)), weights
@@ -210,7 +234,9 @@ class Plant:
         tau = self.torques(q, v, a)
         flow = power_flow(tau, v, a, self.arm.drives, self.friction)
         charge = self._charge(spline, t)
-        power = drawn_at(self.arm.bus, self.arm.regeneration, self.arm.base_power, flow.joints, charge)
+        power = drawn_at(
+            self.arm.bus, self.arm.regeneration, self.arm.base_power, flow.joints, charge
+        )
         shown = charge if self.arm.bus.mode == "storage" else None
         return Trajectory(t, q, v, a, tau, flow.tau_motor, power, shown, spline=spline)
 

@@ -1,9 +1,8 @@
-"""`python -m joulepath.optimizer.energy.precompile [--portable] [ROBOT …]` compiles the kernels of robots, so that
-no request
-is interpreted.
+"""`python -m joulepath.optimizer.energy.precompile [--portable] [ROBOT …]` compiles the kernels of
+robots, so that no request is interpreted.
 
-Without a name it compiles those of all robots. With `--portable` they serve on every processor of this kind, as in an
-image for many machines; without, they are for this one, and twice as fast.
+Without a name it compiles those of all robots. With `--portable` they serve on every processor of
+this kind, as in an image for many machines; without, they are for this one, and twice as fast.
 """
 
 from __future__ import annotations
@@ -17,13 +16,18 @@ if __name__ == "__main__":
     portable = "--portable" in sys.argv
     wanted = [name for name in sys.argv[1:] if name != "--portable"] or robot_names()
     if unknown := set(wanted) - set(robot_names()):
-        sys.exit(f"There is no robot named {', '.join(sorted(unknown))}: use some of {', '.join(robot_names())}.")
+        sys.exit(
+            f"There is no robot named {', '.join(sorted(unknown))}: use some of "
+            f"{', '.join(robot_names())}."
+        )
     try:
         for name in wanted:
             print(compile_kernel(load_robot(name), portable))
     except (RuntimeError, OSError) as error:
         sys.exit(
-            f"The kernels cannot be compiled: {error}\nName a C compiler that works by CC, or a folder for the "
-            "kernels by JOULEPATH_CACHE_DIR. The service also works without them (`make serve JOULEPATH_ROBOTS=`), "
+            f"The kernels cannot be compiled: {error}\nName a C compiler that works by CC, or a "
+            "folder for the "
+            "kernels by JOULEPATH_CACHE_DIR. The service also works without them (`make serve "
+            "JOULEPATH_ROBOTS=`), "
             "more slowly."
         )

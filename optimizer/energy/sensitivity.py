@@ -1,14 +1,15 @@
 """How a motion's electrical energy hangs on the figures of the arm; the motion stays the same.
 
-A joint takes P = u v + inverter(i) + copper i² with u = tau + friction and i = u / torque_constant, so that
+A joint takes P = u v + inverter(i) + copper i² with u = tau + friction and i = u / torque_constant,
+so that
 
     ∂P/∂u = v + (2 copper i + linear sign(i) + 2 quadratic i) / torque_constant.
 
-Friction's coefficients change u by their own terms, the rotor's inertia by a, and the links' parameters by the
-regressor of the rigid bodies' torques. P is taken as linear in the figures. The bus is not: a watt is worth 1 while the
-bus draws, and what the supply or the energy storage takes of it while there is a surplus. Where errors of the figures
-decide which it is, the expected worth counts (statistical linearisation): with a power P of mean m and standard
-deviation σ,
+Friction's coefficients change u by their own terms, the rotor's inertia by a, and the links'
+parameters by the regressor of the rigid bodies' torques. P is taken as linear in the figures. The
+bus is not: a watt is worth 1 while the bus draws, and what the supply or the energy storage takes
+of it while there is a surplus. Where errors of the figures decide which it is, the expected worth
+counts (statistical linearisation): with a power P of mean m and standard deviation σ,
 
     E max(P, 0) = m Φ(m / σ) + σ φ(m / σ),      dE/dm = Φ(m / σ).
 
@@ -37,21 +38,38 @@ _CERTAIN = 1e-9
 
 
 def energy_sensitivity(
-    weights: Array, q: Array, v: Array, a: Array, tau: Array, arm: Arm, spread: Spread, lost: Array | None = None
+    weights: Array,
+    q: Array,
+    v: Array,
+    a: Array,
+    tau: Array,
+    arm: Arm,
+    spread: Spread,
+    lost: Array | None = None,
 ) -> Sensitivity:
-    """That of a motion to the errors of `spread`; q (k, nq) [rad], the other arguments as in `losses.breakdown`."""
+    """That of a motion to the errors of `spread`; q (k, nq) [rad], the other arguments as in
+    `losses.breakdown`.
+    """
     rates, by_link, joints = _power_rates(q, v, a, tau, arm, spread, lost)
     figures, nq, size = rates.shape
     base, behind = np.full(size, arm.base_power), count(nq)
     if arm.bus.mode == "isolated":
         # by figure and joint, as PER_JOINT orders them
-        root, mean = spread.root[1:behind].reshape(figures, nq, -1), spread.mean[1:behind].reshape(figures, nq)
+        root, mean = (
+            spread.root[1:behind].reshape(figures, nq, -1),
+            spread.mean[1:behind].reshape(figures, nq),
+        )
         means = joints + np.einsum("cjk,cj->kj", rates, mean) + by_link @ spread.mean[behind:]
         factors = (rates.transpose(1, 2, 0) @ root.transpose(1, 0, 2)).transpose(1, 0, 2)
         worth, expected = _expected(means, factors + by_link @ spread.root[behind:], np.zeros(nq))
-        drawn, plain = base + spread.mean[0] + expected.sum(axis=1), base + np.maximum(joints, 0.0).sum(axis=1)
+        drawn, plain = (
+            base + spread.mean[0] + expected.sum(axis=1),
+            base + np.maximum(joints, 0.0).sum(axis=1),
+        )
         electronics, watts = np.ones(size), weights[:, None] * worth
-        gradient = np.append(np.einsum("kj,cjk->cj", watts, rates).ravel(), np.einsum("kj,kjp->p", watts, by_link))
+        gradient = np.append(
+            np.einsum("kj,cjk->cj", watts, rates).ravel(), np.einsum("kj,kjp->p", watts, by_link)
+        )
     else:
         net, taken = base + joints.sum(axis=1), _taken(arm, joints, weights)
         flat = rates.reshape(-1, size)
@@ -68,18 +86,21 @@ def energy_sensitivity(
 def waiting_sensitivity(
     arm: Arm, q: Array, tau: Array, motors: float, brakes: float, dwell: Dwell, spread: Spread
 ) -> Sensitivity:
-    """That of standing still at q (nq,) [rad]: for so long [s] while motors hold torques tau (nq,) [N·m], then by
-    brakes."""
+    """That of standing still at q (nq,) [rad]: for so long [s] while motors hold torques tau (nq,)
+    [N·m], then by brakes."""
     still = np.zeros((1, len(tau)))
     rates, by_link, _ = _power_rates(q[None], still, still, tau[None], arm, spread)
     electronics = motors + (brakes if dwell.brake_power is None else 0.0)
-    gradient = np.concatenate([[electronics], motors * rates.ravel(), motors * by_link[0].sum(axis=0)])
+    gradient = np.concatenate(
+        [[electronics], motors * rates.ravel(), motors * by_link[0].sum(axis=0)]
+    )
     return Sensitivity(gradient, float(gradient @ spread.mean))
 
 
 def _expected(means: Array, factors: Array, taken: Array) -> tuple[Array, Array]:
-    """What a watt more is worth, and the drawn power [W], both expected: of powers with these means, and independent
-    standard normal factors (..., r), of whose surplus the share `taken` is given back."""
+    """What a watt more is worth, and the drawn power [W], both expected: of powers with these
+    means, and independent standard normal factors (..., r), of whose surplus the share `taken` is
+    given back."""
     sd = np.maximum(np.sqrt((factors * factors).sum(axis=-1)), _CERTAIN)
     x = means / sd
     above = ndtr(x)
@@ -93,14 +114,17 @@ def _taken(arm: Arm, joints: Array, weights: Array) -> Array:
     if arm.bus.mode != "storage":
         return taken
     flows = exchange(arm.bus, arm.regeneration, arm.base_power, joints, weights)
-    return np.where((flows.charged > 0) & (flows.surplus <= _STORED * flows.charged), arm.bus.efficiency, taken)
+    return np.where(
+        (flows.charged > 0) & (flows.surplus <= _STORED * flows.charged), arm.bus.efficiency, taken
+    )
 
 
 def _power_rates(
     q: Array, v: Array, a: Array, tau: Array, arm: Arm, spread: Spread, lost: Array | None = None
 ) -> tuple[Array, Array, Array]:
-    """Derivatives (c, nq, k) of each joint's power by its figures in PER_JOINT, those (k, nq, p) by the parameters of
-    all links, of which p = 0 have errors where the links are known, and the power (k, nq) itself [W]."""
+    """Derivatives (c, nq, k) of each joint's power by its figures in PER_JOINT, those (k, nq, p) by
+    the parameters of all links, of which p = 0 have errors where the links are known, and the power
+    (k, nq) itself [W]."""
     drives, law = arm.drives, arm.friction_law
     if lost is None:
         lost = friction_torque(law, drives, tau, v, a)
@@ -133,10 +157,14 @@ def _power_rates(
 
 
 def _of_links(q: Array, v: Array, a: Array, arm: Arm, spread: Spread) -> Array:
-    """Derivatives (k, nq, p) of the rigid bodies' torques by the links' parameters that have errors."""
+    """Derivatives (k, nq, p) of the rigid bodies' torques by the links' parameters that have
+    errors.
+    """
     nq = q.shape[1]
     if len(spread.mean) == count(nq):
         return np.zeros((*q.shape, 0))
     model = arm.robot.model.copy()
     model.gravity.linear = arm.gravity
-    return rigid_regressor(model, q, v, a) * np.repeat(np.broadcast_to(arm.link_mass_scale, nq), BODY)
+    return rigid_regressor(model, q, v, a) * np.repeat(
+        np.broadcast_to(arm.link_mass_scale, nq), BODY
+    )

@@ -12,14 +12,16 @@ from joulepath.optimizer.exceptions import JoulepathError
 
 @dataclass(eq=False)
 class NotCertified(JoulepathError):
-    """The motion of an answer that is to be exported failed its certificate, which is computed again: it exceeds a
-    limit of the arm, touches something, does not stand still at its ends, or its samples are not those of its spline
-    on this arm."""
+    """The motion of an answer that is to be exported failed its certificate, which is computed
+    again: it exceeds a limit of the arm, touches something, does not stand still at its ends, or
+    its samples are not those of its spline on this arm."""
 
     title = "Motion not certified"
     remedy = (
-        "Export the answer as the service gave it, with the arm that it was computed for. If the robot's figures have "
-        "changed since, optimise again. A motion that `POST /evaluate` finds beyond a limit cannot be exported."
+        "Export the answer as the service gave it, with the arm that it was computed for. If the "
+        "robot's figures have "
+        "changed since, optimise again. A motion that `POST /evaluate` finds beyond a limit cannot "
+        "be exported."
     )
 
     move: int
@@ -27,13 +29,18 @@ class NotCertified(JoulepathError):
     reason: Annotated[str, Internal]
     """Which check failed."""
     worst_ratio: Annotated[dict[str, float], Unit("1")]
-    """Largest value / limit, for each limit where it is finite; empty if the certificate was not reached."""
+    """Largest value / limit, for each limit where it is finite; empty if the certificate was not
+    reached.
+    """
 
     def __post_init__(self) -> None:
-        self.worst_ratio = {name: ratio for name, ratio in self.worst_ratio.items() if math.isfinite(ratio)}
+        self.worst_ratio = {
+            name: ratio for name, ratio in self.worst_ratio.items() if math.isfinite(ratio)
+        }
 
     def __str__(self) -> str:
         return (
-            f"The motion is not certified: {self.reason}. Export an answer as the service gave it, for the robot as it "
+            f"The motion is not certified: {self.reason}. Export an answer as the service gave it, "
+            "for the robot as it "
             "is."
         )

@@ -1,8 +1,10 @@
-"""Public entry point: `evaluate(arm, motion)` computes the energy and checks the limits of a motion.
+"""Public entry point: `evaluate(arm, motion)` computes the energy and checks the limits of a
+motion.
 
-At a velocity step, acceleration, torque and power are infinite, and no model gives the power drawn. Energy is therefore
-summed over the open intervals between the steps. `kinetic` is the change of kinetic energy within these intervals, so
-that the parts add up to the total as they do for a smooth motion.
+At a velocity step, acceleration, torque and power are infinite, and no model gives the power drawn.
+Energy is therefore summed over the open intervals between the steps. `kinetic` is the change of
+kinetic energy within these intervals, so that the parts add up to the total as they do for a smooth
+motion.
 """
 
 from __future__ import annotations
@@ -24,7 +26,12 @@ from joulepath.optimizer.energy.sensitivity import energy_sensitivity
 from joulepath.optimizer.evaluate.interval_energy import IntervalEnergy, joined
 from joulepath.optimizer.evaluate.limit_report import LimitMonitor, LimitReport
 from joulepath.optimizer.evaluate.nearest_contact import ClearanceMonitor, LeastClearance
-from joulepath.optimizer.evaluate.piecewise_motion import Indices, Motion, PiecewiseMotion, piecewise_motion
+from joulepath.optimizer.evaluate.piecewise_motion import (
+    Indices,
+    Motion,
+    PiecewiseMotion,
+    piecewise_motion,
+)
 from joulepath.optimizer.evaluate.recording import BLOCK
 from joulepath.optimizer.evaluate.sampler import Sampler
 from joulepath.optimizer.exceptions import DeadlineExceeded
@@ -36,7 +43,8 @@ from joulepath.optimizer.result.solution import Samples, Solution
 from joulepath.optimizer.trajectories.quadrature import lobatto_panels
 from joulepath.optimizer.trajectories.spline import Spline
 
-# quadrature panels: their greatest length [s], unless a polynomial piece would have more than MOST_PANELS of them
+# quadrature panels: their greatest length [s], unless a polynomial piece would have more than
+# MOST_PANELS of them
 LONGEST_PANEL, MOST_PANELS = 0.2, 256
 MOST_SEGMENTS = 10_000
 """Most segments of a motion that are listed one by one."""
@@ -46,11 +54,12 @@ SEGMENTS_PER_CHECK = 64
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Energy and limits of a given motion. `segments` is empty if `segment_count` exceeds MOST_SEGMENTS.
+    """Energy and limits of a given motion. `segments` is empty if `segment_count` exceeds
+    MOST_SEGMENTS.
 
-    `speed_jumps` counts the velocity steps inside the motion. `nearest` has the margins subtracted; it is None if
-    collisions are not checked. `close_pass` has none subtracted; it is None unless it is below 2 mm. `unmodelled` is
-    that of a `Solution`.
+    `speed_jumps` counts the velocity steps inside the motion. `nearest` has the margins subtracted;
+    it is None if collisions are not checked. `close_pass` has none subtracted; it is None unless it
+    is below 2 mm. `unmodelled` is that of a `Solution`.
     """
 
     total: IntervalEnergy
@@ -109,10 +118,12 @@ def evaluate(
 
 @dataclass(frozen=True)
 class _Nodes:
-    """Quadrature nodes (k,) of a block in order of time. The first and the last node of each piece are its ends.
+    """Quadrature nodes (k,) of a block in order of time. The first and the last node of each piece
+    are its ends.
 
-    `piece` (k,) is the index of the polynomial piece, t and `weights` (k,) are in seconds; q, v, a, jerk, tau (k, nq)
-    describe the motion there, with tau [N·m] the torque of rigid bodies and rotors.
+    `piece` (k,) is the index of the polynomial piece, t and `weights` (k,) are in seconds; q, v, a,
+    jerk, tau (k, nq) describe the motion there, with tau [N·m] the torque of rigid bodies and
+    rotors.
     """
 
     piece: Indices
@@ -129,7 +140,9 @@ class _Nodes:
         lengths = np.diff(motion.breakpoints)
         # more panels per piece if there are few pieces
         least = max(BLOCK // len(lengths), 1)
-        panels = np.clip(np.ceil(lengths / LONGEST_PANEL), least, max(MOST_PANELS, least)).astype(np.int64)
+        panels = np.clip(np.ceil(lengths / LONGEST_PANEL), least, max(MOST_PANELS, least)).astype(
+            np.int64
+        )
         piece, offset, weights = lobatto_panels(motion.breakpoints, panels)
         q, v, a, jerk = motion.at(piece, offset)
         tau = plant.torques(q, v, a)
@@ -181,7 +194,9 @@ class _Evaluator:
             segment_count=self._segment_count,
             speed_jumps=self._speed_jumps,
             limits=self._limits.report(),
-            samples=None if self._sampler is None else self._sampler.finish(self._last, self._charge),
+            samples=None
+            if self._sampler is None
+            else self._sampler.finish(self._last, self._charge),
             nearest=None if self._clearance is None else self._clearance.nearest,
             close_pass=None if self._clearance is None else self._clearance.close_pass,
             unmodelled=[] if self._clearance is None else self._clearance.unmodelled,
@@ -190,39 +205,59 @@ class _Evaluator:
     def _total(self, segments: list[IntervalEnergy]) -> IntervalEnergy:
         """The whole motion, with the interval of its energy."""
         total = joined(segments)
-        return replace(total, energy=with_interval(total.energy, self._sensitivity, total.duration, self._arm))
+        return replace(
+            total, energy=with_interval(total.energy, self._sensitivity, total.duration, self._arm)
+        )
 
     def _charge_course(self, nodes: _Nodes) -> Array:
         """Charge (k + 1,) [J] of the energy storage before each node and after the last."""
-        joints = power_flow(nodes.tau, nodes.v, nodes.a, self._arm.drives, self._arm.friction_law).joints
+        joints = power_flow(
+            nodes.tau, nodes.v, nodes.a, self._arm.drives, self._arm.friction_law
+        ).joints
         net = nodes.weights * (self._arm.base_power + joints.sum(axis=1))
         charge = charges(replace(self._arm.bus, initial=self._charge), net, nodes.weights)
         self._charge = float(charge[-1])
         return charge
 
-    def _add_energies(self, block: PiecewiseMotion, nodes: _Nodes, steps: Indices, charge: Array) -> None:
-        """Add the energy of each segment in a block; `steps` are the pieces that begin with a velocity step."""
+    def _add_energies(
+        self, block: PiecewiseMotion, nodes: _Nodes, steps: Indices, charge: Array
+    ) -> None:
+        """Add the energy of each segment in a block; `steps` are the pieces that begin with a
+        velocity step.
+        """
         # the first node of every piece, and the end
         first = np.searchsorted(nodes.piece, np.arange(len(block.segment) + 1))
-        segment = block.segment if self._segment_count <= MOST_SEGMENTS else np.zeros_like(block.segment)
+        segment = (
+            block.segment if self._segment_count <= MOST_SEGMENTS else np.zeros_like(block.segment)
+        )
         edges = np.append(np.flatnonzero(np.diff(segment, prepend=-1)), len(segment))
         for k, (low, high) in enumerate(pairwise(edges.tolist()), 1):
             if k % SEGMENTS_PER_CHECK == 0:
                 checkpoint()
             inside = first[steps[(steps > low) & (steps < high)]]
-            energy = self._energy(nodes, int(first[low]), int(first[high]), inside, float(charge[first[low]]))
-            kinetic = self._kinetic(nodes, int(first[low])), self._kinetic(nodes, int(first[high]) - 1)
-            part = IntervalEnergy(float(block.breakpoints[low]), float(block.breakpoints[high]), energy, *kinetic)
+            energy = self._energy(
+                nodes, int(first[low]), int(first[high]), inside, float(charge[first[low]])
+            )
+            kinetic = (
+                self._kinetic(nodes, int(first[low])),
+                self._kinetic(nodes, int(first[high]) - 1),
+            )
+            part = IntervalEnergy(
+                float(block.breakpoints[low]), float(block.breakpoints[high]), energy, *kinetic
+            )
             before = self._intervals.get(int(segment[low]))
             self._intervals[int(segment[low])] = part if before is None else joined([before, part])
 
     def _energy(self, nodes: _Nodes, begin: int, end: int, steps: Indices, charge: float) -> Energy:
-        """Energy from node `begin` to before node `end`; `steps` are the nodes in between just after a velocity step.
+        """Energy from node `begin` to before node `end`; `steps` are the nodes in between just
+        after a velocity step.
 
         `charge` [J] is that of the energy storage at the beginning.
         """
         plant, inside, last = self._plant, slice(begin, end), end - 1
-        at_steps = sum(self._kinetic(nodes, int(k)) - self._kinetic(nodes, int(k) - 1) for k in steps)
+        at_steps = sum(
+            self._kinetic(nodes, int(k)) - self._kinetic(nodes, int(k) - 1) for k in steps
+        )
         return breakdown(
             nodes.weights[inside],
             nodes.v[inside],
@@ -235,9 +270,15 @@ class _Evaluator:
 
     def _kinetic(self, nodes: _Nodes, k: int) -> float:
         """Kinetic energy [J] of arm, payload and rotors at a node."""
-        return float(pin.computeKineticEnergy(self._plant.model, self._data, nodes.q[k], nodes.v[k]))
+        return float(
+            pin.computeKineticEnergy(self._plant.model, self._data, nodes.q[k], nodes.v[k])
+        )
 
     def _charged(self, charge: float) -> Arm:
         """The arm with a charge [J] of its energy storage, if it has one."""
         bus = self._arm.bus
-        return replace(self._arm, bus=replace(bus, initial=charge)) if bus.mode == "storage" else self._arm
+        return (
+            replace(self._arm, bus=replace(bus, initial=charge))
+            if bus.mode == "storage"
+            else self._arm
+        )

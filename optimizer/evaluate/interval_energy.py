@@ -31,7 +31,8 @@ class IntervalEnergy:
     kinetic_end: Joules
     """Kinetic energy just before `end`, rotors included."""
     balance_error: Ratio = field(init=False)
-    """|sum of the electrical parts - total| / total. It is large if the logged `v` and `a` do not fit
+    """|sum of the electrical parts - total| / total. It is large if the logged `v` and `a` do not
+    fit
     `q`."""
 
     def __post_init__(self) -> None:
@@ -65,15 +66,22 @@ def _storage_use(uses: Sequence[StorageUse]) -> StorageUse | None:
     """Use of the energy storage over consecutive intervals; None without energy storage."""
     if not uses:
         return None
-    charged, discharged = (sum(getattr(use, name) for use in uses) for name in ("charged", "discharged"))
+    charged, discharged = (
+        sum(getattr(use, name) for use in uses) for name in ("charged", "discharged")
+    )
     return StorageUse(uses[0].initial, uses[-1].final, charged, discharged)
 
 
 def _sum(one: Sum, other: Sum) -> Sum:
-    """Sum of two numbers or arrays, or of two dataclasses of them, field by field; None plus None is None."""
+    """Sum of two numbers or arrays, or of two dataclasses of them, field by field; None plus None
+    is None.
+    """
     if one is None:
         return one
     if is_dataclass(one) and not isinstance(one, type):
-        sums = {each.name: _sum(getattr(one, each.name), getattr(other, each.name)) for each in fields(one)}
+        sums = {
+            each.name: _sum(getattr(one, each.name), getattr(other, each.name))
+            for each in fields(one)
+        }
         return type(one)(**sums)
     return one + other  # type: ignore[no-any-return, operator]

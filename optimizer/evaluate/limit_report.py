@@ -15,9 +15,19 @@ from joulepath.optimizer.kinematics.path_constraints import path_constraints_of
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE, ratios
 
-LimitName = Literal["position", "velocity", "acceleration", "jerk", "torque", "tool_cone", "tcp_speed", "elbow_speed"]
+LimitName = Literal[
+    "position",
+    "velocity",
+    "acceleration",
+    "jerk",
+    "torque",
+    "tool_cone",
+    "tcp_speed",
+    "elbow_speed",
+]
 
-# a step where pieces meet, as a fraction of the limit: far above rounding, and too small to matter to an arm
+# a step where pieces meet, as a fraction of the limit: far above rounding, and too small to matter
+# to an arm
 SPEED_STEP, ACCELERATION_STEP = 1e-6, 1e-4
 
 
@@ -26,7 +36,8 @@ class LimitReport:
     """One limit, at the instant of the motion with the largest value / limit."""
 
     worst_ratio: Annotated[Ratio, NullIfInfinite]
-    """|value| / limit; for positions: distance from the middle of the range / half of the range. Null
+    """|value| / limit; for positions: distance from the middle of the range / half of the range.
+    Null
     if the value is infinite."""
     limit: LimitName
     """The limit. `tool_cone`, `tcp_speed` and `elbow_speed` only if the request limits them."""
@@ -37,8 +48,8 @@ class LimitReport:
     t: Seconds
     """Time of this instant, from the start of the motion."""
     value: Annotated[float, Unit("SI"), NullIfInfinite]
-    """Value at this instant, in the unit of the limit: rad, rad/s, rad/s², rad/s³, N·m or m/s. Null if
-    it is infinite: the acceleration at a velocity step, the jerk at an acceleration step."""
+    """Value at this instant, in the unit of the limit: rad, rad/s, rad/s², rad/s³, N·m or m/s. Null
+    if it is infinite: the acceleration at a velocity step, the jerk at an acceleration step."""
     bound: Annotated[float, Unit("SI")]
     """Value of the limit, in the same unit."""
 
@@ -64,17 +75,35 @@ class LimitMonitor:
         }
 
     def update(self, t: Array, q: Array, v: Array, a: Array, jerk: Array, tau: Array) -> None:
-        """Add samples at times t (k,) [s]; the others are (k, nq), tau [N·m] is rigid body and rotor torque."""
+        """Add samples at times t (k,) [s]; the others are (k, nq), tau [N·m] is rigid body and
+        rotor torque.
+        """
         limits, tau_limited = self._limits, limited_torque(self._arm, tau, v, a)
         nearer = np.where(q > (limits.q_max + limits.q_min) / 2, limits.q_max, limits.q_min)
-        values = {"position": q, "velocity": v, "acceleration": a, "jerk": jerk, "torque": tau_limited}
+        values = {
+            "position": q,
+            "velocity": v,
+            "acceleration": a,
+            "jerk": jerk,
+            "torque": tau_limited,
+        }
         bounds = {
-            "velocity": limits.v_max, "acceleration": limits.a_max, "jerk": limits.j_max, "torque": limits.tau_max,
-        }  # fmt: skip
+            "velocity": limits.v_max,
+            "acceleration": limits.a_max,
+            "jerk": limits.j_max,
+            "torque": limits.tau_max,
+        }
         for name, ratio in ratios(limits, q, v, a, jerk, tau_limited).items():
             k, j = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
             bound = nearer[k, j] if name == "position" else bounds[name][j]
-            self._note(name, float(ratio[k, j]), int(j), float(t[k]), float(values[name][k, j]), float(bound))  # type: ignore[arg-type]
+            self._note(
+                name,
+                float(ratio[k, j]),
+                int(j),
+                float(t[k]),
+                float(values[name][k, j]),
+                float(bound),
+            )  # type: ignore[arg-type]
         if self._path is not None:
             path_ratios = self._path.ratios(q, v)
             for c, path_name in enumerate(self._path.names):
@@ -82,8 +111,11 @@ class LimitMonitor:
                 worst = float(path_ratios[at, c])
                 self._note(path_name, worst, None, float(t[at]), worst * bound, bound)  # type: ignore[arg-type]
 
-    def update_breakpoints(self, motion: PiecewiseMotion, before: PiecewiseMotion | None) -> Indices:
-        """Add the steps at the breakpoints of a block; `before` is the block before it, None for the first.
+    def update_breakpoints(
+        self, motion: PiecewiseMotion, before: PiecewiseMotion | None
+    ) -> Indices:
+        """Add the steps at the breakpoints of a block; `before` is the block before it, None for
+        the first.
 
         Returns the indices (k,) of the pieces that begin with a velocity step.
         """
@@ -112,7 +144,9 @@ class LimitMonitor:
             k, j = np.argwhere(steps)[0].tolist()
             self._note(name, np.inf, j, float(t[k]), np.inf, float(bounds[j]))
 
-    def _note(self, name: LimitName, ratio: float, joint: int | None, t: float, value: float, bound: float) -> None:
+    def _note(
+        self, name: LimitName, ratio: float, joint: int | None, t: float, value: float, bound: float
+    ) -> None:
         known = self._worst.get(name)
         if known is None or ratio > known.worst_ratio:
             joint_name = None if joint is None else self._joints[joint]

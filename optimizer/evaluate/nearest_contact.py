@@ -27,10 +27,12 @@ CHECKS = 100_000
 
 @dataclass(frozen=True)
 class LeastClearance:
-    """Smallest distance between two bodies at sample points. It proves nothing between two samples."""
+    """Smallest distance between two bodies at sample points. It proves nothing between two
+    samples."""
 
     distance: Metres
-    """Distance minus the obstacle's `margin`; if negative, the two bodies are too close or overlap."""
+    """Distance minus the obstacle's `margin`; if negative, the two bodies are too close or
+    overlap."""
     pair: tuple[str, str]
     """Names of the two bodies: links, `tool`, `payload` or obstacles."""
     time: Seconds
@@ -42,9 +44,9 @@ class LeastClearance:
 class ClearanceMonitor:
     """Updates the least clearance of a motion, block after block.
 
-    `nearest` has the margins subtracted; None if no pair is checked. `close_pass` is the least distance without
-    margins; None unless it is below CLOSE at a sample. `unmodelled` are the deepest contacts of the bodies that stand
-    in for a tool and a payload without a shape.
+    `nearest` has the margins subtracted; None if no pair is checked. `close_pass` is the least
+    distance without margins; None unless it is below CLOSE at a sample. `unmodelled` are the
+    deepest contacts of the bodies that stand in for a tool and a payload without a shape.
     """
 
     def __init__(self, arm: Arm) -> None:
@@ -99,16 +101,23 @@ class _LeastSampled:
         self._time = 0.0
 
     def least(self, spacing: float) -> LeastClearance | None:
-        """The least distance of all samples, which are at most `spacing` [s] apart; None if no pair is checked."""
+        """The least distance of all samples, which are at most `spacing` [s] apart; None if no pair
+        is checked.
+        """
         found = self._closest
-        return None if found is None else LeastClearance(found.distance, found.pair, self._time, spacing)
+        return (
+            None
+            if found is None
+            else LeastClearance(found.distance, found.pair, self._time, spacing)
+        )
 
     def add(self, t: Array, q: Array) -> float:
         """Check samples q (k, nq) [rad] at times t (k,) [s].
 
         Returns their least distance [m], or a lower bound of it if an earlier sample was nearer.
         """
-        # for bodies farther apart than the least distance known, the distance of their enclosing balls is enough
+        # for bodies farther apart than the least distance known, the distance of their enclosing
+        # balls is enough
         coarse = self._model.closest_pairs(q[:: max(len(q) // COARSE, 1)])
         within = min((closest.distance for closest in coarse), default=np.inf)
         at_once = max(CHECKS // max(len(self._model.pairs), 1), 1)
@@ -116,7 +125,9 @@ class _LeastSampled:
         for low in range(0, len(q), at_once):
             if low:
                 checkpoint()
-            for k, closest in enumerate(self._model.closest_pairs(q[low : low + at_once], within), low):
+            for k, closest in enumerate(
+                self._model.closest_pairs(q[low : low + at_once], within), low
+            ):
                 least = min(least, closest.distance)
                 if self._closest is None or closest.distance < self._closest.distance:
                     self._closest, self._time = closest, float(t[k])

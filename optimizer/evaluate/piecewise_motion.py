@@ -1,10 +1,13 @@
-"""A given motion as piecewise polynomials in time, block after block, so that memory does not grow with its length.
+"""A given motion as piecewise polynomials in time, block after block, so that memory does not grow
+with its length.
 
 - `linear`: constant velocity of every joint within a segment; velocity steps where segments meet
-- `trapezoid`: trapezoidal velocity from standstill to standstill in every segment, with the acceleration times of the
+- `trapezoid`: trapezoidal velocity from standstill to standstill in every segment, with the
+  acceleration times of the
   baseline `trapezoid`; acceleration steps
 - `quintic`: 10 τ³ - 15 τ⁴ + 6 τ⁵ from standstill to standstill in every segment
-- `spline`: one curve of degree 5 through all configurations, with standstill (v = a = 0) at the start and at the end
+- `spline`: one curve of degree 5 through all configurations, with standstill (v = a = 0) at the
+  start and at the end
 - a spline: its own polynomials
 - a recording: a cubic spline (not-a-knot) through q, and others through v and a if these were
   recorded; if not, they are the derivatives of the spline before. Nothing is smoothed: an error e
@@ -22,7 +25,13 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline, PPoly, make_interp_spline
 
 from joulepath.models.robot import Array, Limits
-from joulepath.optimizer.evaluate.recording import BLOCK, RecordedRows, Recording, Waypoints, check_joints
+from joulepath.optimizer.evaluate.recording import (
+    BLOCK,
+    RecordedRows,
+    Recording,
+    Waypoints,
+    check_joints,
+)
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.trajectories import quintic
 from joulepath.optimizer.trajectories.spline import Spline
@@ -30,8 +39,8 @@ from joulepath.optimizer.trajectories.time_scalings import blend_time
 
 Indices = npt.NDArray[np.int64]
 
-# rows on either side of a block that its spline also passes through: the influence of a row on a cubic spline falls by
-# a factor of 3.7 from row to row, and 1e-27 of it is left after 48 rows
+# rows on either side of a block that its spline also passes through: the influence of a row on a
+# cubic spline falls by a factor of 3.7 from row to row, and 1e-27 of it is left after 48 rows
 OVERLAP = 48
 # fraction of a segment's duration below which a phase of its trapezoid is left out
 SHORTEST_PHASE = 1e-12
@@ -39,11 +48,12 @@ SHORTEST_PHASE = 1e-12
 
 @dataclass(frozen=True)
 class PiecewiseMotion:
-    """A block of m consecutive polynomial pieces, between `breakpoints` (m + 1,) [s] after the start of the motion.
+    """A block of m consecutive polynomial pieces, between `breakpoints` (m + 1,) [s] after the
+    start of the motion.
 
-    `segment` (m,) is the segment of the motion that each piece belongs to. `q`, `v`, `a`, `jerk` are coefficients
-    (degree + 1, m, nq) as in scipy's PPoly: highest power first, of the time since the start of the piece. If a log has
-    its own v, that is not the derivative of q.
+    `segment` (m,) is the segment of the motion that each piece belongs to. `q`, `v`, `a`, `jerk`
+    are coefficients (degree + 1, m, nq) as in scipy's PPoly: highest power first, of the time since
+    the start of the piece. If a log has its own v, that is not the derivative of q.
     """
 
     breakpoints: Array
@@ -56,16 +66,22 @@ class PiecewiseMotion:
     @staticmethod
     def of(curve: PPoly, segment: Indices) -> PiecewiseMotion:
         """The motion of a curve and its derivatives."""
-        return PiecewiseMotion(curve.x, segment, *(curve.derivative(k).c if k else curve.c for k in range(4)))
+        return PiecewiseMotion(
+            curve.x, segment, *(curve.derivative(k).c if k else curve.c for k in range(4))
+        )
 
     def at(self, piece: Indices, x: Array) -> tuple[Array, Array, Array, Array]:
         """q, v, a, jerk (k, nq) at times x (k,) [s] after the start of pieces (k,)."""
-        q, v, a, jerk = (_horner(c[:, piece], x[:, None]) for c in (self.q, self.v, self.a, self.jerk))
+        q, v, a, jerk = (
+            _horner(c[:, piece], x[:, None]) for c in (self.q, self.v, self.a, self.jerk)
+        )
         return q, v, a, jerk
 
     def at_times(self, t: Array) -> tuple[Array, Array, Array, Array]:
         """q, v, a, jerk (k, nq) at times t (k,) [s]; at a breakpoint, those of the later piece."""
-        piece = np.clip(np.searchsorted(self.breakpoints, t, side="right") - 1, 0, len(self.segment) - 1)
+        piece = np.clip(
+            np.searchsorted(self.breakpoints, t, side="right") - 1, 0, len(self.segment) - 1
+        )
         return self.at(piece, t - self.breakpoints[piece])
 
 
@@ -95,8 +111,13 @@ def piecewise_motion(arm: Arm, motion: Motion) -> Iterator[PiecewiseMotion]:
 def _spline(motion: Spline) -> PiecewiseMotion:
     """The polynomials of a spline: one segment with a piece for each knot span."""
     edges = np.unique(motion.knots)
-    powers = [motion.curve(edges[:-1], order) / math.factorial(order) for order in range(motion.degree, -1, -1)]
-    return PiecewiseMotion.of(PPoly(np.stack(powers), edges), np.zeros(len(edges) - 1, dtype=np.int64))
+    powers = [
+        motion.curve(edges[:-1], order) / math.factorial(order)
+        for order in range(motion.degree, -1, -1)
+    ]
+    return PiecewiseMotion.of(
+        PPoly(np.stack(powers), edges), np.zeros(len(edges) - 1, dtype=np.int64)
+    )
 
 
 def _smooth(motion: Waypoints, ends: Array) -> PiecewiseMotion:
@@ -109,7 +130,9 @@ def _smooth(motion: Waypoints, ends: Array) -> PiecewiseMotion:
 
 
 def _segments(motion: Waypoints, limits: Limits, rows: slice, start: float) -> PiecewiseMotion:
-    """Segments on straight lines in joint space, q_start + s(t) · displacement, the first at `start` [s]."""
+    """Segments on straight lines in joint space, q_start + s(t) · displacement, the first at
+    `start` [s].
+    """
     q, T = motion.q[rows], motion.times[rows]
     displacement = motion.q[rows.start + 1 : rows.stop + 1] - q
     segment = np.arange(rows.start, rows.stop)
@@ -121,14 +144,19 @@ def _segments(motion: Waypoints, limits: Limits, rows: slice, start: float) -> P
         law, lengths = _trapezoid(T, blend_time(limits, displacement, T))
         kept = lengths > SHORTEST_PHASE * np.repeat(T, 3)
         law, lengths = [part[kept] for part in law], lengths[kept]
-        q, displacement, segment = (np.repeat(each, 3, axis=0)[kept] for each in (q, displacement, segment))
+        q, displacement, segment = (
+            np.repeat(each, 3, axis=0)[kept] for each in (q, displacement, segment)
+        )
     coefficients = np.stack(law)[:, :, None] * displacement
     coefficients[-1] += q
-    return PiecewiseMotion.of(PPoly(coefficients, start + np.concatenate([[0.0], np.cumsum(lengths)])), segment)
+    return PiecewiseMotion.of(
+        PPoly(coefficients, start + np.concatenate([[0.0], np.cumsum(lengths)])), segment
+    )
 
 
 def _trapezoid(T: Array, blend: Array) -> tuple[list[Array], Array]:
-    """Coefficients of s(t) in the three phases of n trapezoids of velocity, and the durations (3 n,) [s] of the phases.
+    """Coefficients of s(t) in the three phases of n trapezoids of velocity, and the durations (3
+    n,) [s] of the phases.
 
     T (n,) [s] is the duration, `blend` (n,) [s] the time of acceleration, and of deceleration.
     """
@@ -166,7 +194,9 @@ def _between(log: Recording, rows: RecordedRows, begin: int, end: int) -> Piecew
     inside = (slice(None), slice(begin, end))
     curves = (curve.c[inside] for curve in (q, v, a, a.derivative()))
     # by their middles: an edge is the time of a row but for rounding
-    segment = np.searchsorted(log.edges, (rows.t[begin:end] + rows.t[begin + 1 : end + 1]) / 2, side="right")
+    segment = np.searchsorted(
+        log.edges, (rows.t[begin:end] + rows.t[begin + 1 : end + 1]) / 2, side="right"
+    )
     return PiecewiseMotion(rows.t[begin : end + 1], segment, *curves)
 
 
@@ -189,7 +219,9 @@ def _from(block: RecordedRows, row: int) -> RecordedRows:
 
 
 def _horner(coefficients: Array, x: Array) -> Array:
-    """Values (k, nq) at x (k, 1) of polynomials with coefficients (degree + 1, k, nq), highest power first."""
+    """Values (k, nq) at x (k, 1) of polynomials with coefficients (degree + 1, k, nq), highest
+    power first.
+    """
     value = coefficients[0]
     for c in coefficients[1:]:
         value = value * x + c

@@ -21,7 +21,8 @@ BLOCK = 2048
 MOST_ROWS = 1_000_000
 """Most rows of a motion."""
 MOST_SPLINE_POINTS = 10_000
-"""Most configurations that one smooth curve passes through: its equations are solved all at once."""
+"""Most configurations that one smooth curve passes through: its equations are solved all at
+once."""
 CLOSEST_TIMES = 1e-6
 """Least time between rows [s]."""
 MOST_SPEED, MOST_ACCELERATION = 1e4, 1e7
@@ -32,10 +33,11 @@ FAR_OUT = 2.0
 
 @dataclass(frozen=True)
 class Waypoints:
-    """Joint positions q (n, nq) [rad] that a motion passes in this order, with a time for each segment between them.
+    """Joint positions q (n, nq) [rad] that a motion passes in this order, with a time for each
+    segment between them.
 
-    `times` (n - 1,) [s] may be one number for all segments. `piecewise_motion` describes the interpolations. Errors
-    count rows from `first_row`. Raises InvalidProblem.
+    `times` (n - 1,) [s] may be one number for all segments. `piecewise_motion` describes the
+    interpolations. Errors count rows from `first_row`. Raises InvalidProblem.
     """
 
     q: Array
@@ -45,13 +47,16 @@ class Waypoints:
 
     def __post_init__(self) -> None:
         if np.ndim(self.q) != 2 or len(self.q) < 2:
-            raise InvalidProblem("configurations", "configurations must be a list of two or more joint positions.")
+            raise InvalidProblem(
+                "configurations", "configurations must be a list of two or more joint positions."
+            )
         object.__setattr__(self, "q", frozen(self.q, np.shape(self.q), "configurations"))
         segments = len(self.q) - 1
         times = np.full(segments, self.times) if np.ndim(self.times) == 0 else self.times
         if np.shape(times) != (segments,):
             raise InvalidProblem(
-                "time_per_segment", f"time_per_segment must be one number or a list of {segments}, one per segment."
+                "time_per_segment",
+                f"time_per_segment must be one number or a list of {segments}, one per segment.",
             )
         object.__setattr__(self, "times", frozen(times, (segments,), "time_per_segment"))
         if (self.times <= 0).any():
@@ -59,7 +64,8 @@ class Waypoints:
         if self.interpolation == "spline" and len(self.q) > MOST_SPLINE_POINTS:
             raise InvalidProblem(
                 "interpolation",
-                f"A spline passes at most {MOST_SPLINE_POINTS} configurations: send more as a trajectory with t.",
+                f"A spline passes at most {MOST_SPLINE_POINTS} configurations: send more as a "
+                "trajectory with t.",
             )
 
     @property
@@ -68,7 +74,8 @@ class Waypoints:
         return len(self.times)
 
     def check(self, arm: Arm) -> None:
-        """Raise InvalidProblem or InvalidTable if the joint positions cannot be those of the arm."""
+        """Raise InvalidProblem or InvalidTable if the joint positions cannot be those of the
+        arm."""
         check_joints(arm, self.q, self.first_row)
 
 
@@ -105,7 +112,12 @@ class Recording:
 
     @classmethod
     def of(
-        cls, t: Array, q: Array, v: Array | None = None, a: Array | None = None, edges: Sequence[float] = ()
+        cls,
+        t: Array,
+        q: Array,
+        v: Array | None = None,
+        a: Array | None = None,
+        edges: Sequence[float] = (),
     ) -> Recording:
         """A recording that is in memory.
 
@@ -124,9 +136,14 @@ class Recording:
         """
         columns = [None if each is None else np.asarray(each, dtype=float) for each in (t, q, v, a)]
         if len({len(each) for each in columns if each is not None}) > 1:
-            raise InvalidProblem("trajectory", "t, q, v and a must have as many rows as each other.")
+            raise InvalidProblem(
+                "trajectory", "t, q, v and a must have as many rows as each other."
+            )
         rows = [slice(low, high) for low, high in pairwise([*range(0, len(t), BLOCK), len(t)])]
-        blocks = [RecordedRows(*(None if each is None else each[part] for each in columns)) for part in rows]  # type: ignore[arg-type]
+        blocks = [
+            RecordedRows(*(None if each is None else each[part] for each in columns))
+            for part in rows
+        ]  # type: ignore[arg-type]
         return cls(blocks, edges=edges)
 
     @property
@@ -144,7 +161,10 @@ class Recording:
             if not len(block.t):
                 continue
             if row + len(block.t) - self.first_row > MOST_ROWS:
-                raise InvalidTable(f"A trajectory has at most {MOST_ROWS} rows: send fewer rows, or send it in parts.")
+                raise InvalidTable(
+                    f"A trajectory has at most {MOST_ROWS} rows: send fewer rows, or send it in "
+                    "parts."
+                )
             origin = float(block.t[0]) if origin is None else origin
             _check_finite(block, row)
             t = block.t - origin
@@ -152,7 +172,8 @@ class Recording:
             if (steps < CLOSEST_TIMES).any():
                 at = int(np.argmax(steps < CLOSEST_TIMES))
                 raise InvalidTable(
-                    f"t must increase from row to row by {CLOSEST_TIMES:g} s or more, and does not at row {row + at}: "
+                    f"t must increase from row to row by {CLOSEST_TIMES:g} s or more, and does not "
+                    f"at row {row + at}: "
                     "sort the rows and drop repeated ones.",
                     row + at,
                     "t",
@@ -161,7 +182,9 @@ class Recording:
             yield RecordedRows(t, block.q, block.v, block.a)
             row, last = row + len(t), float(t[-1])
         if row - self.first_row < 2:
-            raise InvalidTable("A trajectory needs two or more rows: there is no motion in fewer.", None, None)
+            raise InvalidTable(
+                "A trajectory needs two or more rows: there is no motion in fewer.", None, None
+            )
 
 
 def _check_finite(block: RecordedRows, first_row: int) -> None:
@@ -175,7 +198,8 @@ def _check_finite(block: RecordedRows, first_row: int) -> None:
             row, joint = wrong[0].tolist()
             column = name if name == "t" else f"{name}{joint + 1}"
             raise InvalidTable(
-                f"{column} at row {first_row + row} is not finite, or too large to be a robot's: correct it or drop "
+                f"{column} at row {first_row + row} is not finite, or too large to be a robot's: "
+                "correct it or drop "
                 "the row.",
                 first_row + row,
                 column,
@@ -185,13 +209,18 @@ def _check_finite(block: RecordedRows, first_row: int) -> None:
 def check_joints(arm: Arm, q: Array, first_row: int = 0) -> None:
     """Raises InvalidProblem or InvalidTable for joint positions q (k, n) [rad] of another arm."""
     if q.shape[1] != arm.robot.nq:
-        raise InvalidProblem("q", f"Every row must have {arm.robot.nq} joint positions, one per joint.")
+        raise InvalidProblem(
+            "q", f"Every row must have {arm.robot.nq} joint positions, one per joint."
+        )
     limits = arm.robot.limits
-    wrong = np.argwhere(np.abs(q) > FAR_OUT * np.maximum(np.abs(limits.q_min), np.abs(limits.q_max)))
+    wrong = np.argwhere(
+        np.abs(q) > FAR_OUT * np.maximum(np.abs(limits.q_min), np.abs(limits.q_max))
+    )
     if len(wrong):
         row, joint = wrong[0].tolist()
         raise InvalidTable(
-            f"q{joint + 1} at row {first_row + row} is far beyond the joint's range and looks like degrees: give "
+            f"q{joint + 1} at row {first_row + row} is far beyond the joint's range and looks like "
+            "degrees: give "
             "radians, or a CSV with units=deg.",
             first_row + row,
             f"q{joint + 1}",

@@ -33,12 +33,19 @@ def check_samples(arm: Arm, spline: Spline, t: Array, samples: Sequence[Array]) 
         NotCertified: they differ by more than rounding.
     """
     limits, duration = arm.active_limits, spline.duration
-    if len(t) and not (t[0] >= 0 and t[-1] <= duration * (1 + SAMPLE_TOLERANCE) and np.isfinite(t).all()):
+    if len(t) and not (
+        t[0] >= 0 and t[-1] <= duration * (1 + SAMPLE_TOLERANCE) and np.isfinite(t).all()
+    ):
         raise NotCertified(0, "its samples are not of its own time", {})
     q, v, a = sample(spline, np.minimum(t, duration))
     own = (q, v, a, Plant(arm).torques(q, v, a))
     scales = (np.ones_like(limits.v_max), limits.v_max, limits.a_max, limits.tau_max)
     names = ("joint positions", "velocities", "accelerations", "torques")
     for name, computed, given, scale in zip(names, own, samples, scales, strict=True):
-        if given.shape != computed.shape or not (np.abs(given - computed) <= SAMPLE_TOLERANCE * scale).all():
-            raise NotCertified(0, f"the {name} of its samples are not those of its spline on this arm", {})
+        if (
+            given.shape != computed.shape
+            or not (np.abs(given - computed) <= SAMPLE_TOLERANCE * scale).all()
+        ):
+            raise NotCertified(
+                0, f"the {name} of its samples are not those of its spline on this arm", {}
+            )

@@ -30,7 +30,8 @@ class Sampler:
         self._count = 0
 
     def update(self, motion: PiecewiseMotion, charge: Callable[[Array], Array]) -> None:
-        """Add the samples before the end of a block; `charge` gives that of the energy storage [J] at times (k,) [s].
+        """Add the samples before the end of a block; `charge` gives that of the energy storage [J]
+        at times (k,) [s].
 
         Raises InvalidProblem beyond MOST_SAMPLES.
         """
@@ -38,7 +39,8 @@ class Sampler:
         if stop >= MOST_SAMPLES:
             raise InvalidProblem(
                 "sample_period",
-                f"An answer has at most {MOST_SAMPLES} samples: use a longer sample_period, or leave it out.",
+                f"An answer has at most {MOST_SAMPLES} samples: use a longer sample_period, or "
+                "leave it out.",
             )
         if stop > self._count:
             t = np.asarray(np.arange(self._count, stop) * self._period, dtype=float)
@@ -46,11 +48,18 @@ class Sampler:
             self._count = stop
 
     def finish(self, last: PiecewiseMotion, charge: float) -> Samples:
-        """All samples, with one at the end of the `last` block, where the energy storage has `charge` [J]."""
+        """All samples, with one at the end of the `last` block, where the energy storage has
+        `charge` [J].
+        """
         self._add(last, last.breakpoints[-1:], np.array([charge]))
         stored = self._plant.arm.bus.mode == "storage"
         names = [each.name for each in fields(Samples) if stored or each.name != "charge"]
-        return Samples(**{name: np.concatenate([getattr(part, name) for part in self._parts]) for name in names})
+        return Samples(
+            **{
+                name: np.concatenate([getattr(part, name) for part in self._parts])
+                for name in names
+            }
+        )
 
     def _add(self, motion: PiecewiseMotion, t: Array, charge: Array) -> None:
         arm = self._plant.arm

@@ -9,19 +9,26 @@ from joulepath.optimizer.exceptions import JoulepathError
 
 @dataclass(eq=False)
 class ExcitationInfeasible(JoulepathError):
-    """No excitation was found that keeps its limits from any start. `limit` names the one that the last start broke."""
+    """No excitation was found that keeps its limits from any start. `limit` names the one that the
+    last start broke.
+    """
 
     title = "No excitation within the limits"
     remedy = (
-        "For `clearance`, move obstacles, ask for less, or give a `centre` with more room; else relax the limit or "
+        "For `clearance`, move obstacles, ask for less, or give a `centre` with more room; else "
+        "relax the limit or "
         "give a longer `period`."
     )
 
     limit: str
-    """`clearance`, or a name of `worst_ratio` in a certificate: `position`, `velocity`, `torque`, …"""
+    """`clearance`, or a name of `worst_ratio` in a certificate: `position`, `velocity`, `torque`,
+    …"""
 
     def __str__(self) -> str:
         remedy = "relax it, or give a longer period"
         if self.limit == "clearance":
             remedy = "move the obstacles, ask for less clearance, or give a centre with more room"
-        return f"No excitation was found that keeps its limits, the last one broke {self.limit}: {remedy}."
+        return (
+            f"No excitation was found that keeps its limits, the last one broke {self.limit}: "
+            f"{remedy}."
+        )

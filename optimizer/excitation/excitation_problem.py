@@ -1,4 +1,6 @@
-"""What is asked of an excitation: an arm, a period, and the parameters that its motion is to tell apart."""
+"""What is asked of an excitation: an arm, a period, and the parameters that its motion is to tell
+apart.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +16,8 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.arrays import frozen, per_joint
 
 Part = Literal["inertials", "rotor", "friction"]
-"""Parameters that are to be told apart: base parameters of the links, rotor inertias, friction (Coulomb, viscous,
-offset, load)."""
+"""Parameters that are to be told apart: base parameters of the links, rotor inertias, friction
+(Coulomb, viscous, offset, load)."""
 Criterion = Literal["d", "condition"]
 
 MOST_HARMONICS = 10
@@ -28,13 +30,14 @@ LEAST_DEADLINE = 1e-6
 class ExcitationProblem:
     """A request for a periodic motion of `arm` that tells its parameters apart.
 
-    `period` [s] of a Fourier series with `harmonics`. `parts`: which parameters. `criterion` "d" maximises the
-    determinant of the information, "condition" lowers the condition of its columns scaled to one length. The motion
-    stays within `speed_fraction` of the speed limits, and `clearance` [m] away from the arm itself, the scene, and with
-    `mounting_plane` from the plane z = 0 of the base, on which the arm stands. `centre` (nq,) [rad] fixes the centre of
-    the series. `noise` [N·m] is that of the torques, one number or (nq,): by default 1 % of the torque limit.
-    After `deadline` [s] the best motion so far is returned; `starts` are tried at most. `sample_period` [s] is that of
-    the returned samples.
+    `period` [s] of a Fourier series with `harmonics`. `parts`: which parameters. `criterion` "d"
+    maximises the determinant of the information, "condition" lowers the condition of its columns
+    scaled to one length. The motion stays within `speed_fraction` of the speed limits, and
+    `clearance` [m] away from the arm itself, the scene, and with `mounting_plane` from the plane z
+    = 0 of the base, on which the arm stands. `centre` (nq,) [rad] fixes the centre of the series.
+    `noise` [N·m] is that of the torques, one number or (nq,): by default 1 % of the torque limit.
+    After `deadline` [s] the best motion so far is returned; `starts` are tried at most.
+    `sample_period` [s] is that of the returned samples.
 
     Raises InvalidProblem, with the field named.
     """
@@ -67,13 +70,21 @@ class ExcitationProblem:
                 raise InvalidProblem(name, f"{name} must lie between {least:g} and {most:g}.")
         if self.period > self.sample_period * MOST_SAMPLES:
             least = self.period / MOST_SAMPLES
-            raise InvalidProblem("sample_period", f"sample_period must be at least {least:.2g} s for this period.")
+            raise InvalidProblem(
+                "sample_period", f"sample_period must be at least {least:.2g} s for this period."
+            )
         if not self.parts or not set(self.parts) <= set(get_args(Part)):
-            raise InvalidProblem("parameters", f"parameters must name some of {', '.join(get_args(Part))}.")
+            raise InvalidProblem(
+                "parameters", f"parameters must name some of {', '.join(get_args(Part))}."
+            )
         if self.criterion not in get_args(Criterion):
-            raise InvalidProblem("criterion", f"criterion must be one of {', '.join(get_args(Criterion))}.")
+            raise InvalidProblem(
+                "criterion", f"criterion must be one of {', '.join(get_args(Criterion))}."
+            )
         if self.arm.tool_cone is not None:
-            raise InvalidProblem("tool_cone", "An excitation turns the tool in every direction: leave tool_cone out.")
+            raise InvalidProblem(
+                "tool_cone", "An excitation turns the tool in every direction: leave tool_cone out."
+            )
         nq = self.arm.robot.nq
         if self.centre is not None:
             object.__setattr__(self, "centre", frozen(self.centre, (nq,), "centre"))

@@ -1,8 +1,10 @@
-"""excite(problem) → Excitation: a motion that tells the parameters of an arm apart, with its certificate.
+"""excite(problem) → Excitation: a motion that tells the parameters of an arm apart, with its
+certificate.
 
-Fourier series at rest at both ends (Swevers, Ganseman, Tükel, De Schutter, Van Brussel 1997), D-optimal, by L-BFGS on a
-cost with penalties from several random starts. What the penalties leave of speed, acceleration, jerk and torque is
-removed by a longer period; collisions are proven absent, or the start is dropped.
+Fourier series at rest at both ends (Swevers, Ganseman, Tükel, De Schutter, Van Brussel 1997),
+D-optimal, by L-BFGS on a cost with penalties from several random starts. What the penalties leave
+of speed, acceleration, jerk and torque is removed by a longer period; collisions are proven absent,
+or the start is dropped.
 """
 
 from __future__ import annotations
@@ -24,7 +26,12 @@ from joulepath.optimizer.excitation.errors import ExcitationInfeasible
 from joulepath.optimizer.excitation.excitation_problem import ExcitationProblem
 from joulepath.optimizer.excitation.fourier import FourierBasis
 from joulepath.optimizer.excitation.information import Information
-from joulepath.optimizer.excitation.limits import ClearancePenalty, excess, range_excess, torque_excess
+from joulepath.optimizer.excitation.limits import (
+    ClearancePenalty,
+    excess,
+    range_excess,
+    torque_excess,
+)
 from joulepath.optimizer.excitation.torque_columns import TorqueColumns
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.problem.arm import Arm
@@ -42,11 +49,14 @@ STATES = 120
 PENALTY, MOST_EVALUATIONS = 40.0, 1000
 # relative decrease of the cost below which a start ends
 PROGRESS = 1e-5
-# independent samples per second that the predicted deviations assume: residuals of torques are correlated over 0.1 s
+# independent samples per second that the predicted deviations assume: residuals of torques are
+# correlated over 0.1 s
 INDEPENDENT_RATE = 10.0
-# attempts to find a centre without collision, and greatest amplitude [rad/s] of the first coefficients
+# attempts to find a centre without collision, and greatest amplitude [rad/s] of the first
+# coefficients
 _CENTRES, _AMPLITUDE = 100, 0.15
-# shares of the way from a start to what was found at which a motion is looked for that keeps all limits
+# shares of the way from a start to what was found at which a motion is looked for that keeps all
+# limits
 _WAY_BACK = (1.0, 0.9, 0.7, 0.4, 0.0)
 # share of its part of the time left that the search of a start may use: its certificate needs some
 _SHARE = 0.9
@@ -56,8 +66,8 @@ Coefficients = Annotated[Array, Axes(("joint", "harmonic")), Unit("rad/s")]
 
 @dataclass(frozen=True)
 class Series:
-    """The Fourier series of every joint: q = centre + Σ_k a_k sin(kωt) / (kω) - b_k cos(kωt) / (kω),
-    ω = 2π / period. A row of `a` and `b` is that of a joint."""
+    """The Fourier series of every joint: q = centre + Σ_k a_k sin(kωt) / (kω) - b_k cos(kωt) /
+    (kω), ω = 2π / period. A row of `a` and `b` is that of a joint."""
 
     period: Seconds
     """Period; longer than asked for if the limits need it."""
@@ -77,7 +87,8 @@ class PredictedDeviation:
     """A base parameter as a sum of parameters of bodies (`m`, `mx` …, `Ixx` …) and rotors (`Ia`),
     each with the number of its joint; or `coulomb`, `viscous`, `offset` or `load` of a joint."""
     sd: Annotated[float, Unit("SI")]
-    """Standard deviation after one period, with 10 independent samples of every joint per second."""
+    """Standard deviation after one period, with 10 independent samples of every joint per
+    second."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,7 +119,9 @@ class Excitation:
 
 @one_thread()
 def excite(problem: ExcitationProblem) -> Excitation:
-    """The best motion of all starts that end before the deadline. Raises ExcitationInfeasible, or DeadlineExceeded."""
+    """The best motion of all starts that end before the deadline. Raises ExcitationInfeasible, or
+    DeadlineExceeded.
+    """
     deadline = Deadline.after(problem.deadline)
     design = _Design(problem)
     best: Excitation | None = None
@@ -121,7 +134,9 @@ def excite(problem: ExcitationProblem) -> Excitation:
         if coordinates is None:
             limit = "clearance"
             continue
-        motion, limit = design.kept(coordinates, design.improved(coordinates, deadline.within(part)))
+        motion, limit = design.kept(
+            coordinates, design.improved(coordinates, deadline.within(part))
+        )
         if motion is None:
             continue
         feasible += 1
@@ -144,24 +159,34 @@ class _Design:
         self.plant = Plant(self.arm)
         limits = self.arm.active_limits
         self.rates = [limits.v_max * problem.speed_fraction, limits.a_max, limits.j_max]
-        self.collisions: CollisionModel | None = collision_model(self.arm) if self.arm.collisions else None
+        self.collisions: CollisionModel | None = (
+            collision_model(self.arm) if self.arm.collisions else None
+        )
 
     def start(self, number: int) -> Array | None:
-        """Coordinates of a small motion about a centre without collision; None if none was found."""
+        """Coordinates of a small motion about a centre without collision; None if none was
+        found."""
         random, limits = np.random.default_rng(number), self.arm.active_limits
         size = (self.basis.free, self.arm.robot.nq)
         small = random.uniform(-_AMPLITUDE, _AMPLITUDE, size) * np.minimum(1.0, limits.v_max)
         if self.problem.centre is not None:
             return np.vstack([self.problem.centre, small])
         low, high = np.maximum(limits.q_min, -np.pi), np.minimum(limits.q_max, np.pi)
-        for centre in random.uniform(low + 0.2 * (high - low), high - 0.2 * (high - low), (_CENTRES, len(low))):
+        for centre in random.uniform(
+            low + 0.2 * (high - low), high - 0.2 * (high - low), (_CENTRES, len(low))
+        ):
             q = centre + self.matrices[0][:, 1:] @ small
-            if self.collisions is None or self.collisions.least_distance(q, 0.1) > self.problem.clearance:
+            if (
+                self.collisions is None
+                or self.collisions.least_distance(q, 0.1) > self.problem.clearance
+            ):
                 return np.vstack([centre, small])
         return None
 
     def improved(self, coordinates: Array, deadline: Deadline) -> Array:
-        """Coordinates of a local optimum of the cost with penalties, or of the best point before the deadline."""
+        """Coordinates of a local optimum of the cost with penalties, or of the best point before
+        the deadline.
+        """
         shape = coordinates.shape
         fixed = self.problem.centre is not None
 
@@ -181,7 +206,12 @@ class _Design:
             jac=True,
             method="L-BFGS-B",
             callback=stop_late,
-            options={"maxfun": MOST_EVALUATIONS, "maxiter": MOST_EVALUATIONS, "maxcor": 30, "ftol": PROGRESS},
+            options={
+                "maxfun": MOST_EVALUATIONS,
+                "maxiter": MOST_EVALUATIONS,
+                "maxcor": 30,
+                "ftol": PROGRESS,
+            },
         )
         return np.asarray(found.x, dtype=float).reshape(shape)
 
@@ -198,7 +228,10 @@ class _Design:
         torque_cost, by_torque = torque_excess(arm, W @ columns.dynamics, v, a)
         seed += PENALTY * by_torque[:, :, None] * columns.dynamics
         gradients = [*columns.pulled_back(q, v, a, seed), np.zeros_like(jerk)]
-        penalties = [range_excess(arm, q), *(excess(x, most) for x, most in zip(states[1:], self.rates, strict=True))]
+        penalties = [
+            range_excess(arm, q),
+            *(excess(x, most) for x, most in zip(states[1:], self.rates, strict=True)),
+        ]
         for order, (_, by_state) in enumerate(penalties):
             gradients[order] = gradients[order] + PENALTY * by_state
         penalty = torque_cost + sum(each for each, _ in penalties)
@@ -206,12 +239,15 @@ class _Design:
             near, by_q = ClearancePenalty(self.collisions, self.problem.clearance)(q)
             penalty += near
             gradients[0] = gradients[0] + PENALTY * by_q
-        total = sum(matrix.T @ gradient for matrix, gradient in zip(self.matrices, gradients, strict=True))
+        total = sum(
+            matrix.T @ gradient for matrix, gradient in zip(self.matrices, gradients, strict=True)
+        )
         return value + PENALTY * penalty, np.asarray(total)
 
     def kept(self, start: Array, found: Array) -> tuple[Excitation | None, str | None]:
-        """The motion of a search that ended at coordinates `found`, or the nearest one back to its start that keeps all
-        limits: a search that ran out of time may break them. If none does, the limit that it breaks."""
+        """The motion of a search that ended at coordinates `found`, or the nearest one back to its
+        start that keeps all limits: a search that ran out of time may break them. If none does, the
+        limit that it breaks."""
         limit = None
         for share in _WAY_BACK:
             motion = self.certified(start + share * (found - start))
@@ -234,7 +270,9 @@ class _Design:
         t = np.linspace(0.0, spline.duration, STATES, endpoint=False)
         W = self.columns.values(*(np.asarray(spline.curve(t, order)) for order in range(3)))
         noise = np.asarray(self.problem.noise)
-        information = Information((W[:, :, self.columns.wanted] / noise[:, None]).reshape(-1, len(self.columns.wanted)))
+        information = Information(
+            (W[:, :, self.columns.wanted] / noise[:, None]).reshape(-1, len(self.columns.wanted))
+        )
         deviations = information.deviations(INDEPENDENT_RATE * spline.duration * self.arm.robot.nq)
         return Excitation(
             coefficients=Series(basis.period, *basis.coefficients(stretched)),
@@ -254,10 +292,21 @@ class _Design:
 
     def _stretch(self, certificate: Certificate) -> float:
         """Factor ≥ 1 of the period that brings every rate within its limit."""
-        orders = {"velocity": 1, "acceleration": 2, "jerk": 3, "tcp_speed": 1, "elbow_speed": 1, "torque": 2}
+        orders = {
+            "velocity": 1,
+            "acceleration": 2,
+            "jerk": 3,
+            "tcp_speed": 1,
+            "elbow_speed": 1,
+            "torque": 2,
+        }
         ratios = dict(certificate.worst_ratio)
         ratios["velocity"] /= self.problem.speed_fraction
-        needed = [(ratios[name] * (1 + 1e-9)) ** (1 / order) for name, order in orders.items() if name in ratios]
+        needed = [
+            (ratios[name] * (1 + 1e-9)) ** (1 / order)
+            for name, order in orders.items()
+            if name in ratios
+        ]
         return float(max(1.0, *needed))
 
     def broken(self, certificate: Certificate) -> str | None:
@@ -271,7 +320,9 @@ class _Design:
 
     def _certificate(self, spline: Spline) -> tuple[Certificate, Energy]:
         energy, (start, *_, goal) = self.plant.energy(spline), spline.control_points
-        return certify(Problem(arm=self.arm, start=start, goal=goal), spline, start, goal, energy), energy
+        return certify(
+            Problem(arm=self.arm, start=start, goal=goal), spline, start, goal, energy
+        ), energy
 
 
 def _standing(problem: ExcitationProblem) -> Arm:

@@ -1,8 +1,10 @@
-"""Fourier series of joint positions that are at rest at both ends of their period (Swevers et al. 1997).
+"""Fourier series of joint positions that are at rest at both ends of their period (Swevers et al.
+1997).
 
 q_j(t) = centre_j + Σ_k a_jk sin(kωt) / (kω) − b_jk cos(kωt) / (kω),  ω = 2π / period
 
-v = a = 0 at the ends of the period is Σ_k a_jk = 0 and Σ_k k b_jk = 0: two directions fewer for each joint.
+v = a = 0 at the ends of the period is Σ_k a_jk = 0 and Σ_k k b_jk = 0: two directions fewer for
+each joint.
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ _SPANS = 24
 class FourierBasis:
     """Series of some `harmonics` over a `period` [s].
 
-    Coordinates of a motion are (1 + free, joints): the centre, then the coordinates in the space of series at rest.
+    Coordinates of a motion are (1 + free, joints): the centre, then the coordinates in the space of
+    series at rest.
     """
 
     period: float
@@ -33,7 +36,9 @@ class FourierBasis:
 
     @cached_property
     def resting(self) -> Array:
-        """Orthonormal directions (2 harmonics, free) of the coefficients a, then b, of series that rest at the ends."""
+        """Orthonormal directions (2 harmonics, free) of the coefficients a, then b, of series that
+        rest at the ends.
+        """
         k = np.arange(1, self.harmonics + 1)
         zero = np.zeros(self.harmonics)
         return np.asarray(null_space(np.array([[*np.ones(self.harmonics), *zero], [*zero, *k]])))
@@ -46,14 +51,17 @@ class FourierBasis:
     def matrix(self, t: Array, derivative: int) -> Array:
         """The derivative (m, 1 + free) of q at times t (m,) [s] by the coordinates."""
         w = 2 * np.pi / self.period * np.arange(1, self.harmonics + 1)
-        # of sin: the derivative d shifts the phase by d quarters of a turn, and multiplies by the frequency
+        # of sin: the derivative d shifts the phase by d quarters of a turn, and multiplies by the
+        # frequency
         phase = np.outer(t, w) + derivative * np.pi / 2
         series = np.hstack([np.sin(phase), -np.cos(phase)]) * np.tile(w ** (derivative - 1), 2)
         centre = np.full((len(t), 1), 1.0 if derivative == 0 else 0.0)
         return np.hstack([centre, series @ self.resting])
 
     def coefficients(self, coordinates: Array) -> tuple[Array, Array, Array]:
-        """Centre (joints,) [rad], a and b (joints, harmonics) [rad/s] of coordinates (1 + free, joints)."""
+        """Centre (joints,) [rad], a and b (joints, harmonics) [rad/s] of coordinates (1 + free,
+        joints).
+        """
         both = (self.resting @ coordinates[1:]).T
         return coordinates[0], both[:, : self.harmonics], both[:, self.harmonics :]
 

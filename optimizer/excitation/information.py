@@ -1,4 +1,6 @@
-"""How well a motion tells parameters apart: criterion with its gradient, condition, and predicted deviations."""
+"""How well a motion tells parameters apart: criterion with its gradient, condition, and predicted
+deviations.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ class Information:
     columns: Array
 
     def criterion(self, kind: Criterion) -> tuple[float, Array]:
-        """A cost that falls as the parameters become better told apart, and its gradient (m, p) by the columns."""
+        """A cost that falls as the parameters become better told apart, and its gradient (m, p) by
+        the columns.
+        """
         W = self.columns
         scale = np.sqrt((W * W).mean(axis=0)) + _SINGULAR
         scaled = W / scale
@@ -32,7 +36,9 @@ class Information:
         if kind == "d":
             # -log det of the information; the scale contributes its logarithm
             cost = -float(np.log(values).sum()) - 2 * float(np.log(scale).sum())
-            return cost / W.shape[1], -2 * (scaled @ (vectors / values @ vectors.T)) / (scale * W.size)
+            return cost / W.shape[1], -2 * (scaled @ (vectors / values @ vectors.T)) / (
+                scale * W.size
+            )
         power = (values**-_POWER).mean() ** (1 / _POWER)
         weight = -(power ** (1 - _POWER)) * values ** (-_POWER - 1) / len(values) / power
         by_gram = vectors * weight @ vectors.T
@@ -47,6 +53,8 @@ class Information:
         return float(np.linalg.cond(W))
 
     def deviations(self, samples: float) -> Array:
-        """Standard deviations (p,) of the parameters if the rows hold `samples` independent measurements in all."""
+        """Standard deviations (p,) of the parameters if the rows hold `samples` independent
+        measurements in all.
+        """
         gram = self.columns.T @ self.columns * (samples / len(self.columns))
         return np.asarray(np.sqrt(np.diag(np.linalg.inv(gram))))

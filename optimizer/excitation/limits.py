@@ -1,4 +1,6 @@
-"""Limits of an excitation as smooth penalties with gradients: each excess of a ratio over 1 costs its square."""
+"""Limits of an excitation as smooth penalties with gradients: each excess of a ratio over 1 costs
+its square.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,9 @@ def torque_excess(arm: Arm, tau: Array, v: Array, a: Array) -> tuple[float, Arra
 
 @dataclass(frozen=True)
 class ClearancePenalty:
-    """Penalty of samples closer than `clearance` [m] to an obstacle or the arm itself, margins subtracted."""
+    """Penalty of samples closer than `clearance` [m] to an obstacle or the arm itself, margins
+    subtracted.
+    """
 
     model: CollisionModel
     clearance: float

@@ -1,4 +1,6 @@
-"""The columns that an arm's torques are linear in, at states of a motion, and the gradients of functions of them."""
+"""The columns that an arm's torques are linear in, at states of a motion, and the gradients of
+functions of them.
+"""
 
 from __future__ import annotations
 
@@ -26,11 +28,13 @@ POSES = 200
 
 
 class TorqueColumns:
-    """Columns for n states of an arm: base parameters of its links and rotors, then friction of every joint. Load
-    friction is that of the arm's own rigid torque, at the joints whose load varies enough to tell it.
+    """Columns for n states of an arm: base parameters of its links and rotors, then friction of
+    every joint. Load friction is that of the arm's own rigid torque, at the joints whose load
+    varies enough to tell it.
 
-    `names` (p,) are those of the columns, `wanted` the indices of those of `parts`. `dynamics` (p,) are the arm's own
-    values of links and rotors, zero for friction: with them the columns give the torques without friction.
+    `names` (p,) are those of the columns, `wanted` the indices of those of `parts`. `dynamics` (p,)
+    are the arm's own values of links and rotors, zero for friction: with them the columns give the
+    torques without friction.
     """
 
     def __init__(self, arm: Arm, parts: Sequence[Part], n: int) -> None:
@@ -42,7 +46,9 @@ class TorqueColumns:
         dynamics = ca.horzcat(links, ca.diag(a))[:, list(base.independent)]
         sign = v / ca.sqrt(v * v + KNEE * KNEE)
         carried = loaded_joints(arm)
-        load = ca.diag(sign * _size(ca.mtimes(links, ca.DM(body_parameters(model))), arm))[:, carried]
+        load = ca.diag(sign * _size(ca.mtimes(links, ca.DM(body_parameters(model))), arm))[
+            :, carried
+        ]
         columns = ca.horzcat(dynamics, ca.diag(sign), ca.diag(v), ca.SX.eye(nq), load)
         seed = ca.SX.sym("seed", nq, columns.shape[1])
         state = ca.vertcat(q, v, a)
@@ -51,7 +57,9 @@ class TorqueColumns:
         pulled = ca.gradient(ca.dot(seed, columns), state)
         self._pulled_back = ca.Function("pulled_back", [q, v, a, seed], [ca.densify(pulled)]).map(n)
         kinds = ("coulomb", "viscous", "offset")
-        friction = [f"{kind}{j}" for kind in kinds for j in range(1, nq + 1)] + [f"load{j + 1}" for j in carried]
+        friction = [f"{kind}{j}" for kind in kinds for j in range(1, nq + 1)] + [
+            f"load{j + 1}" for j in carried
+        ]
         self.names = (*base.expressions, *friction)
         self.dynamics = np.append(base.combination @ _own(model), np.zeros(len(friction)))
         self.wanted = _wanted(base.independent, nq, parts, len(friction))
@@ -70,13 +78,17 @@ class TorqueColumns:
 
 
 def loaded_joints(arm: Arm) -> list[int]:
-    """Joints whose load varies by as much as an identification asks for, by the weight of links and payload."""
+    """Joints whose load varies by as much as an identification asks for, by the weight of links and
+    payload.
+    """
     model, limits = rigid_body_model(arm), arm.active_limits
     data = model.createData()
     low, high = np.maximum(limits.q_min, -np.pi), np.minimum(limits.q_max, np.pi)
     poses = np.random.default_rng(0).uniform(low, high, (POSES, model.nq))
     weights = np.array([pin.computeGeneralizedGravity(model, data, q) for q in poses])
-    return np.flatnonzero(weights.std(axis=0) >= LEAST_LOAD_SPREAD * arm.robot.limits.tau_max).tolist()
+    return np.flatnonzero(
+        weights.std(axis=0) >= LEAST_LOAD_SPREAD * arm.robot.limits.tau_max
+    ).tolist()
 
 
 def _size(tau: ca.SX, arm: Arm) -> ca.SX:
@@ -91,7 +103,11 @@ def _own(model: pin.Model) -> Array:
 
 def _wanted(independent: Sequence[int], nq: int, parts: Sequence[Part], friction: int) -> list[int]:
     rotors = 10 * nq
-    chosen = [k for k, number in enumerate(independent) if ("inertials" if number < rotors else "rotor") in parts]
+    chosen = [
+        k
+        for k, number in enumerate(independent)
+        if ("inertials" if number < rotors else "rotor") in parts
+    ]
     if "friction" in parts:
         chosen += range(len(independent), len(independent) + friction)
     return chosen

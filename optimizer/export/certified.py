@@ -28,7 +28,8 @@ def certified(program: Program) -> list[Certificate]:
         checkpoint()
         if move.duration > LONGEST_DURATION:
             raise InvalidProblem(
-                "speed_scale", f"A move takes more than {LONGEST_DURATION:g} s: give a larger speed_scale."
+                "speed_scale",
+                f"A move takes more than {LONGEST_DURATION:g} s: give a larger speed_scale.",
             )
         ends = move.spline.control_points[0], move.spline.control_points[-1]
         try:

@@ -22,5 +22,8 @@ def to_csv(program: Program, options: TableOptions | None = None) -> WrittenFile
     text = StringIO()
     text.write(",".join(names) + "\n")
     np.savetxt(text, np.column_stack([t, *program.at(t)]), fmt="%.12g", delimiter=",")
-    notes = (f"Rows every {period:g} s, exact at each; between them it is for the reader to interpolate.",)
+    notes = (
+        f"Rows every {period:g} s, exact at each; between them it is for the reader to "
+        "interpolate.",
+    )
     return WrittenFile.of_text(text.getvalue(), "text/csv", "csv", notes)

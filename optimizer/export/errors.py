@@ -11,8 +11,8 @@ from joulepath.optimizer.exceptions import JoulepathError
 
 @dataclass(eq=False)
 class FormatUnsuitable(JoulepathError):
-    """The motion cannot be written in this format: the robot has another number of joints or another maker's
-    controller, or the file would be too large."""
+    """The motion cannot be written in this format: the robot has another number of joints or
+    another maker's controller, or the file would be too large."""
 
     title = "Format unsuitable"
     remedy = "Use one of the formats or options that `detail` names."

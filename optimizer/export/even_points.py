@@ -1,7 +1,8 @@
-"""Points at equal times, for controllers that take points and times and interpolate in a way of their own.
+"""Points at equal times, for controllers that take points and times and interpolate in a way of
+their own.
 
-What such a controller does between the points is not published. Two courses are taken for it that lie to either side,
-and the larger deviation from the spline is stated.
+What such a controller does between the points is not published. Two courses are taken for it that
+lie to either side, and the larger deviation from the spline is stated.
 """
 
 from __future__ import annotations
@@ -29,7 +30,9 @@ Course = Callable[[Array, Array], Callable[[Array], Array]]
 
 @dataclass(frozen=True)
 class EvenPoints:
-    """Points q (k, nq) [rad] of a move, `period` [s] apart, the first at its start; largest deviation [rad]."""
+    """Points q (k, nq) [rad] of a move, `period` [s] apart, the first at its start; largest
+    deviation [rad].
+    """
 
     q: Array
     period: float
@@ -37,7 +40,9 @@ class EvenPoints:
 
 
 def even_points(move: Move, courses: tuple[Course, ...], tolerance: float) -> EvenPoints:
-    """The fewest points with which all courses stay within the tolerance [rad]; if none do, as many as may be."""
+    """The fewest points with which all courses stay within the tolerance [rad]; if none do, as many
+    as may be.
+    """
     most = max(min(math.floor(move.duration / SHORTEST), MOST_POINTS), 2)
     count = min(4, most)
     while True:
@@ -57,8 +62,8 @@ def straight(t: Array, q: Array) -> BSpline:
 
 
 def rounded(t: Array, q: Array) -> Callable[[Array], Array]:
-    """Corners rounded as far as they may be: the speed changes evenly from the middle of one line to that of the
-    next."""
+    """Corners rounded as far as they may be: the speed changes evenly from the middle of one line
+    to that of the next."""
     speeds = np.diff(q, axis=0) / np.diff(t)[:, None]
     times = np.concatenate([t[:1], (t[:-1] + t[1:]) / 2, t[-1:]])
     speed = straight(times, np.concatenate([speeds[:1], speeds, speeds[-1:]]))

@@ -29,12 +29,22 @@ from joulepath.optimizer.export.urscript import UrscriptOptions, to_urscript
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.solution import Solution
 
-ExportOptions = UrscriptOptions | Ros2Options | MoveitOptions | FrankaOptions | RapidOptions | KrlOptions | TableOptions
+ExportOptions = (
+    UrscriptOptions
+    | Ros2Options
+    | MoveitOptions
+    | FrankaOptions
+    | RapidOptions
+    | KrlOptions
+    | TableOptions
+)
 
 
 @dataclass(frozen=True)
 class Format:
-    """An export format: its description, its writer, and the class of its options (None without options)."""
+    """An export format: its description, its writer, and the class of its options (None without
+    options).
+    """
 
     meaning: str
     write: Callable[[Program, Any], WrittenFile]
@@ -48,7 +58,8 @@ FORMATS: dict[FormatName, Format] = {
         UrscriptOptions,
     ),
     "ros2": Format(
-        "A FollowJointTrajectory goal or a JointTrajectory for ros2_control, as YAML or for rosbridge.",
+        "A FollowJointTrajectory goal or a JointTrajectory for ros2_control, as YAML or for "
+        "rosbridge.",
         to_ros2,
         Ros2Options,
     ),
@@ -68,8 +79,14 @@ FORMATS: dict[FormatName, Format] = {
         to_krl,
         KrlOptions,
     ),
-    "csv": Format("A table of samples: t, q, v, a. `POST /evaluate` reads it.", to_csv, TableOptions),
-    "json": Format("The splines themselves, with payloads and rests.", lambda program, _: to_json(program), None),
+    "csv": Format(
+        "A table of samples: t, q, v, a. `POST /evaluate` reads it.", to_csv, TableOptions
+    ),
+    "json": Format(
+        "The splines themselves, with payloads and rests.",
+        lambda program, _: to_json(program),
+        None,
+    ),
     "npz": Format("Arrays for NumPy: samples and splines.", to_npz, TableOptions),
 }
 """The formats by name."""
@@ -175,7 +192,9 @@ def _format(name: FormatName, options: ExportOptions | None) -> Format:
         raise InvalidProblem("format", f"format must be one of {', '.join(FORMATS)}.")
     if options is not None and type(options) is not kind.options:
         own = "has no options" if kind.options is None else f"takes {kind.options.__name__}"
-        raise InvalidProblem("options", f"The format {name} {own}: leave out {type(options).__name__}.")
+        raise InvalidProblem(
+            "options", f"The format {name} {own}: leave out {type(options).__name__}."
+        )
     return kind
 
 
@@ -185,7 +204,9 @@ def _program(motion: Solution | CycleSolution | Program, problem: Problem | None
     if isinstance(motion, Program):
         return motion
     if problem is None:
-        raise InvalidProblem("problem", "A solution does not name its arm: give the problem that it solves.")
+        raise InvalidProblem(
+            "problem", "A solution does not name its arm: give the problem that it solves."
+        )
     given = motion.trajectory
     check_samples(problem.arm, given.spline, given.t, (given.q, given.v, given.a, given.tau))
     return Program((Move(given.spline, problem.arm),))

@@ -8,7 +8,10 @@ from dataclasses import dataclass
 from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.program import Program
 
-NOT_RUN = "Not run on hardware: run it in the simulator of the maker, then slowly, with a hand at the stop button."
+NOT_RUN = (
+    "Not run on hardware: run it in the simulator of the maker, then slowly, with a hand at "
+    "the stop button."
+)
 _LONGEST_COMMENT = 160
 _NOT_PLAIN = re.compile(r"[^A-Za-z0-9 .,:+\-/()=%_]")
 
@@ -26,20 +29,28 @@ class WrittenFile:
     notes: tuple[str, ...] = ()
 
     @staticmethod
-    def of_text(text: str, media_type: str, extension: str, notes: tuple[str, ...] = ()) -> WrittenFile:
+    def of_text(
+        text: str, media_type: str, extension: str, notes: tuple[str, ...] = ()
+    ) -> WrittenFile:
         """A file of text."""
         return WrittenFile(text.encode(), media_type, extension, notes)
 
 
 def comment(text: str) -> str:
-    """The text with nothing in it that could end a comment or a string of any format: one line, plain ASCII."""
+    """The text with nothing in it that could end a comment or a string of any format: one line,
+    plain ASCII.
+    """
     return _NOT_PLAIN.sub("?", text)[:_LONGEST_COMMENT]
 
 
 def header(program: Program, title: str, notes: tuple[str, ...]) -> list[str]:
     """Lines that open a file; the writer of a format puts its sign of a comment before each."""
     scale = program.speed_scale
-    slowed = "at full speed" if scale == 1 else f"slowed down to {scale:.4g} of its speed, certified at this speed"
+    slowed = (
+        "at full speed"
+        if scale == 1
+        else f"slowed down to {scale:.4g} of its speed, certified at this speed"
+    )
     payload = program.payload
     com = ", ".join(f"{x:.4f}" for x in payload.com)
     lines = [
@@ -56,11 +67,16 @@ def output_note(program: Program, output: int | str | None) -> tuple[str, ...]:
     """A note for the program of a cycle that switches no output."""
     if output is not None or all(timed.payload is None for timed in program.timed):
         return ()
-    return ("no output is switched where the payload changes: give digital_output, or add the gripper commands",)
+    return (
+        "no output is switched where the payload changes: give digital_output, or add the gripper "
+        "commands",
+    )
 
 
 def check_joints(program: Program, format: str, nq: int, maker: str, arms: str) -> None:
-    """Raises FormatUnsuitable for a robot with other than `nq` joints, or one of another maker's that is known."""
+    """Raises FormatUnsuitable for a robot with other than `nq` joints, or one of another maker's
+    that is known.
+    """
     robot = program.robot
     # arms of users' own have figures without a maker: their number of joints decides
     known = next((each for each in _MAKERS if robot.title.startswith(each)), maker)
@@ -69,7 +85,8 @@ def check_joints(program: Program, format: str, nq: int, maker: str, arms: str) 
     has = f"{robot.nq} joints" if robot.nq != nq else f"a controller of {known}"
     raise FormatUnsuitable(
         format,
-        f"The format {format} is for {arms}, and this robot has {has}: use ros2, moveit, csv, json or npz.",
+        f"The format {format} is for {arms}, and this robot has {has}: use ros2, moveit, csv, json "
+        "or npz.",
     )
 
 

@@ -1,8 +1,9 @@
-"""`franka`: samples at the 1 kHz of Franka's control interface, as CSV or as a header for libfranka.
+"""`franka`: samples at the 1 kHz of Franka's control interface, as CSV or as a header for
+libfranka.
 
 The header holds a motion generator: a callable from `franka::RobotState` and `franka::Duration` to
-`franka::JointPositions`, as `franka::Robot::control` takes it, which ends with `franka::MotionFinished`; see
-generate_joint_position_motion.cpp among the examples of libfranka.
+`franka::JointPositions`, as `franka::Robot::control` takes it, which ends with
+`franka::MotionFinished`; see generate_joint_position_motion.cpp among the examples of libfranka.
 """
 
 from __future__ import annotations
@@ -28,18 +29,23 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class FrankaOptions:
-    """Options of `franka`: the `form` is a table as CSV, or a C++ header with a motion generator."""
+    """Options of `franka`: the `form` is a table as CSV, or a C++ header with a motion
+    generator."""
 
     form: Literal["csv", "cpp"] = "csv"
 
 
 def to_franka(program: Program, options: FrankaOptions | None = None) -> WrittenFile:
-    """The table or the header. Raises FormatUnsuitable for another kind of robot, and if it were too large."""
+    """The table or the header. Raises FormatUnsuitable for another kind of robot, and if it were
+    too large.
+    """
     options = options or FrankaOptions()
     check_joints(program, "franka", 7, "Franka", "robots of Franka, with seven joints")
     if any(timed.payload is not None for timed in program.timed):
         raise FormatUnsuitable(
-            "franka", "The payload changes on the way, and a motion generator cannot switch it: export move by move."
+            "franka",
+            "The payload changes on the way, and a motion generator cannot switch it: export move "
+            "by move.",
         )
     t = ticks(program, PERIOD, "franka", MOST_ROWS if options.form == "csv" else MOST_COMPILED)
     q, v, _ = program.at(t)
@@ -49,14 +55,21 @@ def to_franka(program: Program, options: FrankaOptions | None = None) -> Written
         "limits of the FR3 that depend on the joint positions are not checked",
     )
     if options.form == "csv":
-        names = ["t", *(f"{kind}{joint}" for kind in "qv" for joint in range(1, program.robot.nq + 1))]
+        names = [
+            "t",
+            *(f"{kind}{joint}" for kind in "qv" for joint in range(1, program.robot.nq + 1)),
+        ]
         text = StringIO()
         text.write(",".join(names) + "\n")
         np.savetxt(text, np.column_stack([t, q, v]), fmt=["%.3f"] + ["%.12f"] * 14, delimiter=",")
         return WrittenFile.of_text(text.getvalue(), "text/csv", "csv", notes)
     rows = "\n".join("    {{" + ", ".join(f"{x:.12f}" for x in row) + "}}," for row in q)
-    head = "\n".join(f"// {line}" for line in header(program, "motion generator for libfranka", notes))
-    return WrittenFile.of_text(_HEADER.format(head=head, count=len(q), rows=rows), "text/plain", "hpp", notes)
+    head = "\n".join(
+        f"// {line}" for line in header(program, "motion generator for libfranka", notes)
+    )
+    return WrittenFile.of_text(
+        _HEADER.format(head=head, count=len(q), rows=rows), "text/plain", "hpp", notes
+    )
 
 
 _HEADER = """{head}

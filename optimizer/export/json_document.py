@@ -12,8 +12,9 @@ from joulepath.optimizer.export.program import Move, Program, Timed
 def to_json(program: Program) -> WrittenFile:
     """A JSON document with `robot`, `joint_names`, `duration` [s], `speed_scale` and `steps`.
 
-    A step of kind `move` has a clamped B-spline (`degree`, `knots` [s] from its own start, `control_points`
-    [point][joint] [rad]), one of kind `rest` stands still for `duration` [s]. Both have `t0` [s].
+    A step of kind `move` has a clamped B-spline (`degree`, `knots` [s] from its own start,
+    `control_points` [point][joint] [rad]), one of kind `rest` stands still for `duration` [s]. Both
+    have `t0` [s].
     """
     content = {
         "robot": program.robot.name,

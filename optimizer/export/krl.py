@@ -1,8 +1,10 @@
-"""`krl`: a program for KUKA controllers (KR C4 and later), a spline block of SPTP points in a time block.
+"""`krl`: a program for KUKA controllers (KR C4 and later), a spline block of SPTP points in a time
+block.
 
-Syntax, as in KUKA's manual "KUKA System Software 8.x, operating and programming instructions for system integrators",
-chapter on spline motions: `PTP_SPLINE … SPTP {A1 …} … ENDSPLINE`; in it `TIME_BLOCK START`, after each part
-`TIME_BLOCK PART = share [%]`, and last `TIME_BLOCK END = time [s]`.
+Syntax, as in KUKA's manual "KUKA System Software 8.x, operating and programming instructions for
+system integrators", chapter on spline motions: `PTP_SPLINE … SPTP {A1 …} … ENDSPLINE`; in it
+`TIME_BLOCK START`, after each part `TIME_BLOCK PART = share [%]`, and last `TIME_BLOCK END = time
+[s]`.
 """
 
 from __future__ import annotations
@@ -31,12 +33,16 @@ class KrlOptions(PointOptions):
 def to_krl(program: Program, options: KrlOptions | None = None) -> WrittenFile:
     """The program. Raises FormatUnsuitable for a robot without six joints or of another maker."""
     options = options or KrlOptions()
-    check_joints(program, "krl", 6, "KUKA", "robots of KUKA that are programmed in KRL, with six joints")
+    check_joints(
+        program, "krl", 6, "KUKA", "robots of KUKA that are programmed in KRL, with six joints"
+    )
     options.check("krl", program.robot.nq)
     moves = [even_points(move, (straight, smooth), options.tolerance) for move in program.moves]
     notes = (
-        f"within {max(each.deviation for each in moves):.2e} rad of the spline, if the controller keeps every time",
-        "model of the controller: it passes the points at their times, and between them anything from straight lines "
+        f"within {max(each.deviation for each in moves):.2e} rad of the spline, if the controller "
+        "keeps every time",
+        "model of the controller: it passes the points at their times, and between them anything "
+        "from straight lines "
         "in joint space to the cubic spline",
         "what it adds to a time that it cannot keep is not in this bound",
         *output_note(program, options.digital_output),
@@ -79,4 +85,7 @@ def _switch(timed: Timed, output: int | None) -> list[str]:
     """Lines for what the arm takes up or puts down before a step."""
     if timed.payload is None:
         return []
-    return [*([] if output is None else [f"$OUT[{output}]={str(timed.grasps).upper()}"]), _load(timed.payload)]
+    return [
+        *([] if output is None else [f"$OUT[{output}]={str(timed.grasps).upper()}"]),
+        _load(timed.payload),
+    ]

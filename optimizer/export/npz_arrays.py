@@ -13,8 +13,9 @@ from joulepath.optimizer.export.rows import TableOptions, times
 
 
 def to_npz(program: Program, options: TableOptions | None = None) -> WrittenFile:
-    """Arrays t (k,) [s], q, v, a (k, nq) [rad, s] every period, `joint_names`, `speed_scale`, and for the move of
-    index i `degree_i`, `knots_i` (m,) [s], `control_points_i` (n, nq) [rad] and its start `t0_i` [s].
+    """Arrays t (k,) [s], q, v, a (k, nq) [rad, s] every period, `joint_names`, `speed_scale`, and
+    for the move of index i `degree_i`, `knots_i` (m,) [s], `control_points_i` (n, nq) [rad] and its
+    start `t0_i` [s].
 
     `numpy.load` reads it without pickle. Raises FormatUnsuitable if the motion is too long.
     """
@@ -33,5 +34,7 @@ def to_npz(program: Program, options: TableOptions | None = None) -> WrittenFile
     }
     file = BytesIO()
     names = np.array(program.robot.joint_names)
-    np.savez_compressed(file, t=t, q=q, v=v, a=a, joint_names=names, speed_scale=program.speed_scale, **splines)
+    np.savez_compressed(
+        file, t=t, q=q, v=v, a=a, joint_names=names, speed_scale=program.speed_scale, **splines
+    )
     return WrittenFile(file.getvalue(), "application/octet-stream", "npz")

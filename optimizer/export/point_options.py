@@ -15,7 +15,8 @@ class PointOptions:
     """Number of points, and the axes of the controller: axis = sign · joint + offset [degrees].
 
     `tolerance` [rad] is the deviation from the spline that the number of points is chosen for.
-    `signs` (1 or -1) and `offsets` [degrees] have one number per joint; None stands for 1 and for 0.
+    `signs` (1 or -1) and `offsets` [degrees] have one number per joint; None stands for 1 and for
+    0.
     """
 
     tolerance: float = 0.005
@@ -35,4 +36,6 @@ class PointOptions:
         """Raises FormatUnsuitable unless there are as many signs and offsets as joints, if any."""
         for name, given in (("signs", self.signs), ("offsets", self.offsets)):
             if given is not None and len(given) != nq:
-                raise FormatUnsuitable(format, f"{format}.{name} must have {nq} numbers: one per joint.")
+                raise FormatUnsuitable(
+                    format, f"{format}.{name} must have {nq} numbers: one per joint."
+                )

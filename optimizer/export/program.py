@@ -42,8 +42,8 @@ class Rest:
 
 @dataclass(frozen=True)
 class Timed:
-    """A step and when it begins [s]. Before it the payload becomes `payload`, where that is not None: the arm takes
-    something up (`grasps`), or puts it down."""
+    """A step and when it begins [s]. Before it the payload becomes `payload`, where that is not
+    None: the arm takes something up (`grasps`), or puts it down."""
 
     step: Move | Rest
     t0: float
@@ -55,8 +55,8 @@ class Timed:
 class Program:
     """Steps for one robot, the first of them a move.
 
-    Moves are slowed down by `speed_scale` already; rests are not. Raises InvalidProblem if the steps do not fit
-    together.
+    Moves are slowed down by `speed_scale` already; rests are not. Raises InvalidProblem if the
+    steps do not fit together.
     """
 
     steps: tuple[Move | Rest, ...]
@@ -64,13 +64,21 @@ class Program:
 
     def __post_init__(self) -> None:
         if not self.steps or isinstance(self.steps[0], Rest):
-            raise InvalidProblem("answer", "The answer has no motion: export one that begins with a move.")
+            raise InvalidProblem(
+                "answer", "The answer has no motion: export one that begins with a move."
+            )
         if any(move.arm.robot is not self.robot for move in self.moves):
-            raise InvalidProblem("answer", "The moves are those of several robots: export them one by one.")
-        jumps = [np.abs(a.spline.control_points[-1] - b.spline.control_points[0]) for a, b in pairwise(self.moves)]
+            raise InvalidProblem(
+                "answer", "The moves are those of several robots: export them one by one."
+            )
+        jumps = [
+            np.abs(a.spline.control_points[-1] - b.spline.control_points[0])
+            for a, b in pairwise(self.moves)
+        ]
         if max((float(jump.max()) for jump in jumps), default=0.0) > JOIN:
             raise InvalidProblem(
-                "answer", "A move does not begin where the one before it ends: ask for the cycle again."
+                "answer",
+                "A move does not begin where the one before it ends: ask for the cycle again.",
             )
 
     @cached_property
@@ -103,14 +111,18 @@ class Program:
 
     @cached_property
     def timed(self) -> tuple[Timed, ...]:
-        """The steps with their times. What the arm takes up or puts down, it does as soon as it stands at the place."""
+        """The steps with their times. What the arm takes up or puts down, it does as soon as it
+        stands at the place.
+        """
         timed, t, carried = list[Timed](), 0.0, self.payload
         for k, step in enumerate(self.steps):
             following = next((each for each in self.steps[k:] if isinstance(each, Move)), None)
             payload = None
             if k and following is not None and not _same(following.arm.payload, carried):
                 payload = following.arm.payload
-            timed.append(Timed(step, t, payload, payload is not None and payload.mass > carried.mass))
+            timed.append(
+                Timed(step, t, payload, payload is not None and payload.mass > carried.mass)
+            )
             carried, t = payload or carried, t + step.duration
         return tuple(timed)
 
@@ -131,9 +143,13 @@ class Program:
         return q, v, a
 
     def slowed(self, speed_scale: float) -> Program:
-        """The same with every move slowed down to this fraction of its speed. Rests stay as long as they are."""
+        """The same with every move slowed down to this fraction of its speed. Rests stay as long as
+        they are.
+        """
         steps = tuple(
-            replace(step, spline=retimed(step.spline, 1 / speed_scale)) if isinstance(step, Move) else step
+            replace(step, spline=retimed(step.spline, 1 / speed_scale))
+            if isinstance(step, Move)
+            else step
             for step in self.steps
         )
         return Program(steps, self.speed_scale * speed_scale)
@@ -144,7 +160,9 @@ def program_of_cycle(found: CycleSolution) -> Program:
     steps = list[Move | Rest]()
     for move in found.moves:
         planned = move.planned
-        steps.append(Move(move.solution.trajectory.spline, planned.arm, f"{planned.start} to {planned.goal}"))
+        steps.append(
+            Move(move.solution.trajectory.spline, planned.arm, f"{planned.start} to {planned.goal}")
+        )
         for label, length in (("dwell", planned.dwell), ("wait", move.wait)):
             if length > 0:
                 steps.append(Rest(length, f"{label} at {planned.goal}"))
@@ -152,4 +170,8 @@ def program_of_cycle(found: CycleSolution) -> Program:
 
 
 def _same(one: Payload, other: Payload) -> bool:
-    return one.mass == other.mass and np.array_equal(one.com, other.com) and np.array_equal(one.inertia, other.inertia)
+    return (
+        one.mass == other.mass
+        and np.array_equal(one.com, other.com)
+        and np.array_equal(one.inertia, other.inertia)
+    )

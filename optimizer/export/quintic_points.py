@@ -1,4 +1,6 @@
-"""Points of a program between which a controller's own quintics stay within a tolerance of the splines."""
+"""Points of a program between which a controller's own quintics stay within a tolerance of the
+splines.
+"""
 
 from __future__ import annotations
 
@@ -26,8 +28,8 @@ MOST_HALVINGS = 20
 
 @dataclass(frozen=True)
 class QuinticPoints:
-    """Times (k,) [ns] from the start; q, v, a (k, nq) in rad and s; largest deviations of the quintics between them
-    from the splines [rad], [rad/s]."""
+    """Times (k,) [ns] from the start; q, v, a (k, nq) in rad and s; largest deviations of the
+    quintics between them from the splines [rad], [rad/s]."""
 
     nanoseconds: list[int]
     q: Array
@@ -38,12 +40,17 @@ class QuinticPoints:
 
 
 def quintic_points(program: Program, format: str) -> QuinticPoints:
-    """The ends of all polynomial pieces, and more points where a spline is no quintic or its acceleration jumps.
+    """The ends of all polynomial pieces, and more points where a spline is no quintic or its
+    acceleration jumps.
 
-    The controller passes each point with its position, velocity and acceleration. Raises FormatUnsuitable if there
-    are too many points.
+    The controller passes each point with its position, velocity and acceleration. Raises
+    FormatUnsuitable if there are too many points.
     """
-    times, rows, worst = [np.zeros(1)], [np.stack(sample(program.moves[0].spline, np.zeros(1)), axis=1)], np.zeros(2)
+    times, rows, worst = (
+        [np.zeros(1)],
+        [np.stack(sample(program.moves[0].spline, np.zeros(1)), axis=1)],
+        np.zeros(2),
+    )
     for timed in program.timed:
         if isinstance(timed.step, Move):
             t, states, deviation = _of_move(timed.step.spline, timed.t0, format)
@@ -57,11 +64,14 @@ def quintic_points(program: Program, format: str) -> QuinticPoints:
         if sum(map(len, times)) > MOST_POINTS:
             raise FormatUnsuitable(
                 format,
-                f"The trajectory would have more than {MOST_POINTS} points: export it move by move, not as {format}.",
+                f"The trajectory would have more than {MOST_POINTS} points: export it move by "
+                f"move, not as {format}.",
             )
     joined = np.concatenate(rows)
     nanoseconds = np.rint(np.concatenate(times) * NANO).astype(int).tolist()
-    return QuinticPoints(nanoseconds, joined[:, 0], joined[:, 1], joined[:, 2], float(worst[0]), float(worst[1]))
+    return QuinticPoints(
+        nanoseconds, joined[:, 0], joined[:, 1], joined[:, 2], float(worst[0]), float(worst[1])
+    )
 
 
 def _of_move(spline: Spline, t0: float, format: str) -> tuple[Array, Array, Array]:
@@ -71,20 +81,23 @@ def _of_move(spline: Spline, t0: float, format: str) -> tuple[Array, Array, Arra
     own[-1] = spline.duration
     for _ in range(MOST_HALVINGS):
         states, deviation = _deviations(spline, own, t0)
-        too_far = (deviation > np.array([[POSITION_TOLERANCE], [VELOCITY_TOLERANCE]]) / 2).any(axis=0)
+        too_far = (deviation > np.array([[POSITION_TOLERANCE], [VELOCITY_TOLERANCE]]) / 2).any(
+            axis=0
+        )
         if not too_far.any():
             return own + t0, states, deviation.max(axis=1)
         own = np.sort(np.append(own, (own[:-1] + own[1:])[too_far] / 2))
         if len(own) > MOST_POINTS or np.diff(own).min() < CLOSEST:
             break
     raise FormatUnsuitable(
-        format, "No points of this motion hold the tolerance between them: export it as json, csv or npz."
+        format,
+        "No points of this motion hold the tolerance between them: export it as json, csv or npz.",
     )
 
 
 def _deviations(spline: Spline, own: Array, t0: float) -> tuple[Array, Array]:
-    """States (k, 3, nq) at times own (k,) [s] of a move that begins at t0 [s], and the largest deviations (2, k - 1)
-    between them."""
+    """States (k, 3, nq) at times own (k,) [s] of a move that begins at t0 [s], and the largest
+    deviations (2, k - 1) between them."""
     states = np.stack(sample(spline, own), axis=1)
     # what the controller knows: times in whole nanoseconds
     told = np.rint((own + t0) * NANO) / NANO - t0
@@ -92,14 +105,18 @@ def _deviations(spline: Spline, own: Array, t0: float) -> tuple[Array, Array]:
     q, v = quintic(states, lengths, INSIDE)
     t = np.clip(told[:-1] + INSIDE[:, None] * lengths, 0.0, spline.duration)
     true_q, true_v = (spline.curve(t.ravel(), order).reshape(*t.shape, -1) for order in range(2))
-    return states, np.stack([np.abs(q - true_q).max(axis=(0, 2)), np.abs(v - true_v).max(axis=(0, 2))])
+    return states, np.stack(
+        [np.abs(q - true_q).max(axis=(0, 2)), np.abs(v - true_v).max(axis=(0, 2))]
+    )
 
 
 def quintic(states: Array, lengths: Array, u: Array) -> tuple[Array, Array]:
-    """q and v (len(u), k - 1, nq) at the shares u of the time of k - 1 quintics between states (k, 3, nq): q, v, a.
+    """q and v (len(u), k - 1, nq) at the shares u of the time of k - 1 quintics between states (k,
+    3, nq): q, v, a.
 
-    `lengths` (k - 1,) [s]. The polynomial is that of the joint trajectory controller of ros2_control for points that
-    have all three, `Trajectory::interpolate_between_points` in joint_trajectory_controller/src/trajectory.cpp.
+    `lengths` (k - 1,) [s]. The polynomial is that of the joint trajectory controller of
+    ros2_control for points that have all three, `Trajectory::interpolate_between_points` in
+    joint_trajectory_controller/src/trajectory.cpp.
     """
     T = lengths[:, None]
     (q0, v0, a0), (q1, v1, a1) = (np.moveaxis(each, 1, 0) for each in (states[:-1], states[1:]))

@@ -1,7 +1,8 @@
 """`rapid`: a module for ABB controllers, MoveAbsJ through points at equal times.
 
-Syntax, as in ABB's technical reference manual "RAPID Instructions, Functions and Data types" (3HAC050917):
-`MoveAbsJ ToJointPos [\\NoEOffs] Speed [\\V] | [\\T] Zone [\\Z] Tool`; `\\T` is the total time of the movement [s].
+Syntax, as in ABB's technical reference manual "RAPID Instructions, Functions and Data types"
+(3HAC050917): `MoveAbsJ ToJointPos [\\NoEOffs] Speed [\\V] | [\\T] Zone [\\Z] Tool`; `\\T` is the
+total time of the movement [s].
 """
 
 from __future__ import annotations
@@ -40,11 +41,15 @@ def to_rapid(program: Program, options: RapidOptions | None = None) -> WrittenFi
     check_joints(program, "rapid", 6, "ABB", "robots of ABB, with six joints")
     options.check("rapid", program.robot.nq)
     if options.digital_output is not None and not SIGNAL.fullmatch(options.digital_output):
-        raise FormatUnsuitable("rapid", "rapid.digital_output must be the name of a signal: letters, digits and _.")
+        raise FormatUnsuitable(
+            "rapid", "rapid.digital_output must be the name of a signal: letters, digits and _."
+        )
     moves = [even_points(move, (straight, rounded), options.tolerance) for move in program.moves]
     notes = (
-        f"within {max(each.deviation for each in moves):.2e} rad of the spline, if the controller keeps every time",
-        "model of the controller: straight lines in joint space, each in its time, corners rounded by any amount up to "
+        f"within {max(each.deviation for each in moves):.2e} rad of the spline, if the controller "
+        "keeps every time",
+        "model of the controller: straight lines in joint space, each in its time, corners rounded "
+        "by any amount up to "
         "the middles of the lines",
         "what it adds to a time that it cannot keep is not in this bound",
         *output_note(program, options.digital_output),
@@ -53,7 +58,10 @@ def to_rapid(program: Program, options: RapidOptions | None = None) -> WrittenFi
     lines = ["MODULE Joulepath"]
     lines += [f"  ! {line}" for line in header(program, "module for ABB controllers", notes)]
     lines += [_tool(k, load) for k, load in enumerate(loads)]
-    lines += ["  PROC joulepath()", "    " + _instruction(options.degrees(program.start), "v50", "fine", 0)]
+    lines += [
+        "  PROC joulepath()",
+        "    " + _instruction(options.degrees(program.start), "v50", "fine", 0),
+    ]
     tool, points = 0, iter(moves)
     for timed in program.timed:
         lines.append(f"    ! {comment(timed.step.label)}, {timed.step.duration:.4f} s")
@@ -69,23 +77,34 @@ def to_rapid(program: Program, options: RapidOptions | None = None) -> WrittenFi
 
 
 def _loads(program: Program) -> list[Payload]:
-    return [program.payload, *(timed.payload for timed in program.timed if timed.payload is not None)]
+    return [
+        program.payload,
+        *(timed.payload for timed in program.timed if timed.payload is not None),
+    ]
 
 
 def _tool(number: int, load: Payload) -> str:
     com = ",".join(f"{1000 * x:.3f}" for x in load.com)
     mass = max(load.mass, _LEAST_MASS)
-    return f"  PERS tooldata jpTool{number}:=[TRUE,[[0,0,0],[1,0,0,0]],[{mass:.4f},[{com}],[1,0,0,0],0,0,0]];"
+    return (
+        "  PERS tooldata "
+        f"jpTool{number}:=[TRUE,[[0,0,0],[1,0,0,0]],[{mass:.4f},[{com}],[1,0,0,0],0,0,0]];"
+    )
 
 
 def _instruction(axes: list[str], speed: str, zone: str, tool: int) -> str:
-    return f"MoveAbsJ [[{','.join(axes)}],{_NO_EXTERNAL_AXES}]\\NoEOffs,{speed},{zone},jpTool{tool};"
+    return (
+        f"MoveAbsJ [[{','.join(axes)}],{_NO_EXTERNAL_AXES}]\\NoEOffs,{speed},{zone},jpTool{tool};"
+    )
 
 
 def _moves(points: EvenPoints, options: RapidOptions, tool: int) -> list[str]:
     speed, last = f"v1000\\T:={points.period:.9f}", len(points.q) - 1
     rows = enumerate(points.q[1:], 1)
-    return ["    " + _instruction(options.degrees(q), speed, "fine" if k == last else "z10", tool) for k, q in rows]
+    return [
+        "    " + _instruction(options.degrees(q), speed, "fine" if k == last else "z10", tool)
+        for k, q in rows
+    ]
 
 
 def _switch(timed: Timed, output: str | None) -> list[str]:

@@ -1,7 +1,9 @@
-"""`ros2` and `moveit`: messages with a joint trajectory, as YAML for the command line or JSON for rosbridge.
+"""`ros2` and `moveit`: messages with a joint trajectory, as YAML for the command line or JSON for
+rosbridge.
 
 Definitions: trajectory_msgs/msg/JointTrajectory, control_msgs/action/FollowJointTrajectory,
-moveit_msgs/msg/RobotTrajectory; of rosbridge, ROSBRIDGE_PROTOCOL.md (operations `send_action_goal` and `publish`).
+moveit_msgs/msg/RobotTrajectory; of rosbridge, ROSBRIDGE_PROTOCOL.md (operations `send_action_goal`
+and `publish`).
 """
 
 from __future__ import annotations
@@ -42,20 +44,33 @@ class MoveitOptions:
 
 
 def to_ros2(program: Program, options: Ros2Options | None = None) -> WrittenFile:
-    """The message for a joint trajectory controller. Raises FormatUnsuitable if the motion is too long."""
+    """The message for a joint trajectory controller. Raises FormatUnsuitable if the motion is too
+    long.
+    """
     options = options or Ros2Options()
     points = quintic_points(program, "ros2")
     trajectory = _trajectory(program, points)
-    action, topic = f"/{options.controller}/follow_joint_trajectory", f"/{options.controller}/joint_trajectory"
+    action, topic = (
+        f"/{options.controller}/follow_joint_trajectory",
+        f"/{options.controller}/joint_trajectory",
+    )
     if options.message == "goal":
-        tolerance = [{"name": name, "position": GOAL_TOLERANCE} for name in program.robot.joint_names]
+        tolerance = [
+            {"name": name, "position": GOAL_TOLERANCE} for name in program.robot.joint_names
+        ]
         message = {
             "trajectory": trajectory,
             "goal_tolerance": tolerance,
             "goal_time_tolerance": {"sec": GOAL_TIME, "nanosec": 0},
         }
         kind = "control_msgs/action/FollowJointTrajectory"
-        wrapped = {"op": "send_action_goal", "action": action, "action_type": kind, "args": message, "feedback": True}
+        wrapped = {
+            "op": "send_action_goal",
+            "action": action,
+            "action_type": kind,
+            "args": message,
+            "feedback": True,
+        }
         use = f"ros2 action send_goal {action} {kind} (this file in quotes)"
     else:
         kind = "trajectory_msgs/msg/JointTrajectory"
@@ -68,13 +83,20 @@ def to_ros2(program: Program, options: Ros2Options | None = None) -> WrittenFile
 def to_moveit(program: Program, options: MoveitOptions | None = None) -> WrittenFile:
     """A RobotTrajectory for MoveIt. Raises FormatUnsuitable if the motion is too long."""
     encoding, points = (options or MoveitOptions()).encoding, quintic_points(program, "moveit")
-    message = {"joint_trajectory": _trajectory(program, points), "multi_dof_joint_trajectory": {"joint_names": []}}
+    message = {
+        "joint_trajectory": _trajectory(program, points),
+        "multi_dof_joint_trajectory": {"joint_names": []},
+    }
     kind = "moveit_msgs/msg/RobotTrajectory"
-    return _file(program, points, encoding, kind, "for MoveGroupInterface::execute", message, message)
+    return _file(
+        program, points, encoding, kind, "for MoveGroupInterface::execute", message, message
+    )
 
 
 def _trajectory(program: Program, points: QuinticPoints) -> dict[str, Any]:
-    rows = zip(points.nanoseconds, points.q.tolist(), points.v.tolist(), points.a.tolist(), strict=True)
+    rows = zip(
+        points.nanoseconds, points.q.tolist(), points.v.tolist(), points.a.tolist(), strict=True
+    )
     return {
         "joint_names": list(program.robot.joint_names),
         "points": [
@@ -99,7 +121,8 @@ def _file(
     wrapped: dict[str, Any],
 ) -> WrittenFile:
     notes = (
-        f"{len(points.nanoseconds)} points, and quintics between them are within {points.position:.1e} rad and "
+        f"{len(points.nanoseconds)} points, and quintics between them are within "
+        f"{points.position:.1e} rad and "
         f"{points.velocity:.1e} rad/s of the spline",
         "payload and outputs are not in the message: set them on the robot",
         *(
@@ -109,7 +132,9 @@ def _file(
         ),
     )
     if encoding == "json":
-        return WrittenFile.of_text(json.dumps(wrapped, allow_nan=False), "application/json", "json", notes)
+        return WrittenFile.of_text(
+            json.dumps(wrapped, allow_nan=False), "application/json", "json", notes
+        )
     head = "".join(f"# {line}\n" for line in header(program, kind, (use, *notes)))
     # the dumper in C, where PyYAML has it: ten times as fast
     dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)

@@ -25,15 +25,17 @@ class TableOptions:
 
 
 def times(program: Program, period: float, format: str, most: int = MOST_ROWS) -> Array:
-    """Multiples of the period [s] from 0 on, and the end. Raises FormatUnsuitable if they are too many."""
+    """Multiples of the period [s] from 0 on, and the end. Raises FormatUnsuitable if they are too
+    many.
+    """
     before_end = math.ceil((program.duration - SHORTEST_ROW) / period)
     _check_count(before_end + 1, format, most)
     return np.append(np.arange(before_end) * period, program.duration)
 
 
 def ticks(program: Program, period: float, format: str, most: int = MOST_ROWS) -> Array:
-    """Multiples of the period [s] from 0 to the end, or to the first one after it. Raises FormatUnsuitable if they are
-    too many."""
+    """Multiples of the period [s] from 0 to the end, or to the first one after it. Raises
+    FormatUnsuitable if they are too many."""
     count = math.ceil((program.duration - SHORTEST_ROW) / period) + 1
     _check_count(count, format, most)
     return np.asarray(np.arange(count) * period, dtype=float)
@@ -43,6 +45,7 @@ def _check_count(count: int, format: str, most: int) -> None:
     if count > most:
         raise FormatUnsuitable(
             format,
-            f"The file would have {count} rows, and {format} has at most {most}: export it with a longer period, "
+            f"The file would have {count} rows, and {format} has at most {most}: export it with a "
+            "longer period, "
             "with a larger speed_scale, or move by move.",
         )

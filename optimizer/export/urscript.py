@@ -1,10 +1,13 @@
-"""`urscript`: a program for the controllers of Universal Robots that follows the spline with servoj.
+"""`urscript`: a program for the controllers of Universal Robots that follows the spline with
+servoj.
 
-Syntax and functions are those of the maker's script manual (PolyScope 5, e-series; CB3 has the same):
+Syntax and functions are those of the maker's script manual (PolyScope 5, e-series; CB3 has the
+same):
 https://www.universal-robots.com/manuals/EN/HTML/SW5_20/Content/prod-scriptmanual/G5/servoj_qavt0-008lookahead_time.htm
-servoj controls the arm for `t` seconds and then returns; with t = 0.002 s (CB3: 0.008 s) one call is one period of the
-controller. A program that is sent over a socket begins with `def` and ends with `end` in the first column, and every
-other line is indented (page "Connecting to URControl" of the same manual). Under speed scaling servoj takes longer:
+servoj controls the arm for `t` seconds and then returns; with t = 0.002 s (CB3: 0.008 s) one call
+is one period of the controller. A program that is sent over a socket begins with `def` and ends
+with `end` in the first column, and every other line is indented (page "Connecting to URControl" of
+the same manual). Under speed scaling servoj takes longer:
 https://www.universal-robots.com/articles/ur/programming/trajectory-improvements-for-servoj
 """
 
@@ -38,10 +41,10 @@ LEAST_TRACKING, TRACKING_TIME = 0.05, 0.1
 class UrscriptOptions:
     """Options of `urscript`.
 
-    `rate` [Hz] is that of the controller: 500 for e-series, 125 for CB3. The `form` is the polynomials,
-    which the controller evaluates, or all set points. `lookahead_time` [s] and `gain` are servoj's.
-    `digital_output`, a standard output, is on while the arm carries more than at the start; None
-    switches nothing.
+    `rate` [Hz] is that of the controller: 500 for e-series, 125 for CB3. The `form` is the
+    polynomials, which the controller evaluates, or all set points. `lookahead_time` [s] and `gain`
+    are servoj's. `digital_output`, a standard output, is on while the arm carries more than at the
+    start; None switches nothing.
     """
 
     rate: Literal[500, 125] = 500
@@ -54,12 +57,15 @@ class UrscriptOptions:
 def to_urscript(program: Program, options: UrscriptOptions | None = None) -> WrittenFile:
     """The program. Raises FormatUnsuitable for another kind of robot, and if it were too large."""
     options = options or UrscriptOptions()
-    check_joints(program, "urscript", 6, "Universal Robots", "robots of Universal Robots, with six joints")
+    check_joints(
+        program, "urscript", 6, "Universal Robots", "robots of Universal Robots, with six joints"
+    )
     _check_size(program, options)
     fastest = max(float(peak_rates(move.spline)[0].max()) for move in program.moves)
     tracking = LEAST_TRACKING + fastest * (options.lookahead_time + TRACKING_TIME)
     notes = (
-        f"set points every {1000 / options.rate:g} ms by servoj, within {SET_POINT_ERROR:.0e} rad of the spline",
+        f"set points every {1000 / options.rate:g} ms by servoj, within {SET_POINT_ERROR:.0e} rad "
+        "of the spline",
         f"the arm follows them later by about lookahead_time = {options.lookahead_time:g} s",
         f"it stops if a joint is more than {tracking:.3f} rad away from its set point",
         "at the end of a move it waits up to 1 s until every joint is within 0.001 rad",
@@ -68,8 +74,13 @@ def to_urscript(program: Program, options: UrscriptOptions | None = None) -> Wri
     )
     degree = max(move.spline.degree for move in program.moves)
     lines = ["def joulepath():"]
-    lines += [f"  # {line}" for line in header(program, "program for Universal Robots controllers", notes)]
-    lines += [*CHECKS, *serving(options.rate, options.lookahead_time, options.gain, tracking, degree)]
+    lines += [
+        f"  # {line}" for line in header(program, "program for Universal Robots controllers", notes)
+    ]
+    lines += [
+        *CHECKS,
+        *serving(options.rate, options.lookahead_time, options.gain, tracking, degree),
+    ]
     lines += [*_beginning(program), *_body(program, options, degree), "end"]
     return WrittenFile.of_text("\n".join(lines) + "\n", "text/plain", "script", notes)
 
@@ -86,13 +97,22 @@ def _number(x: float) -> str:
 
 def _check_size(program: Program, options: UrscriptOptions) -> None:
     if options.form == "points":
-        count, most, what = sum(int(m.duration * options.rate) + 1 for m in program.moves), MOST_POINTS, "set points"
+        count, most, what = (
+            sum(int(m.duration * options.rate) + 1 for m in program.moves),
+            MOST_POINTS,
+            "set points",
+        )
     else:
-        count, most, what = sum(len(pieces(m.spline)[0]) - 1 for m in program.moves), MOST_PIECES, "polynomials"
+        count, most, what = (
+            sum(len(pieces(m.spline)[0]) - 1 for m in program.moves),
+            MOST_PIECES,
+            "polynomials",
+        )
     if count > most:
         raise FormatUnsuitable(
             "urscript",
-            f"The program would have {count} {what}, and has at most {most}: export it move by move, or as ros2.",
+            f"The program would have {count} {what}, and has at most {most}: export it move by "
+            "move, or as ros2.",
         )
 
 
@@ -113,12 +133,14 @@ def _beginning(program: Program) -> list[str]:
         f"  # {comment(program.timed[0].step.label)}: the start, in joint space",
         f"  local jp_start = {start}",
         f"  if norm(get_target_payload() - {program.payload.mass:.6f}) > 0.05:",
-        f'    popup("The payload in force is not that of the motion, {program.payload.mass:.3f} kg. Continue sets it."'
+        f'    popup("The payload in force is not that of the motion, {program.payload.mass:.3f} '
+        'kg. Continue sets it."'
         ', "joulepath", True, False, blocking=True)',
         "  end",
         *_payload(program.payload),
         "  if jp_far(get_actual_joint_positions(), jp_start) > 0.01:",
-        '    popup("The arm is not at the start of the motion. Continue moves it there slowly, with no check for '
+        '    popup("The arm is not at the start of the motion. Continue moves it there slowly, '
+        "with no check for "
         'obstacles.", "joulepath", True, False, blocking=True)',
         "    movej(jp_start, a=0.3, v=0.2)",
         "  end",
@@ -172,4 +194,7 @@ def _polynomials(move: Move, degree: int) -> list[str]:
 def _points(move: Move, rate: int) -> list[str]:
     ticks = np.arange(1, int(np.ceil(move.duration * rate - 1e-6)) + 1) / rate
     q = move.spline.curve(np.minimum(ticks, move.duration))
-    return [*(f"  jp_servo({_numbers(row)})" for row in q), f"  jp_arrive({_numbers(move.spline.control_points[-1])})"]
+    return [
+        *(f"  jp_servo({_numbers(row)})" for row in q),
+        f"  jp_arrive({_numbers(move.spline.control_points[-1])})",
+    ]

@@ -32,11 +32,13 @@ CHECKS = """\
       jp_stop("The controller did not take the payload of the motion.")
     end
   end""".splitlines()
-"""Functions that stop, measure distances between joint positions, and set the payload; `jp_tick` counts the periods
-of a move, so that no rounding adds up."""
+"""Functions that stop, measure distances between joint positions, and set the payload; `jp_tick`
+counts the periods of a move, so that no rounding adds up."""
 
 
-def serving(rate: int, lookahead_time: float, gain: float, tracking: float, degree: int) -> list[str]:
+def serving(
+    rate: int, lookahead_time: float, gain: float, tracking: float, degree: int
+) -> list[str]:
     """Functions that serve set points at `rate` [Hz] to servoj.
 
     `tracking` [rad] is the largest distance from a set point. `degree` is that of all polynomials.

@@ -1,4 +1,6 @@
-"""Identified figures in the form of a robot's `figures.yaml`: value, unit, source, trust and standard deviation."""
+"""Identified figures in the form of a robot's `figures.yaml`: value, unit, source, trust and
+standard deviation.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +14,27 @@ from joulepath.optimizer.identify.results import IdentifiedFigures
 
 LAW = "identified"
 """Name of the friction law."""
-_LAW_UNITS = {"coulomb": "N·m", "curved": "N·m", "speed": "rad/s", "viscous": "N·m·s/rad", "load": "1"}
-_DRIVES = {"torque_constant": "N·m/A", "rotor_inertia": "kg·m²", "copper": "W/A²", "inverter_linear": "W/A"}
+_LAW_UNITS = {
+    "coulomb": "N·m",
+    "curved": "N·m",
+    "speed": "rad/s",
+    "viscous": "N·m·s/rad",
+    "load": "1",
+}
+_DRIVES = {
+    "torque_constant": "N·m/A",
+    "rotor_inertia": "kg·m²",
+    "copper": "W/A²",
+    "inverter_linear": "W/A",
+}
 _INERTIALS = {"mass": "kg", "center_of_mass": "m", "inertia": "kg·m²"}
 TRUST = "B"
 MASS = "inertials.m"
 
 
 def document_of(figures: IdentifiedFigures, date: str) -> dict[str, Any]:
-    """The document of figures identified on a `date`: only sections with identified figures, and their covariance.
+    """The document of figures identified on a `date`: only sections with identified figures, and
+    their covariance.
 
     Names in the covariance are paths of figures with the number of the joint: `drives.copper.2`.
     """
@@ -45,16 +59,23 @@ def document_of(figures: IdentifiedFigures, date: str) -> dict[str, Any]:
         document["electronics"] = {"idle_power": figure("idle_power", "W")}
     if inertials:
         turned = {"value": np.zeros((len(figures.values["mass"]), 3)).tolist(), "unit": "rad"}
-        document["inertials"] = inertials | {"inertia_frame_rpy": turned | {"source": source, "trust": TRUST}}
+        document["inertials"] = inertials | {
+            "inertia_frame_rpy": turned | {"source": source, "trust": TRUST}
+        }
     told = [k for k, (name, _) in enumerate(figures.parameters) if _path(name) is not None]
     if told:
         names = [_path(name, joint) for name, joint in (figures.parameters[k] for k in told)]
-        document["covariance"] = {"names": names, "matrix": _symmetric(figures.covariance[np.ix_(told, told)]).tolist()}
+        document["covariance"] = {
+            "names": names,
+            "matrix": _symmetric(figures.covariance[np.ix_(told, told)]).tolist(),
+        }
     return document | {"session_sd": figures.session_sd, "move_sd": figures.move_sd}
 
 
 def _deviations(figures: IdentifiedFigures, name: str, value: Array) -> Array | None:
-    """Standard deviations in the shape of a figure, 0 for joints that keep the robot's own; None if no one is known."""
+    """Standard deviations in the shape of a figure, 0 for joints that keep the robot's own; None if
+    no one is known.
+    """
     found, known = np.zeros(value.shape), False
     for (figure, joint), sd in zip(figures.parameters, figures.sd.tolist(), strict=True):
         if figure == (MASS if name == "mass" else name):

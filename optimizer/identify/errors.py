@@ -15,24 +15,28 @@ class NotExcited(JoulepathError):
 
     title = "Not excited"
     remedy = (
-        "Log motions in which every joint moves, at several speeds and in both directions, with motor currents or the "
+        "Log motions in which every joint moves, at several speeds and in both directions, with "
+        "motor currents or the "
         "power of the arm's bus."
     )
     detail = (
-        "Nothing that was asked for can be identified from these logs: log motions in which every joint moves, at "
+        "Nothing that was asked for can be identified from these logs: log motions in which every "
+        "joint moves, at "
         "several speeds and in both directions."
     )
 
     parameters: list[str]
     """Parameters that cannot be identified."""
     advice: dict[str, Any]
-    """A body for `POST /excitation`, whose motion tells these parameters. Add the scene of your cell."""
+    """A body for `POST /excitation`, whose motion tells these parameters. Add the scene of your
+    cell.
+    """
 
 
 @dataclass(eq=False)
 class NothingHeldOut(JoulepathError):
-    """The logs have fewer than two different motions, so that no move can be held out for the validation. A motion and
-    its repetitions, in either direction, count as one."""
+    """The logs have fewer than two different motions, so that no move can be held out for the
+    validation. A motion and its repetitions, in either direction, count as one."""
 
     title = "Nothing held out"
     remedy = "Log more motions, or name other logs in `validate`."
@@ -42,7 +46,8 @@ class NothingHeldOut(JoulepathError):
 
     def __str__(self) -> str:
         return (
-            f"The logs have {self.moves} moves along fewer than two different motions, so that none can be held out: "
+            f"The logs have {self.moves} moves along fewer than two different motions, so that "
+            "none can be held out: "
             "log at least two different motions, or name other logs in `validate`."
         )
 
@@ -52,11 +57,13 @@ class NoPowerChannel(JoulepathError):
 
     title = "No power channel"
     remedy = (
-        "Log `actual_robot_voltage` and `actual_robot_current`, or a column `P`. Joint currents are not taken for it: "
+        "Log `actual_robot_voltage` and `actual_robot_current`, or a column `P`. Joint currents "
+        "are not taken for it: "
         "they are no DC currents."
     )
     detail = (
-        "No log has the power of the arm's bus: log voltage and current of the arm, or its power. Joint currents are "
+        "No log has the power of the arm's bus: log voltage and current of the arm, or its power. "
+        "Joint currents are "
         "not taken for it, as they are no DC currents."
     )
 
@@ -79,17 +86,20 @@ class MethodNotApplicable(JoulepathError):
 
 @dataclass(eq=False)
 class PayloadUnknown(JoulepathError):
-    """`torque_constant` is asked for, it is not known what the arm carried, and joints carry too little weight to tell
-    their constants."""
+    """`torque_constant` is asked for, it is not known what the arm carried, and joints carry too
+    little weight to tell their constants."""
 
     title = "Payload unknown"
     remedy = (
-        'Send the logs again with `payload`: `{"mass": 0}` if the arm carried nothing. A payload is found from two '
+        'Send the logs again with `payload`: `{"mass": 0}` if the arm carried nothing. A payload '
+        "is found from two "
         'logs, by `"fit": ["payload"]` without `torque_constant`.'
     )
     detail = (
-        "Gravity does not tell the torque constants of all joints, and nobody said what the arm carried: give "
-        "`payload` with each log, of mass 0 if it was nothing, and find a payload and torque constants one by one."
+        "Gravity does not tell the torque constants of all joints, and nobody said what the arm "
+        "carried: give "
+        "`payload` with each log, of mass 0 if it was nothing, and find a payload and torque "
+        "constants one by one."
     )
 
     joints: Annotated[list[int], Unit("1")]

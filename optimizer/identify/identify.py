@@ -21,7 +21,12 @@ from joulepath.optimizer.identify.fits.base_fit import BaseTerms
 from joulepath.optimizer.identify.fits.block import own_value, terms_of
 from joulepath.optimizer.identify.fits.by_method import fit_by_method, prepared
 from joulepath.optimizer.identify.fits.fitting import LINK_MASS_SCALE, Fitted, motor_torque
-from joulepath.optimizer.identify.fits.payload_fit import Carried, joints_without_gravity, loaded, payload_of
+from joulepath.optimizer.identify.fits.payload_fit import (
+    Carried,
+    joints_without_gravity,
+    loaded,
+    payload_of,
+)
 from joulepath.optimizer.identify.fits.temperature import temperatures_of
 from joulepath.optimizer.identify.fits.torque_fit import MOST_RELATIVE_SD, UNSURE, ZERO
 from joulepath.optimizer.identify.fits.whole_fit import LINK, LINK_NAMES
@@ -56,10 +61,11 @@ WHITE = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """An arm's figures from logs. `validation` is of a fit without the held-out moves; None if none was asked for.
+    """An arm's figures from logs. `validation` is of a fit without the held-out moves; None if none
+    was asked for.
 
-    `payload` is what the last log carried; None if it was not asked for. `curves` show the moves that are not held out,
-    as the figures predict them."""
+    `payload` is what the last log carried; None if it was not asked for. `curves` show the moves
+    that are not held out, as the figures predict them."""
 
     robot: Robot
     options: IdentificationOptions
@@ -89,9 +95,13 @@ class Identification:
 
     @one_thread()
     def validate(self, logs: Sequence[Log]) -> Validation:
-        """Errors of the figures on other logs, none of whose moves may be in the fit. Raises InvalidProblem."""
+        """Errors of the figures on other logs, none of whose moves may be in the fit. Raises
+        InvalidProblem.
+        """
         rows = rows_of(self.robot, logs, self.options.needs_regressor)
-        return validate(self.robot, [Fold(self.fitted, self.spread, rows)], self.options.velocity_threshold)
+        return validate(
+            self.robot, [Fold(self.fitted, self.spread, rows)], self.options.velocity_threshold
+        )
 
     def figures(self) -> IdentifiedFigures:
         """The figures, complete over all joints, with their covariance."""
@@ -109,8 +119,13 @@ class Identification:
             values |= inertials_of(self.robot, (arm.links - 1) * body_parameters(self.robot.model))
         if arm.bodies is not None and not self.options.reduced:
             values |= inertials_of(self.robot, arm.bodies)
-        # those that the logs tell only together with others count, too: their errors go with the others'
-        turn = {name: row for name, row in self._parameters_of_figures() if name[0] in values or name[0] in LINK_NAMES}
+        # those that the logs tell only together with others count, too: their errors go with the
+        # others'
+        turn = {
+            name: row
+            for name, row in self._parameters_of_figures()
+            if name[0] in values or name[0] in LINK_NAMES
+        }
         matrix = np.array([*turn.values()])
         covariance = matrix @ estimate.covariance @ matrix.T
         told = np.flatnonzero(np.diag(covariance) > 0)
@@ -138,12 +153,19 @@ class Identification:
         return document_of(self.figures(), date)
 
     def _parameters_of_figures(self) -> Iterator[tuple[Name, Array]]:
-        """The parameters of the figures that the estimate (p,) stands for, and rows (p,) that make them of it."""
+        """The parameters of the figures that the estimate (p,) stands for, and rows (p,) that make
+        them of it.
+        """
         names = self.fitted.estimate.names
         for name, row in zip(names, np.eye(len(names)), strict=True):
             if name[0] == LINK_MASS_SCALE:
-                for joint, body in enumerate(body_parameters(self.robot.model).reshape(-1, BODY).tolist()):
-                    yield from (((LINK + part, joint), own * row) for part, own in zip(LINKS, body, strict=True))
+                for joint, body in enumerate(
+                    body_parameters(self.robot.model).reshape(-1, BODY).tolist()
+                ):
+                    yield from (
+                        ((LINK + part, joint), own * row)
+                        for part, own in zip(LINKS, body, strict=True)
+                    )
             else:
                 yield name, row
 
@@ -153,7 +175,9 @@ LAW = ("coulomb", "viscous", "load", "curved")
 
 
 @one_thread()
-def identify(robot: Robot, logs: Sequence[Log], options: IdentificationOptions | None = None) -> Identification:
+def identify(
+    robot: Robot, logs: Sequence[Log], options: IdentificationOptions | None = None
+) -> Identification:
     """Identify an arm's own figures from logs of its motions.
 
     The figures are fitted to all moves of all logs. Before that, a fit without the held-out moves
@@ -204,7 +228,11 @@ def identify(robot: Robot, logs: Sequence[Log], options: IdentificationOptions |
         physical=None if options.reduced else physical_of(robot, fitted.arm),
         residuals=_residuals(fitted, rows, options),
         temperatures=temperatures_of(
-            rows, motor_torque(fitted.arm, rows), fitted.arm, fitted.clusters, options.velocity_threshold
+            rows,
+            motor_torque(fitted.arm, rows),
+            fitted.arm,
+            fitted.clusters,
+            options.velocity_threshold,
         ),
         advice=advice_of(fitted, rows),
         validation=validation,
@@ -214,19 +242,29 @@ def identify(robot: Robot, logs: Sequence[Log], options: IdentificationOptions |
     )
 
 
-def _check_identified(parameters: Sequence[Parameter], logs: Sequence[Log], options: IdentificationOptions) -> None:
+def _check_identified(
+    parameters: Sequence[Parameter], logs: Sequence[Log], options: IdentificationOptions
+) -> None:
     """Raise NotExcited if the logs tell nothing of what is sought."""
-    sought = [each for each in parameters if set(options.fit) != {"payload"} or each.figure.startswith("payload")]
+    sought = [
+        each
+        for each in parameters
+        if set(options.fit) != {"payload"} or each.figure.startswith("payload")
+    ]
     if not any(each.identified for each in sought):
         raise _not_excited([each.figure for each in sought], logs, options)
 
 
 def _rows(robot: Robot, logs: Sequence[Log], options: IdentificationOptions) -> Rows:
-    """The rows of the logs. Where a payload is sought, the last log's counts as nothing, whatever it says."""
+    """The rows of the logs. Where a payload is sought, the last log's counts as nothing, whatever
+    it says.
+    """
     if "payload" not in options.fit:
         return rows_of(robot, logs, options.needs_regressor, options.method == "base_wrench")
     if len(logs) < 2:
-        raise InvalidProblem("logs", "A payload needs two logs: one without it, and last the one with it.")
+        raise InvalidProblem(
+            "logs", "A payload needs two logs: one without it, and last the one with it."
+        )
     return rows_of(robot, [*logs[:-1], replace(logs[-1], payload=Payload())], regressor=True)
 
 
@@ -234,7 +272,9 @@ def _carried(robot: Robot, rows: Rows, options: IdentificationOptions, last: int
     """The payload of the `last` log, if it was asked for."""
     if "payload" not in options.fit:
         return None
-    return payload_of(robot, rows, motor_torque(own_arm(robot), rows), last, options.velocity_threshold)
+    return payload_of(
+        robot, rows, motor_torque(own_arm(robot), rows), last, options.velocity_threshold
+    )
 
 
 def _fold(robot: Robot, rows: Rows, out: Mask, options: IdentificationOptions, last: int) -> Fold:
@@ -253,19 +293,27 @@ def _check(robot: Robot, rows: Rows, logs: Sequence[Log], options: Identificatio
     """Whether the logs have what was asked for."""
     if any(log.effort_meaning == "external" for log in logs):
         raise EffortNotUsable(
-            "The efforts of these logs are without gravity and identify nothing: log motor currents or torques.",
+            "The efforts of these logs are without gravity and identify nothing: log motor "
+            "currents or torques.",
             "external",
             {},
         )
-    if "torque_constant" in options.fit and (not rows.current or options.needs_regressor or options.couplings):
+    if "torque_constant" in options.fit and (
+        not rows.current or options.needs_regressor or options.couplings
+    ):
         raise InvalidProblem(
             "fit",
-            "torque_constant needs motor currents, and links that are known: leave it out, or keep the inertials.",
+            "torque_constant needs motor currents, and links that are known: leave it out, or keep "
+            "the inertials.",
         )
-    if "torque_constant" in options.fit and ("payload" in options.fit or not all(log.payload_known for log in logs)):
+    if "torque_constant" in options.fit and (
+        "payload" in options.fit or not all(log.payload_known for log in logs)
+    ):
         raise PayloadUnknown(joints_without_gravity(robot, rows, logs))
     if "payload" in options.fit and (options.needs_regressor or options.couplings):
-        raise InvalidProblem("fit", "A payload needs links that are known, and no couplings: leave it out.")
+        raise InvalidProblem(
+            "fit", "A payload needs links that are known, and no couplings: leave it out."
+        )
     power = bool(np.isfinite(rows.power).any())
     if "power" in options.fit and not power:
         raise NoPowerChannel
@@ -278,16 +326,28 @@ def _check(robot: Robot, rows: Rows, logs: Sequence[Log], options: Identificatio
         raise _not_excited(["payload"], logs, options)
 
 
-def _not_excited(parameters: Sequence[str], logs: Sequence[Log], options: IdentificationOptions) -> NotExcited:
-    """With the excitation that would tell them: friction always, and what the torques of the links tell."""
+def _not_excited(
+    parameters: Sequence[str], logs: Sequence[Log], options: IdentificationOptions
+) -> NotExcited:
+    """With the excitation that would tell them: friction always, and what the torques of the links
+    tell.
+    """
     links = options.needs_regressor or {"torque_constant", "payload"} & set(options.fit)
-    excite = [*(["inertials"] if links else []), *(["rotor"] if "rotor" in options.targets else []), "friction"]
+    excite = [
+        *(["inertials"] if links else []),
+        *(["rotor"] if "rotor" in options.targets else []),
+        "friction",
+    ]
     carried = logs[0].payload
-    payload = {"payload": {"mass": carried.mass, "com": carried.com.tolist()}} if carried.mass > 0 else {}
+    payload = (
+        {"payload": {"mass": carried.mass, "com": carried.com.tolist()}} if carried.mass > 0 else {}
+    )
     return NotExcited(list(parameters), {"robot": logs[0].robot, "parameters": excite, **payload})
 
 
-def _parameters(robot: Robot, estimate: Estimate, options: IdentificationOptions) -> tuple[Parameter, ...]:
+def _parameters(
+    robot: Robot, estimate: Estimate, options: IdentificationOptions
+) -> tuple[Parameter, ...]:
     base = BaseTerms.of(robot, [], options) if options.reduced else None
     own = {} if base is None else dict(zip(base.names, base.own.tolist(), strict=True))
     deviations = np.sqrt(np.diag(estimate.covariance))
@@ -311,7 +371,11 @@ def _previous(robot: Robot, name: Name) -> float:
     figure, joint = name
     if figure.startswith(LINK):
         assert joint is not None
-        return float(body_parameters(robot.model).reshape(-1, BODY)[joint, LINKS.index(figure.removeprefix(LINK))])
+        return float(
+            body_parameters(robot.model).reshape(-1, BODY)[
+                joint, LINKS.index(figure.removeprefix(LINK))
+            ]
+        )
     if figure == LINK_MASS_SCALE:
         return 1.0
     if figure == "idle_power":
@@ -335,4 +399,6 @@ def _residuals(fitted: Fitted, rows: Rows, options: IdentificationOptions) -> Re
         part = rows.take(with_power)
         lag = lag_one(part.power - fitted.arm.power(part)[0], part.move)
     every = np.append(lags, lag)
-    return Residuals(lags, lag, bool((every[np.isfinite(every)] < WHITE).all()), sessions(fitted, rows))
+    return Residuals(
+        lags, lag, bool((every[np.isfinite(every)] < WHITE).all()), sessions(fitted, rows)
+    )

@@ -17,8 +17,8 @@ from joulepath.optimizer.identify.choices import DEFAULT_TERMS, Estimator, Metho
 class Coupling:
     """A motor that turns with several joints: its speed is `ratios` (nq,) times theirs.
 
-    Its inertia and friction act on all of them. An example is a wrist whose last motor is driven through the joint
-    before it.
+    Its inertia and friction act on all of them. An example is a wrist whose last motor is driven
+    through the joint before it.
     """
 
     ratios: Array
@@ -26,7 +26,9 @@ class Coupling:
     def __post_init__(self) -> None:
         ratios = np.array(self.ratios, dtype=float)
         if ratios.ndim != 1 or (ratios != 0).sum() < 2 or not np.isfinite(ratios).all():
-            raise InvalidProblem("couplings", "A coupling must have a ratio other than 0 for at least two joints.")
+            raise InvalidProblem(
+                "couplings", "A coupling must have a ratio other than 0 for at least two joints."
+            )
         ratios.setflags(write=False)
         object.__setattr__(self, "ratios", ratios)
 
@@ -43,10 +45,10 @@ class IdentificationOptions:
 
     `method` is how they are found, and `period` [s] that of the motion for the method `periodic`.
 
-    `held_out` is the fraction of the moves that validate; 0: none, 1: each motion in its turn. `terms` are those of the
-    friction law, `knee` [rad/s] that of its step (None: the robot's own). `velocity_threshold` [rad/s]: slower samples
-    of a joint do not enter its rows. `prior_weight` is that of the robot's own inertials in a refit. Raises
-    InvalidProblem.
+    `held_out` is the fraction of the moves that validate; 0: none, 1: each motion in its turn.
+    `terms` are those of the friction law, `knee` [rad/s] that of its step (None: the robot's own).
+    `velocity_threshold` [rad/s]: slower samples of a joint do not enter its rows. `prior_weight` is
+    that of the robot's own inertials in a refit. Raises InvalidProblem.
     """
 
     fit: Sequence[Target] = ("friction", "rotor")
@@ -65,17 +67,22 @@ class IdentificationOptions:
         for name, allowed in (("fit", get_args(Target)), ("terms", get_args(Term))):
             given = tuple(getattr(self, name))
             if not given or not set(given) <= set(allowed) or len(set(given)) < len(given):
-                raise InvalidProblem(name, f"{name} must name some of {', '.join(allowed)}, each once.")
+                raise InvalidProblem(
+                    name, f"{name} must name some of {', '.join(allowed)}, each once."
+                )
             object.__setattr__(self, name, given)
         if self.estimator not in get_args(Estimator):
-            raise InvalidProblem("estimator", f"estimator must be one of {', '.join(get_args(Estimator))}.")
+            raise InvalidProblem(
+                "estimator", f"estimator must be one of {', '.join(get_args(Estimator))}."
+            )
         if self.method not in get_args(Method):
             raise InvalidProblem("method", f"method must be one of {', '.join(get_args(Method))}.")
         if self.period is not None and not 0.1 <= self.period <= 1e4:
             raise InvalidProblem("period", "period must be from 0.1 to 10000 s.")
         if self.refit and self.links_unknown:
             raise InvalidProblem(
-                "inertials", f"The method {self.method} finds the links by itself: keep the inertials."
+                "inertials",
+                f"The method {self.method} finds the links by itself: keep the inertials.",
             )
         for name, least, most in (
             ("held_out", 0.0, 1.0),

@@ -11,7 +11,8 @@ from joulepath.optimizer.identify.rows.fit_rows import Numbers
 
 @dataclass(frozen=True)
 class Parameter:
-    """A figure of a joint (None: of the whole arm), its standard deviation, and the robot's own value before.
+    """A figure of a joint (None: of the whole arm), its standard deviation, and the robot's own
+    value before.
 
     `identified` is false where the logs do not tell it; `why` says why not, or is empty.
     """
@@ -27,8 +28,9 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class TorqueErrors:
-    """Errors of predicted torques, per joint (nq,): root mean square [N·m], and relative to the measured torque [%]
-    over rows in which the joint moves and over all. Errors [%] of the energy at the shafts and in the copper."""
+    """Errors of predicted torques, per joint (nq,): root mean square [N·m], and relative to the
+    measured torque [%] over rows in which the joint moves and over all. Errors [%] of the energy at
+    the shafts and in the copper."""
 
     rmse: Array
     relative: Array
@@ -39,7 +41,9 @@ class TorqueErrors:
 
 @dataclass(frozen=True, eq=False)
 class PowerErrors:
-    """Errors of predicted power: root mean square [W] over moving rows, and of the energies of moves [%]."""
+    """Errors of predicted power: root mean square [W] over moving rows, and of the energies of
+    moves [%].
+    """
 
     rmse: float
     energy_mean: float
@@ -59,9 +63,9 @@ class Prediction:
 class Curves:
     """What was measured over n rows in motion, and what figures make of it.
 
-    `log`, `move` (n,) are their numbers from 0, `time` (n,) [s] counts from the start of the log. Torques of the motors
-    (n, nq) [N·m] and power on the bus (n,) [W] are NaN where nothing was measured. So is the modelled torque of a joint
-    that hardly moves: friction at rest is not known.
+    `log`, `move` (n,) are their numbers from 0, `time` (n,) [s] counts from the start of the log.
+    Torques of the motors (n, nq) [N·m] and power on the bus (n,) [W] are NaN where nothing was
+    measured. So is the modelled torque of a joint that hardly moves: friction at rest is not known.
     """
 
     log: Numbers
@@ -77,9 +81,10 @@ class Curves:
 class Validation:
     """How the figures predict `moves` moves that their fit has not seen.
 
-    `fitted` are the identified figures, `own` the robot's, `constant` a constant power. `coverage` [1] is the share of
-    these moves whose measured energy lies between P5 and P95, `half_width` [%] the mean half of that interval; None
-    without power. `curves` show these moves, as the fit without them predicts them.
+    `fitted` are the identified figures, `own` the robot's, `constant` a constant power. `coverage`
+    [1] is the share of these moves whose measured energy lies between P5 and P95, `half_width` [%]
+    the mean half of that interval; None without power. `curves` show these moves, as the fit
+    without them predicts them.
     """
 
     moves: int
@@ -93,10 +98,11 @@ class Validation:
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """Numbers of `standard` and `base` parameters of bodies and rotors, and each base parameter as an expression.
+    """Numbers of `standard` and `base` parameters of bodies and rotors, and each base parameter as
+    an expression.
 
-    `condition` of the columns of the base parameters in these logs, scaled to length 1; `excited`: their rank. Both are
-    None where the inertials are not fitted.
+    `condition` of the columns of the base parameters in these logs, scaled to length 1; `excited`:
+    their rank. Both are None where the inertials are not fitted.
     """
 
     standard: int
@@ -108,7 +114,9 @@ class Structure:
 
 @dataclass(frozen=True, eq=False)
 class Physical:
-    """Whether the inertials of every link belong to a body, and the least eigenvalue of each pseudo-inertia (nq,)."""
+    """Whether the inertials of every link belong to a body, and the least eigenvalue of each
+    pseudo-inertia (nq,).
+    """
 
     consistent: bool
     min_eigenvalue: Array
@@ -116,9 +124,11 @@ class Physical:
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """Correlation of neighbouring residuals of torque per joint (nq,) and of power, NaN where nothing was measured.
+    """Correlation of neighbouring residuals of torque per joint (nq,) and of power, NaN where
+    nothing was measured.
 
-    `white`: whether all of them are below 0.3. `sessions` has the size of each log's friction relative to the fit's.
+    `white`: whether all of them are below 0.3. `sessions` has the size of each log's friction
+    relative to the fit's.
     """
 
     torque_lag_one: Array
@@ -129,8 +139,9 @@ class Residuals:
 
 @dataclass(frozen=True, eq=False)
 class Temperatures:
-    """Friction over temperature per joint: friction(T) = friction(T0)·exp(-k (T - T0)); k [1/K] (nq,) is NaN where the
-    logs span too little. `reference` T0 and `span` (nq,) [°C, K], NaN without temperatures."""
+    """Friction over temperature per joint: friction(T) = friction(T0)·exp(-k (T - T0)); k [1/K]
+    (nq,) is NaN where the logs span too little. `reference` T0 and `span` (nq,) [°C, K], NaN
+    without temperatures."""
 
     reference: Array
     span: Array
@@ -153,8 +164,8 @@ class MeasuredNoise:
 
 @dataclass(frozen=True)
 class Advice:
-    """What would help most: the figure that takes the largest `share` of the energy's variance away if it is known, and
-    what to log."""
+    """What would help most: the figure that takes the largest `share` of the energy's variance away
+    if it is known, and what to log."""
 
     figure: str
     joint: int | None
@@ -166,9 +177,10 @@ class Advice:
 class IdentifiedFigures:
     """Figures of `robot` that logs gave, over joints (nq,) or of the whole arm, by name.
 
-    `values` holds complete figures: joints that the logs do not tell have the robot's own. `parameters` (p) are those
-    that the logs moved, in the order of `covariance` (p, p). `session_sd` is the relative standard deviation of
-    friction from day to day, `move_sd` [W] that of the mean power of a move, which the model cannot express.
+    `values` holds complete figures: joints that the logs do not tell have the robot's own.
+    `parameters` (p) are those that the logs moved, in the order of `covariance` (p, p).
+    `session_sd` is the relative standard deviation of friction from day to day, `move_sd` [W] that
+    of the mean power of a move, which the model cannot express.
     """
 
     robot: str

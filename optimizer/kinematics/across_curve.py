@@ -1,4 +1,6 @@
-"""Newton's method onto the curve of configurations that hold a pose, across given directions: n points at once."""
+"""Newton's method onto the curve of configurations that hold a pose, across given directions: n
+points at once.
+"""
 
 from __future__ import annotations
 
@@ -14,16 +16,17 @@ TINY, NO_SQUARE = 1e-14, 1e-28
 STEPS, LEFT = 5, 2e-11
 # length [rad] of no step
 NONE = 1e-300
-# share of a step that the second order adds to it, below which it is added, and below which the step's matrices serve
-# for another one
+# share of a step that the second order adds to it, below which it is added, and below which the
+# step's matrices serve for another one
 HALF, ALIKE = 0.5, 0.1
 # points from which on they are solved for side by side: LAPACK takes as long for each of them
 MANY = 128
 
 
 def step_across(chain: Chain, q: Array, along: Array, T: Array) -> tuple[Array, Array]:
-    """Steps (n, nq) [rad] from q (n, nq), across the directions `along` (n, nq), to where the flange is at T (4, 4);
-    and tangents (n, nq) of its curve at q, of any length, towards `along`. Both to first order."""
+    """Steps (n, nq) [rad] from q (n, nq), across the directions `along` (n, nq), to where the
+    flange is at T (4, 4); and tangents (n, nq) of its curve at q, of any length, towards `along`.
+    Both to first order."""
     reached, jacobian = chain.flange_and_columns(q)
     error = nearly_error(reached, T)
     if len(q) >= MANY:
@@ -37,8 +40,8 @@ def step_across(chain: Chain, q: Array, along: Array, T: Array) -> tuple[Array, 
 def _side_by_side(jacobian: Array, along: Array, error: Array) -> tuple[Array, Array]:
     """The same with Jacobians (6, nq, n) and errors (n, 6), all points in a row.
 
-    The rows of the system are made orthogonal one after the other, with their right sides (Gram and Schmidt,
-    modified: it needs no choice of pivots). The last one, `along`, then is a tangent.
+    The rows of the system are made orthogonal one after the other, with their right sides (Gram and
+    Schmidt, modified: it needs no choice of pivots). The last one, `along`, then is a tangent.
     """
     count, nq, n = jacobian.shape
     rows = np.zeros((count + 1, nq + 1, n))
@@ -56,13 +59,17 @@ def _side_by_side(jacobian: Array, along: Array, error: Array) -> tuple[Array, A
     return np.einsum("in,ijn->nj", rows[:, -1], rows[:, :-1]), tangent.T
 
 
-def led(chain: Chain, q: Array, along: Array, ahead: Array, T: Array, longest: float = np.inf) -> tuple[Array, Array]:
-    """The configurations (n, nq) [rad] next to q (n, nq) that have the flange at T (4, 4), displaced by `ahead` (n,) in
-    the directions `along` (n, nq), as a scalar product; and an estimate of the greatest joint error (n,) [rad] left.
+def led(
+    chain: Chain, q: Array, along: Array, ahead: Array, T: Array, longest: float = np.inf
+) -> tuple[Array, Array]:
+    """The configurations (n, nq) [rad] next to q (n, nq) that have the flange at T (4, 4),
+    displaced by `ahead` (n,) in the directions `along` (n, nq), as a scalar product; and an
+    estimate of the greatest joint error (n,) [rad] left.
 
-    Newton's method with its step and what the second order adds to it: with a ratio r of the two, what is left is some
-    r² of the step. Where r is small, the next step takes the same matrices (the chord method): it leaves some 2 r of
-    itself. No joint moves by more than `longest` [rad] in a step.
+    Newton's method with its step and what the second order adds to it: with a ratio r of the two,
+    what is left is some r² of the step. Where r is small, the next step takes the same matrices
+    (the chord method): it leaves some 2 r of itself. No joint moves by more than `longest` [rad] in
+    a step.
     """
     q, ahead, left, rows = q.copy(), ahead.copy(), np.empty(len(q)), np.arange(len(q))
     for _ in range(STEPS):
@@ -71,7 +78,10 @@ def led(chain: Chain, q: Array, along: Array, ahead: Array, T: Array, longest: f
         (again,) = ((left[rows] > LEFT) & (ratio < ALIKE)).nonzero()
         if len(again):
             here, sides = rows[again], np.empty((len(again), q.shape[1]))
-            sides[:, :-1], sides[:, -1] = nearly_error(chain.flange_components(q[here]), T), ahead[here]
+            sides[:, :-1], sides[:, -1] = (
+                nearly_error(chain.flange_components(q[here]), T),
+                ahead[here],
+            )
             move = np.einsum("nij,nj->ni", inverse[again], sides)
             _advance(q, ahead, along, here, np.minimum(np.maximum(move, -longest), longest))
             left[here] = 2 * ratio[again] * np.maximum.reduce(np.abs(move), axis=1)
@@ -82,16 +92,23 @@ def led(chain: Chain, q: Array, along: Array, ahead: Array, T: Array, longest: f
 
 
 def _advance(q: Array, ahead: Array, along: Array, rows: NDArray[np.intp], move: Array) -> None:
-    """Moves (m, nq) of rows (m,) of q (n, nq), which shorten what is ahead (n,) of them along given directions."""
+    """Moves (m, nq) of rows (m,) of q (n, nq), which shorten what is ahead (n,) of them along given
+    directions.
+    """
     q[rows] += move
     ahead[rows] -= np.einsum("ij,ij->i", move, along[rows])
 
 
-def _step(chain: Chain, q: Array, along: Array, ahead: Array, T: Array) -> tuple[Array, Array, Array, Array]:
-    """A step (n, nq) of `led` and what it leaves (n,), the ratio (n,) of the second order to the first, and the inverse
-    matrices (n, nq, nq)."""
+def _step(
+    chain: Chain, q: Array, along: Array, ahead: Array, T: Array
+) -> tuple[Array, Array, Array, Array]:
+    """A step (n, nq) of `led` and what it leaves (n,), the ratio (n,) of the second order to the
+    first, and the inverse matrices (n, nq, nq)."""
     reached, jacobian = chain.flange_and_columns(q)
-    inverse, sides = np.asarray(np.linalg.inv(_system(jacobian, along)), dtype=float), np.zeros(q.shape)
+    inverse, sides = (
+        np.asarray(np.linalg.inv(_system(jacobian, along)), dtype=float),
+        np.zeros(q.shape),
+    )
     sides[:, :-1], sides[:, -1] = nearly_error(reached, T), ahead
     move: Array = np.einsum("nij,nj->ni", inverse, sides)
     more: Array = np.einsum("nij,jn->ni", inverse[:, :, :-1], second_order(jacobian, move.T))
@@ -99,11 +116,18 @@ def _step(chain: Chain, q: Array, along: Array, ahead: Array, T: Array) -> tuple
     first = np.maximum(first, NONE)
     ratio: Array = second / first
     small = ratio < HALF
-    return move - np.where(small[:, None], more, 0.0), np.where(small, ratio * second, first), ratio, inverse
+    return (
+        move - np.where(small[:, None], more, 0.0),
+        np.where(small, ratio * second, first),
+        ratio,
+        inverse,
+    )
 
 
 def _system(jacobian: Array, along: Array) -> Array:
-    """Matrices (n, nq, nq) of Jacobians (6, nq, n) above directions (n, nq), next to singular ones at worst."""
+    """Matrices (n, nq, nq) of Jacobians (6, nq, n) above directions (n, nq), next to singular ones
+    at worst.
+    """
     n, nq = along.shape
     system = np.empty((n, nq, nq))
     system[:, :-1], system[:, -1] = jacobian.transpose(2, 0, 1), along
@@ -112,12 +136,12 @@ def _system(jacobian: Array, along: Array) -> Array:
 
 
 def second_order(jacobian: Array, move: Array) -> Array:
-    """The part (6, n) [m, rad] of second order in the motion of the flange with a geometric Jacobian (6, nq, n) along
-    moves (nq, n) [rad]: of its place, and of the rotation vector.
+    """The part (6, n) [m, rad] of second order in the motion of the flange with a geometric
+    Jacobian (6, nq, n) along moves (nq, n) [rad]: of its place, and of the rotation vector.
 
-    A joint turns all behind it, and so what a later one does: the second derivative by joints i <= j of the place is
-    z_i × v_j, with v_j the velocity by joint j. The rotation vector has half the sum of z_i × z_j over i < j (Baker,
-    Campbell, Hausdorff).
+    A joint turns all behind it, and so what a later one does: the second derivative by joints i <=
+    j of the place is z_i × v_j, with v_j the velocity by joint j. The rotation vector has half the
+    sum of z_i × z_j over i < j (Baker, Campbell, Hausdorff).
     """
     parts = jacobian * move
     z = parts[3:]
@@ -131,18 +155,21 @@ def second_order(jacobian: Array, move: Array) -> Array:
 
 
 def onto(chain: Chain, q: Array, along: Array, T: Array) -> Array:
-    """The configurations (n, nq) [rad] with the flange at T (4, 4) next to q (n, nq), across `along` (n, nq)."""
+    """The configurations (n, nq) [rad] with the flange at T (4, 4) next to q (n, nq), across
+    `along` (n, nq).
+    """
     return led(chain, q, along, np.zeros(len(q)), T)[0]
 
 
 def nearly_error(reached: Array, T: Array) -> Array:
-    """`pose_error` (n, 6) of poses (3, n, 4), as of `flange_components`, against T (4, 4), with the sine of its angle:
-    the same but for its cube.
+    """`pose_error` (n, 6) of poses (3, n, 4), as of `flange_components`, against T (4, 4), with the
+    sine of its angle: the same but for its cube.
 
     Of both poses' rotations it is half the sum of the products of their columns.
     """
     first, second, third = (T[:3, :3] / 2).tolist()
-    # what is reached, by rows x, y, z of three rotated and one shifted component, makes the six of the error
+    # what is reached, by rows x, y, z of three rotated and one shifted component, makes the six of
+    # the error
     weights = [
         *([0.0, 0.0, 0.0, 0.0, -c, b] for b, c in zip(second, third, strict=True)),
         [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0],

@@ -1,4 +1,6 @@
-"""The self-motion of a spherical wrist with its first and last axis in one line: both joints turn, the flange stays."""
+"""The self-motion of a spherical wrist with its first and last axis in one line: both joints turn,
+the flange stays.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +15,11 @@ from joulepath.optimizer.problem.branches import BranchLabel
 
 @dataclass(frozen=True, eq=False)
 class AlignedWrist:
-    """The self-motion through a configuration q (6,) [rad] with the fourth and the sixth axis in one line.
+    """The self-motion through a configuration q (6,) [rad] with the fourth and the sixth axis in
+    one line.
 
-    The parameter is the fourth joint's position h. The sixth turns against it if the axes point the same way (`turn`
+    The parameter is the fourth joint's position h. The sixth turns against it if the axes point the
+    same way (`turn`
     -1), with it if they are opposed (`turn` 1): q6 = q[5] + turn (h - q[3]). The other joints rest.
     """
 
@@ -45,7 +49,10 @@ class AlignedWrist:
 
     def boxes(self, parameter: Array, half: Array) -> tuple[Array, Array]:
         """See `SelfMotion`. Both joints move as the parameter does: the boxes are exact."""
-        centre, half = self._unwrapped(np.asarray(parameter, dtype=float)), np.asarray(half, dtype=float)
+        centre, half = (
+            self._unwrapped(np.asarray(parameter, dtype=float)),
+            np.asarray(half, dtype=float),
+        )
         sides = np.zeros_like(centre)
         sides[:, 3] = sides[:, 5] = half
         return centre, sides

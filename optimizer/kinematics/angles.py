@@ -13,5 +13,6 @@ def wrapped(angle: Array) -> Array:
 
 
 def nearest_turn(angle: Array, reference: Array) -> Array:
-    """The angles [rad] with the full turns that bring them within half a turn of `reference` [rad]."""
+    """The angles [rad] with the full turns that bring them within half a turn of `reference`
+    [rad]."""
     return angle + 2 * np.pi * np.rint((reference - angle) / (2 * np.pi))

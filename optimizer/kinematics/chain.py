@@ -1,4 +1,6 @@
-"""The chain of an arm for its inverse kinematics: flange poses, Jacobians, and the error against a pose."""
+"""The chain of an arm for its inverse kinematics: flange poses, Jacobians, and the error against a
+pose.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ FEW = 16
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Joints about z at `placements` (nq, 4, 4), each in the frame of the link before, and the flange on the last."""
+    """Joints about z at `placements` (nq, 4, 4), each in the frame of the link before, and the
+    flange on the last.
+    """
 
     placements: Array
     T_last_flange: Array
@@ -38,7 +42,8 @@ class Chain:
     def mirrored(self) -> Chain:
         """The chain from the flange to the base.
 
-        With -q in the other order, it has the base where q has the flange, each seen from the other end.
+        With -q in the other order, it has the base where q has the flange, each seen from the other
+        end.
         """
         back = np.linalg.inv(np.concatenate([self.placements, self.T_last_flange[None]]))[::-1]
         return Chain(back[:-1], back[-1])
@@ -59,7 +64,8 @@ class Chain:
 
     @cached_property
     def _waves(self) -> Array:
-        """Coefficients (3, nq, 4, 4) of cos q, sin q and 1 in the pose of each link in the frame before it.
+        """Coefficients (3, nq, 4, 4) of cos q, sin q and 1 in the pose of each link in the frame
+        before it.
 
         The flange stands for the last link.
         """
@@ -93,7 +99,9 @@ class Chain:
         return self._frames(q)[1]
 
     def _frames(self, q: Array) -> tuple[Array, Array]:
-        """The links' frames (nq, 3, n, 4) and the flange's (3, n, 4) at q (n, nq) [rad], as of `flange_and_columns`."""
+        """The links' frames (nq, 3, n, 4) and the flange's (3, n, 4) at q (n, nq) [rad], as of
+        `flange_and_columns`.
+        """
         n, nq = q.shape
         turns, angles = np.empty((nq, n), dtype=complex), q.T
         turns.real, turns.imag = np.cos(angles), -np.sin(angles)
@@ -116,12 +124,17 @@ def _poses(frames: Array) -> Array:
 
 
 def pose_error(T_reached: Array, T: Array) -> Array:
-    """Twist (n, 6) [m, rad] in base axes that carries poses T_reached (n, 4, 4) to T (4, 4) or (n, 4, 4): to first
-    order in the translation, exactly in the rotation but for half turns."""
+    """Twist (n, 6) [m, rad] in base axes that carries poses T_reached (n, 4, 4) to T (4, 4) or (n,
+    4, 4): to first order in the translation, exactly in the rotation but for half turns."""
     error = np.empty((len(T_reached), 6))
     error[:, :3] = T[..., :3, 3] - T_reached[:, :3, 3]
     E = T[..., :3, :3] @ T_reached[:, :3, :3].transpose(0, 2, 1)
-    axis = np.stack([E[:, 2, 1] - E[:, 1, 2], E[:, 0, 2] - E[:, 2, 0], E[:, 1, 0] - E[:, 0, 1]], axis=1) / 2
+    axis = (
+        np.stack(
+            [E[:, 2, 1] - E[:, 1, 2], E[:, 0, 2] - E[:, 2, 0], E[:, 1, 0] - E[:, 0, 1]], axis=1
+        )
+        / 2
+    )
     sine = np.sqrt((axis * axis).sum(axis=1))
     cosine = (E[:, 0, 0] + E[:, 1, 1] + E[:, 2, 2] - 1) / 2
     scale = np.where(sine > _TINY, np.arctan2(sine, cosine) / np.maximum(sine, _TINY), 1.0)

@@ -1,9 +1,10 @@
 """Points of a course that those of a motion are compared with, in the order of both.
 
-Each point of a motion has the point of the course that is least off, with what it leaves out since the point before:
-so each depends on the one before it. All are looked for at once, from a guess of those before; then again from what
-was found, until nothing changes. What is found then is what going from point to point finds: the first point depends on
-nothing, and each other one on a point that did not change.
+Each point of a motion has the point of the course that is least off, with what it leaves out since
+the point before: so each depends on the one before it. All are looked for at once, from a guess of
+those before; then again from what was found, until nothing changes. What is found then is what
+going from point to point finds: the first point depends on nothing, and each other one on a point
+that did not change.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ import numpy.typing as npt
 
 from joulepath.models.robot import Array
 
-# a point is looked for so many times as far ahead on the course as the motion and its tolerances reach
+# a point is looked for so many times as far ahead on the course as the motion and its tolerances
+# reach
 AHEAD = 2.0
 # m²: two points of the course that are nearer are the same
 TINY = 1e-24
@@ -25,8 +27,8 @@ AT_ONCE, MOST_AT_ONCE = 8, 2_000_000
 
 @dataclass(frozen=True)
 class _Places:
-    """Places on a course (k,): the number of the piece, the share of it, the length [m] up to there, and the point
-    (k, d); and what is `left_out` (k,) [m] since the place before."""
+    """Places on a course (k,): the number of the piece, the share of it, the length [m] up to
+    there, and the point (k, d); and what is `left_out` (k,) [m] since the place before."""
 
     piece: npt.NDArray[np.intp]
     share: Array
@@ -35,7 +37,9 @@ class _Places:
     left_out: Array
 
     def before(self, first: Array) -> _Places:
-        """The places before each of them: the `first` point (d,) of the course, and all but the last."""
+        """The places before each of them: the `first` point (d,) of the course, and all but the
+        last.
+        """
         return _Places(
             np.append(0, self.piece[:-1]),
             np.append(0.0, self.share[:-1]),
@@ -46,8 +50,8 @@ class _Places:
 
 
 class _Course:
-    """A course through points (m, d), the distances between which are lengths [m]; `reach` [m] is that of the
-    tolerances."""
+    """A course through points (m, d), the distances between which are lengths [m]; `reach` [m] is
+    that of the tolerances."""
 
     def __init__(self, known: Array, reach: float) -> None:
         self.known, self.reach = known, reach
@@ -56,18 +60,26 @@ class _Course:
         self.gone = np.concatenate([[0.0], np.cumsum(np.sqrt(self.squares))])
 
     def guess(self, moved: Array) -> _Places:
-        """Places (k,) at the lengths that a motion moves, `moved` (k,) [m] from each of its points to the next."""
+        """Places (k,) at the lengths that a motion moves, `moved` (k,) [m] from each of its points
+        to the next.
+        """
         way = np.cumsum(moved)
         length = way * (self.gone[-1] / max(way[-1], TINY))
-        piece = np.clip(np.searchsorted(self.gone, length, side="right") - 1, 0, len(self.chords) - 1)
-        share = np.clip((length - self.gone[piece]) / np.sqrt(np.maximum(self.squares[piece], TINY)), 0.0, 1.0)
+        piece = np.clip(
+            np.searchsorted(self.gone, length, side="right") - 1, 0, len(self.chords) - 1
+        )
+        share = np.clip(
+            (length - self.gone[piece]) / np.sqrt(np.maximum(self.squares[piece], TINY)), 0.0, 1.0
+        )
         point = self.known[piece] + share[:, None] * self.chords[piece]
         return _Places(piece, share, length, point, np.zeros_like(way))
 
     def after(self, before: _Places, asked: Array, moved: Array) -> _Places | None:
-        """The places (k,) of points (k, d), from those before them; None if that takes too many numbers.
+        """The places (k,) of points (k, d), from those before them; None if that takes too many
+        numbers.
 
-        Of the places that are not too far ahead, the one is taken that is least off, with what it leaves out.
+        Of the places that are not too far ahead, the one is taken that is least off, with what it
+        leaves out.
         """
         first = np.maximum(before.piece - 1, 0)
         last = np.searchsorted(self.gone, before.length + AHEAD * moved + self.reach)
@@ -80,7 +92,9 @@ class _Course:
         pieces = np.minimum(pieces, len(self.chords) - 1)
         start, chord, square = self.known[pieces], self.chords[pieces], self.squares[pieces]
         # where the course turns back, two of its points may be the same
-        share = np.clip(((asked[:, None] - start) * chord).sum(axis=2) / np.maximum(square, TINY), 0.0, 1.0)
+        share = np.clip(
+            ((asked[:, None] - start) * chord).sum(axis=2) / np.maximum(square, TINY), 0.0, 1.0
+        )
         points = start + share[..., None] * chord
         lengths = self.gone[pieces] + share * np.sqrt(square)
         apart = ((points - before.point[:, None]) ** 2).sum(axis=2)
@@ -89,16 +103,20 @@ class _Course:
         best = np.where(too_far, np.inf, off).argmin(axis=1)
         rows = np.arange(len(asked))
         return _Places(
-            pieces[rows, best], share[rows, best], lengths[rows, best], points[rows, best], skipped[rows, best]
+            pieces[rows, best],
+            share[rows, best],
+            lengths[rows, best],
+            points[rows, best],
+            skipped[rows, best],
         )
 
 
 def matched(at: Array, known: Array, asked: Array, reach: float) -> tuple[Array, Array, float]:
-    """Fractions (k,) of a course that are compared with a motion; what is left out before each (k,) [m], and after the
-    last [m].
+    """Fractions (k,) of a course that are compared with a motion; what is left out before each (k,)
+    [m], and after the last [m].
 
-    `known` (m, d) are the points at fractions `at` (m,), `asked` (k, d) those of the motion; `reach` [m] is by how much
-    the tolerances allow to look farther.
+    `known` (m, d) are the points at fractions `at` (m,), `asked` (k, d) those of the motion;
+    `reach` [m] is by how much the tolerances allow to look farther.
     """
     course = _Course(known, AHEAD * reach)
     moved = np.linalg.norm(np.diff(asked, axis=0, prepend=asked[:1]), axis=1)
@@ -120,10 +138,18 @@ def matched(at: Array, known: Array, asked: Array, reach: float) -> tuple[Array,
 def _go_on(course: _Course, found: _Places, k: int, asked: Array, moved: Array) -> None:
     """Put the place of point `k` into those that are `found`, from the one before it."""
     own = slice(max(k - 1, 0), max(k - 1, 0) + 1)
-    last = _Places(found.piece[own], found.share[own], found.length[own], found.point[own], found.left_out[own])
+    last = _Places(
+        found.piece[own], found.share[own], found.length[own], found.point[own], found.left_out[own]
+    )
     if k == 0:
-        last = _Places(np.zeros(1, dtype=np.intp), np.zeros(1), np.zeros(1), course.known[:1], np.zeros(1))
+        last = _Places(
+            np.zeros(1, dtype=np.intp), np.zeros(1), np.zeros(1), course.known[:1], np.zeros(1)
+        )
     place = course.after(last, asked[k : k + 1], moved[k : k + 1])
     assert place is not None
-    found.piece[k], found.share[k], found.length[k] = place.piece[0], place.share[0], place.length[0]
+    found.piece[k], found.share[k], found.length[k] = (
+        place.piece[0],
+        place.share[0],
+        place.length[0],
+    )
     found.point[k], found.left_out[k] = place.point[0], place.left_out[0]

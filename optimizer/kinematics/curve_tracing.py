@@ -1,9 +1,11 @@
-"""The curves of configurations on which a chain with one joint too many holds a pose, followed from given starts.
+"""The curves of configurations on which a chain with one joint too many holds a pose, followed from
+given starts.
 
-A step goes along the curve's tangent and bends as the last one did; Newton's method then leads back to the curve, in
-the plane across the step (E. Allgower and K. Georg, "Introduction to numerical continuation methods", 2003, chapters 2
-and 6). A curve that does not pass a singularity is a loop but for full turns, and is followed once around. All starts
-advance together. One that another passes is on a curve that is followed already, and is given up.
+A step goes along the curve's tangent and bends as the last one did; Newton's method then leads back
+to the curve, in the plane across the step (E. Allgower and K. Georg, "Introduction to numerical
+continuation methods", 2003, chapters 2 and 6). A curve that does not pass a singularity is a loop
+but for full turns, and is followed once around. All starts advance together. One that another
+passes is on a curve that is followed already, and is given up.
 """
 
 from __future__ import annotations
@@ -19,17 +21,19 @@ from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.hermite import hermite
 
-# steps [rad]: the first, the longest, and one below which the curve ends; factors after a good and a bad one
+# steps [rad]: the first, the longest, and one below which the curve ends; factors after a good and
+# a bad one
 FIRST, LONGEST, LEAST, LONGER, SHORTER = 0.15, 0.4, 1e-5, 1.6, 0.4
 # distance [rad] at which the end of a path and the start of the next are one point
 ONE = 1e-3
-# a step is bad if its second correction is longer [rad], its first one longer than this share of it, or its ends'
-# tangents have a lesser cosine; it is good if they have a greater one
+# a step is bad if its second correction is longer [rad], its first one longer than this share of
+# it, or its ends' tangents have a lesser cosine; it is good if they have a greater one
 CORRECTED, ASIDE, BENT, STRAIGHT = 1e-5, 0.3, 0.85, 0.97
 # corrections of a step, and steps along one curve
 CORRECTIONS, STEPS = 2, 400
-# how near [rad] a step passes a start that is on its curve, and the least cosine of their tangents; of a start within a
-# step of length s, the cosines of the angles to it fall short of their number by at most this times s² in all
+# how near [rad] a step passes a start that is on its curve, and the least cosine of their tangents;
+# of a start within a step of length s, the cosines of the angles to it fall short of their number
+# by at most this times s² in all
 PASSED, ALIKE, BESIDE = 2e-3, 0.9, 0.6
 # steps before a curve may be back at its start
 AWAY = 3
@@ -39,7 +43,8 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class TracedPath:
-    """Configurations q (m, nq) [rad] along a curve, without full turns left out, and unit tangents (m, nq) there.
+    """Configurations q (m, nq) [rad] along a curve, without full turns left out, and unit tangents
+    (m, nq) there.
 
     `closed`: the last configuration is the first one but for full turns.
     """
@@ -90,7 +95,8 @@ class _Tracing:
         self.chain, self.T, self.starts = chain, T, starts
         jacobian = chain.flange_and_jacobian(starts)[1]
         null = np.linalg.svd(jacobian)[2][:, -1]
-        # the sign of this determinant does not change along a curve: all of its starts go the same way
+        # the sign of this determinant does not change along a curve: all of its starts go the same
+        # way
         side = np.linalg.slogdet(np.concatenate([jacobian, null[:, None]], axis=1))[0]
         self.first = null * side[:, None]
         self.waves = np.hstack([np.cos(starts), np.sin(starts)])
@@ -104,7 +110,10 @@ class _Tracing:
         loops, chains = cycles(self.follows.tolist())
         found = [self.whole(rows) for rows in loops]
         for path in found:
-            path.q[-1], path.tangents[-1] = path.q[0] + turns(path.q[-1] - path.q[0]), path.tangents[0]
+            path.q[-1], path.tangents[-1] = (
+                path.q[0] + turns(path.q[-1] - path.q[0]),
+                path.tangents[0],
+            )
             path.closed = True
         # a curve that ends goes on in the other direction from where the first of its parts began
         for rows in chains:
@@ -118,7 +127,9 @@ class _Tracing:
         return [path.finished() for path in found]
 
     def whole(self, rows: list[int]) -> _Way:
-        """The paths of rows, one after the other; of a loop, up to the start of the first row again."""
+        """The paths of rows, one after the other; of a loop, up to the start of the first row
+        again.
+        """
         first = self.paths[rows[0]]
         path = _Way(list(first.q), list(first.tangents))
         for row in rows[1:]:
@@ -146,7 +157,9 @@ class _Tracing:
         self.alive[:] = False
 
     def stepped(self, rows: Rows) -> tuple[Array, Array, Mask]:
-        """Where a step leads (n, nq), the tangents there (n, nq), and whether it is near the curve (n,)."""
+        """Where a step leads (n, nq), the tangents there (n, nq), and whether it is near the curve
+        (n,).
+        """
         before, step = self.tangent[rows], self.step[rows]
         q = self.q[rows] + step[:, None] * (before + step[:, None] / 2 * self.bend[rows])
         moved = []
@@ -164,13 +177,17 @@ class _Tracing:
         length = np.linalg.norm(q - self.q[rows], axis=1)[:, None]
         self.bend[rows] = (tangent - self.tangent[rows]) / length
         self.q[rows], self.tangent[rows] = q, tangent
-        self.step[rows] = np.where(cosine > STRAIGHT, np.minimum(self.step[rows] * LONGER, LONGEST), self.step[rows])
+        self.step[rows] = np.where(
+            cosine > STRAIGHT, np.minimum(self.step[rows] * LONGER, LONGEST), self.step[rows]
+        )
         for row, at, along in zip(rows.tolist(), q, tangent, strict=True):
             self.paths[row].q.append(at)
             self.paths[row].tangents.append(along)
 
     def passed(self, rows: Rows, q: Array, tangent: Array) -> NDArray[np.intp]:
-        """The first start (n,) that each of rows (n,) passes on the step to q (n, nq), -1 if it passes none."""
+        """The first start (n,) that each of rows (n,) passes on the step to q (n, nq), -1 if it
+        passes none.
+        """
         here, chord = self.q[rows], q - self.q[rows]
         squares = (chord * chord).sum(axis=1)
         # the sum of the cosines of all angles between them: few starts are within a step
@@ -178,7 +195,13 @@ class _Tracing:
         k, j = np.nonzero(alike > self.chain.nq - BESIDE * (squares[:, None] + PASSED))
         away = wrapped(self.starts[j] - here[k])
         share, length = (away * chord[k]).sum(axis=1) / squares[k], np.sqrt(squares[k])[:, None]
-        at = hermite(share, np.zeros_like(away), chord[k], self.tangent[rows[k]] * length, tangent[k] * length)
+        at = hermite(
+            share,
+            np.zeros_like(away),
+            chord[k],
+            self.tangent[rows[k]] * length,
+            tangent[k] * length,
+        )
         found = (np.abs(at - away).max(axis=1) < PASSED) & (share > 0) & (share <= 1)
         found &= (tangent[k] * self.first[j]).sum(axis=1) > ALIKE
         steps = np.array([len(self.paths[row].q) for row in rows.tolist()])
@@ -190,7 +213,9 @@ class _Tracing:
 
 
 def cycles(follows: list[int]) -> tuple[list[list[int]], list[list[int]]]:
-    """The cycles of a graph in which a node leads to follows[node], and of each end (-1) the longest way to it."""
+    """The cycles of a graph in which a node leads to follows[node], and of each end (-1) the
+    longest way to it.
+    """
     seen, loops = [-1] * len(follows), list[list[int]]()
     for start in range(len(follows)):
         way, node = list[int](), start

@@ -15,9 +15,11 @@ def joint_placements(model: pin.Model) -> Array:
 
 
 def link_frames(placements: Array, q: Array) -> Array:
-    """T_base_link (n, nq + 1, 4, 4) for q (n, nq) [rad] of revolute joints about z at `placements` (nq, 4, 4).
+    """T_base_link (n, nq + 1, 4, 4) for q (n, nq) [rad] of revolute joints about z at `placements`
+    (nq, 4, 4).
 
-    Frame 0 is that of the base, the identity. Frame k, of link k, lies on joint k with z along the joint's axis.
+    Frame 0 is that of the base, the identity. Frame k, of link k, lies on joint k with z along the
+    joint's axis.
     """
     nq = q.shape[1]
     q, placements = np.ascontiguousarray(q, dtype=float), np.ascontiguousarray(placements)

@@ -1,8 +1,10 @@
-"""Self-motions of an arm of the form `SphericalShoulder` on which the last angle stands still, at two singularities.
+"""Self-motions of an arm of the form `SphericalShoulder` on which the last angle stands still, at
+two singularities.
 
-Where the third axis is in line with the first, both turn against each other. Where the fifth axis meets the shoulder,
-as with an LBR iiwa that is stretched, it turns against the first three. Such a motion crosses the curves over the last
-angle (`redundant_curve`), or is all that is left of them. A pose has one only by chance, or if somebody asks for it.
+Where the third axis is in line with the first, both turn against each other. Where the fifth axis
+meets the shoulder, as with an LBR iiwa that is stretched, it turns against the first three. Such a
+motion crosses the curves over the last angle (`redundant_curve`), or is all that is left of them. A
+pose has one only by chance, or if somebody asks for it.
 """
 
 from __future__ import annotations
@@ -21,22 +23,27 @@ from joulepath.optimizer.kinematics.redundant_curve import CurveStack, Redundant
 from joulepath.optimizer.kinematics.redundant_pose import RedundantPose
 from joulepath.optimizer.problem.branches import Label
 
-# sine of the angle between first and third axis, and error [m] of the distance from shoulder to wrist, below which a
-# pose is on the singularity: every member reaches it to a part of what is promised of a solution
+# sine of the angle between first and third axis, and error [m] of the distance from shoulder to
+# wrist, below which a pose is on the singularity: every member reaches it to a part of what is
+# promised of a solution
 IN_LINE, STRETCHED = 1e-10, 1e-10
-# points of a curve from which a crossing is sought, steps of the search, the difference of parameters in it, and how
-# many steps it has before it is given up, if one leaves more than a ratio of the lean
+# points of a curve from which a crossing is sought, steps of the search, the difference of
+# parameters in it, and how many steps it has before it is given up, if one leaves more than a ratio
+# of the lean
 POINTS, STEPS, STEP, FIRST_STEPS, SLOW = 32, 20, 1e-6, 3, 0.7
 # how far the lean may pass zero for a zero to be near, of its second difference between points
 BENT = 4.0
-# rounding of a box [rad]; and half the width of the loops on which an arm that is stretched to within STRETCHED, but
-# not quite, holds a pose: its elbow is bent by up to 4e-5, and rounding of the pose hides the loops
+# rounding of a box [rad]; and half the width of the loops on which an arm that is stretched to
+# within STRETCHED, but not quite, holds a pose: its elbow is bent by up to 4e-5, and rounding of
+# the pose hides the loops
 ROUNDING, LOOPS = 1e-8, 2e-4
 
 
 @dataclass(frozen=True, eq=False)
 class FreeTurn:
-    """`SelfMotion` with the angle of `joint`, the first (0) or the fifth (4), as parameter; `angles` are q7, θ, ψ."""
+    """`SelfMotion` with the angle of `joint`, the first (0) or the fifth (4), as parameter;
+    `angles` are q7, θ, ψ.
+    """
 
     pose: RedundantPose
     angles: tuple[float, float, float]
@@ -70,7 +77,10 @@ class FreeTurn:
 
     def boxes(self, parameter: Array, half: Array) -> tuple[Array, Array]:
         """See `SelfMotion`. The first three joints follow the fifth as `redundant_boxes` has it."""
-        centre, sides = self.at(parameter), np.full((len(parameter), 7), LOOPS if self.joint == 4 else ROUNDING)
+        centre, sides = (
+            self.at(parameter),
+            np.full((len(parameter), 7), LOOPS if self.joint == 4 else ROUNDING),
+        )
         sides[:, self.joint] += half
         if self.joint == 4:
             with_shoulder(self.pose, centre.T, sides.T)
@@ -80,7 +90,9 @@ class FreeTurn:
 
 
 def stretched(pose: RedundantPose, label: Label) -> list[FreeTurn]:
-    """The motions with the fifth axis through the shoulder, of an arm whose fifth axis is square to the sixth."""
+    """The motions with the fifth axis through the shoulder, of an arm whose fifth axis is square to
+    the sixth.
+    """
     found = []
     height = pose.waves[1]
     size, phase = float(np.hypot(height[1], height[2])), float(np.arctan2(height[2], height[1]))
@@ -98,14 +110,17 @@ def stretched(pose: RedundantPose, label: Label) -> list[FreeTurn]:
 
 
 def crossing(curves: Sequence[RedundantCurve]) -> list[FreeTurn]:
-    """The motions with the third axis in line with the first, where these curves of one pose pass that singularity,
-    on their arcs or not.
+    """The motions with the third axis in line with the first, where these curves of one pose pass
+    that singularity, on their arcs or not.
 
-    A pass may be overlooked next to an end of a curve, where the lean hardly changes (1 of 300 poses drawn on the
-    singularity). The boxes of the curves hold its configurations all the same, so that bounds cover them.
+    A pass may be overlooked next to an end of a curve, where the lean hardly changes (1 of 300
+    poses drawn on the singularity). The boxes of the curves hold its configurations all the same,
+    so that bounds cover them.
     """
     # both shoulders pass it at the same points
-    different = list({(curve.interval, *curve.sheet[1:].tolist()): curve for curve in curves}.values())
+    different = list(
+        {(curve.interval, *curve.sheet[1:].tolist()): curve for curve in curves}.values()
+    )
     if not different:
         return []
     stack = CurveStack.of(different)
@@ -119,12 +134,21 @@ def crossing(curves: Sequence[RedundantCurve]) -> list[FreeTurn]:
             curve = different[row]
             last = curve.last_angle(np.array([at]))
             theta, psi = curve.pose.angles(last, curve.sheet[1:2], curve.sheet[2:3])
-            found.append(FreeTurn(curve.pose, (float(last[0]), float(theta[0]), float(psi[0])), 1.0, 0, curve.label))
+            found.append(
+                FreeTurn(
+                    curve.pose,
+                    (float(last[0]), float(theta[0]), float(psi[0])),
+                    1.0,
+                    0,
+                    curve.label,
+                )
+            )
     return found
 
 
 def _may_be_zero(lean: NDArray[np.complex128]) -> Mask:
-    """Next to which of points along curves (m, n) the lean may be zero, by the leans there (m, n)."""
+    """Next to which of points along curves (m, n) the lean may be zero, by the leans there (m,
+    n)."""
     size, step = np.abs(lean), np.abs(lean[:, 1:] - lean[:, :-1])
     near = np.ones(lean.shape, dtype=bool)
     near[:, 1:] &= size[:, 1:] <= size[:, :-1]
@@ -139,25 +163,34 @@ def _may_be_zero(lean: NDArray[np.complex128]) -> Mask:
 
 
 def _lean(curves: CurveStack, u: Array, rows: NDArray[np.intp]) -> NDArray[np.complex128]:
-    """The lean (n,), a complex number, of the third axis from the first at parameters u (n,) of curves (n,)."""
+    """The lean (n,), a complex number, of the third axis from the first at parameters u (n,) of
+    curves (n,).
+    """
     q7 = curves.last_angle(u, rows)
     return curves.pose.third_axis(q7, *curves.pose.angles(q7, *curves.sheet[rows, 1:].T))
 
 
 def _zeros(curves: CurveStack, u: Array, rows: NDArray[np.intp]) -> Array:
-    """The parameters (n,) next to u (n,) of curves (n,) at which the third axis is in line, by Gauss and Newton; nan if
-    there is none."""
+    """The parameters (n,) next to u (n,) of curves (n,) at which the third axis is in line, by
+    Gauss and Newton; nan if there is none."""
     u, found, best = u.copy(), np.full(len(u), np.nan), np.full(len(u), np.inf)
     going = np.arange(len(u))
     for n in range(STEPS):
         if not len(going):
             break
         at, three = u[going], np.tile(rows[going], 3)
-        before, here, after = _lean(curves, np.concatenate([at - STEP, at, at + STEP]), three).reshape(3, -1)
+        before, here, after = _lean(
+            curves, np.concatenate([at - STEP, at, at + STEP]), three
+        ).reshape(3, -1)
         size, slope = np.abs(here), (after - before) / (2 * STEP)
         found[going[size < IN_LINE]] = at[size < IN_LINE]
-        # next to a zero the steps converge quadratically; elsewhere they end where the lean is least
-        on = (size >= IN_LINE) & (np.abs(slope) > 0) & ((n <= FIRST_STEPS) | (size <= SLOW * best[going]))
+        # next to a zero the steps converge quadratically; elsewhere they end where the lean is
+        # least
+        on = (
+            (size >= IN_LINE)
+            & (np.abs(slope) > 0)
+            & ((n <= FIRST_STEPS) | (size <= SLOW * best[going]))
+        )
         best[going], going = size, going[on]
         moved = u[going] - (np.conj(slope[on]) * here[on]).real / np.abs(slope[on]) ** 2
         u[going] = np.clip(moved, np.where(curves.whole[rows[going]], -np.pi, 0.0), np.pi)

@@ -1,6 +1,7 @@
 """The curve of configurations of a redundant or singular arm that hold one pose of the TCP.
 
-It is found by Newton's method on the arm itself. So it does not end where the charts of a closed form do.
+It is found by Newton's method on the arm itself. So it does not end where the charts of a closed
+form do.
 """
 
 from __future__ import annotations
@@ -44,11 +45,14 @@ class HeldPose:
     def of(arm: Arm, q: Array) -> HeldPose:
         """The curve of an arm through q (nq,) [rad], within the limits in force."""
         model, limits = arm.robot.model, arm.active_limits
-        return HeldPose(model, model.createData(), T_last_tcp(arm), tcp_pose(arm, q), limits.q_min, limits.q_max)
+        return HeldPose(
+            model, model.createData(), T_last_tcp(arm), tcp_pose(arm, q), limits.q_min, limits.q_max
+        )
 
     def put(self, q: Array) -> Array | None:
-        """The configuration (nq,) on the curve that Newton's method finds from q (nq,); None if it finds none within
-        the limits. If a joint would be beyond its limit, the one on which it is on the limit."""
+        """The configuration (nq,) on the curve that Newton's method finds from q (nq,); None if it
+        finds none within the limits. If a joint would be beyond its limit, the one on which it is
+        on the limit."""
         found = self._solved(q, None)
         if found is None:
             return None
@@ -73,10 +77,14 @@ class HeldPose:
     def bend(self, q: Array, tangent: Array) -> Array:
         """The change (nq,) of the tangent per length of the curve [1/rad]."""
         before, after = (self.tangent(q + step * tangent) for step in (-STEP, STEP))
-        return np.asarray((after * np.sign(after @ tangent) - before * np.sign(before @ tangent)) / (2 * STEP))
+        return np.asarray(
+            (after * np.sign(after @ tangent) - before * np.sign(before @ tangent)) / (2 * STEP)
+        )
 
     def _solved(self, q: Array, fixed: int | None) -> Array | None:
-        """The configuration that holds the pose, with one joint `fixed`; None if Newton's method finds none."""
+        """The configuration that holds the pose, with one joint `fixed`; None if Newton's method
+        finds none.
+        """
         moving = np.arange(len(q)) != fixed
         q = q.copy()
         for _ in range(STEPS):

@@ -8,7 +8,9 @@ from joulepath.models.robot import Array
 
 
 def hermite(share: Array, q0: Array, q1: Array, slope0: Array, slope1: Array) -> Array:
-    """Values (n, m) at shares (n,), 0 to 1, of the way from q0 to q1 (n, m), by cubics with slopes (n, m) per way."""
+    """Values (n, m) at shares (n,), 0 to 1, of the way from q0 to q1 (n, m), by cubics with slopes
+    (n, m) per way.
+    """
     a, b, c, d = hermite_weights(share)[:, :, None]
     return np.asarray(a * q0 + b * q1 + c * slope0 + d * slope1)
 

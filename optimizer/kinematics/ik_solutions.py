@@ -1,6 +1,7 @@
 """Solutions of inverse kinematics: configurations that reach a pose, and what is known of them.
 
-How near they are to a singularity is computed when it is first asked for, for all branches of a pose at once.
+How near they are to a singularity is computed when it is first asked for, for all branches of a
+pose at once.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ from joulepath.optimizer.problem.branches import BranchLabel
 
 @dataclass(frozen=True, eq=False)
 class Singularities:
-    """How near configurations q (n, nq) [rad] are to a singularity. `parts` names parts of a label that are on one."""
+    """How near configurations q (n, nq) [rad] are to a singularity. `parts` names parts of a label
+    that are on one.
+    """
 
     chain: Chain
     q: Array
@@ -27,7 +30,9 @@ class Singularities:
 
     @cached_property
     def smallest_values(self) -> list[float]:
-        """The smallest singular value of the flange's geometric Jacobian (m and rad mixed, as usual) at each."""
+        """The smallest singular value of the flange's geometric Jacobian (m and rad mixed, as
+        usual) at each.
+        """
         jacobian = self.chain.flange_and_jacobian(self.q)[1]
         values: list[float] = np.linalg.svd(jacobian, compute_uv=False)[:, -1].tolist()
         return values
@@ -37,7 +42,8 @@ class Singularities:
 class PrincipalSolution:
     """One branch of a pose: q (nq,) in [-pi, pi], without regard to limits.
 
-    `self_motion` is the curve of solutions that it is a member of, if any. It is row `row` of those in `singularities`.
+    `self_motion` is the curve of solutions that it is a member of, if any. It is row `row` of those
+    in `singularities`.
     """
 
     q: Array
@@ -47,14 +53,24 @@ class PrincipalSolution:
     row: int
 
     def __init__(
-        self, q: Array, label: BranchLabel, self_motion: SelfMotion | None, singularities: Singularities, row: int
+        self,
+        q: Array,
+        label: BranchLabel,
+        self_motion: SelfMotion | None,
+        singularities: Singularities,
+        row: int,
     ) -> None:
-        # all at once: of some forty solutions of a pose, one by one took as long as it takes to confirm them
-        self.__dict__.update(q=q, label=label, self_motion=self_motion, singularities=singularities, row=row)
+        # all at once: of some forty solutions of a pose, one by one took as long as it takes to
+        # confirm them
+        self.__dict__.update(
+            q=q, label=label, self_motion=self_motion, singularities=singularities, row=row
+        )
 
     @cached_property
     def singular(self) -> tuple[str, ...]:
-        """The parts of the label that are singular: the configuration is on both branches of such a part."""
+        """The parts of the label that are singular: the configuration is on both branches of such a
+        part.
+        """
         return self.singularities.parts(self.q)
 
     @property
@@ -65,7 +81,8 @@ class PrincipalSolution:
 
 @dataclass(frozen=True, eq=False, init=False)
 class LimitedSolution:
-    """One configuration q (nq,) [rad] within limits that reaches a pose, and its branch: see `PrincipalSolution`.
+    """One configuration q (nq,) [rad] within limits that reaches a pose, and its branch: see
+    `PrincipalSolution`.
 
     `limit_distance` [rad] is the least distance of any joint to its limits.
     """

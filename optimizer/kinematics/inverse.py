@@ -1,14 +1,17 @@
-"""Inverse kinematics: every branch of a pose, labelled, with every full turn that the joint ranges allow.
+"""Inverse kinematics: every branch of a pose, labelled, with every full turn that the joint ranges
+allow.
 
-A configuration is singular where two branches meet (shoulder or elbow) or where the arm can move while the pose is
-held (wrist). The first are solutions like any other. The second are members of a self-motion, a curve of solutions.
+A configuration is singular where two branches meet (shoulder or elbow) or where the arm can move
+while the pose is held (wrist). The first are solutions like any other. The second are members of a
+self-motion, a curve of solutions.
 
-`InverseKinematics` is the interface; `inverse_kinematics_for` chooses its implementation for a robot. For six joints
-they are the closed form of Universal Robots' arms in `ur_closed_form`, then that of `decomposition` for arms with three
-axes that are parallel or meet, then Newton's method from many starts (`multi_start`), which may miss branches. For
-seven joints, which hold every pose on self-motions, it is that of arms with a spherical shoulder in `redundant_arm`,
-then self-motions that are followed point by point (`traced_arm`), of which some may be missed.
-For any other arm it returns None: such an arm takes joint positions as targets, not poses.
+`InverseKinematics` is the interface; `inverse_kinematics_for` chooses its implementation for a
+robot. For six joints they are the closed form of Universal Robots' arms in `ur_closed_form`, then
+that of `decomposition` for arms with three axes that are parallel or meet, then Newton's method
+from many starts (`multi_start`), which may miss branches. For seven joints, which hold every pose
+on self-motions, it is that of arms with a spherical shoulder in `redundant_arm`, then self-motions
+that are followed point by point (`traced_arm`), of which some may be missed. For any other arm it
+returns None: such an arm takes joint positions as targets, not poses.
 """
 
 from __future__ import annotations
@@ -28,7 +31,11 @@ from joulepath.optimizer.kinematics import redundant_curve, traced_curve
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.decomposition import DecomposedArm
 from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives, nearest_turns
-from joulepath.optimizer.kinematics.ik_solutions import LimitedSolution, PrincipalSolution, Singularities
+from joulepath.optimizer.kinematics.ik_solutions import (
+    LimitedSolution,
+    PrincipalSolution,
+    Singularities,
+)
 from joulepath.optimizer.kinematics.isolated import distinct
 from joulepath.optimizer.kinematics.multi_start import MultiStart
 from joulepath.optimizer.kinematics.reach import REACH, at_the_edge, out_of_reach
@@ -43,8 +50,8 @@ from joulepath.optimizer.problem.branches import BranchLabel
 
 # greatest error [m, rad] of the forward kinematics of a solution against the pose
 ACCURACY = 1e-9
-# members of a self-motion that stand for it; of many self-motions, so many times those of one in all, and of each at
-# least so many
+# members of a self-motion that stand for it; of many self-motions, so many times those of one in
+# all, and of each at least so many
 MEMBERS, MOST_IN_ALL, LEAST_OF_EACH = 8, 4, 2
 # where so many members are asked for, they stand for the whole curve: none is far from the next
 WHOLE = 16
@@ -57,19 +64,23 @@ class InverseKinematics(Protocol):
 
     @property
     def complete(self) -> bool:
-        """Whether every branch is found. If not, some may be missed: nothing may be claimed of all of them."""
+        """Whether every branch is found. If not, some may be missed: nothing may be claimed of all
+        of them.
+        """
         ...
 
     def label(self, q: Array) -> BranchLabel:
-        """The branch of a configuration q (nq,) [rad]. A full turn of a joint does not change it."""
+        """The branch of a configuration q (nq,) [rad]. A full turn of a joint does not change
+        it."""
         ...
 
     def branches(self, T_base_flange: Array, members: int = MEMBERS) -> list[PrincipalSolution]:
-        """Every branch that reaches the flange pose (4, 4), and `members` of every self-motion or a few more.
+        """Every branch that reaches the flange pose (4, 4), and `members` of every self-motion or a
+        few more.
 
-        Of more than four self-motions, as a redundant arm has them, `members` times four in all. An empty list if the
-        pose is out of reach. Raises SingularPose if it is reached on a self-motion that this inverse kinematics does
-        not know.
+        Of more than four self-motions, as a redundant arm has them, `members` times four in all. An
+        empty list if the pose is out of reach. Raises SingularPose if it is reached on a
+        self-motion that this inverse kinematics does not know.
         """
         ...
 
@@ -82,16 +93,19 @@ class InverseKinematics(Protocol):
         target: str = "goal",
         members: int = MEMBERS,
     ) -> list[LimitedSolution]:
-        """Every configuration inside the limits (default: the robot's) that puts the TCP at T_base_tcp (4, 4).
+        """Every configuration inside the limits (default: the robot's) that puts the TCP at
+        T_base_tcp (4, 4).
 
-        `T_flange_tcp` (4, 4) is the pose of the TCP in the flange frame, by default the identity. With `windings` there
-        is one solution for each combination of full turns that the position limits allow. Without, there is one per
-        branch, the one whose joints are nearest to zero. The solutions of a branch are together, nearest to zero first.
-        Of a self-motion there are `members` solutions or a few more, evenly spread, without full turns; of more than
-        four self-motions, `members` times four in all. The self-motions of a redundant arm are cut to the limits.
+        `T_flange_tcp` (4, 4) is the pose of the TCP in the flange frame, by default the identity.
+        With `windings` there is one solution for each combination of full turns that the position
+        limits allow. Without, there is one per branch, the one whose joints are nearest to zero.
+        The solutions of a branch are together, nearest to zero first. Of a self-motion there are
+        `members` solutions or a few more, evenly spread, without full turns; of more than four
+        self-motions, `members` times four in all. The self-motions of a redundant arm are cut to
+        the limits.
 
-        Raises UnreachablePose, which names `target`, if there is no solution; SingularPose if the pose is only reached
-        on a self-motion that this inverse kinematics does not know.
+        Raises UnreachablePose, which names `target`, if there is no solution; SingularPose if the
+        pose is only reached on a self-motion that this inverse kinematics does not know.
         """
         ...
 
@@ -113,7 +127,9 @@ def required_inverse_kinematics(robot: Robot, field: str) -> InverseKinematics:
     kinematics = inverse_kinematics_for(robot)
     if kinematics is None:
         raise InvalidProblem(
-            field, f"There is no inverse kinematics for {robot.name}: give joint positions (`q`) instead of a pose."
+            field,
+            f"There is no inverse kinematics for {robot.name}: give joint positions (`q`) instead "
+            "of a pose.",
         )
     return kinematics
 
@@ -136,7 +152,8 @@ class ClosedForm(Protocol):
         ...
 
     def solve(self, T: Array) -> tuple[Array, Sequence[BranchLabel]]:
-        """Isolated configurations (n, nq) [rad] in [-pi, pi] that put the flange at T (4, 4), and their n labels.
+        """Isolated configurations (n, nq) [rad] in [-pi, pi] that put the flange at T (4, 4), and
+        their n labels.
 
         Raises SingularPose if T is reached on a self-motion that is not known.
         """
@@ -147,17 +164,23 @@ class ClosedForm(Protocol):
         ...
 
     def self_motions(self, T: Array, limits: Limits | None = None) -> Sequence[SelfMotion]:
-        """The self-motions that hold the flange at T (4, 4); arcs that are outside the limits may be left out."""
+        """The self-motions that hold the flange at T (4, 4); arcs that are outside the limits may
+        be left out.
+        """
         ...
 
     def distance_to_reach(self, T: Array) -> float | None:
-        """Distance [m] by which T (4, 4) must shift, with its orientation kept, to have a solution; None if unknown."""
+        """Distance [m] by which T (4, 4) must shift, with its orientation kept, to have a solution;
+        None if unknown.
+        """
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class _Reached:
-    """Configurations q (n, nq) [rad] of one pose that forward kinematics confirms, and the curve of each, if any."""
+    """Configurations q (n, nq) [rad] of one pose that forward kinematics confirms, and the curve of
+    each, if any.
+    """
 
     q: Array
     labels: list[BranchLabel]
@@ -167,7 +190,16 @@ class _Reached:
         """All of them; nobody may write to q from here on."""
         self.q.setflags(write=False)
         singularities = Singularities(chain, self.q, form.singular_parts)
-        return list(map(PrincipalSolution, self.q, self.labels, self.curves, repeat(singularities), range(len(self.q))))
+        return list(
+            map(
+                PrincipalSolution,
+                self.q,
+                self.labels,
+                self.curves,
+                repeat(singularities),
+                range(len(self.q)),
+            )
+        )
 
 
 class ClosedFormInverseKinematics:
@@ -184,11 +216,14 @@ class ClosedFormInverseKinematics:
         return self._form.complete
 
     def label(self, q: Array) -> BranchLabel:
-        """The branch of a configuration q (nq,) [rad]. A full turn of a joint does not change it."""
+        """The branch of a configuration q (nq,) [rad]. A full turn of a joint does not change
+        it."""
         return self._form.label(q)
 
     def branches(self, T_base_flange: Array, members: int = MEMBERS) -> list[PrincipalSolution]:
-        """Every branch that reaches the flange pose (4, 4), and members of every self-motion: `InverseKinematics`."""
+        """Every branch that reaches the flange pose (4, 4), and members of every self-motion:
+        `InverseKinematics`.
+        """
         return self._reached(T_base_flange, members, None).principal(self._form, self._chain)
 
     def _reached(self, T_base_flange: Array, members: int, limits: Limits | None) -> _Reached:
@@ -216,19 +251,29 @@ class ClosedFormInverseKinematics:
         if not others:
             return reached
         more = _Reached(
-            np.vstack([q for _, q in others]), [each.label for each, _ in others], [each for each, _ in others]
+            np.vstack([q for _, q in others]),
+            [each.label for each, _ in others],
+            [each for each, _ in others],
         )
         more = self._confirmed(more, T, False)
-        return _Reached(np.vstack([reached.q, more.q]), reached.labels + more.labels, reached.curves + more.curves)
+        return _Reached(
+            np.vstack([reached.q, more.q]),
+            reached.labels + more.labels,
+            reached.curves + more.curves,
+        )
 
     def _confirmed(self, found: _Reached, T: Array, several: bool) -> _Reached:
-        """What is found less what does not reach T (4, 4), so that no answer is wrong; and if there are several curves,
-        less one of two that are the same: two of a redundant arm's curves meet at an end that both have."""
+        """What is found less what does not reach T (4, 4), so that no answer is wrong; and if there
+        are several curves, less one of two that are the same: two of a redundant arm's curves meet
+        at an end that both have."""
         off = self._chain.flange(found.q) - T
         if not several and np.abs(off).max(initial=0.0) < ACCURACY / 4:
             return found
         # the sum of the squares of a rotation's error is twice that of its angle
-        all_, place = np.einsum("ijk,ijk->i", off, off), np.einsum("ij,ij->i", off[:, :3, 3], off[:, :3, 3])
+        all_, place = (
+            np.einsum("ijk,ijk->i", off, off),
+            np.einsum("ij,ij->i", off[:, :3, 3], off[:, :3, 3]),
+        )
         q, missed = found.q, np.sqrt(np.maximum(place, (all_ - place) / 2))
         isolated = np.array([curve is None for curve in found.curves], dtype=bool)
         q, missed = at_the_edge(self._chain, q, missed, isolated & (missed >= ACCURACY), T)
@@ -247,7 +292,9 @@ class ClosedFormInverseKinematics:
         target: str = "goal",
         members: int = MEMBERS,
     ) -> list[LimitedSolution]:
-        """Every configuration inside the limits that puts the TCP at T_base_tcp (4, 4): see `InverseKinematics`."""
+        """Every configuration inside the limits that puts the TCP at T_base_tcp (4, 4): see
+        `InverseKinematics`.
+        """
         T = T_base_tcp if T_flange_tcp is None else flange_pose(T_base_tcp, T_flange_tcp)
         limits = self._limits if limits is None else limits
         try:
@@ -270,17 +317,23 @@ class ClosedFormInverseKinematics:
             raise UnreachablePose(
                 target,
                 None,
-                f"The {target} pose is within reach, but every arm configuration for it violates a position limit: "
+                f"The {target} pose is within reach, but every arm configuration for it violates a "
+                "position limit: "
                 "widen limits.position or move the pose.",
             )
         q.setflags(write=False)
         distances = np.minimum(q - limits.q_min, limits.q_max - q).min(axis=1).tolist()
         return list(map(LimitedSolution, q, owners, distances))
 
-    def _reached_beside(self, T: Array, members: int, limits: Limits, distance: float | None) -> _Reached:
-        """What is reached beside a flange pose T (4, 4) that is out of reach by a `distance` [m] within `Reach`."""
+    def _reached_beside(
+        self, T: Array, members: int, limits: Limits, distance: float | None
+    ) -> _Reached:
+        """What is reached beside a flange pose T (4, 4) that is out of reach by a `distance` [m]
+        within `Reach`.
+        """
         nothing = _Reached(np.zeros((0, self._chain.nq)), [], [])
-        # a redundant arm knows all of its self-motions; another one may be on one that it does not know
+        # a redundant arm knows all of its self-motions; another one may be on one that it does not
+        # know
         least = 0.0 if self._chain.nq > 6 else REACH.rounding
         if distance is None or not least <= distance <= REACH.beyond:
             return nothing
@@ -295,13 +348,19 @@ class ClosedFormInverseKinematics:
         return nothing
 
 
-def _wound(q: Array, owners: Sequence[PrincipalSolution], limits: Limits) -> tuple[Array, list[PrincipalSolution]]:
-    """Configurations q (n, nq) [rad] and the branch of each, with every full turn within limits of those that are on no
-    curve."""
+def _wound(
+    q: Array, owners: Sequence[PrincipalSolution], limits: Limits
+) -> tuple[Array, list[PrincipalSolution]]:
+    """Configurations q (n, nq) [rad] and the branch of each, with every full turn within limits of
+    those that are on no curve."""
     wound, found = [np.zeros((0, q.shape[1]))], list[PrincipalSolution]()
     for branch, near in zip(owners, q, strict=True):
         if branch.self_motion is None:
-            wound.append(np.array(list(product(*full_turn_alternatives(branch.q, limits.q_min, limits.q_max)))))
+            wound.append(
+                np.array(
+                    list(product(*full_turn_alternatives(branch.q, limits.q_min, limits.q_max)))
+                )
+            )
         else:
             wound.append(near[None])
         found += [branch] * len(wound[-1])
@@ -309,18 +368,28 @@ def _wound(q: Array, owners: Sequence[PrincipalSolution], limits: Limits) -> tup
 
 
 def _members(motions: Sequence[SelfMotion], parameters: Sequence[Array]) -> list[Array]:
-    """Configurations (n, nq) [rad] of each of the self-motions of one pose at its parameters (n,)."""
+    """Configurations (n, nq) [rad] of each of the self-motions of one pose at its parameters
+    (n,)."""
     found = list[Array]()
-    for kind, group in groupby(zip(motions, parameters, strict=True), key=lambda each: type(each[0])):
+    for kind, group in groupby(
+        zip(motions, parameters, strict=True), key=lambda each: type(each[0])
+    ):
         alike, at = zip(*group, strict=True)
         together = _TOGETHER.get(kind)
-        found += together(alike, at) if together else [motion.at(u) for motion, u in zip(alike, at, strict=True)]
+        found += (
+            together(alike, at)
+            if together
+            else [motion.at(u) for motion, u in zip(alike, at, strict=True)]
+        )
     return found
 
 
-def _unseen(motions: Sequence[SelfMotion], reached: _Reached, limits: Limits) -> list[tuple[SelfMotion, Array]]:
-    """The self-motions that no configuration within the limits stands for, though they have some, and of each the
-    middle one (1, nq) of many that are. Its members may be outside, and an end that is not may count as another's."""
+def _unseen(
+    motions: Sequence[SelfMotion], reached: _Reached, limits: Limits
+) -> list[tuple[SelfMotion, Array]]:
+    """The self-motions that no configuration within the limits stands for, though they have some,
+    and of each the middle one (1, nq) of many that are. Its members may be outside, and an end that
+    is not may count as another's."""
     inside = nearest_turns(reached.q, limits)[1]
     held = {id(curve) for curve, each in zip(reached.curves, inside, strict=True) if each}
     found = list[tuple[SelfMotion, Array]]()
@@ -342,7 +411,9 @@ _TOGETHER: dict[type, Callable[[Any, Sequence[Array]], list[Array]]] = {
 
 
 def _orthonormal(T: Array) -> Array:
-    """T with its rotation nearer to orthonormal: one Newton step of the polar decomposition squares the error."""
+    """T with its rotation nearer to orthonormal: one Newton step of the polar decomposition squares
+    the error.
+    """
     polished = np.array(T, dtype=float)
     R = polished[:3, :3]
     polished[:3, :3] = 1.5 * R - 0.5 * R @ R.T @ R

@@ -9,24 +9,28 @@ from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.newton import solved
 
-# configurations that differ by less are one [rad]: on a fold of two branches, rounding parts them by 1e-7
+# configurations that differ by less are one [rad]: on a fold of two branches, rounding parts them
+# by 1e-7
 SAME = 1e-6
-# what rounding leaves open in the error of a pose [m, rad]: over the smallest singular value, in the configuration
+# what rounding leaves open in the error of a pose [m, rad]: over the smallest singular value, in
+# the configuration
 ROUNDED = 2e-14
-# where two branches meet, an error e [m, rad] moves a configuration by less than this times its root [rad]
+# where two branches meet, an error e [m, rad] moves a configuration by less than this times its
+# root [rad]
 FOLD = 3.0
 # smallest singular value below which a configuration may lie on a curve
 SINGULAR_VALUE = 1e-7
-# step [rad] along the null direction, the damping that keeps it, and the error [m, rad] of what is a curve: half of
-# what is promised of a solution
+# step [rad] along the null direction, the damping that keeps it, and the error [m, rad] of what is
+# a curve: half of what is promised of a solution
 _STEP, _DAMPING, _ON_CURVE = 0.3, 1e-12, 5e-10
 
 
 def distinct(q: Array, missed: Array, smallest: Array | None = None) -> list[int]:
-    """Indices of configurations q (n, nq) [rad], one of each that are the same: those that miss the pose least.
+    """Indices of configurations q (n, nq) [rad], one of each that are the same: those that miss the
+    pose least.
 
-    `missed` (n,) [m, rad] is by how much. With their smallest singular values (n,), near a singularity more counts as
-    the same.
+    `missed` (n,) [m, rad] is by how much. With their smallest singular values (n,), near a
+    singularity more counts as the same.
     """
     # at a fold, an error moves the configuration by its root
     same = np.maximum(SAME, FOLD * np.sqrt(missed))
@@ -54,9 +58,12 @@ def distinct(q: Array, missed: Array, smallest: Array | None = None) -> list[int
 def lies_on_a_curve(chain: Chain, q: Array, T: Array) -> bool:
     """Whether a singular configuration (nq,) [rad] can move while the flange stays at T (4, 4).
 
-    A step along the null direction, corrected across it, is tried on both sides: on a curve it reaches the pose, too.
+    A step along the null direction, corrected across it, is tried on both sides: on a curve it
+    reaches the pose, too.
     """
     null = np.linalg.svd(chain.flange_and_jacobian(q[None])[1][0])[2][-1]
-    tried, missed = solved(chain, q + np.array([[_STEP], [-_STEP]]) * null, T, steps=25, least_damping=_DAMPING)
+    tried, missed = solved(
+        chain, q + np.array([[_STEP], [-_STEP]]) * null, T, steps=25, least_damping=_DAMPING
+    )
     far = np.abs(wrapped(tried - q)).max(axis=1) > _STEP / 10
     return bool((far & (missed < _ON_CURVE)).any())

@@ -12,7 +12,8 @@ from joulepath.optimizer.kinematics.vectors import cross
 
 
 def point_jacobian(frames: Array, link: int, x: Array) -> Array:
-    """∂x/∂q (n, 3, nq) of points x (n, 3) [m], base frame, fixed to a link: column j is z_j × (x - p_j).
+    """∂x/∂q (n, 3, nq) of points x (n, 3) [m], base frame, fixed to a link: column j is z_j × (x -
+    p_j).
 
     Joints 1 … k move link k: the columns of the joints beyond are zero.
     """
@@ -23,7 +24,9 @@ def point_jacobian(frames: Array, link: int, x: Array) -> Array:
 
 
 def direction_jacobian(frames: Array, d: Array) -> Array:
-    """∂d/∂q (n, 3, nq) of directions d (n, 3), base frame, fixed to the last link: column j is z_j × d."""
+    """∂d/∂q (n, 3, nq) of directions d (n, 3), base frame, fixed to the last link: column j is z_j
+    × d.
+    """
     return np.asarray(np.cross(frames[:, 1:, :3, 2], d[:, None]).transpose(0, 2, 1))
 
 
@@ -39,8 +42,9 @@ def geometric_jacobian(frames: Array, x: Array) -> Array:
 def velocity_gradient(frames: Array, J: Array, v: Array) -> Array:
     """∂(J v)/∂q (n, 3, nq) for a point's Jacobian J (n, 3, nq) and joint speeds v (n, nq) [rad/s].
 
-    Joint k rotates the contributions of the joints after it, and moves the point within the rotation of the joints up
-    to it. Column k is therefore z_k × Σ_{j>k} J_j v_j + (Σ_{j≤k} v_j z_j) × J_k.
+    Joint k rotates the contributions of the joints after it, and moves the point within the
+    rotation of the joints up to it. Column k is therefore z_k × Σ_{j>k} J_j v_j + (Σ_{j≤k} v_j z_j)
+    × J_k.
     """
     axes = frames[:, 1:, :3, 2]
     parts = J * v[:, None, :]

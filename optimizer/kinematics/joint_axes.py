@@ -1,7 +1,9 @@
-"""The joint axes of a chain at its zero position, and the simplest arm nearby: axes that nearly are parallel or meet.
+"""The joint axes of a chain at its zero position, and the simplest arm nearby: axes that nearly are
+parallel or meet.
 
-Rounded angles in a description (1.5708 for a quarter turn) and the calibration of a single arm leave axes that meet, or
-are parallel, but for little. A formula that needs them to is applied to the simplest arm, and its solutions are starts.
+Rounded angles in a description (1.5708 for a quarter turn) and the calibration of a single arm
+leave axes that meet, or are parallel, but for little. A formula that needs them to is applied to
+the simplest arm, and its solutions are starts.
 """
 
 from __future__ import annotations
@@ -14,7 +16,8 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.forward import link_frames
 
-# sine of an angle between neighbouring axes below which they count as parallel: far more than rounded angles make
+# sine of an angle between neighbouring axes below which they count as parallel: far more than
+# rounded angles make
 PARALLEL = 2e-4
 # distance [m] of axes below which they count as meeting: far more than a calibration moves them
 MEETING = 5e-4
@@ -22,7 +25,9 @@ MEETING = 5e-4
 
 @dataclass(frozen=True, eq=False)
 class JointAxes:
-    """Directions (nq, 3) and points (nq, 3) [m] of the axes in the base frame, and the flange (4, 4), all at q = 0."""
+    """Directions (nq, 3) and points (nq, 3) [m] of the axes in the base frame, and the flange (4,
+    4), all at q = 0.
+    """
 
     directions: Array
     points: Array
@@ -32,7 +37,9 @@ class JointAxes:
     def of(cls, chain: Chain) -> JointAxes:
         """The axes of a chain."""
         frames = link_frames(chain.placements, np.zeros((1, chain.nq)))[0]
-        return cls(frames[1:, :3, 2].copy(), frames[1:, :3, 3].copy(), frames[-1] @ chain.T_last_flange)
+        return cls(
+            frames[1:, :3, 2].copy(), frames[1:, :3, 3].copy(), frames[-1] @ chain.T_last_flange
+        )
 
     def chain(self) -> Chain:
         """The chain with these axes."""
@@ -69,14 +76,16 @@ class JointAxes:
 
 
 def meeting_point(directions: Array, points: Array) -> tuple[Array, float]:
-    """The point (3,) nearest to axes (n, 3), (n, 3), and the greatest distance [m] of an axis from it; inf if they are
-    parallel."""
+    """The point (3,) nearest to axes (n, 3), (n, 3), and the greatest distance [m] of an axis from
+    it; inf if they are parallel."""
     across = np.eye(3) - directions[:, :, None] * directions[:, None, :]
     total = across.sum(axis=0)
     if np.linalg.cond(total) > 1e6:
         return points[0], np.inf
     centre = np.linalg.solve(total, (across @ points[:, :, None]).sum(axis=0)[:, 0])
-    return centre, float(np.linalg.norm((across @ (centre - points)[:, :, None])[..., 0], axis=1).max())
+    return centre, float(
+        np.linalg.norm((across @ (centre - points)[:, :, None])[..., 0], axis=1).max()
+    )
 
 
 def _let_meet(directions: Array, points: Array, moved: int, other: int) -> None:

@@ -1,11 +1,12 @@
 """The least time in which the TCP goes along a tool path whose speed has a bound.
 
-A motion along a course passes by each of its points, in their order: for each point there is a time at which the TCP is
-within twice the position tolerance of it. (Once for how far the motion may be from the course, and once for what the
-certificate lets it leave out of the course, which lies within the tolerance of what it goes along.) At both ends it is
-at the very point. So between the times of two points, c apart, the TCP moves by c - 4 ε at least, or c - 2 ε where one
-of them is an end, or c from end to end. The sum over any points of the course is the least way of the TCP: few points
-for a straight line, more where it bends. This over the greatest speed is the least time.
+A motion along a course passes by each of its points, in their order: for each point there is a time
+at which the TCP is within twice the position tolerance of it. (Once for how far the motion may be
+from the course, and once for what the certificate lets it leave out of the course, which lies
+within the tolerance of what it goes along.) At both ends it is at the very point. So between the
+times of two points, c apart, the TCP moves by c - 4 ε at least, or c - 2 ε where one of them is an
+end, or c from end to end. The sum over any points of the course is the least way of the TCP: few
+points for a straight line, more where it bends. This over the greatest speed is the least time.
 """
 
 from __future__ import annotations

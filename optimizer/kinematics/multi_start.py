@@ -1,9 +1,9 @@
 """Inverse kinematics of any six-joint arm by Newton's method from many starts: the last resort.
 
-Starts are drawn evenly over all joint positions, from a fixed seed. They come in rounds, until rounds that find nothing
-new follow each other. A branch with a small basin of attraction may be missed all the same: nothing here is `complete`.
-A general arm has at most sixteen branches (E. J. F. Primrose, "On the input-output equation of the general
-7R-mechanism", 1986).
+Starts are drawn evenly over all joint positions, from a fixed seed. They come in rounds, until
+rounds that find nothing new follow each other. A branch with a small basin of attraction may be
+missed all the same: nothing here is `complete`. A general arm has at most sixteen branches (E. J.
+F. Primrose, "On the input-output equation of the general 7R-mechanism", 1986).
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ ROUND, ROUNDS, IDLE = 64, 16, 3
 STEPS, HOPELESS = 45, 0.5
 # error [m, rad] of a solution, far below what is promised
 SOLVED = 1e-11
-# steps [rad] from a solution along its weakest direction, behind which the branch that meets it there lies
+# steps [rad] from a solution along its weakest direction, behind which the branch that meets it
+# there lies
 STRIDES = (0.05, 0.3, 1.0, 2.0, 3.0)
 # smallest singular value below which another branch is likely to be near
 WEAK = 0.1
@@ -51,11 +52,15 @@ class MultiStart:
 
     @classmethod
     def of(cls, model: pin.Model) -> MultiStart | None:
-        """The inverse kinematics of a Pinocchio model with a frame `flange`; None if it has not six joints."""
+        """The inverse kinematics of a Pinocchio model with a frame `flange`; None if it has not six
+        joints.
+        """
         return cls(Chain.of(model)) if model.nq == JOINTS else None
 
     def label(self, q: Array) -> BranchLabel:
-        """The branch of a configuration (6,) [rad], by the nearest solution of its pose: the first on a self-motion."""
+        """The branch of a configuration (6,) [rad], by the nearest solution of its pose: the first
+        on a self-motion.
+        """
         try:
             return numbered(q, self.solve(self._chain.flange(q[None])[0])[0])
         except SingularPose:
@@ -66,7 +71,8 @@ class MultiStart:
         return ()
 
     def solve(self, T: Array) -> tuple[Array, list[BranchLabel]]:
-        """Configurations (n, 6) [rad] in [-pi, pi] that put the flange at T (4, 4), and their labels.
+        """Configurations (n, 6) [rad] in [-pi, pi] that put the flange at T (4, 4), and their
+        labels.
 
         Raises SingularPose if one lies on a self-motion.
         """
@@ -92,7 +98,9 @@ class MultiStart:
             if idle == IDLE or len(fresh) >= MOST_BRANCHES:
                 found = fresh
                 break
-            starts = np.vstack([rng.uniform(-np.pi, np.pi, (ROUND, JOINTS)), self._beside(fresh[len(found) :])])
+            starts = np.vstack(
+                [rng.uniform(-np.pi, np.pi, (ROUND, JOINTS)), self._beside(fresh[len(found) :])]
+            )
             found = fresh
         singular = self._smallest(found)
         for k in np.flatnonzero(singular < SINGULAR_VALUE):
@@ -103,7 +111,9 @@ class MultiStart:
         return found
 
     def _joined(self, found: Array, starts: Array, T: Array) -> Array:
-        """The solutions found (n, 6) [rad], then those that starts (m, 6) lead to and that are not among them."""
+        """The solutions found (n, 6) [rad], then those that starts (m, 6) lead to and that are not
+        among them.
+        """
         q, missed = solved(self._chain, starts, T, STEPS, HOPELESS)
         singular = self._smallest(q) < REACH.singular
         done = (missed < SOLVED) | ((missed < REACH.beyond) & singular)
@@ -113,11 +123,17 @@ class MultiStart:
 
     def _smallest(self, q: Array) -> Array:
         """The smallest singular values (n,) of the Jacobian at configurations (n, 6) [rad]."""
-        return np.asarray(np.linalg.svd(self._chain.flange_and_jacobian(q)[1], compute_uv=False)[:, -1])
+        return np.asarray(
+            np.linalg.svd(self._chain.flange_and_jacobian(q)[1], compute_uv=False)[:, -1]
+        )
 
     def _beside(self, found: Array) -> Array:
-        """Starts (n, 6) beside nearly singular solutions (m, 6), on the side where the branch that meets them lies."""
+        """Starts (n, 6) beside nearly singular solutions (m, 6), on the side where the branch that
+        meets them lies.
+        """
         _, s, vt = np.linalg.svd(self._chain.flange_and_jacobian(found)[1])
         weak = s[:, -1] < WEAK
         null = vt[weak, -1]
-        return np.vstack([found[weak] + side * stride * null for stride in STRIDES for side in (1, -1)])
+        return np.vstack(
+            [found[weak] + side * stride * null for stride in STRIDES for side in (1, -1)]
+        )

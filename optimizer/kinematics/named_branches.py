@@ -29,7 +29,8 @@ class NamedBranches(Protocol):
 def in_order(q: Array) -> Array:
     """Solutions (n, nq) [rad] in the order of their numbers.
 
-    Joints of branches that share them differ by rounding, and half a turn may have either sign: neither counts.
+    Joints of branches that share them differ by rounding, and half a turn may have either sign:
+    neither counts.
     """
     keys = np.round(q, DIGITS)
     keys[keys <= np.round(-np.pi, DIGITS)] = np.round(np.pi, DIGITS)
@@ -37,7 +38,9 @@ def in_order(q: Array) -> Array:
 
 
 def numbered(q: Array, solutions: Array) -> NumberedBranch:
-    """The number of q (nq,) [rad] among the solutions (n, nq) [rad] of its pose, by the nearest of them."""
+    """The number of q (nq,) [rad] among the solutions (n, nq) [rad] of its pose, by the nearest of
+    them.
+    """
     if not len(solutions):
         return NumberedBranch(1)
     return NumberedBranch(int(np.abs(wrapped(solutions - q)).max(axis=1).argmin()) + 1)

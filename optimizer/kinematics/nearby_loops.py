@@ -1,9 +1,10 @@
 """The curves of an arm, all points at once, from those of an arm nearby whose closed form is known.
 
-Where these are long or bend, they get more points: a curve with too few would have to be followed point by point.
-Where two branches meet, the curve over one goes on over the other: together they are loops. A step of Newton's method
-leads points along a loop onto the curve of the arm itself. Next to a singularity that curve is another one: there the
-step is long, or its tangents turn, and the loop is left to be followed point by point.
+Where these are long or bend, they get more points: a curve with too few would have to be followed
+point by point. Where two branches meet, the curve over one goes on over the other: together they
+are loops. A step of Newton's method leads points along a loop onto the curve of the arm itself.
+Next to a singularity that curve is another one: there the step is long, or its tangents turn, and
+the loop is left to be followed point by point.
 """
 
 from __future__ import annotations
@@ -23,10 +24,12 @@ from joulepath.optimizer.kinematics.redundant_curve import CurveStack
 from joulepath.optimizer.kinematics.redundant_pose import RedundantPose
 from joulepath.optimizer.kinematics.traced_stack import TracedStack
 
-# steps along each curve of the arm nearby, twice as many once around, and starts on so many: two of these make a loop
+# steps along each curve of the arm nearby, twice as many once around, and starts on so many: two of
+# these make a loop
 STEPS, STARTS = 12, 3
-# a step that is longer [rad] is cut into parts that long, so many at most; one along which the curve bends by more than
-# BENT_BY [rad], into two, if it is not shorter than LEAST [rad]; so many times over
+# a step that is longer [rad] is cut into parts that long, so many at most; one along which the
+# curve bends by more than BENT_BY [rad], into two, if it is not shorter than LEAST [rad]; so many
+# times over
 LONG, PART, MOST_PARTS, BENT_BY, LEAST, ROUNDS = 0.75, 0.4, 16, 0.35, 0.03, 5
 # farthest points that are kept along a curve [rad], and most that it bends between them [rad]
 SPACED, TURNED = 0.6, 0.4
@@ -38,7 +41,8 @@ WHOLE = (-np.pi, np.pi)
 JOINED, APART = 1e-4, 1e-2
 # product of lengths [rad²] of which one is none
 NONE = 1e-20
-# longest step of Newton's method [rad] that needs no other, and farthest way [rad] of a point to the curve
+# longest step of Newton's method [rad] that needs no other, and farthest way [rad] of a point to
+# the curve
 SHORT, MOVED = 0.01, 0.05
 # kinds of curves of a pose, whole or not, whose parameters are kept
 MOST_KINDS = 64
@@ -46,8 +50,8 @@ MOST_KINDS = 64
 
 @dataclass(frozen=True, eq=False)
 class Loops:
-    """Points (m, nq) [rad] along loops, one loop after the other; each has so many, from its first once around, without
-    full turns left out. From one loop to the next there may be any."""
+    """Points (m, nq) [rad] along loops, one loop after the other; each has so many, from its first
+    once around, without full turns left out. From one loop to the next there may be any."""
 
     points: Array
     counts: list[int]
@@ -58,8 +62,8 @@ class Loops:
 
 
 def loops(pose: RedundantPose) -> tuple[Loops, list[Array]]:
-    """Loops of curves of a pose on the right shoulder; and points (m, 7) [rad] along curves that are in none, since
-    more than two meet at an end, or only one."""
+    """Loops of curves of a pose on the right shoulder; and points (m, 7) [rad] along curves that
+    are in none, since more than two meet at an end, or only one."""
     curves = right_curves(pose)
     if curves is None:
         return Loops(np.zeros((0, 7)), []), []
@@ -97,8 +101,8 @@ def spread_over(points: Array) -> Array:
 
 @lru_cache(MOST_KINDS)
 def _grid(whole: tuple[bool, ...]) -> tuple[Array, NDArray[np.intp], NDArray[np.intp]]:
-    """Parameters (m,) along curves, which are whole or not (n,), the curve (m,) of each, and the rows (2n,) of the
-    first and of the last one of every curve."""
+    """Parameters (m,) along curves, which are whole or not (n,), the curve (m,) of each, and the
+    rows (2n,) of the first and of the last one of every curve."""
     # a whole turn has twice the range
     counts = np.where(whole, 2 * STEPS, STEPS)
     rows = np.repeat(np.arange(len(counts)), counts + 1)
@@ -109,8 +113,9 @@ def _grid(whole: tuple[bool, ...]) -> tuple[Array, NDArray[np.intp], NDArray[np.
 
 
 def _points(curves: CurveStack) -> tuple[Array, list[int], Array]:
-    """Points (m, 7) [rad] along the curves from end to end, one curve after the other; where each of them begins, and
-    m; and the configurations at the first and the last point of each, (2n, 7)."""
+    """Points (m, 7) [rad] along the curves from end to end, one curve after the other; where each
+    of them begins, and m; and the configurations at the first and the last point of each, (2n, 7).
+    """
     u, rows, outer = _grid(tuple(curves.whole.tolist()))
     q = _at(curves, u, rows)
     ends = q[outer]
@@ -142,8 +147,9 @@ def _at(curves: CurveStack, u: Array, rows: NDArray[np.intp]) -> Array:
 
 
 def _steps(q: Array, rows: NDArray[np.intp]) -> tuple[Array, Array]:
-    """The lengths [rad] (n - 1,) of the steps from each of the points q (n, 7) of curves (n,) to the next, 0 from one
-    curve to another, and by how much [rad] the curves bend along them (n - 1,), nearly."""
+    """The lengths [rad] (n - 1,) of the steps from each of the points q (n, 7) of curves (n,) to
+    the next, 0 from one curve to another, and by how much [rad] the curves bend along them (n -
+    1,), nearly."""
     steps = wrapped(q[1:] - q[:-1])
     length = np.sqrt(np.einsum("ij,ij->i", steps, steps))
     other = np.flatnonzero(rows[1:] != rows[:-1])
@@ -153,14 +159,23 @@ def _steps(q: Array, rows: NDArray[np.intp]) -> tuple[Array, Array]:
     turn = np.zeros(len(q))
     turn[1:-1] = np.where(product > NONE, np.sqrt(np.maximum(2 - 2 * cosine, 0.0)), 0.0)
     # at its ends, a curve goes on along another one, and bends as it does next to them
-    turn[0], turn[-1], turn[other], turn[other + 1] = turn[1], turn[-2], turn[other - 1], turn[other + 2]
+    turn[0], turn[-1], turn[other], turn[other + 1] = (
+        turn[1],
+        turn[-2],
+        turn[other - 1],
+        turn[other + 2],
+    )
     return length, (turn[1:] + turn[:-1]) / 2
 
 
 def _parts(length: Array, bend: Array) -> NDArray[np.intp]:
-    """How many parts each step of a length (n,) along which the curve bends (n,) [rad] is to be cut into."""
+    """How many parts each step of a length (n,) along which the curve bends (n,) [rad] is to be cut
+    into.
+    """
     long = np.minimum(np.ceil(length / PART), MOST_PARTS)
-    return np.where(length > LONG, long, np.where((bend > BENT_BY) & (length > LEAST), 2, 1)).astype(np.intp)
+    return np.where(
+        length > LONG, long, np.where((bend > BENT_BY) & (length > LEAST), 2, 1)
+    ).astype(np.intp)
 
 
 def _kept(length: Array, bend: Array, rows: NDArray[np.intp]) -> list[int]:
@@ -168,7 +183,9 @@ def _kept(length: Array, bend: Array, rows: NDArray[np.intp]) -> list[int]:
     starts = [True, *(rows[1:] != rows[:-1]).tolist(), True]
     found, way, turned = list[int](), 0.0, 0.0
     # plain numbers: every choice depends on the one before
-    for k, (step, turn) in enumerate(zip([*length.tolist(), 0.0], [*bend.tolist(), 0.0], strict=True)):
+    for k, (step, turn) in enumerate(
+        zip([*length.tolist(), 0.0], [*bend.tolist(), 0.0], strict=True)
+    ):
         if starts[k] or starts[k + 1] or way + step > SPACED or turned + turn > TURNED:
             found.append(k)
             way = turned = 0.0
@@ -178,7 +195,12 @@ def _kept(length: Array, bend: Array, rows: NDArray[np.intp]) -> list[int]:
 
 def right_curves(pose: RedundantPose) -> CurveStack | None:
     """The curves of a pose on the right shoulder; None if there are none."""
-    each = [(interval, elbow) for elbow in (1.0, -1.0) for interval in pose.intervals(elbow) for _ in range(2)]
+    each = [
+        (interval, elbow)
+        for elbow in (1.0, -1.0)
+        for interval in pose.intervals(elbow)
+        for _ in range(2)
+    ]
     if not each:
         return None
     interval = np.array([ends for ends, _ in each]).T
@@ -198,7 +220,9 @@ def _meeting(ends: Array) -> list[int]:
 
 
 def followed(chain: Chain, loops: Loops, T: Array) -> tuple[TracedStack, Mask]:
-    """The curves that hold the flange at T (4, 4) along loops, and which of the loops (n,) have one."""
+    """The curves that hold the flange at T (4, 4) along loops, and which of the loops (n,) have
+    one.
+    """
     if not loops.counts:
         return TracedStack.of([]), np.zeros(0, dtype=bool)
     points = loops.points
@@ -206,7 +230,9 @@ def followed(chain: Chain, loops: Loops, T: Array) -> tuple[TracedStack, Mask]:
     first, final = end - loops.counts, end - 1
     along = np.empty_like(points)
     along[1:-1] = points[2:] - points[:-2]
-    along[first] = along[final] = points[first + 1] - points[first] + points[final] - points[final - 1]
+    along[first] = along[final] = (
+        points[first + 1] - points[first] + points[final] - points[final - 1]
+    )
     q, tangent, moved = _onto(chain, points, along, T)
     # once around, a loop is where it began, but for full turns
     q[final], tangent[final] = q[first] + turns(points[final] - points[first]), tangent[first]
@@ -225,8 +251,8 @@ def followed(chain: Chain, loops: Loops, T: Array) -> tuple[TracedStack, Mask]:
 
 
 def _onto(chain: Chain, q: Array, along: Array, T: Array) -> tuple[Array, Array, Array]:
-    """Points near q (n, nq) [rad] of the curves that hold the flange at T (4, 4), unit tangents there, and how far
-    [rad] they are (n,); from q across the directions `along` (n, nq)."""
+    """Points near q (n, nq) [rad] of the curves that hold the flange at T (4, 4), unit tangents
+    there, and how far [rad] they are (n,); from q across the directions `along` (n, nq)."""
     move, tangent = step_across(chain, q, along, T)
     reached = q + move
     moved = np.sqrt(np.einsum("ij,ij->i", move, move))

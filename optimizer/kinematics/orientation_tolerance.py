@@ -1,4 +1,6 @@
-"""Orientations that a pose with an orientation tolerance allows: distance from them, projection onto them, samples."""
+"""Orientations that a pose with an orientation tolerance allows: distance from them, projection
+onto them, samples.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ PARALLEL = 1e-12
 
 
 def tilt(pose: ConeOrientedPose, R: Array) -> Array:
-    """Rotation vector (3,) [rad], base frame, from `direction` to `axis` as it points at the orientation R (3, 3)."""
+    """Rotation vector (3,) [rad], base frame, from `direction` to `axis` as it points at the
+    orientation R (3, 3).
+    """
     pointing = R @ pose.axis
     normal = np.cross(pose.direction, pointing)
     sine = float(np.linalg.norm(normal))
@@ -24,7 +28,9 @@ def tilt(pose: ConeOrientedPose, R: Array) -> Array:
 
 
 def excess_angle(pose: ConeOrientedPose, R: Array) -> float:
-    """Angle [rad] by which the tool axis at R (3, 3) lies outside the cone; 0 for an allowed orientation."""
+    """Angle [rad] by which the tool axis at R (3, 3) lies outside the cone; 0 for an allowed
+    orientation.
+    """
     return max(0.0, float(np.linalg.norm(tilt(pose, R))) - pose.half_angle)
 
 
@@ -40,8 +46,8 @@ def nearest_orientation(pose: ConeOrientedPose, R: Array) -> Array:
 def sample_orientations(pose: ConeOrientedPose, count: int) -> Array:
     """`count` allowed orientations (count, 3, 3), evenly spread and always the same.
 
-    The tool axis is spread evenly over the cone's cap of the sphere, the rotation about it evenly over the circle. The
-    points are of a Halton sequence.
+    The tool axis is spread evenly over the cone's cap of the sphere, the rotation about it evenly
+    over the circle. The points are of a Halton sequence.
     """
     if pose.half_angle > 0:
         level, azimuth, spin = (_radical_inverse(base, count) for base in (2, 3, 5))
@@ -77,7 +83,8 @@ def _least_rotation(a: Array, b: Array) -> Array:
 
 
 def _radical_inverse(base: int, count: int) -> Array:
-    """The numbers 0 ... count - 1 with their digits mirrored at the point (count,): one axis of the Halton sequence.
+    """The numbers 0 ... count - 1 with their digits mirrored at the point (count,): one axis of the
+    Halton sequence.
 
     scipy.stats has it, too, but takes longer to import than all else that a request needs.
     """

@@ -1,6 +1,7 @@
 """Path constraints: a tool axis within a cone, and limits on the speeds of TCP and elbow.
 
-Each gives ratios value / limit for joint positions and speeds, and their gradients. A ratio above 1 violates the limit.
+Each gives ratios value / limit for joint positions and speeds, and their gradients. A ratio above 1
+violates the limit.
 """
 
 from __future__ import annotations
@@ -14,17 +15,24 @@ import numpy as np
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
-from joulepath.optimizer.kinematics.jacobians import direction_jacobian, point_jacobian, velocity_gradient
+from joulepath.optimizer.kinematics.jacobians import (
+    direction_jacobian,
+    point_jacobian,
+    velocity_gradient,
+)
 from joulepath.optimizer.kinematics.tcp import T_last_tcp
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.tool_cone import ToolCone
 
-# angle [rad] or speed [m/s] below which the gradient is replaced by a finite one: both have a kink at zero
+# angle [rad] or speed [m/s] below which the gradient is replaced by a finite one: both have a kink
+# at zero
 AT_REST = 1e-9
 
 
 class ConstraintRatios(NamedTuple):
-    """Ratios value / limit (n, c) of c constraints at n states, and their gradients by q and by v (n, c, nq)."""
+    """Ratios value / limit (n, c) of c constraints at n states, and their gradients by q and by v
+    (n, c, nq).
+    """
 
     value: Array
     by_q: Array
@@ -43,16 +51,22 @@ class PathConstraint(Protocol):
         """Ratios (n, c) for frames (n, nq + 1, 4, 4), q [rad] and v [rad/s] (n, nq)."""
         ...
 
-    def linearised(self, frames: Array, q: Array, v: Array, wanted: Mask | None = None) -> ConstraintRatios:
-        """Ratios and gradients at the same states. Those that are not `wanted` (n, c) may be left out: zero."""
+    def linearised(
+        self, frames: Array, q: Array, v: Array, wanted: Mask | None = None
+    ) -> ConstraintRatios:
+        """Ratios and gradients at the same states. Those that are not `wanted` (n, c) may be left
+        out: zero.
+        """
         ...
 
 
 @dataclass(frozen=True)
 class ToolConeConstraint:
-    """The direction `axis` (3,) of the last link, in its frame, stays within `half_angle` [rad] of `direction` (3,).
+    """The direction `axis` (3,) of the last link, in its frame, stays within `half_angle` [rad] of
+    `direction` (3,).
 
-    `direction` is in the base frame; both are unit vectors. The ratio is the angle between them over the half angle.
+    `direction` is in the base frame; both are unit vectors. The ratio is the angle between them
+    over the half angle.
     """
 
     axis: Array
@@ -63,21 +77,29 @@ class ToolConeConstraint:
 
     @staticmethod
     def of(arm: Arm, cone: ToolCone) -> ToolConeConstraint:
-        """The constraint of an arm's cone, with its axis transformed from the TCP frame into that of the last link."""
-        return ToolConeConstraint(T_last_tcp(arm)[:3, :3] @ cone.axis, cone.direction, cone.half_angle)
+        """The constraint of an arm's cone, with its axis transformed from the TCP frame into that
+        of the last link.
+        """
+        return ToolConeConstraint(
+            T_last_tcp(arm)[:3, :3] @ cone.axis, cone.direction, cone.half_angle
+        )
 
     def ratios(self, frames: Array, q: Array, v: Array) -> Array:
         """Ratios (n, 1) for frames (n, nq + 1, 4, 4), q [rad] and v [rad/s] (n, nq)."""
         return (self._angle(frames[:, -1, :3, :3] @ self.axis) / self.half_angle)[:, None]
 
-    def linearised(self, frames: Array, q: Array, v: Array, wanted: Mask | None = None) -> ConstraintRatios:
+    def linearised(
+        self, frames: Array, q: Array, v: Array, wanted: Mask | None = None
+    ) -> ConstraintRatios:
         """Ratios and gradients at the same states; the angle's differential is -d(cos) / sin."""
         pointing = frames[:, -1, :3, :3] @ self.axis
         angle = self._angle(pointing)
         slope = -(self.direction @ direction_jacobian(frames, pointing))
         by_q = slope / (np.maximum(np.sin(angle), AT_REST) * self.half_angle)[:, None]
         return ConstraintRatios(
-            (angle / self.half_angle)[:, None], by_q[:, None], np.zeros((*v.shape[:1], 1, v.shape[1]))
+            (angle / self.half_angle)[:, None],
+            by_q[:, None],
+            np.zeros((*v.shape[:1], 1, v.shape[1])),
         )
 
     def _angle(self, pointing: Array) -> Array:
@@ -88,7 +110,9 @@ class ToolConeConstraint:
 
 @dataclass(frozen=True)
 class PointSpeedConstraint:
-    """Points (c, 3) [m] fixed to a link, in its frame, move at most at `limit` [m/s] in the base frame."""
+    """Points (c, 3) [m] fixed to a link, in its frame, move at most at `limit` [m/s] in the base
+    frame.
+    """
 
     name: str
     link: int
@@ -102,10 +126,17 @@ class PointSpeedConstraint:
 
     def ratios(self, frames: Array, q: Array, v: Array) -> Array:
         """Ratios (n, c) for frames (n, nq + 1, 4, 4), q [rad] and v [rad/s] (n, nq)."""
-        velocities = [point_jacobian(frames, self.link, x) @ v[..., None] for x in self._positions(frames)]
-        return np.stack([np.linalg.norm(velocity[..., 0], axis=1) for velocity in velocities], axis=1) / self.limit
+        velocities = [
+            point_jacobian(frames, self.link, x) @ v[..., None] for x in self._positions(frames)
+        ]
+        return (
+            np.stack([np.linalg.norm(velocity[..., 0], axis=1) for velocity in velocities], axis=1)
+            / self.limit
+        )
 
-    def linearised(self, frames: Array, q: Array, v: Array, wanted: Mask | None = None) -> ConstraintRatios:
+    def linearised(
+        self, frames: Array, q: Array, v: Array, wanted: Mask | None = None
+    ) -> ConstraintRatios:
         """Ratios and gradients at the same states."""
         value, by_q, by_v = [], [], []
         for x in self._positions(frames):
@@ -116,10 +147,15 @@ class PointSpeedConstraint:
             value.append(speed)
             by_q.append((along @ velocity_gradient(frames, J, v))[:, 0])
             by_v.append((along @ J)[:, 0])
-        return ConstraintRatios(*(np.stack(each, axis=1) / self.limit for each in (value, by_q, by_v)))
+        return ConstraintRatios(
+            *(np.stack(each, axis=1) / self.limit for each in (value, by_q, by_v))
+        )
 
     def _positions(self, frames: Array) -> list[Array]:
-        return [frames[:, self.link, :3, :3] @ point + frames[:, self.link, :3, 3] for point in self.points]
+        return [
+            frames[:, self.link, :3, :3] @ point + frames[:, self.link, :3, 3]
+            for point in self.points
+        ]
 
 
 @dataclass(frozen=True)
@@ -145,22 +181,37 @@ class PathConstraints:
         return np.concatenate([limit.ratios(frames, q, v) for limit in self.limits], axis=1)
 
     def speed_ratios(self, q: Array, v: Array) -> Array:
-        """The largest ratio (n,) of a speed at q [rad] and v [rad/s] (n, nq); 0 without such limits."""
+        """The largest ratio (n,) of a speed at q [rad] and v [rad/s] (n, nq); 0 without such
+        limits.
+        """
         frames, speeds = link_frames(self.placements, q), np.zeros((len(q), 1))
-        limited = [each.ratios(frames, q, v) for each in self.limits if isinstance(each, PointSpeedConstraint)]
+        limited = [
+            each.ratios(frames, q, v)
+            for each in self.limits
+            if isinstance(each, PointSpeedConstraint)
+        ]
         return np.asarray(np.hstack([speeds, *limited]).max(axis=1))
 
     def linearised(self, q: Array, v: Array, wanted: Mask | None = None) -> ConstraintRatios:
-        """Ratios and gradients at q [rad] and v [rad/s] (n, nq); those not `wanted` (n, c) may be zero."""
+        """Ratios and gradients at q [rad] and v [rad/s] (n, nq); those not `wanted` (n, c) may be
+        zero.
+        """
         frames = link_frames(self.placements, q)
         if wanted is None:
             parts = [limit.linearised(frames, q, v) for limit in self.limits]
         else:
-            columns = np.split(wanted, np.cumsum([len(limit.names) for limit in self.limits])[:-1], axis=1)
-            parts = [limit.linearised(frames, q, v, each) for limit, each in zip(self.limits, columns, strict=True)]
+            columns = np.split(
+                wanted, np.cumsum([len(limit.names) for limit in self.limits])[:-1], axis=1
+            )
+            parts = [
+                limit.linearised(frames, q, v, each)
+                for limit, each in zip(self.limits, columns, strict=True)
+            ]
         if len(parts) == 1:
             return parts[0]
-        return ConstraintRatios(*(np.concatenate(each, axis=1) for each in zip(*parts, strict=True)))
+        return ConstraintRatios(
+            *(np.concatenate(each, axis=1) for each in zip(*parts, strict=True))
+        )
 
 
 def path_constraint_list(arm: Arm) -> list[PathConstraint]:
@@ -169,9 +220,17 @@ def path_constraint_list(arm: Arm) -> list[PathConstraint]:
     if arm.tool_cone is not None:
         limits.append(ToolConeConstraint.of(arm, arm.tool_cone))
     if arm.tcp_speed is not None:
-        limits.append(PointSpeedConstraint("tcp_speed", arm.robot.nq, T_last_tcp(arm)[None, :3, 3], arm.tcp_speed))
+        limits.append(
+            PointSpeedConstraint(
+                "tcp_speed", arm.robot.nq, T_last_tcp(arm)[None, :3, 3], arm.tcp_speed
+            )
+        )
     if arm.elbow_speed is not None and arm.robot.elbow is not None:
-        limits.append(PointSpeedConstraint("elbow_speed", arm.robot.elbow.link, arm.robot.elbow.axis, arm.elbow_speed))
+        limits.append(
+            PointSpeedConstraint(
+                "elbow_speed", arm.robot.elbow.link, arm.robot.elbow.axis, arm.elbow_speed
+            )
+        )
     return limits
 
 

@@ -1,10 +1,13 @@
-"""Inverse kinematics along a path of the TCP: Levenberg-Marquardt, each point from the configuration of the last.
+"""Inverse kinematics along a path of the TCP: Levenberg-Marquardt, each point from the
+configuration of the last.
 
-The points are positions alone (three equations, orientation free) or whole poses. A step is the damped least squares
-step Jᵀ (J Jᵀ + μ I)⁻¹ e (Levenberg 1944, Marquardt 1963; Wampler 1986 for arms). Of all steps with the same effect, it
-moves the joints least. scipy's Levenberg-Marquardt, from MINPACK, needs at least as many equations as unknowns.
+The points are positions alone (three equations, orientation free) or whole poses. A step is the
+damped least squares step Jᵀ (J Jᵀ + μ I)⁻¹ e (Levenberg 1944, Marquardt 1963; Wampler 1986 for
+arms). Of all steps with the same effect, it moves the joints least. scipy's Levenberg-Marquardt,
+from MINPACK, needs at least as many equations as unknowns.
 
-A configuration is part of the motion only if it reaches its point, is not nearly singular and is within the limits.
+A configuration is part of the motion only if it reaches its point, is not nearly singular and is
+within the limits.
 """
 
 from __future__ import annotations
@@ -27,7 +30,8 @@ from joulepath.optimizer.problem.arrays import frozen
 from joulepath.optimizer.problem.pose import Pose
 
 MOST_ITERATIONS = 200
-# error [m, rad] at which the search for a point has converged: a ten-thousandth of the finest tolerance
+# error [m, rad] at which the search for a point has converged: a ten-thousandth of the finest
+# tolerance
 CONVERGED = 1e-13
 # longest step of a joint [rad]: beyond it, the linearisation is a poor model
 LONGEST_STEP = 0.5
@@ -47,8 +51,8 @@ class PathPoint:
     rotation_error: Radians | None
     """Angle of the TCP to the orientation of the pose; null for positions."""
     smallest_singular_value: Ratio
-    """Smallest singular value of the TCP's Jacobian in metres and radians: of its translational rows
-    for a position, of all rows for a pose."""
+    """Smallest singular value of the TCP's Jacobian in metres and radians: of its translational
+    rows for a position, of all rows for a pose."""
     reached: bool = field(init=False)
     """Whether the errors are within `tolerance`."""
     written: bool = field(init=False)
@@ -72,12 +76,14 @@ def follow(
 ) -> list[PathPoint]:
     """Configurations along a path of positions (n, 3) [m] or poses of the TCP in the base frame.
 
-    The search for the first point starts from `guess` (nq,) [rad], for each other point from the last configuration
-    that is part of the motion. If that fails, it starts once more from `guess`. A point is reached if its error is at
-    most `tolerance` [m, rad]. `near_singular` is the least smallest singular value of a configuration that is part of
-    the motion. No search for a point begins after `deadline`.
+    The search for the first point starts from `guess` (nq,) [rad], for each other point from the
+    last configuration that is part of the motion. If that fails, it starts once more from `guess`.
+    A point is reached if its error is at most `tolerance` [m, rad]. `near_singular` is the least
+    smallest singular value of a configuration that is part of the motion. No search for a point
+    begins after `deadline`.
 
-    Raises InvalidProblem or OutsideLimits, or DeadlineExceeded if the deadline passes before the first search.
+    Raises InvalidProblem or OutsideLimits, or DeadlineExceeded if the deadline passes before the
+    first search.
     """
     guess = frozen(guess, (arm.robot.nq,), "guess")
     arm.check_inside("guess", guess)
@@ -92,7 +98,9 @@ def follow(
             if not points:
                 raise DeadlineExceeded([])
             start = search.found(wanted, last)
-            points.append(PathPoint(start.q, start.position, start.rotation, start.singular_value, "deadline"))
+            points.append(
+                PathPoint(start.q, start.position, start.rotation, start.singular_value, "deadline")
+            )
             continue
         attempts = [search.solve(wanted, last)]
         if attempts[0].worst > tolerance and last is not guess:
@@ -107,7 +115,9 @@ def follow(
             reason = "outside_limits"
         if reason is None:
             last = found.q
-        points.append(PathPoint(found.q, found.position, found.rotation, found.singular_value, reason))
+        points.append(
+            PathPoint(found.q, found.position, found.rotation, found.singular_value, reason)
+        )
     return points
 
 
@@ -129,22 +139,31 @@ class _Search:
     def __init__(self, arm: Arm) -> None:
         self._model = arm.robot.model.copy()
         last = self._model.njoints - 1
-        self._tcp = self._model.addFrame(pin.Frame("tcp", last, pin.SE3(T_last_tcp(arm)), pin.FrameType.OP_FRAME))
+        self._tcp = self._model.addFrame(
+            pin.Frame("tcp", last, pin.SE3(T_last_tcp(arm)), pin.FrameType.OP_FRAME)
+        )
         self._data = self._model.createData()
 
     def solve(self, wanted: Array, start: Array) -> _Found:
-        """The configuration at which the search from `start` (nq,) for a position (3,) or pose (4, 4) ends."""
+        """The configuration at which the search from `start` (nq,) for a position (3,) or pose (4,
+        4) ends.
+        """
         q, error, damping = start, self._error(wanted, start), FIRST_DAMPING
         jacobian = self._jacobian(q)[: len(error)]
         for _ in range(MOST_ITERATIONS):
             if np.abs(error).max() < CONVERGED or damping > MOST_DAMPING:
                 break
-            step = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + damping * np.eye(len(error)), error)
+            step = jacobian.T @ np.linalg.solve(
+                jacobian @ jacobian.T + damping * np.eye(len(error)), error
+            )
             step /= max(1.0, np.abs(step).max() / LONGEST_STEP)
             tried = self._error(wanted, q + step)
             if tried @ tried < error @ error:
                 q, error = q + step, tried
-                jacobian, damping = self._jacobian(q)[: len(error)], max(damping / 10, LEAST_DAMPING)
+                jacobian, damping = (
+                    self._jacobian(q)[: len(error)],
+                    max(damping / 10, LEAST_DAMPING),
+                )
             else:
                 damping *= 10
         # full turns of a joint reach the same pose: the configuration nearest to the start is meant
@@ -162,7 +181,9 @@ class _Search:
         )
 
     def _error(self, wanted: Array, q: Array) -> Array:
-        """From the TCP to the point, in base axes: translation (3,) [m] and, for a pose, rotation vector (3,) [rad]."""
+        """From the TCP to the point, in base axes: translation (3,) [m] and, for a pose, rotation
+        vector (3,) [rad].
+        """
         pin.forwardKinematics(self._model, self._data, q)
         T = pin.updateFramePlacement(self._model, self._data, self._tcp)
         if wanted.ndim == 1:
@@ -173,5 +194,7 @@ class _Search:
     def _jacobian(self, q: Array) -> Array:
         """Geometric Jacobian of the TCP (6, nq) in base axes, linear rows first."""
         return np.asarray(
-            pin.computeFrameJacobian(self._model, self._data, q, self._tcp, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+            pin.computeFrameJacobian(
+                self._model, self._data, q, self._tcp, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+            )
         )

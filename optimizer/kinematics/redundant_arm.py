@@ -1,4 +1,6 @@
-"""Inverse kinematics of arms of the form `SphericalShoulder`: every curve of configurations that hold a pose."""
+"""Inverse kinematics of arms of the form `SphericalShoulder`: every curve of configurations that
+hold a pose.
+"""
 
 from __future__ import annotations
 
@@ -27,14 +29,18 @@ Q7_ANGLES, ELBOW_ANGLES = 48, 48
 
 @dataclass(frozen=True, eq=False)
 class RedundantArm:
-    """`ClosedForm` of a redundant arm. Its configurations are never isolated, but where a curve is a point."""
+    """`ClosedForm` of a redundant arm. Its configurations are never isolated, but where a curve is
+    a point.
+    """
 
     form: SphericalShoulder
     complete, confirmed = True, False
 
     @classmethod
     def of(cls, model: pin.Model) -> RedundantArm | None:
-        """The closed form of a Pinocchio model with a frame `flange`; None if it is not of this form."""
+        """The closed form of a Pinocchio model with a frame `flange`; None if it is not of this
+        form.
+        """
         form = SphericalShoulder.of(model)
         return None if form is None else cls(form)
 
@@ -51,15 +57,20 @@ class RedundantArm:
         """No configuration: all are on self-motions."""
         return np.zeros((0, 7)), []
 
-    def self_motions(self, T: Array, limits: Limits | None = None) -> Sequence[RedundantCurve | FreeTurn]:
-        """All curves that hold the flange at T (4, 4), cut to arcs that hold every member within the limits, then what
-        turns freely on a singularity."""
+    def self_motions(
+        self, T: Array, limits: Limits | None = None
+    ) -> Sequence[RedundantCurve | FreeTurn]:
+        """All curves that hold the flange at T (4, 4), cut to arcs that hold every member within
+        the limits, then what turns freely on a singularity."""
         pose = RedundantPose(self.form, T)
         curves = [
             RedundantCurve.of(pose, sheet, interval, label_of(sheet))
             for elbow in pose.elbows(limits)
             for interval in pose.intervals(elbow)
-            for sheet in (np.array([shoulder, elbow, wrist]) for shoulder, wrist in product((1.0, -1.0), repeat=2))
+            for sheet in (
+                np.array([shoulder, elbow, wrist])
+                for shoulder, wrist in product((1.0, -1.0), repeat=2)
+            )
         ]
         aligned: Sequence[RedundantCurve] = curves
         if limits is not None:
@@ -67,7 +78,9 @@ class RedundantArm:
         return [*curves, *crossing(aligned), *stretched(pose, label_of(np.ones(3)))]
 
     def distance_to_reach(self, T: Array) -> float:
-        """Distance [m] by which T (4, 4) must shift, with its orientation kept, to have a solution; 0 if it has one."""
+        """Distance [m] by which T (4, 4) must shift, with its orientation kept, to have a solution;
+        0 if it has one.
+        """
         pose = RedundantPose(self.form, T)
         if pose.intervals(1.0) or pose.intervals(-1.0):
             return 0.0
@@ -81,20 +94,26 @@ class RedundantArm:
         def miss(x: Array) -> float:
             return float(self._misses(pose, x[:1], x[1:])[0])
 
-        refined = minimize(miss, start, method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-12})
+        refined = minimize(
+            miss, start, method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-12}
+        )
         return float(min(refined.fun, tried[best]))
 
     def _misses(self, pose: RedundantPose, q7: Array, theta: Array) -> Array:
         """Distances (n,) [m] of v from where the wrist's fifth axis can have it, at angles (n,)."""
         form, v, S = self.form, pose.from_wrist(q7).T, self.form.shoulder_about_fifth(theta)
-        # about the sixth axis, S is on the ring that the fifth axis leaves it: from angle - cone to angle + cone of it
+        # about the sixth axis, S is on the ring that the fifth axis leaves it: from angle - cone to
+        # angle + cone of it
         length = np.linalg.norm(S, axis=1)
         cone = np.arctan2(np.hypot(S[:, 0], S[:, 1]), S[:, 2])
         inclined = float(np.arctan2(form.inclined, form.fifth_in_6[2]))
         least, most = np.abs(inclined - cone), np.pi - np.abs(np.pi - inclined - cone)
         polar = np.arctan2(np.hypot(v[:, 0], v[:, 1]), v[:, 2])
         nearest = np.clip(polar, least, most)
-        across, up = np.hypot(v[:, 0], v[:, 1]) - length * np.sin(nearest), v[:, 2] - length * np.cos(nearest)
+        across, up = (
+            np.hypot(v[:, 0], v[:, 1]) - length * np.sin(nearest),
+            v[:, 2] - length * np.cos(nearest),
+        )
         return np.asarray(np.hypot(across, up))
 
     def _angles(self, q: Array) -> tuple[float, float, float]:
@@ -111,17 +130,18 @@ class RedundantArm:
 
     @cached_property
     def _label_waves(self) -> list[list[float]]:
-        """Coefficients of 1, cos θ and sin θ in S about the fifth axis, three rows; then the first two axes of joint 6
-        in the frame of link 5."""
+        """Coefficients of 1, cos θ and sin θ in S about the fifth axis, three rows; then the first
+        two axes of joint 6 in the frame of link 5."""
         return [*self.form.shoulder_waves.T.tolist(), *self.form.placements[5][:3, :2].T.tolist()]
 
 
 def label_of(sheet: Array) -> Label:
     """The label of a sheet's signs (3,).
 
-    The shoulder is `right` if the second angle is on the positive side of its singularity, where the third axis is in
-    line with the first. The elbow is `up` if θ > 0, one of the two ways to bend it from where shoulder and wrist are
-    nearest. The wrist is `no_flip` if the shoulder, seen from the sixth axis, is on the positive side of the fifth.
+    The shoulder is `right` if the second angle is on the positive side of its singularity, where
+    the third axis is in line with the first. The elbow is `up` if θ > 0, one of the two ways to
+    bend it from where shoulder and wrist are nearest. The wrist is `no_flip` if the shoulder, seen
+    from the sixth axis, is on the positive side of the fifth.
     """
     return Label(
         shoulder="right" if sheet[0] > 0 else "left",

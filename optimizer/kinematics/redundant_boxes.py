@@ -1,21 +1,31 @@
-"""Boxes of joint positions that hold every configuration of a sheet of `RedundantPose` over an interval of q7.
+"""Boxes of joint positions that hold every configuration of a sheet of `RedundantPose` over an
+interval of q7.
 
-All bounds are of one kind: a vector that is moved by at most m from its place at a radius r about an axis has its
-azimuth changed by at most asin(m / r), or by anything once m reaches r. In order:
+All bounds are of one kind: a vector that is moved by at most m from its place at a radius r about
+an axis has its azimuth changed by at most asin(m / r), or by anything once m reaches r. In order:
 
-- |v|² and v_z are waves over q7, with exact ranges. |v|² gives the range of cos θ and so of θ, exactly; θ that of c(θ).
-- ψ: the range of its cosine from those of c, v_z and r. v moves by at most its radius about the last axis times the
+- |v|² and v_z are waves over q7, with exact ranges. |v|² gives the range of cos θ and so of θ,
+  exactly; θ that of c(θ).
+- ψ: the range of its cosine from those of c, v_z and r. v moves by at most its radius about the
+  last axis times the
   half interval; this bounds its azimuth about the sixth axis, and so q6.
-- q5: the azimuth of S about the fifth axis, seen from both sides. On one side, S moves by ρ times the half range of θ.
-  On the other, S is at the angle β from the sixth axis: fifth axis, sixth axis and v make a spherical triangle with the
-  angle ψ at the sixth axis and β at the fifth, so that (v_z - e c) = s sqrt(1 - e²) cos β, with s the distance of S
+- q5: the azimuth of S about the fifth axis, seen from both sides. On one side, S moves by ρ times
+  the half range of θ.
+  On the other, S is at the angle β from the sixth axis: fifth axis, sixth axis and v make a
+  spherical triangle with the
+  angle ψ at the sixth axis and β at the fifth, so that (v_z - e c) = s sqrt(1 - e²) cos β, with s
+  the distance of S
   from the fifth axis, s² = |v|² - c².
-- The orientation of link 3 is turned by at most H, the sum of the half ranges of q4 … q7. So is the third axis, seen
-  from the first, and the first, seen from the third: this bounds q2, q1 and q3. Where the third axis is within H of
-  the first, q1 and q3 may be anything: a box on a singularity holds the configurations that turn freely there, too.
+- The orientation of link 3 is turned by at most H, the sum of the half ranges of q4 … q7. So is the
+  third axis, seen
+  from the first, and the first, seen from the third: this bounds q2, q1 and q3. Where the third
+  axis is within H of
+  the first, q1 and q3 may be anything: a box on a singularity holds the configurations that turn
+  freely there, too.
 
-Blurred boxes hold the configurations of every pose of the same orientation that is no farther from the given one than
-`blur`. S, seen from the last link, and with it v may then be off by that: so may |v| and v_z, and v moves by more.
+Blurred boxes hold the configurations of every pose of the same orientation that is no farther from
+the given one than `blur`. S, seen from the last link, and with it v may then be off by that: so may
+|v| and v_z, and v moves by more.
 """
 
 from __future__ import annotations
@@ -31,7 +41,8 @@ from joulepath.optimizer.kinematics.spinors import Complex
 
 # what cosines [1] and half sides [rad] are widened by, for rounding; the former is a root's
 COSINE, ROUNDING = 1e-14, 1e-9
-# a range is kept as its least value, negative, and its greatest: what bounds one from above does so with the other
+# a range is kept as its least value, negative, and its greatest: what bounds one from above does so
+# with the other
 _SIGNS = np.array([[-1.0], [1.0]])
 # a squared radius [m²] and a radius [m] that divide nothing by zero
 _NO_SQUARE, _NO_RADIUS = 1e-300, 1e-150
@@ -48,8 +59,8 @@ class Cells:
 
 @dataclass(frozen=True, eq=False)
 class HeldBoxes:
-    """Middles and half sides (n, 7) [rad] of boxes around the configurations of cells, which (n,) may hold any, and of
-    which (n,) both cosines are between -1 and 1 throughout."""
+    """Middles and half sides (n, 7) [rad] of boxes around the configurations of cells, which (n,)
+    may hold any, and of which (n,) both cosines are between -1 and 1 throughout."""
 
     centre: Array
     half: Array
@@ -58,22 +69,26 @@ class HeldBoxes:
 
 
 def boxes_of(pose: RedundantPose, cells: Cells) -> tuple[Array, Array]:
-    """Middles and half sides (n, 7) [rad] of boxes around the configurations of cells, which are in the intervals of
-    their sheets."""
+    """Middles and half sides (n, 7) [rad] of boxes around the configurations of cells, which are in
+    the intervals of their sheets."""
     centre, half, _ = _boxes(pose, cells, 0.0)
     return centre.T, half.T
 
 
 def held_boxes(pose: RedundantPose, cells: Cells, blur: float = 0.0) -> HeldBoxes:
-    """The boxes around the configurations that cells, anywhere on the circle, have of all poses within `blur` [m]."""
+    """The boxes around the configurations that cells, anywhere on the circle, have of all poses
+    within `blur` [m].
+    """
     centre, half, cosines = _boxes(pose, cells, blur)
     held = cosines.min(axis=0) >= -1
-    return HeldBoxes(centre.T, half.T, np.asarray(held), np.asarray(held & (cosines.max(axis=0) <= 1)))
+    return HeldBoxes(
+        centre.T, half.T, np.asarray(held), np.asarray(held & (cosines.max(axis=0) <= 1))
+    )
 
 
 def _boxes(pose: RedundantPose, cells: Cells, blur: float) -> tuple[Array, Array, Array]:
-    """Middles and half sides (7, n) [rad] of the boxes of `held_boxes`, and the ranges (4, n) of the cosines of θ and
-    ψ."""
+    """Middles and half sides (7, n) [rad] of the boxes of `held_boxes`, and the ranges (4, n) of
+    the cosines of θ and ψ."""
     form, (side, elbow, wrist), n = pose.form, cells.sheet.T, len(cells.low)
     middle, half = (cells.low + cells.high) / 2, np.minimum((cells.high - cells.low) / 2, np.pi)
     c, s = np.cos(half / 2), np.sin(half / 2)
@@ -115,7 +130,9 @@ def _boxes(pose: RedundantPose, cells: Cells, blur: float) -> tuple[Array, Array
 
 
 def with_shoulder(pose: RedundantPose, centre: Array, sides: Array) -> None:
-    """Sets the half sides of the first three joints, which those of the others bound; all (7, n) [rad]."""
+    """Sets the half sides of the first three joints, which those of the others bound; all (7, n)
+    [rad].
+    """
     turn = np.add.reduce(sides[3:], axis=0)
     lean = np.abs(np.sin(pose.form.lean(centre[1])))
     # once the sine of the turn is 1, the first and the third joint may have any angle
@@ -125,8 +142,8 @@ def with_shoulder(pose: RedundantPose, centre: Array, sides: Array) -> None:
 
 
 def _backwards(last: Array, fourth: Array, at_zero: float, seventh: Array) -> Complex:
-    """e^{-iq} (4, n) of the last four joints (4, n), with `angle_waves` of `at_zero` less the fourth, and of the
-    seventh."""
+    """e^{-iq} (4, n) of the last four joints (4, n), with `angle_waves` of `at_zero` less the
+    fourth, and of the seventh."""
     found = np.empty(last.shape, dtype=complex)
     real, imag = found.real, found.imag
     real[1:3], imag[1:3] = np.cos(last[1:3]), -np.sin(last[1:3])
@@ -136,9 +153,12 @@ def _backwards(last: Array, fourth: Array, at_zero: float, seventh: Array) -> Co
     return found
 
 
-def _wave_ranges(parts: tuple[Array, Array, Array], turns: Array, cos: Array, sin: Array) -> tuple[Array, Array]:
-    """Ranges (m, 2, n) of the waves of `parts`, as `wave_ranges` has them, with the angle off that of `angle_waves` (3,
-    n) by at most one of these cosines and sines (n,), up to π; widened for rounding. And the other waves there."""
+def _wave_ranges(
+    parts: tuple[Array, Array, Array], turns: Array, cos: Array, sin: Array
+) -> tuple[Array, Array]:
+    """Ranges (m, 2, n) of the waves of `parts`, as `wave_ranges` has them, with the angle off that
+    of `angle_waves` (3, n) by at most one of these cosines and sines (n,), up to π; widened for
+    rounding. And the other waves there."""
     mean, size, waves = parts
     m, now = len(mean), waves @ turns
     ends = now[: 2 * m].reshape(m, 2, -1)
@@ -161,8 +181,9 @@ def _angles(cosine: Array) -> tuple[Array, Array]:
 
 
 def _wrist_cosines(cosine: float, sine: float, x: Array, distance: Array) -> Array:
-    """Ranges (2, 2, n) of (x - e y) / (r sine), with e the given cosine and r the root of |v|² - y², by those of c and
-    v_z as x and as y, and those (2, n) of |v|²; widened for rounding. First that of the cosine of ψ, then of β."""
+    """Ranges (2, 2, n) of (x - e y) / (r sine), with e the given cosine and r the root of |v|² -
+    y², by those of c and v_z as x and as y, and those (2, n) of |v|²; widened for rounding. First
+    that of the cosine of ψ, then of β."""
     y, radius = x[::-1], np.empty(x.shape)
     largest, smallest = np.maximum(y[:, 0], y[:, 1]), np.maximum(-np.minimum(y[:, 0], y[:, 1]), 0.0)
     near, far = radius[0], radius[1]
@@ -179,5 +200,9 @@ def _wrist_cosines(cosine: float, sine: float, x: Array, distance: Array) -> Arr
 
 
 def _turned(moved: Array, radius: Array) -> Array:
-    """Half range (n,) [rad] of the azimuth of what is moved by at most `moved` (n,) from `radius` (n,)."""
-    return np.where(moved < radius, np.arcsin(np.minimum(moved / np.maximum(radius, _NO_RADIUS), 1.0)), np.pi)
+    """Half range (n,) [rad] of the azimuth of what is moved by at most `moved` (n,) from `radius`
+    (n,).
+    """
+    return np.where(
+        moved < radius, np.arcsin(np.minimum(moved / np.maximum(radius, _NO_RADIUS), 1.0)), np.pi
+    )

@@ -1,7 +1,8 @@
 """Curves of configurations on which an arm of the form `SphericalShoulder` holds a pose.
 
-A curve is one branch over one interval of the last angle. At an end of the interval two branches meet, and the angles
-change with the root of the distance from it. With q7 = middle - half cos u they change evenly with the parameter u.
+A curve is one branch over one interval of the last angle. At an end of the interval two branches
+meet, and the angles change with the root of the distance from it. With q7 = middle - half cos u
+they change evenly with the parameter u.
 """
 
 from __future__ import annotations
@@ -19,10 +20,12 @@ from joulepath.optimizer.kinematics.redundant_boxes import Cells, boxes_of
 from joulepath.optimizer.kinematics.redundant_pose import RedundantPose
 from joulepath.optimizer.problem.branches import Label
 
-# parts that a curve is cut into to find where it is within the limits, then parts of what is not decided, and again
+# parts that a curve is cut into to find where it is within the limits, then parts of what is not
+# decided, and again
 PARTS = (40, 8)
-# a configuration is sought along the tangent if it is farther than NEAREST from the member with its last angle [rad],
-# and first among MEMBERS of each arc if it is farther than FAR; steps, and the difference of parameters for the tangent
+# a configuration is sought along the tangent if it is farther than NEAREST from the member with its
+# last angle [rad], and first among MEMBERS of each arc if it is farther than FAR; steps, and the
+# difference of parameters for the tangent
 NEAREST, FAR, MEMBERS, STEPS, STEP = 1e-9, 1e-2, 16, 3, 1e-6
 # rounding of an angle on a limit [rad]
 ROUNDING = 1e-9
@@ -32,7 +35,8 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class RedundantCurve:
-    """`SelfMotion` on one sheet, signs (3,), over one interval [rad] of q7; a `whole` turn has q7 itself as parameter.
+    """`SelfMotion` on one sheet, signs (3,), over one interval [rad] of q7; a `whole` turn has q7
+    itself as parameter.
 
     `arcs` are the intervals of the parameter: all of it, or what may be within limits.
     """
@@ -44,7 +48,9 @@ class RedundantCurve:
     arcs: list[tuple[float, float]]
 
     @classmethod
-    def of(cls, pose: RedundantPose, sheet: Array, interval: tuple[float, float], label: Label) -> RedundantCurve:
+    def of(
+        cls, pose: RedundantPose, sheet: Array, interval: tuple[float, float], label: Label
+    ) -> RedundantCurve:
         """The whole curve."""
         full = interval == (-np.pi, np.pi)
         return cls(pose, sheet, interval, label, [(-np.pi, np.pi) if full else (0.0, np.pi)])
@@ -56,20 +62,25 @@ class RedundantCurve:
 
     @cached_property
     def free(self) -> tuple[int, ...]:
-        """Indices of the joints that move: all but the fourth where the last axis meets the wrist."""
+        """Indices of the joints that move: all but the fourth where the last axis meets the
+        wrist."""
         square = self.pose.waves[0]
         still = np.hypot(square[1], square[2]) < 1e-12
         return tuple(j for j in range(7) if j != 3 or not still)
 
     def last_angle(self, parameter: Array) -> Array:
         """q7 (n,) [rad] at parameters (n,)."""
-        return last_angle(np.asarray(parameter, dtype=float), np.array(self.interval), np.asarray(self.whole))
+        return last_angle(
+            np.asarray(parameter, dtype=float), np.array(self.interval), np.asarray(self.whole)
+        )
 
     def parameter(self, q: Array) -> float:
-        """The parameter of the member nearest to q (7,), nearly: that with its last angle, then on along the tangent.
+        """The parameter of the member nearest to q (7,), nearly: that with its last angle, then on
+        along the tangent.
 
-        Next to a singularity, and where two sheets meet, the other angles change by far more than the last one. Of a
-        configuration that is not on the curve, the nearest of some members comes first.
+        Next to a singularity, and where two sheets meet, the other angles change by far more than
+        the last one. Of a configuration that is not on the curve, the nearest of some members comes
+        first.
         """
         a, b = self.interval
         u = float(nearest_turn(np.asarray(q[6]), np.asarray((a + b) / 2)))
@@ -85,7 +96,9 @@ class RedundantCurve:
         for _ in range(STEPS):
             if np.abs(gap).max() < NEAREST:
                 break
-            tangent = wrapped(np.diff(self.at(np.array([u - STEP, u + STEP])), axis=0)[0]) / (2 * STEP)
+            tangent = wrapped(np.diff(self.at(np.array([u - STEP, u + STEP])), axis=0)[0]) / (
+                2 * STEP
+            )
             near = self.clipped(u + float(tangent @ gap / max(float(tangent @ tangent), 1e-300)))
             fresh = wrapped(q - self.at(np.array([near]))[0])
             if np.abs(fresh).max() >= np.abs(gap).max():
@@ -115,27 +128,36 @@ class RedundantCurve:
 
 
 def members(curves: Sequence[RedundantCurve], parameters: Sequence[Array]) -> list[Array]:
-    """The configurations (n, 7) [rad] of each of the curves of one pose at its parameters (n,) on its arcs."""
+    """The configurations (n, 7) [rad] of each of the curves of one pose at its parameters (n,) on
+    its arcs.
+    """
     counts, stack = [len(at) for at in parameters], CurveStack.of(curves)
     rows, last = np.repeat(np.arange(len(curves)), counts), np.cumsum(counts).tolist()
-    q = stack.pose.configurations(stack.last_angle(np.concatenate(parameters), rows), stack.sheet[rows])
+    q = stack.pose.configurations(
+        stack.last_angle(np.concatenate(parameters), rows), stack.sheet[rows]
+    )
     return [q[end - count : end] for count, end in zip(counts, last, strict=True)]
 
 
 def within(
     curves: Sequence[RedundantCurve], q_min: Array, q_max: Array
 ) -> tuple[list[RedundantCurve], list[RedundantCurve]]:
-    """The curves of one pose that may be within limits (7,) [rad], cut to arcs that hold every member that is; and
-    those of the given curves with a member that may be, whose third axis may be in line with the first.
+    """The curves of one pose that may be within limits (7,) [rad], cut to arcs that hold every
+    member that is; and those of the given curves with a member that may be, whose third axis may be
+    in line with the first.
 
-    Each is given with both shoulders. What is left out is proven to be outside by its box. The arcs reach beyond the
-    limits by some hundredths [rad].
+    Each is given with both shoulders. What is left out is proven to be outside by its box. The arcs
+    reach beyond the limits by some hundredths [rad].
     """
     if not curves:
         return [], []
-    owner = np.array([[k for k, curve in enumerate(curves) if curve.sheet[0] * side > 0] for side in (1.0, -1.0)])
+    owner = np.array(
+        [[k for k, curve in enumerate(curves) if curve.sheet[0] * side > 0] for side in (1.0, -1.0)]
+    )
     right = CurveStack.of([curves[k] for k in owner[0]])
-    kept, passing = _kept(right, np.array([curves[k].arcs[0] for k in owner[0]]), _Room.of(q_min, q_max))
+    kept, passing = _kept(
+        right, np.array([curves[k].arcs[0] for k in owner[0]]), _Room.of(q_min, q_max)
+    )
     found: list[list[tuple[float, float]]] = [[] for _ in curves]
     for k, arc in zip(owner.ravel()[kept[0]].tolist(), kept[1], strict=True):
         found[k].append(arc)
@@ -147,13 +169,17 @@ def within(
     return cut, [curves[k] for k in sorted(owner[passing].tolist())]
 
 
-def _kept(curves: CurveStack, arcs: Array, room: _Room) -> tuple[tuple[Rows, list[tuple[float, float]]], Mask]:
-    """Where curves on the right shoulder, on their arcs (m, 2), and their counterparts with the left one may be within
-    limits: rows (k,) of all the curves (2 m), and k arcs. And which (2, m) may have members there whose third axis is
-    in line with the first."""
+def _kept(
+    curves: CurveStack, arcs: Array, room: _Room
+) -> tuple[tuple[Rows, list[tuple[float, float]]], Mask]:
+    """Where curves on the right shoulder, on their arcs (m, 2), and their counterparts with the
+    left one may be within limits: rows (k,) of all the curves (2 m), and k arcs. And which (2, m)
+    may have members there whose third axis is in line with the first."""
     m, (coarse, fine) = len(arcs), PARTS
     whole, ends = _cut(arcs, coarse), np.empty((m, coarse * fine + 1))
-    ends[:, :-1] = _cut(np.stack([whole[:, :-1], whole[:, 1:]], axis=2).reshape(-1, 2), fine)[:, :-1].reshape(m, -1)
+    ends[:, :-1] = _cut(np.stack([whole[:, :-1], whole[:, 1:]], axis=2).reshape(-1, 2), fine)[
+        :, :-1
+    ].reshape(m, -1)
     ends[:, -1] = arcs[:, 1]
     q7 = curves.last_angle(ends.T, np.arange(m)).T
     sheet = curves.sheet[np.arange(m).repeat(coarse)]
@@ -168,7 +194,9 @@ def _kept(curves: CurveStack, arcs: Array, room: _Room) -> tuple[tuple[Rows, lis
     (left,) = (open_[0] | open_[1]).nonzero()
     if len(left):
         low, high = q7[:, :-1].reshape(-1, fine)[left], q7[:, 1:].reshape(-1, fine)[left]
-        held, _, aligned = _judged(curves.pose, Cells(low.ravel(), high.ravel(), sheet[left.repeat(fine)]), room)
+        held, _, aligned = _judged(
+            curves.pose, Cells(low.ravel(), high.ravel(), sheet[left.repeat(fine)]), room
+        )
         held = held.reshape(2, -1, fine) & open_[:, left, None]
         parts[:, left] |= held
         side, row = np.logical_or.reduce(held & aligned.reshape(-1, fine), axis=2).nonzero()
@@ -190,7 +218,8 @@ def _cut(arcs: Array, count: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class CurveStack:
-    """Curves of one pose: intervals (2, m) [rad] of q7, which are `whole` (m,), and sheets (m, 3)."""
+    """Curves of one pose: intervals (2, m) [rad] of q7, which are `whole` (m,), and sheets (m,
+    3)."""
 
     pose: RedundantPose
     interval: Array
@@ -221,8 +250,8 @@ class CurveStack:
 
 @dataclass(frozen=True, eq=False)
 class _Room:
-    """Middles (10, 1) and half widths (10, 1) [rad] of what limits leave the seven joints, then the first three again.
-    A joint that may turn all around has no width that its angle could exceed."""
+    """Middles (10, 1) and half widths (10, 1) [rad] of what limits leave the seven joints, then the
+    first three again. A joint that may turn all around has no width that its angle could exceed."""
 
     middle: Array
     width: Array
@@ -231,18 +260,22 @@ class _Room:
     def of(cls, q_min: Array, q_max: Array) -> _Room:
         """Within limits (7,) [rad]."""
         joints = [*range(7), 0, 1, 2]
-        middle, width = (q_min + q_max)[joints, None] / 2, (q_max - q_min)[joints, None] / 2 + ROUNDING
+        middle, width = (
+            (q_min + q_max)[joints, None] / 2,
+            (q_max - q_min)[joints, None] / 2 + ROUNDING,
+        )
         width[width >= np.pi] = np.inf
         return cls(middle, width)
 
 
 def _judged(pose: RedundantPose, cells: Cells, room: _Room) -> tuple[Mask, Mask, Mask]:
-    """Which cells (n,) with the right shoulder may have members within the limits, and which have no others; (2, n)
-    each, the second row for their counterparts with the left shoulder. Then which (n,) may have a member whose third
-    axis is in line with the first."""
+    """Which cells (n,) with the right shoulder may have members within the limits, and which have
+    no others; (2, n) each, the second row for their counterparts with the left shoulder. Then which
+    (n,) may have a member whose third axis is in line with the first."""
     right, half = boxes_of(pose, cells)
     q, sides = np.empty((10, len(half))), np.empty((2, 10, len(half)))
-    # with the other shoulder, the third axis leans to the other side; the last four joints are the same
+    # with the other shoulder, the third axis leans to the other side; the last four joints are the
+    # same
     q[:7], q[7:] = right.T, right.T[:3]
     q[7:10:2] += np.pi
     q[8] = -q[8] - 2 * pose.form.lean_at_zero
@@ -252,7 +285,11 @@ def _judged(pose: RedundantPose, cells: Cells, room: _Room) -> tuple[Mask, Mask,
     within = beyond <= sides
     last = np.logical_and.reduce(within[:, 3:7], axis=1)
     first, mirrored = (last & np.logical_and.reduce(within[:, k : k + 3], axis=1) for k in (0, 7))
-    return np.array([first[0], mirrored[0]]), np.array([first[1], mirrored[1]]), np.asarray(half[:, 0] >= np.pi)
+    return (
+        np.array([first[0], mirrored[0]]),
+        np.array([first[1], mirrored[1]]),
+        np.asarray(half[:, 0] >= np.pi),
+    )
 
 
 def last_angle(u: Array, interval: Array, whole: Mask) -> Array:

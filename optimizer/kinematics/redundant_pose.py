@@ -1,7 +1,9 @@
-"""One pose of an arm of the form `SphericalShoulder`: its configurations over the last angle, and where there are any.
+"""One pose of an arm of the form `SphericalShoulder`: its configurations over the last angle, and
+where there are any.
 
-A `sheet` is one of the eight branches: the signs (shoulder, elbow, wrist), 1 or -1, of the angle χ between the third
-axis and the first, of θ and of ψ. The module's text of `spherical_shoulder` has the formulas.
+A `sheet` is one of the eight branches: the signs (shoulder, elbow, wrist), 1 or -1, of the angle χ
+between the third axis and the first, of θ and of ψ. The module's text of `spherical_shoulder` has
+the formulas.
 """
 
 from __future__ import annotations
@@ -17,7 +19,8 @@ from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.spherical_shoulder import SphericalShoulder, wave_parts
 from joulepath.optimizer.kinematics.spinors import Complex, unitary
 
-# zeros of the polynomial this near the unit circle may be angles; nearer to each other than APART [rad] they are one
+# zeros of the polynomial this near the unit circle may be angles; nearer to each other than APART
+# [rad] they are one
 NEAR_CIRCLE, APART = 1e-4, 1e-9
 # coefficients of less than this share of the greatest are rounding
 NEGLIGIBLE = 1e-14
@@ -25,13 +28,14 @@ NEGLIGIBLE = 1e-14
 ROUNDING = 1e-12
 # rounding of an angle on a limit [rad]
 ANGLE = 1e-9
-# a squared sine is zero at an edge to this: an angle where it has a double zero is found to some 1e-8 rad
+# a squared sine is zero at an edge to this: an angle where it has a double zero is found to some
+# 1e-8 rad
 ZERO = 1e-7
 # a squared distance [m²] that is none
 TINY = 1e-12
 
-# a real polynomial in exp(iq) and exp(-iq), by its coefficients of the powers of exp(iq) from 0 on: those of exp(-iq)
-# are their conjugates. Plain numbers: several times as fast as arrays of so few
+# a real polynomial in exp(iq) and exp(-iq), by its coefficients of the powers of exp(iq) from 0 on:
+# those of exp(-iq) are their conjugates. Plain numbers: several times as fast as arrays of so few
 Polynomial = list[complex]
 ONE: Polynomial = [1 + 0j]
 
@@ -84,7 +88,8 @@ class RedundantPose:
         return wave_parts(self.waves, self._wrist_waves[:2])
 
     def angles(self, q7: Array, elbow: Array, wrist: Array) -> tuple[Array, Array]:
-        """θ and ψ (n,) [rad] at q7 (n,) on sheets of these signs (n,); cosines beyond 1 count as 1."""
+        """θ and ψ (n,) [rad] at q7 (n,) on sheets of these signs (n,); cosines beyond 1 count as
+        1."""
         theta, psi, _ = self._angles_of(angle_waves(np.cos(q7), np.sin(q7)), elbow, wrist)
         return theta, psi
 
@@ -107,10 +112,15 @@ class RedundantPose:
         return np.ascontiguousarray(self.completed(last, backwards(last), shoulder).T)
 
     def at_angles(
-        self, q7: Array, theta: Array, psi: Array, shoulder: Array, free: dict[int, Array] | None = None
+        self,
+        q7: Array,
+        theta: Array,
+        psi: Array,
+        shoulder: Array,
+        free: dict[int, Array] | None = None,
     ) -> Array:
-        """Configurations (n, 7) [rad] with the given angles (n,). On a singularity the first joint (0) or the fifth (4)
-        may have any angle (n,): that in `free`."""
+        """Configurations (n, 7) [rad] with the given angles (n,). On a singularity the first joint
+        (0) or the fifth (4) may have any angle (n,): that in `free`."""
         last = self.wrist(q7, theta, psi)
         free = {} if free is None else free
         if 4 in free:
@@ -120,7 +130,11 @@ class RedundantPose:
     def wrist(self, q7: Array, theta: Array, psi: Array) -> Array:
         """The last four joint positions (4, n) [rad] at the given angles (n,)."""
         return self._last(
-            q7, theta, psi, angle_waves(np.cos(q7), np.sin(q7)), angle_waves(np.cos(theta), np.sin(theta))
+            q7,
+            theta,
+            psi,
+            angle_waves(np.cos(q7), np.sin(q7)),
+            angle_waves(np.cos(theta), np.sin(theta)),
         )
 
     def _last(self, q7: Array, theta: Array, psi: Array, seventh: Array, fourth: Array) -> Array:
@@ -136,12 +150,15 @@ class RedundantPose:
         last[1] = np.arctan2(S[1] * x - S[0] * y, S[0] * x + S[1] * y)
         return last
 
-    def completed(self, last: Array, back: Complex, shoulder: Array, q1: Array | None = None) -> Array:
-        """Joint positions (7, n) [rad] in [-π, π] with the last four (4, n), of which `back` (4, n) are the numbers
-        e^{-iq}, and signs of the shoulder (n,)."""
+    def completed(
+        self, last: Array, back: Complex, shoulder: Array, q1: Array | None = None
+    ) -> Array:
+        """Joint positions (7, n) [rad] in [-π, π] with the last four (4, n), of which `back` (4, n)
+        are the numbers e^{-iq}, and signs of the shoulder (n,)."""
         form, q, spinor = self.form, np.empty((7, len(shoulder))), self._spinors(back)
         size, phase = np.abs(spinor), np.arctan2(spinor.imag, spinor.real)
-        # the other shoulder has the third axis lean to the other side; the turns left half of the last angles out
+        # the other shoulder has the third axis lean to the other side; the turns left half of the
+        # last angles out
         left, out = np.pi / 2 * (1 - shoulder), np.add.reduce(last, axis=0)
         azimuth = phase[1] - phase[0] if q1 is None else q1 + form.lean_azimuth - left
         if q1 is None:
@@ -160,8 +177,8 @@ class RedundantPose:
         return np.asarray(2 * ahead.conj() * aside)
 
     def _spinors(self, back: Complex) -> Complex:
-        """Spinors (2, n), but for factors, of the rotation from joint 1 at q1 = 0 to link 3, with e^{-iq} of the last
-        four joints (4, n)."""
+        """Spinors (2, n), but for factors, of the rotation from joint 1 at q1 = 0 to link 3, with
+        e^{-iq} of the last four joints (4, n)."""
         first, *others = self.form.backwards
         spinor = np.ones((2, back.shape[1]), dtype=complex)
         spinor[1] = back[0]
@@ -181,15 +198,21 @@ class RedundantPose:
         if limits is not None:
             low, high = float(limits.q_min[3]), float(limits.q_max[3])
         size, scale = float(np.hypot(square[1], square[2])), 2 * form.rho * form.nu
-        cosines = [(form.squares - float(square[0]) + side * size) / scale + side * ROUNDING for side in (1.0, -1.0)]
+        cosines = [
+            (form.squares - float(square[0]) + side * size) / scale + side * ROUNDING
+            for side in (1.0, -1.0)
+        ]
         least, most = (acos(min(max(each, -1.0), 1.0)) for each in cosines)
         middle, half = (least + most) / 2, (most - least + high - low) / 2
-        away = {elbow: remainder(form.q4_at_zero - elbow * middle - (low + high) / 2, tau) for elbow in (1.0, -1.0)}
+        away = {
+            elbow: remainder(form.q4_at_zero - elbow * middle - (low + high) / 2, tau)
+            for elbow in (1.0, -1.0)
+        }
         return [elbow for elbow, each in away.items() if abs(each) <= half + ANGLE]
 
     def intervals(self, elbow: float) -> list[tuple[float, float]]:
-        """The intervals [rad] of q7, each within a turn, in which both sheets of this elbow are; (-π, π) if nothing
-        bounds them. An interval may be one angle."""
+        """The intervals [rad] of q7, each within a turn, in which both sheets of this elbow are;
+        (-π, π) if nothing bounds them. An interval may be one angle."""
         edges = self._edges
         own = self._excesses[0 if elbow > 0 else 1]
         if not len(edges):
@@ -200,13 +223,19 @@ class RedundantPose:
         bounds = np.abs(at) < ZERO
         if all(inside) and not bounds.any():
             return [(-np.pi, np.pi)]
-        found = [(float(q7), float(q7)) for k, q7 in enumerate(edges) if bounds[k] and not inside[k - 1] | inside[k]]
+        found = [
+            (float(q7), float(q7))
+            for k, q7 in enumerate(edges)
+            if bounds[k] and not inside[k - 1] | inside[k]
+        ]
         # from an edge on, so that no interval starts before the first one
         first = int(bounds.argmax())
         start: float | None = None
         for k in [*range(first, len(edges)), *range(first)]:
             if start is not None and (bounds[k] or not inside[k]):
-                found.append((start, float(edges[k] if edges[k] >= start else edges[k] + 2 * np.pi)))
+                found.append(
+                    (start, float(edges[k] if edges[k] >= start else edges[k] + 2 * np.pi))
+                )
                 start = None
             if inside[k] and start is None:
                 start = float(edges[k])
@@ -217,7 +246,8 @@ class RedundantPose:
 
     @cached_property
     def _excesses(self) -> Array:
-        """The excess (2, k) at the edges, then between each and the next, for both elbows; without edges, anywhere.
+        """The excess (2, k) at the edges, then between each and the next, for both elbows; without
+        edges, anywhere.
 
         That is the lesser of sin²θ and of sin²ψ r²/|v|²: negative off the sheets.
         """
@@ -232,7 +262,9 @@ class RedundantPose:
         aside = ks * np.sqrt((1 - clipped) * (1 + clipped))
         along = k0 + kc * clipped - form.fifth_in_6[2] * v_z + np.array([aside, -aside])
         reach = form.inclined**2 * np.maximum(distance - v_z * v_z, 0.0)
-        return np.asarray(np.minimum(1 - cos * cos, (reach - along * along) / np.maximum(distance, TINY)))
+        return np.asarray(
+            np.minimum(1 - cos * cos, (reach - along * along) / np.maximum(distance, TINY))
+        )
 
     @cached_property
     def _edges(self) -> Array:
@@ -249,16 +281,26 @@ class RedundantPose:
         if abs(ks) > ROUNDING:
             P = _sum((1.0, _product(P, P)), (-4 * ks**2, _product(flat2, sin2)))
         found = sorted([*_angles(P), *self._straight()])
-        return np.array([each for k, each in enumerate(found) if k == 0 or each - found[k - 1] > APART])
+        return np.array(
+            [each for k, each in enumerate(found) if k == 0 or each - found[k - 1] > APART]
+        )
 
     def _straight(self) -> list[float]:
         """Angles [rad] at which the elbow is stretched or folded, or nearly: |cos θ| = 1."""
         still, ahead, aside = self.waves[0].tolist()
-        reach, size, phase = 2 * self.form.rho * self.form.nu, hypot(ahead, aside), atan2(aside, ahead)
+        reach, size, phase = (
+            2 * self.form.rho * self.form.nu,
+            hypot(ahead, aside),
+            atan2(aside, ahead),
+        )
         if size <= NEGLIGIBLE * reach:
             return []
         cosines = [(self.form.squares - still + each) / size for each in (reach, -reach)]
-        turned = [acos(min(max(each, -1.0), 1.0)) for each in cosines if abs(each) < 1 + NEAR_CIRCLE**2 / 2]
+        turned = [
+            acos(min(max(each, -1.0), 1.0))
+            for each in cosines
+            if abs(each) < 1 + NEAR_CIRCLE**2 / 2
+        ]
         return [remainder(phase + side * each, tau) for side in (1.0, -1.0) for each in turned]
 
 

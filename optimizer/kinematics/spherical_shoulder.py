@@ -1,22 +1,28 @@
-"""Closed form of arms of seven joints whose first three axes meet in one point, the shoulder S, at right angles, and
-whose fifth and sixth axes meet in another, the wrist W.
+"""Closed form of arms of seven joints whose first three axes meet in one point, the shoulder S, at
+right angles, and whose fifth and sixth axes meet in another, the wrist W.
 
-Franka's arms are of this form, KUKA's LBR iiwa and UFACTORY's xArm 7, too. With the last angle given, six joints are
-left, and the pose leaves them eight configurations at most:
+Franka's arms are of this form, KUKA's LBR iiwa and UFACTORY's xArm 7, too. With the last angle
+given, six joints are left, and the pose leaves them eight configurations at most:
 
-- Seen from link 6, S is at v(q7) from W: it turns about the last axis. Its distance from W depends on the fourth angle
-  alone: |v|² = E - 2 ρ ν cos θ with θ = const - q4. The two signs of θ are the two parts of the `elbow`.
-- Along the fifth axis, S is at c(θ) from W. This axis turns about the sixth, which it makes an angle with whose cosine
-  is e: r cos ψ = (c - e v_z) / sqrt(1 - e²), with ψ = q6 + const + the azimuth of v, and r its distance from the sixth
+- Seen from link 6, S is at v(q7) from W: it turns about the last axis. Its distance from W depends
+  on the fourth angle
+  alone: |v|² = E - 2 ρ ν cos θ with θ = const - q4. The two signs of θ are the two parts of the
+      `elbow`.
+- Along the fifth axis, S is at c(θ) from W. This axis turns about the sixth, which it makes an
+  angle with whose cosine
+  is e: r cos ψ = (c - e v_z) / sqrt(1 - e²), with ψ = q6 + const + the azimuth of v, and r its
+  distance from the sixth
   axis. The two signs of ψ are the two parts of the `wrist`.
-- The azimuth of S about the fifth axis gives q5; what is left of the orientation gives the first three angles, in two
+- The azimuth of S about the fifth axis gives q5; what is left of the orientation gives the first
+  three angles, in two
   ways: with the second angle on either side of the singularity of the `shoulder`.
 
-So a pose is reached on curves over q7, one for each of the eight branches and for each interval in which the cosines
-are at most 1 (`intervals`). These are exact: no curve is missed. With f(q7) = a + b cos q7 + c sin q7 for |v|² and v_z,
-cos θ is of this kind, and sin²θ and sin²ψ, times r², are trigonometric polynomials but for the sign of sin θ; their
-zeros are those of a polynomial of degree 8. The idea of locking q7 for Franka's arms is that of Y. He and S. Liu,
-"Analytical inverse kinematics for Franka Emika Panda" (2021); here for the whole family, and over all of q7.
+So a pose is reached on curves over q7, one for each of the eight branches and for each interval in
+which the cosines are at most 1 (`intervals`). These are exact: no curve is missed. With f(q7) = a +
+b cos q7 + c sin q7 for |v|² and v_z, cos θ is of this kind, and sin²θ and sin²ψ, times r², are
+trigonometric polynomials but for the sign of sin θ; their zeros are those of a polynomial of degree
+8. The idea of locking q7 for Franka's arms is that of Y. He and S. Liu, "Analytical inverse
+kinematics for Franka Emika Panda" (2021); here for the whole family, and over all of q7.
 """
 
 from __future__ import annotations
@@ -33,7 +39,8 @@ from joulepath.optimizer.kinematics.spinors import Complex, unitary
 
 # greatest distance [m] of axes that meet, and cosine of axes at right angles
 EQUAL = 1e-9
-# distance [m] from the fifth axis at which the shoulder is on it; angles from which it is sought there, and steps
+# distance [m] from the fifth axis at which the shoulder is on it; angles from which it is sought
+# there, and steps
 ALIGNED, ALIGNED_STARTS, ALIGNED_STEPS = 1e-12, 8, 20
 # what ranges of waves are widened by, for rounding [m² or m]
 WIDENED = 1e-14
@@ -43,8 +50,9 @@ WIDENED = 1e-14
 class SphericalShoulder:
     """The lengths and angles of the module's text, of one arm.
 
-    `placements` (7, 4, 4): each joint in the frame of the link before. `shoulder` (3,): S in the base frame. `upper`,
-    `fifth`, `sixth` [m]: where S lies on the third axis, W on the fifth and on the sixth.
+    `placements` (7, 4, 4): each joint in the frame of the link before. `shoulder` (3,): S in the
+    base frame. `upper`, `fifth`, `sixth` [m]: where S lies on the third axis, W on the fifth and on
+    the sixth.
     """
 
     placements: Array
@@ -56,7 +64,9 @@ class SphericalShoulder:
 
     @classmethod
     def of(cls, model: pin.Model) -> SphericalShoulder | None:
-        """The form of a Pinocchio model with a frame `flange`; None if its axes do not meet in this way."""
+        """The form of a Pinocchio model with a frame `flange`; None if its axes do not meet in this
+        way.
+        """
         return cls.of_chain(Chain.of(model)) if model.nq == model.nv == 7 else None
 
     @classmethod
@@ -65,7 +75,13 @@ class SphericalShoulder:
         P = chain.placements
         first, second, third = (_meeting(P[k]) for k in (1, 2, 5))
         square = max(abs(P[1][2, 2]), abs(P[2][2, 2]))
-        if first is None or second is None or third is None or square > EQUAL or abs(first[1] - second[0]) > EQUAL:
+        if (
+            first is None
+            or second is None
+            or third is None
+            or square > EQUAL
+            or abs(first[1] - second[0]) > EQUAL
+        ):
             return None
         shoulder = P[0] @ [0.0, 0.0, first[0], 1.0]
         form = cls(P, chain.T_last_flange, shoulder[:3], second[1], third[0], third[1])
@@ -73,8 +89,9 @@ class SphericalShoulder:
 
     @cached_property
     def backwards(self) -> tuple[Complex, Complex, Complex]:
-        """What carries spinors of the rotation from a link to link 3 to the link before: to links 5, 6 and 7, each from
-        behind the turn of the joint between. The first one is for (1, e^{-iq4}), with the way from link 3 to joint 4.
+        """What carries spinors of the rotation from a link to link 3 to the link before: to links
+        5, 6 and 7, each from behind the turn of the joint between. The first one is for (1,
+        e^{-iq4}), with the way from link 3 to joint 4.
         """
         third, *others = (unitary(each).conj().T for each in self.placements[3:, :3, :3])
         return others[0] * third[:, 0], others[1], others[2]
@@ -160,15 +177,17 @@ class SphericalShoulder:
 
     @cached_property
     def lean_azimuth(self) -> float:
-        """Azimuth [rad], in the frame of link 1, of the direction that the third axis leans towards if χ > 0."""
+        """Azimuth [rad], in the frame of link 1, of the direction that the third axis leans towards
+        if χ > 0.
+        """
         first = self.placements[1][2]
         lean = self.placements[1][:3, :3] @ [-first[1], first[0], 0.0]
         return float(np.arctan2(lean[1], lean[0]))
 
     @cached_property
     def twist(self) -> float:
-        """ψ [rad] at a third angle of zero, in R_z(φ) R_y(χ) R_z(ψ) for the rotation from joint 1 to link 3, with φ the
-        azimuth of the lean."""
+        """ψ [rad] at a third angle of zero, in R_z(φ) R_y(χ) R_z(ψ) for the rotation from joint 1
+        to link 3, with φ the azimuth of the lean."""
         R = self.placements[1, :3, :3] @ self.placements[2, :3, :3]
         # the image of x before the turn by ψ, seen from link 3
         azimuth, chi = self.lean_azimuth, self.lean_at_zero
@@ -191,12 +210,14 @@ class SphericalShoulder:
 
     @cached_property
     def aligned(self) -> tuple[float, ...]:
-        """The angles θ [rad] at which the fifth axis meets the shoulder, as it does where an arm without offsets is
-        stretched or folded."""
+        """The angles θ [rad] at which the fifth axis meets the shoulder, as it does where an arm
+        without offsets is stretched or folded."""
         found: list[float] = []
         for theta in np.linspace(-np.pi, np.pi, ALIGNED_STARTS, endpoint=False):
             for _ in range(ALIGNED_STEPS):
-                across, ahead = self.shoulder_about_fifth(np.array([theta, theta + np.pi / 2]))[:, :2]
+                across, ahead = self.shoulder_about_fifth(np.array([theta, theta + np.pi / 2]))[
+                    :, :2
+                ]
                 # a turn by a right angle gives the derivative, but for what does not turn
                 slope = ahead - self.shoulder_about_fifth(np.array([theta - np.pi / 2]))[0, :2]
                 theta -= 2 * float(across @ slope) / max(float(slope @ slope), EQUAL)
@@ -223,9 +244,9 @@ class SphericalShoulder:
 def wave_parts(waves: Array, others: Array) -> tuple[Array, Array, Array]:
     """What bounds waves a + b cos x + c sin x, (m, 3), with other ones (k, 3).
 
-    Means (m, 2, 1), negative and positive, widened for rounding. Sizes |(b, c)| (m, 1, 1). And coefficients (3m + k,
-    3): where a wave is a + size cos y, those of -size cos y and size cos y, wave by wave, then those of size sin y,
-    then those of the others.
+    Means (m, 2, 1), negative and positive, widened for rounding. Sizes |(b, c)| (m, 1, 1). And
+    coefficients (3m + k, 3): where a wave is a + size cos y, those of -size cos y and size cos y,
+    wave by wave, then those of size sin y, then those of the others.
     """
     m = len(waves)
     parts = np.zeros((3 * m + len(others), 3))
@@ -238,7 +259,8 @@ def wave_parts(waves: Array, others: Array) -> tuple[Array, Array, Array]:
 
 
 def _meeting(P: Array) -> tuple[float, float] | None:
-    """Where [m] two successive joint axes meet, on the first and on the second of them; None if they do not.
+    """Where [m] two successive joint axes meet, on the first and on the second of them; None if
+    they do not.
 
     P (4, 4) is the second joint in the frame of the first one's link.
     """

@@ -1,11 +1,13 @@
-"""The branches of an arm with a spherical wrist whose base is ortho-parallel, as most industrial arms are.
+"""The branches of an arm with a spherical wrist whose base is ortho-parallel, as most industrial
+arms are.
 
-The second axis is at right angles to the first, the third parallel to the second. The last three meet in one point, the
-wrist, each at right angles to the next at some position. The arm's plane is at right angles to the second axis.
+The second axis is at right angles to the first, the third parallel to the second. The last three
+meet in one point, the wrist, each at right angles to the next at some position. The arm's plane is
+at right angles to the second axis.
 
-The names of such arms' branches need few lengths of this plane: M. Brandstötter, A. Angerer, M. Hofbaur, "An
-analytical solution of the inverse kinematics problem of industrial serial manipulators with an ortho-parallel basis and
-a spherical wrist" (2014).
+The names of such arms' branches need few lengths of this plane: M. Brandstötter, A. Angerer, M.
+Hofbaur, "An analytical solution of the inverse kinematics problem of industrial serial manipulators
+with an ortho-parallel basis and a spherical wrist" (2014).
 """
 
 from __future__ import annotations
@@ -22,18 +24,22 @@ from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.joint_axes import MEETING, PARALLEL, JointAxes, meeting_point
 from joulepath.optimizer.problem.branches import Elbow, Label, Shoulder, Wrist
 
-# sine of the wrist angle below which the wrist counts as aligned: then every member of its self-motion reaches the pose
-# to half of what is promised of a solution
+# sine of the wrist angle below which the wrist counts as aligned: then every member of its
+# self-motion reaches the pose to half of what is promised of a solution
 ALIGNED = 5e-10
 # distance [m] beyond the reach at which a pose may lie by rounding alone
 ROUNDING = 1e-10
-# a part of the label is singular where its sine, or the shoulder's distance [m], is below this: nearer to it, a pose
-# that is rounded to double precision no longer determines the joints to 1e-9 rad
+# a part of the label is singular where its sine, or the shoulder's distance [m], is below this:
+# nearer to it, a pose that is rounded to double precision no longer determines the joints to 1e-9
+# rad
 SINGULAR = 1e-6
 
 
 # all branches, in the order of their names
-LABELS = tuple(Label(*parts) for parts in product(*(sorted(get_args(part)) for part in (Shoulder, Elbow, Wrist))))
+LABELS = tuple(
+    Label(*parts)
+    for parts in product(*(sorted(get_args(part)) for part in (Shoulder, Elbow, Wrist)))
+)
 
 
 def branch_numbers(measures: Array) -> Array:
@@ -46,11 +52,12 @@ def branch_numbers(measures: Array) -> Array:
 class SphericalWrist:
     """Where the parts of the label change.
 
-    In the arm's plane, forward and up of the first axis: `shoulder` (2,) [m] the second axis, `upper` and `fore` the
-    length [m] and, at zero, angle [rad] of the links from second to third axis and from there to the wrist. These turn
-    with `turns` (2,) times q2 and q3. `offset` [m] is the distance of the wrist's plane from the first axis, `bend`
-    [rad] the wrist angle at q5 = 0. `up` and `origin` (3,) are direction and point of the first axis, `wrist` (3,) the
-    wrist in the flange frame.
+    In the arm's plane, forward and up of the first axis: `shoulder` (2,) [m] the second axis,
+    `upper` and `fore` the length [m] and, at zero, angle [rad] of the links from second to third
+    axis and from there to the wrist. These turn with `turns` (2,) times q2 and q3. `offset` [m] is
+    the distance of the wrist's plane from the first axis, `bend` [rad] the wrist angle at q5 = 0.
+    `up` and `origin` (3,) are direction and point of the first axis, `wrist` (3,) the wrist in the
+    flange frame.
     """
 
     shoulder: Array
@@ -97,7 +104,8 @@ class SphericalWrist:
         )
 
     def label(self, q: Array) -> Label:
-        """The branch of a configuration (6,) [rad]; on a singularity, one of those that meet there."""
+        """The branch of a configuration (6,) [rad]; on a singularity, one of those that meet
+        there."""
         return LABELS[int(branch_numbers(self.measures(q)))]
 
     def singular_parts(self, q: Array) -> tuple[str, ...]:
@@ -106,54 +114,74 @@ class SphericalWrist:
         return tuple(part for part, value in measures if abs(value) < SINGULAR)
 
     def measures(self, q: Array) -> Array:
-        """Distance [m] of the wrist ahead of the first axis, sines of elbow and wrist (..., 3), at q (..., 6) [rad].
+        """Distance [m] of the wrist ahead of the first axis, sines of elbow and wrist (..., 3), at
+        q (..., 6) [rad].
 
         Each is zero where its part of the label changes.
         """
         lift = self.turns[0] * q[..., 1]
         first, second = self.upper[1] + lift, self.fore[1] + lift + self.turns[1] * q[..., 2]
         found = np.empty((*q.shape[:-1], 3))
-        found[..., 0] = self.shoulder[0] + self.upper[0] * np.cos(first) + self.fore[0] * np.cos(second)
+        found[..., 0] = (
+            self.shoulder[0] + self.upper[0] * np.cos(first) + self.fore[0] * np.cos(second)
+        )
         found[..., 1] = np.sin(second - first)
         found[..., 2] = np.sin(self.bend + q[..., 4])
         return found
 
     def bent(self, sine: float, aligned: bool) -> Array:
-        """The positions (2,) [rad] of the fifth joint with a wrist angle of this sine; one for no sine.
+        """The positions (2,) [rad] of the fifth joint with a wrist angle of this sine; one for no
+        sine.
 
-        They are near the `aligned` wrist, whose axes point the same way, or else near the folded one.
+        They are near the `aligned` wrist, whose axes point the same way, or else near the folded
+        one.
         """
-        angles = [atan2(side, 1.0 if aligned else -1.0) for side in ((sine, -sine) if sine > 0 else (0.0,))]
+        angles = [
+            atan2(side, 1.0 if aligned else -1.0)
+            for side in ((sine, -sine) if sine > 0 else (0.0,))
+        ]
         return np.asarray(wrapped(np.array(angles) - self.bend))
 
     def distance_to_reach(self, T: Array) -> float | None:
-        """Distance [m] by which the wrist is out of reach with the flange at T (4, 4); None for an arm with an offset.
+        """Distance [m] by which the wrist is out of reach with the flange at T (4, 4); None for an
+        arm with an offset.
 
-        The orientation does not matter. In the arm's plane the wrist can be anywhere between two circles about the
-        second axis, ahead of the first axis or behind it.
+        The orientation does not matter. In the arm's plane the wrist can be anywhere between two
+        circles about the second axis, ahead of the first axis or behind it.
         """
         if abs(self.offset) > ALIGNED:
             return None
         radius, height = self._wrist_at(T)
         least, most = abs(self.upper[0] - self.fore[0]), self.upper[0] + self.fore[0]
-        distances = [hypot(side - self.shoulder[0], height - self.shoulder[1]) for side in (radius, -radius)]
+        distances = [
+            hypot(side - self.shoulder[0], height - self.shoulder[1]) for side in (radius, -radius)
+        ]
         return min(max(0.0, least - distance, distance - most) for distance in distances)
 
     def turns_freely(self, T: Array) -> bool:
-        """Whether the first axis, or the second, may turn with the flange at T (4, 4), because the wrist lies on it.
+        """Whether the first axis, or the second, may turn with the flange at T (4, 4), because the
+        wrist lies on it.
 
         The wrist then turns back. Of an arm with an offset no axis but the second can.
         """
         radius, height = self._wrist_at(T)
         ahead = sqrt(max(radius**2 - self.offset**2, 0.0))
-        on_second = min(hypot(side - self.shoulder[0], height - self.shoulder[1]) for side in (ahead, -ahead)) < ALIGNED
+        on_second = (
+            min(
+                hypot(side - self.shoulder[0], height - self.shoulder[1])
+                for side in (ahead, -ahead)
+            )
+            < ALIGNED
+        )
         if on_second and abs(self.upper[0] - self.fore[0]) < ALIGNED:
             return True
         distance = self.distance_to_reach(T)
         return radius < ALIGNED and distance is not None and distance <= ROUNDING
 
     def _wrist_at(self, T: Array) -> tuple[float, float]:
-        """Distance from the first axis, and height along it [m], of the wrist with the flange at T (4, 4)."""
+        """Distance from the first axis, and height along it [m], of the wrist with the flange at T
+        (4, 4).
+        """
         away = T[:3, :3] @ self.wrist + T[:3, 3] - self.origin
         height = float(away @ self.up)
         x, y, z = (away - height * self.up).tolist()

@@ -1,9 +1,10 @@
-"""Rotations as spinors: the first columns (2,) of unitary matrices U (2, 2), a turn by q about z being diag(e^{-iq/2},
-e^{iq/2}). A product of rotations costs half of what matrices do, and its Euler angles are the arguments of two numbers.
+"""Rotations as spinors: the first columns (2,) of unitary matrices U (2, 2), a turn by q about z
+being diag(e^{-iq/2}, e^{iq/2}). A product of rotations costs half of what matrices do, and its
+Euler angles are the arguments of two numbers.
 
-The rotation R_z(φ) R_y(χ) R_z(ψ), with χ from 0 to π, has the spinor (cos(χ/2) e^{-i(φ + ψ)/2}, sin(χ/2) e^{i(φ -
-ψ)/2}): so φ and ψ follow from the sum and the difference of its arguments (H. Goldstein, "Classical Mechanics", 1980,
-section 4-5).
+The rotation R_z(φ) R_y(χ) R_z(ψ), with χ from 0 to π, has the spinor (cos(χ/2) e^{-i(φ + ψ)/2},
+sin(χ/2) e^{i(φ - ψ)/2}): so φ and ψ follow from the sum and the difference of its arguments (H.
+Goldstein, "Classical Mechanics", 1980, section 4-5).
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""The TCP: its frame, pose and Jacobian, and poses that differ from it by a rotation about its own origin."""
+"""The TCP: its frame, pose and Jacobian, and poses that differ from it by a rotation about its own
+origin.
+"""
 
 from __future__ import annotations
 
@@ -28,24 +30,31 @@ def flange_pose(T_base_tcp: Array, T_flange_tcp: Array) -> Array:
 
 
 def tcp_pose(arm: Arm, q: Array) -> Array:
-    """Pose T_base_tcp (..., 4, 4) of the TCP in the base frame for joint positions q (..., nq) [rad]."""
+    """Pose T_base_tcp (..., 4, 4) of the TCP in the base frame for joint positions q (..., nq)
+    [rad].
+    """
     q = np.asarray(q, dtype=float)
     frames = link_frames(joint_placements(arm.robot.model), q.reshape(-1, arm.robot.nq))
     return np.asarray(frames[:, -1] @ T_last_tcp(arm)).reshape(*q.shape[:-1], 4, 4)
 
 
 def tcp_jacobian(arm: Arm, q: Array) -> Array:
-    """Geometric Jacobian (6, nq) of the TCP at q (nq,) [rad]: linear rows [m] first, in base axes."""
+    """Geometric Jacobian (6, nq) of the TCP at q (nq,) [rad]: linear rows [m] first, in base
+    axes."""
     frames = link_frames(joint_placements(arm.robot.model), q[None])
     return np.asarray(geometric_jacobian(frames, (frames[:, -1] @ T_last_tcp(arm))[:, :3, 3])[0])
 
 
 def rotated_poses(arm: Arm, q: Array, rotvecs: Sequence[Array]) -> list[tuple[Array, Array]]:
-    """Position (3,) [m] and quaternion x, y, z, w (4,) of the TCP at q (nq,) [rad] after each rotation, in base frame.
+    """Position (3,) [m] and quaternion x, y, z, w (4,) of the TCP at q (nq,) [rad] after each
+    rotation, in base frame.
 
-    Each rotation is a rotation vector (3,) [rad] in the TCP frame, about the origin of the TCP. The position is
-    therefore the same for all.
+    Each rotation is a rotation vector (3,) [rad] in the TCP frame, about the origin of the TCP. The
+    position is therefore the same for all.
     """
     T = tcp_pose(arm, q)
     orientation = Rotation.from_matrix(T[:3, :3])
-    return [(T[:3, 3].copy(), (orientation * Rotation.from_rotvec(rotvec)).as_quat()) for rotvec in rotvecs]
+    return [
+        (T[:3, 3].copy(), (orientation * Rotation.from_rotvec(rotvec)).as_quat())
+        for rotvec in rotvecs
+    ]

@@ -1,8 +1,9 @@
-"""A self-motion that is known by points along it: cubics between them, which Newton's method leads onto the curve.
+"""A self-motion that is known by points along it: cubics between them, which Newton's method leads
+onto the curve.
 
-A member is the configuration of the curve across from the cubic: in the plane through its point at right angles to the
-direction there, which goes evenly from one tangent to the next. So the parameter of a member is found without
-kinematics, from the cubic alone.
+A member is the configuration of the curve across from the cubic: in the plane through its point at
+right angles to the direction there, which goes evenly from one tangent to the next. So the
+parameter of a member is found without kinematics, from the cubic alone.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ from joulepath.optimizer.kinematics.curve_tracing import TracedPath
 from joulepath.optimizer.kinematics.traced_stack import Rows, TracedStack
 from joulepath.optimizer.problem.branches import BranchLabel
 
-# distance [rad] from the cubics within which a member is, and from the curve at which a configuration is one
+# distance [rad] from the cubics within which a member is, and from the curve at which a
+# configuration is one
 BESIDE, SAME = 0.05, 1e-5
 # rounding of an angle on a limit [rad]
 ROUNDING = 1e-9
@@ -81,14 +83,20 @@ class TracedCurve:
         parameter, away = self._nearest(q)
         if away > BESIDE:
             return False
-        return bool(np.abs(wrapped(self.at(np.array([self.clipped(parameter)]))[0] - q)).max() < SAME)
+        return bool(
+            np.abs(wrapped(self.at(np.array([self.clipped(parameter)]))[0] - q)).max() < SAME
+        )
 
     def clipped(self, parameter: float) -> float:
         """The nearest parameter on an arc."""
         found = []
         for lower, upper in self.arcs:
             middle = (lower + upper) / 2
-            near = parameter + 2 * np.pi * round((middle - parameter) / (2 * np.pi)) if self.closed else parameter
+            near = (
+                parameter + 2 * np.pi * round((middle - parameter) / (2 * np.pi))
+                if self.closed
+                else parameter
+            )
             on_arc = min(max(near, lower), upper)
             found.append((abs(near - on_arc), on_arc))
         return float(min(found)[1])
@@ -101,8 +109,12 @@ class TracedCurve:
         centre = self.at(np.asarray(parameter, dtype=float))
         if len(self.nodes) == 1:
             return centre, np.full_like(centre, ROUNDING)
-        rates = np.abs(np.diff(self.nodes, axis=0) / np.diff(self.stack.knots[self._part])[:, None]).max(axis=0)
-        return centre, np.minimum(FASTER * np.asarray(half, dtype=float)[:, None] * rates + ROUNDING, np.pi)
+        rates = np.abs(
+            np.diff(self.nodes, axis=0) / np.diff(self.stack.knots[self._part])[:, None]
+        ).max(axis=0)
+        return centre, np.minimum(
+            FASTER * np.asarray(half, dtype=float)[:, None] * rates + ROUNDING, np.pi
+        )
 
     @property
     def _part(self) -> slice:
@@ -110,16 +122,23 @@ class TracedCurve:
         return slice(int(self.stack.first[self.row]), int(self.stack.last[self.row]) + 1)
 
     def _nearest(self, q: Array) -> tuple[float, float]:
-        """The parameter of the point between nodes across from q (nq,), and how far [rad] it is from q, or more."""
+        """The parameter of the point between nodes across from q (nq,), and how far [rad] it is
+        from q, or more.
+        """
         stack, part = self.stack, self._part
         k: Rows = np.arange(part.start, max(part.stop - 1, part.start + 1))
         unwound = nearest_turn(q, stack.nodes[k])
         ways = np.maximum(stack.ways[k], ROUNDING)
         share = ((unwound - stack.nodes[k]) * stack.tangents[k]).sum(axis=1) / ways
-        chosen = np.abs(stack.at(k, np.minimum(np.maximum(share, 0.0), 1.0)) - unwound).max(axis=1).argsort()[:3]
+        chosen = (
+            np.abs(stack.at(k, np.minimum(np.maximum(share, 0.0), 1.0)) - unwound)
+            .max(axis=1)
+            .argsort()[:3]
+        )
         k, unwound = k[chosen], unwound[chosen]
         share = stack.in_line(k, np.minimum(np.maximum(share[chosen], 0.0), 1.0), unwound)
-        # next to a point, rounding may have it beyond the ends of both ways: it is little beyond either
+        # next to a point, rounding may have it beyond the ends of both ways: it is little beyond
+        # either
         beyond = np.abs(share - np.minimum(np.maximum(share, 0.0), 1.0)) * ways[chosen]
         away = np.abs(stack.at(k, share) - unwound).max(axis=1) + beyond
         best = int(away.argmin())
@@ -137,8 +156,8 @@ def members(curves: Sequence[TracedCurve], parameters: Sequence[Array]) -> list[
 
 
 def on_curve(one: TracedCurve, k: Rows, share: Array) -> Array:
-    """The members (n, nq) [rad] across from the cubics at shares (n,) of the ways from points k (n,) to the next ones.
-    `one` is any curve of the pose."""
+    """The members (n, nq) [rad] across from the cubics at shares (n,) of the ways from points k
+    (n,) to the next ones. `one` is any curve of the pose."""
     q = onto(one.chain, one.stack.at(k, share), one.stack.along(k, share), one.T)
     # np.clip takes five times as long for so few
     return np.asarray(np.minimum(np.maximum(wrapped(q), -np.pi), np.pi))

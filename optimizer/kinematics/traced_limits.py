@@ -1,6 +1,8 @@
-"""Where the curves of `traced_curve` that hold one pose are within position limits, all curves at once.
+"""Where the curves of `traced_curve` that hold one pose are within position limits, all curves at
+once.
 
-A cubic is within the hull of its four control points: most are inside all limits, or outside one, by that alone.
+A cubic is within the hull of its four control points: most are inside all limits, or outside one,
+by that alone.
 """
 
 from __future__ import annotations
@@ -30,7 +32,9 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class _Range:
-    """The joints that have limits, the middles (m,) of their ranges and half their widths (m,) [rad]."""
+    """The joints that have limits, the middles (m,) of their ranges and half their widths (m,)
+    [rad].
+    """
 
     joints: Rows
     middle: Array
@@ -53,13 +57,17 @@ class _Range:
 
 
 def within(curves: Sequence[TracedCurve], q_min: Array, q_max: Array) -> list[TracedCurve]:
-    """The curves of one pose, cut to where they are within limits (nq,) [rad] but for full turns; without those that
-    are nowhere."""
+    """The curves of one pose, cut to where they are within limits (nq,) [rad] but for full turns;
+    without those that are nowhere."""
     limits = _Range.of(q_min, q_max)
     if not curves or not len(limits.joints):
         return list(curves)
     cut = _cut(curves, limits)
-    return [curve if arcs == curve.arcs else curve.cut(arcs) for curve, arcs in zip(curves, cut, strict=True) if arcs]
+    return [
+        curve if arcs == curve.arcs else curve.cut(arcs)
+        for curve, arcs in zip(curves, cut, strict=True)
+        if arcs
+    ]
 
 
 def _cut(curves: Sequence[TracedCurve], limits: _Range) -> list[list[tuple[float, float]]]:
@@ -80,13 +88,17 @@ def _cut(curves: Sequence[TracedCurve], limits: _Range) -> list[list[tuple[float
     crossed, behind = ends.tolist(), [0, *np.searchsorted(piece, stack.last).tolist()]
     first, last = inside[stack.first].tolist(), inside[stack.last].tolist()
     return [
-        _arcs(each, crossed[behind[each.row] : behind[each.row + 1]], first[each.row], last[each.row])
+        _arcs(
+            each, crossed[behind[each.row] : behind[each.row + 1]], first[each.row], last[each.row]
+        )
         for each in curves
     ]
 
 
 def _by_hull(stack: TracedStack, limits: _Range) -> tuple[Mask, Rows]:
-    """Which nodes (n,) are inside limits, and the rows of those nodes after which the cubic may cross one."""
+    """Which nodes (n,) are inside limits, and the rows of those nodes after which the cubic may
+    cross one.
+    """
     q, tangents = stack.nodes[:, limits.joints], stack.tangents[:, limits.joints]
     own = wrapped(q - limits.middle)
     inside: Mask = np.logical_and.reduce(np.abs(own) <= limits.half, axis=1)
@@ -100,7 +112,9 @@ def _by_hull(stack: TracedStack, limits: _Range) -> tuple[Mask, Rows]:
     low, high = least >= -limits.half, most <= limits.half
     held = np.logical_and.reduce(low & high, axis=1)
     beyond = 2 * np.pi - limits.half
-    outside = ((least > limits.half) & (most < beyond)) | ((most < -limits.half) & (least > -beyond))
+    outside = ((least > limits.half) & (most < beyond)) | (
+        (most < -limits.half) & (least > -beyond)
+    )
     # of nodes on a limit, rounding may have it that hull and node differ
     both, either = inside[:-1] & inside[1:], inside[:-1] | inside[1:]
     crossing = ~(held & both) & (either | ~np.logical_or.reduce(outside, axis=1))
@@ -108,8 +122,12 @@ def _by_hull(stack: TracedStack, limits: _Range) -> tuple[Mask, Rows]:
     return inside, np.flatnonzero(crossing)
 
 
-def _arcs(curve: TracedCurve, ends: list[float], first: bool, last: bool) -> list[tuple[float, float]]:
-    """The arcs of a curve that crosses limits at `ends`; `first`, `last`: whether its own ends are inside."""
+def _arcs(
+    curve: TracedCurve, ends: list[float], first: bool, last: bool
+) -> list[tuple[float, float]]:
+    """The arcs of a curve that crosses limits at `ends`; `first`, `last`: whether its own ends are
+    inside.
+    """
     if not ends:
         return curve.arcs if first else []
     if first:
@@ -125,10 +143,12 @@ def _arcs(curve: TracedCurve, ends: list[float], first: bool, last: bool) -> lis
 
 
 def _crossings(one: TracedCurve, limits: _Range, k: Rows, part: Rows, excess: Array) -> Array:
-    """Shares (n,) of the pieces from points k (n,) on at which the curves cross limits, in the given parts (n,) of
-    these; the cubics exceed them by so much (n, PARTS + 1) at the ends of all. `one` is any curve of the pose."""
+    """Shares (n,) of the pieces from points k (n,) on at which the curves cross limits, in the
+    given parts (n,) of these; the cubics exceed them by so much (n, PARTS + 1) at the ends of all.
+    `one` is any curve of the pose."""
     stack, rows = one.stack, np.arange(len(k))
-    # a parabola through the ends of the part and of the next one crosses limits next to where the curve does
+    # a parabola through the ends of the part and of the next one crosses limits next to where the
+    # curve does
     low, high = excess[rows, part], excess[rows, part + 1]
     beside = np.where(part < PARTS - 1, part + 2, part - 1)
     chord = low / (low - high)
@@ -150,8 +170,8 @@ def _crossings(one: TracedCurve, limits: _Range, k: Rows, part: Rows, excess: Ar
 
 
 def _on_limits(one: TracedCurve, limits: _Range, q: Array) -> tuple[Array, Mask]:
-    """The configurations (n, nq) [rad] of the curves next to q (n, nq) with a joint on its limit, and which are found
-    (n,)."""
+    """The configurations (n, nq) [rad] of the curves next to q (n, nq) with a joint on its limit,
+    and which are found (n,)."""
     n, nq = q.shape
     rows = np.arange(n)
     own = wrapped(q[:, limits.joints] - limits.middle)
@@ -165,8 +185,8 @@ def _on_limits(one: TracedCurve, limits: _Range, q: Array) -> tuple[Array, Mask]
 
 
 def _zeros(beyond: Callable[[Array], Array], share: Array, inside: Mask) -> Array:
-    """Where a function of shares (n,) is zero, to ROUNDING, between those given (2, n); inside, if that is not found.
-    `inside` (n,): whether it is negative at the first of them."""
+    """Where a function of shares (n,) is zero, to ROUNDING, between those given (2, n); inside, if
+    that is not found. `inside` (n,): whether it is negative at the first of them."""
     low, high = share
     f_low, f_high = beyond(low), beyond(high)
     found = np.full(len(low), np.nan)

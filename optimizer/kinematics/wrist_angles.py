@@ -12,8 +12,8 @@ from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.forward import link_frames
 from joulepath.optimizer.kinematics.spherical_wrist import ALIGNED, SphericalWrist
 
-# Newton steps that correct an arm's place by some last digits, and singular values, relative to the largest, along
-# which they do not: where the elbow is stretched
+# Newton steps that correct an arm's place by some last digits, and singular values, relative to the
+# largest, along which they do not: where the elbow is stretched
 CORRECTIONS, FOLDED = 2, 1e-6
 
 
@@ -25,14 +25,19 @@ class WristAngles:
     wrist: SphericalWrist
 
     def sines(self, frames: Array, T: Array) -> Array:
-        """Sines (n,) of the angle from the fourth axis of link frames (n, 7, 4, 4) to the sixth axis at T (4, 4)."""
-        return np.asarray(np.linalg.norm(np.cross(frames[:, 4, :3, 2], T[:3, :3] @ self.wrist.last_axis), axis=1))
+        """Sines (n,) of the angle from the fourth axis of link frames (n, 7, 4, 4) to the sixth
+        axis at T (4, 4).
+        """
+        return np.asarray(
+            np.linalg.norm(np.cross(frames[:, 4, :3, 2], T[:3, :3] @ self.wrist.last_axis), axis=1)
+        )
 
     def near_alignment(self, arm: Array, T: Array) -> list[Array] | AlignedWrist:
-        """The configurations (6,) [rad] with the first three joints (3,) and the flange's orientation of T (4, 4): two,
-        or the self-motion if the wrist is aligned.
+        """The configurations (6,) [rad] with the first three joints (3,) and the flange's
+        orientation of T (4, 4): two, or the self-motion if the wrist is aligned.
 
-        Each angle comes from an atan2 of two exact lengths, so that it is as accurate as the pose allows.
+        Each angle comes from an atan2 of two exact lengths, so that it is as accurate as the pose
+        allows.
         """
         arm = self._placed(arm, T)
         at_zero = self._frames(arm, 0.0, 0.0)
@@ -44,14 +49,17 @@ class WristAngles:
             return AlignedWrist(self.wrist.label(q), q, -1.0 if along else 1.0)
         found = []
         for q5 in self.wrist.bent(sine, along).tolist():
-            # with q4 = 0 the sixth axis is bent to one side: q4 turns it about the fourth to where it is to be
+            # with q4 = 0 the sixth axis is bent to one side: q4 turns it about the fourth to where
+            # it is to be
             bent = np.cross(fourth, self._frames(arm, 0.0, q5)[6, :3, 2])
             q4 = np.arctan2(float(np.cross(bent, across) @ fourth), float(bent @ across))
             found.append(self._turned(arm, float(q4), q5, T))
         return found
 
     def beside_fold(self, q: Array, step: float) -> list[Array]:
-        """The configuration (6,) [rad] moved by `step` [rad] to both sides, as least moves the wrist."""
+        """The configuration (6,) [rad] moved by `step` [rad] to both sides, as least moves the
+        wrist.
+        """
         null = np.linalg.svd(self._wrist_and_jacobian(q[:3])[1])[2][-1]
         return [q + side * step * np.append(null, np.zeros(3)) for side in (1, -1)]
 

@@ -1,8 +1,10 @@
-"""Bounds on where a chain can be if it reaches a position with its last three joints in any position.
+"""Bounds on where a chain can be if it reaches a position with its last three joints in any
+position.
 
-These three joints, the wrist, decide the orientation of the tool. The joints before them, the inner ones, decide where
-the wrist is: the origin of its first joint. The bounds hold for every chain of revolute joints with at least one inner
-joint. They are exact for a point and conservative over a box of inner joint positions.
+These three joints, the wrist, decide the orientation of the tool. The joints before them, the inner
+ones, decide where the wrist is: the origin of its first joint. The bounds hold for every chain of
+revolute joints with at least one inner joint. They are exact for a point and conservative over a
+box of inner joint positions.
 """
 
 from __future__ import annotations
@@ -21,11 +23,13 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 
 OUTER = 3
-# angles of each of the last two joints at which the distance from wrist to TCP is sampled; a margin covers the rest
+# angles of each of the last two joints at which the distance from wrist to TCP is sampled; a margin
+# covers the rest
 REACH_ANGLES = 240
 # rounding of these distances [m]
 ROUNDING = 1e-9
-# points on the axis of the pose, from the TCP [m], whose distance from the wrist is bounded if a cone holds the axis
+# points on the axis of the pose, from the TCP [m], whose distance from the wrist is bounded if a
+# cone holds the axis
 ANCHORS = (0.0, -0.05, 0.05, -0.1, 0.1, -0.2, 0.2, -0.3, 0.3)
 
 
@@ -40,8 +44,8 @@ class Shell:
 
 @dataclass(frozen=True)
 class WristBody:
-    """A link beyond the wrist: mass [kg], greatest distance [m] of its centre of mass from the wrist, and the least
-    potential [J/kg] that the goal leaves it."""
+    """A link beyond the wrist: mass [kg], greatest distance [m] of its centre of mass from the
+    wrist, and the least potential [J/kg] that the goal leaves it."""
 
     mass: float
     reach: float
@@ -50,7 +54,9 @@ class WristBody:
 
 @dataclass(frozen=True)
 class WristGeometry:
-    """An arm's chain, split into inner joints and wrist. `model` holds payload and gravity, as Pinocchio has them."""
+    """An arm's chain, split into inner joints and wrist. `model` holds payload and gravity, as
+    Pinocchio has them.
+    """
 
     arm: Arm
     model: pin.Model
@@ -83,11 +89,15 @@ class WristGeometry:
 
     @cached_property
     def potential_rates(self) -> Array:
-        """Greatest change (inner,) of the inner links' potential energy with each inner joint [J/rad]."""
+        """Greatest change (inner,) of the inner links' potential energy with each inner joint
+        [J/rad].
+        """
         return potential_rates(self.model, self.gravity, self.inner)
 
     def placed(self, q: Array) -> tuple[Array, Array]:
-        """Wrist (b, 3) [m] and potential energy (b,) [J] of the inner links at inner joint positions q (b, inner)."""
+        """Wrist (b, 3) [m] and potential energy (b,) [J] of the inner links at inner joint
+        positions q (b, inner).
+        """
         frames = link_frames(self.placements[: self.inner], q)
         potential = np.zeros(len(q))
         for j in range(1, self.inner + 1):
@@ -97,14 +107,17 @@ class WristGeometry:
 
     @cached_property
     def _wrist_lengths(self) -> Array:
-        """Distances (2,) [m] from the wrist's first joint to its second, and from this one to its third."""
+        """Distances (2,) [m] from the wrist's first joint to its second, and from this one to its
+        third.
+        """
         return np.asarray(np.linalg.norm(self.placements[self.inner + 1 :, :3, 3], axis=1))
 
     def shells(self, pose: ConeOrientedPose) -> list[Shell]:
         """Where the wrist lies if the TCP is at the pose.
 
-        A point on the pose's axis, s from the TCP, lies within 2 |s| sin(half_angle / 2) of its place with the axis
-        along the direction. The wrist's first joint does not change the distance of this point from its own origin.
+        A point on the pose's axis, s from the TCP, lies within 2 |s| sin(half_angle / 2) of its
+        place with the axis along the direction. The wrist's first joint does not change the
+        distance of this point from its own origin.
         """
         tcp, lengths = T_last_tcp(self.arm), self._wrist_lengths
         angles = 2 * np.pi * np.arange(REACH_ANGLES) / REACH_ANGLES
@@ -130,7 +143,8 @@ class WristGeometry:
         bodies = [self.model.inertias[k] for k in range(self.inner + 1, self.arm.robot.nq + 1)]
         levers = [float(np.linalg.norm(body.lever)) for body in bodies]
         at_goal = -float(pose.position @ g)
-        # the last body is fixed in the TCP frame: along the axis it cannot rotate further than the cone allows
+        # the last body is fixed in the TCP frame: along the axis it cannot rotate further than the
+        # cone allows
         offset = T[:3, :3].T @ (bodies[-1].lever - T[:3, 3])
         along = float(offset @ pose.axis)
         across = float(np.linalg.norm(offset - along * pose.axis))
@@ -142,14 +156,18 @@ class WristGeometry:
             at_goal + max(upright, -strength * float(np.linalg.norm(offset))),
         ]
         reach = [levers[k] + float(lengths[:k].sum()) for k in range(len(bodies))]
-        return [WristBody(body.mass, far, low) for body, far, low in zip(bodies, reach, least, strict=True)]
+        return [
+            WristBody(body.mass, far, low)
+            for body, far, low in zip(bodies, reach, least, strict=True)
+        ]
 
 
 def potential_rates(model: pin.Model, gravity: Array, links: int | None = None) -> Array:
-    """Greatest change (links,) [J/rad] of the potential energy of the first `links` links with each of their joints.
+    """Greatest change (links,) [J/rad] of the potential energy of the first `links` links with each
+    of their joints.
 
-    A link's centre of mass is no farther from an earlier joint than the joints' origins between them and its own lever.
-    `links` is by default every link; `gravity` (3,) is in m/s².
+    A link's centre of mass is no farther from an earlier joint than the joints' origins between
+    them and its own lever. `links` is by default every link; `gravity` (3,) is in m/s².
     """
     count = model.nq if links is None else links
     lengths = np.linalg.norm(joint_placements(model)[1:count, :3, 3], axis=1)

@@ -1,4 +1,6 @@
-"""The methods: one parametrisation of a motion each, for the same problem, candidates, bounds and certificate."""
+"""The methods: one parametrisation of a motion each, for the same problem, candidates, bounds and
+certificate.
+"""
 
 from __future__ import annotations
 
@@ -39,5 +41,7 @@ def solver_for(
     deadline: Deadline,
     interval: DurationInterval | None = None,
 ) -> Method:
-    """The solver of the problem's method for a candidate from q_start to q_goal (nq,) in an interval of durations."""
+    """The solver of the problem's method for a candidate from q_start to q_goal (nq,) in an
+    interval of durations.
+    """
     return method_of(prepared.problem)(prepared, q_start, q_goal, deadline, interval)

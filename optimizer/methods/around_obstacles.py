@@ -1,4 +1,5 @@
-"""Motions along smooth planned paths, for methods whose own path is one fixed curve that collides."""
+"""Motions along smooth planned paths, for methods whose own path is one fixed curve that
+collides."""
 
 from __future__ import annotations
 
@@ -28,10 +29,11 @@ Law = Callable[[Spline], SolveResult]
 
 
 def around_obstacles(method: Method, own: str, collision: Clearance, law: Law) -> SolveResult:
-    """The motion of least energy along smooth planned paths, for a method whose `own` path has a `collision`.
+    """The motion of least energy along smooth planned paths, for a method whose `own` path has a
+    `collision`.
 
-    A candidate is not solved further if its own path needs at least as much energy as the best motion known, even
-    without obstacles.
+    A candidate is not solved further if its own path needs at least as much energy as the best
+    motion known, even without obstacles.
     """
     if np.isfinite(method.best_known) and _cost_without_obstacles(method) >= method.best_known:
         return SolveResult(SolveStatus.PRUNED, NO_BETTER, collision=collision)
@@ -59,7 +61,9 @@ def along_path(method: Method, path: Array, law: Law) -> SolveResult:
         try:
             smooth = smooth_path(method.prepared, path)
             if smooth is None:
-                return SolveResult(SolveStatus.FAILED, "no smooth path around it is proven to be collision-free")
+                return SolveResult(
+                    SolveStatus.FAILED, "no smooth path around it is proven to be collision-free"
+                )
             result = law(smooth)
             if result.spline is None:
                 return result
@@ -67,8 +71,11 @@ def along_path(method: Method, path: Array, law: Law) -> SolveResult:
         except DeadlinePassed:
             return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED)
     if hit is not None:
-        # the motion is fitted to the path, from which it differs by far less than the planner's reserve
-        failed = SolveResult(SolveStatus.FAILED, f"found no collision-free motion: {hit.message}", collision=hit)
+        # the motion is fitted to the path, from which it differs by far less than the planner's
+        # reserve
+        failed = SolveResult(
+            SolveStatus.FAILED, f"found no collision-free motion: {hit.message}", collision=hit
+        )
         return with_effort(failed, [result])
     return replace(result, reason=f"{result.reason}{ALONG_PLANNED_PATH}")
 

@@ -1,4 +1,6 @@
-"""The angle at which the tool ends where its path leaves it free: angles all around, then near the best of these."""
+"""The angle at which the tool ends where its path leaves it free: angles all around, then near the
+best of these.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ FAR = 10.0
 
 
 def try_angles(cost: Callable[[float], float], known: float) -> None:
-    """Ask for the `cost` [J] of angles [rad] until no other seems to be less; inf: none. It is `known` at zero."""
+    """Ask for the `cost` [J] of angles [rad] until no other seems to be less; inf: none. It is
+    `known` at zero.
+    """
     found = {0.0: known} | {angle: cost(angle) for angle in ALL_AROUND}
     middle = min(found, key=lambda angle: found[angle])
     if not np.isfinite(found[middle]):

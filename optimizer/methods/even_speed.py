@@ -1,8 +1,10 @@
-"""Motions along a tool path at a fixed speed of the TCP: even between two ramps, whose lengths alone are free.
+"""Motions along a tool path at a fixed speed of the TCP: even between two ramps, whose lengths
+alone are free.
 
-The way of the TCP along the path of the joints is measured by its own derivative, so that the speed is even on what is
-followed, and not on what was asked for. On a ramp the speed rises as 10 x³ - 15 x⁴ + 6 x⁵ over the time. The motion is
-the spline that fits this best, with so many knots that the speed is off by no more than its tolerance.
+The way of the TCP along the path of the joints is measured by its own derivative, so that the speed
+is even on what is followed, and not on what was asked for. On a ramp the speed rises as 10 x³ - 15
+x⁴ + 6 x⁵ over the time. The motion is the spline that fits this best, with so many knots that the
+speed is off by no more than its tolerance.
 """
 
 from __future__ import annotations
@@ -27,9 +29,11 @@ from joulepath.optimizer.trajectories.spline import Spline, sample
 
 # samples of the path per control point, to measure along it
 SAMPLED = 16
-# share of a ramp's way that is used at most; and times of a ramp that are tried, over the longest one
+# share of a ramp's way that is used at most; and times of a ramp that are tried, over the longest
+# one
 USED, TIMES = 0.98, (1.0, 0.75, 0.55, 0.4)
-# even spans of a motion, first and more, spans of each ramp, and instants per span at which it is fitted
+# even spans of a motion, first and more, spans of each ramp, and instants per span at which it is
+# fitted
 SPANS, RAMP_SPANS, FITTED = (48, 96, 192, 384), 8, 5
 # spans that are shorter than this share of an even one are none
 LEAST_SPAN = 0.05
@@ -39,15 +43,20 @@ CHECKED, WITHIN = 8, 0.5
 LEAST_PACE = 1e-9
 TURNS = "the tool turns in place on its way: no path.speed can be held there"
 TOO_FAST = (
-    "the joints' limits do not allow the fixed path.speed with ramps of path.speed.ramp: give a lower speed, a longer "
+    "the joints' limits do not allow the fixed path.speed with ramps of path.speed.ramp: give a "
+    "lower speed, a longer "
     "path.speed.ramp, or a larger path.blend"
 )
-NOT_HELD = "found no motion that holds the fixed path.speed: give a larger path.blend or path.tolerance"
+NOT_HELD = (
+    "found no motion that holds the fixed path.speed: give a larger path.blend or path.tolerance"
+)
 
 
 @dataclass(frozen=True, eq=False)
 class _Tried:
-    """The `motion` with ramps of some `times` [s], None if there is none within the limits, and its cost [J]."""
+    """The `motion` with ramps of some `times` [s], None if there is none within the limits, and its
+    cost [J].
+    """
 
     times: tuple[float, float]
     motion: Spline | None
@@ -57,7 +66,8 @@ class _Tried:
 
 @dataclass(frozen=True, eq=False)
 class EvenSpeed:
-    """Motions along `path`, a spline of the joints over [0, 1], at a fixed `speed` [m/s] of the TCP.
+    """Motions along `path`, a spline of the joints over [0, 1], at a fixed `speed` [m/s] of the
+    TCP.
 
     `keeps` says whether a motion is within the tolerances of the tool path.
     """
@@ -69,16 +79,24 @@ class EvenSpeed:
     keeps: Callable[[Spline], bool]
 
     def solve(self) -> SolveResult:
-        """The motion of least cost over the lengths of both ramps. Ends by DeadlinePassed once that is watched."""
+        """The motion of least cost over the lengths of both ramps. Ends by DeadlinePassed once that
+        is watched.
+        """
         if self._pace.min() < LEAST_PACE:
             return SolveResult(SolveStatus.INFEASIBLE, TURNS)
         tried = list[_Tried]()
-        for pairs in (self._even_ramps(), self._uneven_ramps(0, tried), self._uneven_ramps(1, tried)):
+        for pairs in (
+            self._even_ramps(),
+            self._uneven_ramps(0, tried),
+            self._uneven_ramps(1, tried),
+        ):
             tried += [self._tried(*pair) for pair in pairs]
         for each in sorted(tried, key=lambda each: each.cost):
             motion = self._kept(each)
             if motion is not None:
-                return SolveResult(SolveStatus.SOLVED, CONVERGED, len(tried), len(tried), motion, stationarity=0.0)
+                return SolveResult(
+                    SolveStatus.SOLVED, CONVERGED, len(tried), len(tried), motion, stationarity=0.0
+                )
         reason = TOO_FAST if any(each.too_fast for each in tried) else NOT_HELD
         return SolveResult(SolveStatus.FAILED, reason, len(tried), len(tried))
 
@@ -90,10 +108,14 @@ class EvenSpeed:
             known[key] = motion, motion is not None and self._is_within_limits(motion)
         motion, within = known[key]
         cost = self._cost(motion) if motion is not None and within else np.inf
-        return _Tried((first, last), motion if within else None, cost, motion is not None and not within)
+        return _Tried(
+            (first, last), motion if within else None, cost, motion is not None and not within
+        )
 
     def _kept(self, tried: _Tried) -> Spline | None:
-        """The motion, with more spans if it leaves its path by more than it may; None if there is none."""
+        """The motion, with more spans if it leaves its path by more than it may; None if there is
+        none.
+        """
         motion = tried.motion
         if motion is None or self.keeps(motion):
             return motion
@@ -137,7 +159,8 @@ class EvenSpeed:
 
     @cached_property
     def _bounds(self) -> tuple[float, float]:
-        """Least and greatest mean time [s] of both ramps that the durations of the interval allow."""
+        """Least and greatest mean time [s] of both ramps that the durations of the interval
+        allow."""
         even = float(self._gone[-1]) / self.speed
         return self.interval.t_min - even, self.interval.t_max - even
 
@@ -147,9 +170,14 @@ class EvenSpeed:
         return 2 * USED * self._least_speed.ramp / self.speed
 
     def _even_ramps(self) -> Iterator[tuple[float, float]]:
-        """Times [s] of two equal ramps, the longest ones first, and those of the shortest and the longest motion."""
+        """Times [s] of two equal ramps, the longest ones first, and those of the shortest and the
+        longest motion.
+        """
         for time in (*(self._longest * share for share in TIMES), *self._bounds):
-            if max(self._bounds[0], 0.0) <= time <= min(self._bounds[1], self._longest) and time > 0:
+            if (
+                max(self._bounds[0], 0.0) <= time <= min(self._bounds[1], self._longest)
+                and time > 0
+            ):
                 yield time, time
 
     def _uneven_ramps(self, end: int, tried: list[_Tried]) -> Iterator[tuple[float, float]]:
@@ -165,15 +193,17 @@ class EvenSpeed:
                 yield times[0], times[1]
 
     def _motion(self, first: float, last: float, numbers: Sequence[int]) -> Spline | None:
-        """The motion with ramps of these times [s], in the first of these numbers of spans with which it holds its
-        speed; None if it does not."""
+        """The motion with ramps of these times [s], in the first of these numbers of spans with
+        which it holds its speed; None if it does not."""
         length = float(self._gone[-1])
         duration = length / self.speed + (first + last) / 2
         for spans in numbers:
             breaks = _breaks(spans, first / duration, last / duration)
             t = _within(breaks, FITTED) * duration
             gone = np.where(
-                t < duration / 2, _ramped(t, first, self.speed), length - _ramped(duration - t, last, self.speed)
+                t < duration / 2,
+                _ramped(t, first, self.speed),
+                length - _ramped(duration - t, last, self.speed),
             )
             q = self.path.curve(np.clip(self._fraction(gone), 0.0, 1.0))
             q[[0, -1]] = self.path.control_points[[0, -1]]
@@ -184,7 +214,9 @@ class EvenSpeed:
         return None
 
     def _deviation(self, motion: Spline, first: float, last: float) -> float:
-        """The largest deviation from the speed over its tolerance: between the ramps, and above it on them."""
+        """The largest deviation from the speed over its tolerance: between the ramps, and above it
+        on them.
+        """
         assert self.prepared.problem.tool_path is not None
         t = _within(np.unique(motion.knots), CHECKED)
         q, v, _ = sample(motion, t)
@@ -199,9 +231,13 @@ class EvenSpeed:
 
 
 def _breaks(spans: int, first: float, last: float) -> Array:
-    """Ends of spans (k,) in [0, 1]: even ones, and those of ramps that take shares `first` and `last` of the time."""
+    """Ends of spans (k,) in [0, 1]: even ones, and those of ramps that take shares `first` and
+    `last` of the time.
+    """
     ramp = np.linspace(0.0, 1.0, RAMP_SPANS + 1)
-    breaks = np.unique(np.concatenate([np.linspace(0.0, 1.0, spans + 1), first * ramp, 1 - last * ramp]))
+    breaks = np.unique(
+        np.concatenate([np.linspace(0.0, 1.0, spans + 1), first * ramp, 1 - last * ramp])
+    )
     breaks = breaks[np.append(True, np.diff(breaks) > LEAST_SPAN / spans)]
     breaks[-1] = 1.0
     return np.asarray(breaks)
@@ -214,6 +250,8 @@ def _within(breaks: Array, count: int) -> Array:
 
 
 def _ramped(t: Array, ramp: float, speed: float) -> Array:
-    """The way (k,) [m] after times t (k,) [s] from rest: a ramp of `ramp` [s], then at the speed [m/s]."""
+    """The way (k,) [m] after times t (k,) [s] from rest: a ramp of `ramp` [s], then at the speed
+    [m/s].
+    """
     x = np.clip(t / ramp, 0.0, 1.0)
     return np.asarray(speed * (ramp * (2.5 * x**4 - 3 * x**5 + x**6) + np.maximum(t - ramp, 0.0)))

@@ -1,10 +1,11 @@
 """The fastest motion between two configurations: several starts of the minimum-time problem.
 
-From a single start the minimum-time problem may end in a local optimum that takes several times as long as the fastest
-motion, or in none at all. Several starts are tried therefore, in the order of their effort, until one of them meets the
-lower bound on the duration: the method's own; Ruckig's motion, and toppra's along the straight line; motions that are
-known; and a continuation from a slow motion to faster ones, at rising prices of time. Every motion that is found on the
-way counts, if it is confirmed, so that the result is never slower than any of them.
+From a single start the minimum-time problem may end in a local optimum that takes several times as
+long as the fastest motion, or in none at all. Several starts are tried therefore, in the order of
+their effort, until one of them meets the lower bound on the duration: the method's own; Ruckig's
+motion, and toppra's along the straight line; motions that are known; and a continuation from a slow
+motion to faster ones, at rising prices of time. Every motion that is found on the way counts, if it
+is confirmed, so that the result is never slower than any of them.
 """
 
 from __future__ import annotations
@@ -36,38 +37,44 @@ class FastestSettings:
     """How thoroughly the fastest motion is looked for."""
 
     proven: float = 1e-3
-    """Relative excess over the lower bound up to which a motion counts as the fastest one. Splines with knots at the
-    switches of jerk come within 0.03 % of the bound; one solve more would gain no more than this."""
+    """Relative excess over the lower bound up to which a motion counts as the fastest one. Splines
+    with knots at the switches of jerk come within 0.03 % of the bound; one solve more would gain no
+    more than this."""
 
     prices: tuple[float, ...] = (100.0, 1000.0)
-    """Prices of time [W] of the continuation from a slow motion to the fastest one. At the first a UR5e's motions take
-    some 3 % more time than the fastest ones, from any initial guess."""
+    """Prices of time [W] of the continuation from a slow motion to the fastest one. At the first a
+    UR5e's motions take some 3 % more time than the fastest ones, from any initial guess."""
 
     jerks: tuple[float, ...] = (1.0, 1e-2, 1e-4)
-    """Shares of the jerk limits with which Ruckig's motion is tried in turn. Where a motion takes minutes and a phase
-    of constant jerk some milliseconds, rounding takes its jerk far beyond the limit; with less jerk, phases are longer.
+    """Shares of the jerk limits with which Ruckig's motion is tried in turn. Where a motion takes
+    minutes and a phase of constant jerk some milliseconds, rounding takes its jerk far beyond the
+    limit; with less jerk, phases are longer.
     """
 
     jump: float = 2e-3
-    """Time [s] in which acceleration reaches its limit where no limit on jerk is in force: no spline has an
-    acceleration that jumps, and the certificate looks once a millisecond."""
+    """Time [s] in which acceleration reaches its limit where no limit on jerk is in force: no
+    spline has an acceleration that jumps, and the certificate looks once a millisecond."""
 
     gain: float = 1e-3
-    """Relative decrease of the duration below which no further solve from the fastest motion follows."""
+    """Relative decrease of the duration below which no further solve from the fastest motion
+    follows.
+    """
 
     most_repeated: int = 4
     """Solves from the fastest motion at most, each from the result of the one before."""
 
     most_thorough: int = 6
-    """Candidates of a problem that are solved from every start, those of the fastest motions first."""
+    """Candidates of a problem that are solved from every start, those of the fastest motions
+    first."""
 
 
 class FastestMotion(ABC):
-    """The search for the fastest motion from q_start to q_goal (nq,) [rad], whatever durations the problem allows.
+    """The search for the fastest motion from q_start to q_goal (nq,) [rad], whatever durations the
+    problem allows.
 
-    `best` is the fastest motion that is confirmed so far, None if there is none. `known` are motions between the same
-    ends. With `wanted` [s] the search ends with the first motion that takes no longer, and not before. `cut_short`: the
-    deadline ended the search.
+    `best` is the fastest motion that is confirmed so far, None if there is none. `known` are
+    motions between the same ends. With `wanted` [s] the search ends with the first motion that
+    takes no longer, and not before. `cut_short`: the deadline ended the search.
     """
 
     def __init__(
@@ -83,7 +90,9 @@ class FastestMotion(ABC):
         self.wanted = wanted
         self.settings = settings or FastestSettings()
         limits = prepared.problem.arm.active_limits
-        self.bound = max(float(shortest_duration(q_goal - q_start, limits)), prepared.least_time, LEAST_DURATION)
+        self.bound = max(
+            float(shortest_duration(q_goal - q_start, limits)), prepared.least_time, LEAST_DURATION
+        )
         self.best: Spline | None = None
         self.cut_short = False
 
@@ -117,12 +126,13 @@ class FastestMotion(ABC):
         return self.best
 
     def look_quickly(self) -> None:
-        """Try the method's own start; Ruckig's motion, as a guess and as it is, slowed until it keeps the torque
-        limits; and the motions that are known."""
+        """Try the method's own start; Ruckig's motion, as a guess and as it is, slowed until it
+        keeps the torque limits; and the motions that are known."""
         self._try_all(self._quick())
 
     def look_thoroughly(self) -> None:
-        """Try the other starts, and solve again from the fastest motion as long as that gains time."""
+        """Try the other starts, and solve again from the fastest motion as long as that gains
+        time."""
         if self._solver.takes_guesses and not (self.is_proven or self._is_done):
             self._try_all(self._thorough())
 
@@ -141,7 +151,11 @@ class FastestMotion(ABC):
     def take_note(self, result: SolveResult) -> None:
         """Take the motion of a result if it is the fastest one, and confirmed."""
         self.cut_short |= result.cut_short or result.status is SolveStatus.OUT_OF_TIME
-        if result.spline is not None and result.spline.duration < self.duration and self.confirms(result.spline):
+        if (
+            result.spline is not None
+            and result.spline.duration < self.duration
+            and self.confirms(result.spline)
+        ):
             self.best = result.spline
 
     @property
@@ -187,7 +201,9 @@ class FastestMotion(ABC):
         return partial(self.solver(fastest(self.prepared)).solve_from, *sampled(spline), fine=fine)
 
     def _scaled_ruckig(self) -> SolveResult:
-        """Ruckig's motion, slowed until it keeps the torque limits; it does not move around obstacles."""
+        """Ruckig's motion, slowed until it keeps the torque limits; it does not move around
+        obstacles.
+        """
         given = self._ruckig
         hit = self.prepared.surroundings.worst_violation(given)
         if hit is not None:
@@ -196,11 +212,15 @@ class FastestMotion(ABC):
 
     @cached_property
     def _ruckig(self) -> Spline:
-        """Ruckig's motion; with less jerk where its phases are too short for a spline within the limits."""
+        """Ruckig's motion; with less jerk where its phases are too short for a spline within the
+        limits.
+        """
         limits, found = self.prepared.problem.arm.active_limits, dict[float, Spline]()
         most = np.where(np.isinf(limits.j_max), limits.a_max / self.settings.jump, limits.j_max)
         for share in self.settings.jerks:
-            spline = time_optimal_spline(replace(limits, j_max=share * most), self.q_start, self.q_goal)
+            spline = time_optimal_spline(
+                replace(limits, j_max=share * most), self.q_start, self.q_goal
+            )
             needed = max(least_time_scale(spline, limits.rates), 1.0)
             found[spline.duration * needed] = spline
             if needed <= 1 + self.settings.proven:
@@ -214,7 +234,9 @@ class FastestMotion(ABC):
 
     def _on_line(self) -> Iterator[Spline]:
         """The fastest motion along the straight line, from toppra's; none if the line collides."""
-        line = TimeScaling(self.prepared, self.q_start, self.q_goal, self.deadline, fastest(self.prepared))
+        line = TimeScaling(
+            self.prepared, self.q_start, self.q_goal, self.deadline, fastest(self.prepared)
+        )
         if not self._takes_ruckig or line.collides:
             return
         result = line.solve()
@@ -224,12 +246,18 @@ class FastestMotion(ABC):
             yield result.spline
 
     def _continued(self) -> Iterator[Attempt]:
-        """Solves at rising prices of time, each from the motion of the one before, and one for the least time."""
+        """Solves at rising prices of time, each from the motion of the one before, and one for the
+        least time.
+        """
         spline: Spline | None = None
         for price in self.settings.prices:
             p = self.prepared.parameters(electrical=1.0, time=price)
             solver = self.solver(DurationInterval(p, LEAST_DURATION, LONGEST_DURATION, price=price))
-            result = solver.solve() if spline is None else solver.solve_from(*sampled(spline), fine=False)
+            result = (
+                solver.solve()
+                if spline is None
+                else solver.solve_from(*sampled(spline), fine=False)
+            )
             self.take_note(result)
             spline = spline if result.spline is None else result.spline
         if spline is not None:

@@ -1,8 +1,10 @@
-"""`lagrange`: one polynomial per joint; its values at Chebyshev nodes and the duration are optimised.
+"""`lagrange`: one polynomial per joint; its values at Chebyshev nodes and the duration are
+optimised.
 
-L.-P. Luo, C. Yuan, R.-J. Yan, Q. Yuan, J. Wu, K.-S. Shin, C.-S. Han, "Trajectory planning for energy minimization of
-industry robotic manipulators using the Lagrange interpolation method", Int. J. Precis. Eng. Manuf. 16, 2015: Lagrange
-interpolation at Chebyshev nodes. The SQP with exact derivatives is this project's.
+L.-P. Luo, C. Yuan, R.-J. Yan, Q. Yuan, J. Wu, K.-S. Shin, C.-S. Han, "Trajectory planning for
+energy minimization of industry robotic manipulators using the Lagrange interpolation method", Int.
+J. Precis. Eng. Manuf. 16, 2015: Lagrange interpolation at Chebyshev nodes. The SQP with exact
+derivatives is this project's.
 """
 
 from __future__ import annotations
@@ -20,8 +22,8 @@ from joulepath.optimizer.trajectories.ruckig_motion import time_optimal
 from joulepath.optimizer.trajectories.spline import Spline
 from joulepath.optimizer.trajectories.time_scalings import quintic
 
-# degree 15. Two more nodes save a UR5e some 0.15 % of the energy and take a fifth more time, at all degrees from 9 to
-# 19; Bernstein's coefficients lose a digit with every three nodes
+# degree 15. Two more nodes save a UR5e some 0.15 % of the energy and take a fifth more time, at all
+# degrees from 9 to 19; Bernstein's coefficients lose a digit with every three nodes
 NODES = 10
 
 
@@ -50,7 +52,11 @@ class Lagrange(SqpMethod):
             if tried[-1].status in (SolveStatus.SOLVED, SolveStatus.OUT_OF_TIME):
                 return with_effort(tried[-1], tried)
         # of two failures, the one with a collision came further
-        collided = [result for result in tried if result.status is SolveStatus.FAILED and result.collision is not None]
+        collided = [
+            result
+            for result in tried
+            if result.status is SolveStatus.FAILED and result.collision is not None
+        ]
         if tried[-1].status is SolveStatus.FAILED and collided:
             failed = no_polynomial_around(collided[-1], polynomials(NODES).degree)
             tried.append(self.from_planned_paths(failed))
@@ -67,5 +73,7 @@ class Lagrange(SqpMethod):
         return self.improve(Guess(space, space.fit(q, t / duration), duration))
 
     def overshoot(self, spline: Spline) -> tuple[Array, Array]:
-        """Excess (nq,) [rad] below and above the position limits: values at nodes do not bound a polynomial between."""
+        """Excess (nq,) [rad] below and above the position limits: values at nodes do not bound a
+        polynomial between.
+        """
         return sampled_overshoot(self.prepared, spline)

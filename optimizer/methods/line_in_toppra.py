@@ -1,6 +1,7 @@
 """A straight line in joint space and the limits of an arm along it, in the form that toppra takes.
 
-Speeds and accelerations are in proportion to those of the line's fraction s: their limits bound ds/dt and d²s/dt².
+Speeds and accelerations are in proportion to those of the line's fraction s: their limits bound
+ds/dt and d²s/dt².
 """
 
 from __future__ import annotations
@@ -49,13 +50,17 @@ class LineLimits(LinearConstraint):  # type: ignore[misc]
         self.prepared = prepared
         self.identical = True
 
-    def compute_constraint_params(self, path: StraightLine, gridpoints: Array, *_: Any) -> tuple[Array, ...]:
+    def compute_constraint_params(
+        self, path: StraightLine, gridpoints: Array, *_: Any
+    ) -> tuple[Array, ...]:
         """a, b, c (k, nq), F, g, and bounds (k, 2) of u = d²s/dt² and x = (ds/dt)².
 
         F (a u + b x + c) ≤ g bounds the smooth part of the torque.
         """
         arm, count = self.prepared.arm, len(gridpoints)
-        rates = Coordinates.straight_line(path.q_start, path.q_start + path.displacement, arm.active_limits).limits
+        rates = Coordinates.straight_line(
+            path.q_start, path.q_start + path.displacement, arm.active_limits
+        ).limits
         q, d, none = path(gridpoints), path(gridpoints, 1), np.zeros((count, path.dof))
         v, a = np.concatenate([none, none, d]), np.concatenate([none, d, none])
         tau = self.prepared.torques(np.concatenate([q, q, q]), v, a)

@@ -23,7 +23,8 @@ CONVERGED = "converged"
 
 
 def with_excess(cost: float, tau: Array, limits: Limits) -> float:
-    """A cost that is greater by the largest share by which torques tau (N, nq) [N·m] exceed their limits.
+    """A cost that is greater by the largest share by which torques tau (N, nq) [N·m] exceed their
+    limits.
 
     A cost may be below zero, where waiting less counts as a gain: then it comes nearer to zero.
     """
@@ -33,10 +34,10 @@ def with_excess(cost: float, tau: Array, limits: Limits) -> float:
 class SolveStatus(StrEnum):
     """Outcome of solving one candidate.
 
-    SOLVED: there is a motion within the limits. INFEASIBLE: the method has none for this candidate. FAILED: the method
-    found none. PRUNED: it needs at least as much energy as the best motion known, by what the solve promises, or
-    although it collides. POSTPONED: the planner found no path to its goal yet, and others come first. OUT_OF_TIME: the
-    deadline passed.
+    SOLVED: there is a motion within the limits. INFEASIBLE: the method has none for this candidate.
+    FAILED: the method found none. PRUNED: it needs at least as much energy as the best motion
+    known, by what the solve promises, or although it collides. POSTPONED: the planner found no path
+    to its goal yet, and others come first. OUT_OF_TIME: the deadline passed.
     """
 
     SOLVED = "solved"
@@ -49,12 +50,14 @@ class SolveStatus(StrEnum):
 
 @dataclass(frozen=True)
 class SolveResult:
-    """Result of solving one candidate: status, reason for the report, the motion if solved, and the effort.
+    """Result of solving one candidate: status, reason for the report, the motion if solved, and the
+    effort.
 
-    `iterations` are those of the method: SQP iterations, generations, or energies evaluated. `solves` counts the NLPs.
-    `collision` is the clearance that the best motion found violates, None if it violates none. `cut_short`: the
-    deadline ended the optimisation of the motion, or the planning of a path. `unhindered` [J] is what the motion of
-    least energy without clearance constraints needs, if that collides.
+    `iterations` are those of the method: SQP iterations, generations, or energies evaluated.
+    `solves` counts the NLPs. `collision` is the clearance that the best motion found violates, None
+    if it violates none. `cut_short`: the deadline ended the optimisation of the motion, or the
+    planning of a path. `unhindered` [J] is what the motion of least energy without clearance
+    constraints needs, if that collides.
     """
 
     status: SolveStatus
@@ -74,7 +77,8 @@ class Method(ABC):
     `interval` holds the allowed durations and the cost; None: the first one of the problem.
     """
 
-    # baselines used as initial guess, and baselines that the method can represent exactly and therefore accepts
+    # baselines used as initial guess, and baselines that the method can represent exactly and
+    # therefore accepts
     guess_baselines: ClassVar[tuple[BaselineName, ...]] = ()
     accepted_baselines: ClassVar[tuple[BaselineName, ...]] = ()
     # greatest number of candidates that are solved
@@ -85,14 +89,16 @@ class Method(ABC):
     takes_guesses: ClassVar[bool] = False
     # whether it ends in a local optimum
     converges: ClassVar[bool] = True
-    # cost of the best motion known, as of `cost_of`: motions that collide and cost more are not solved further
+    # cost of the best motion known, as of `cost_of`: motions that collide and cost more are not
+    # solved further
     best_known: float = np.inf
-    # goals (nq,) [rad] of other candidates from the same start: as long as no motion is known, a path to any may do
+    # goals (nq,) [rad] of other candidates from the same start: as long as no motion is known, a
+    # path to any may do
     other_goals: Callable[[], Sequence[Array]] = tuple
     # whether there is no other candidate
     is_sole: bool = False
-    # whether the candidate was postponed: then clearance constraints on its own motion, and a planning in few states,
-    # were tried in vain
+    # whether the candidate was postponed: then clearance constraints on its own motion, and a
+    # planning in few states, were tried in vain
     was_postponed: bool = False
     # whether the motion that the candidate has is from a planned path
     is_from_planned_path: bool = False
@@ -115,7 +121,8 @@ class Method(ABC):
         """Solve without an initial guess from elsewhere (cold start)."""
 
     def cost_of(self, spline: Spline | None) -> float:
-        """What the interval makes least: the duration [s], or the objective with the price of time [J].
+        """What the interval makes least: the duration [s], or the objective with the price of time
+        [J].
 
         It is infinite if there is no motion.
         """
@@ -138,10 +145,11 @@ class Method(ABC):
         return self.solve_from(*sampled(spline), fine)
 
     def solve_evenly(self, q: Array, t: Array, count: int, progress: float) -> SolveResult:
-        """Solve from samples q (k, nq) [rad] at times t (k,) [s] with `count` control points, evenly spaced in time.
+        """Solve from samples q (k, nq) [rad] at times t (k,) [s] with `count` control points,
+        evenly spaced in time.
 
-        A slow motion has more of them at its ramps. The solve ends when a step promises less than the relative decrease
-        `progress`.
+        A slow motion has more of them at its ramps. The solve ends when a step promises less than
+        the relative decrease `progress`.
         """
         return SolveResult(SolveStatus.FAILED, "the method has no evenly spaced control points")
 

@@ -1,8 +1,10 @@
-"""The motion of least cost through configurations at which it does not rest: one spline over all of them.
+"""The motion of least cost through configurations at which it does not rest: one spline over all of
+them.
 
-One quintic B-spline per joint, as in `bspline`. It goes through each configuration at a time that is free: the times
-are chosen together with the control points and the duration. First there are few control points; then its knots are
-double where it passes, since the best motion's jerk may change quickly there.
+One quintic B-spline per joint, as in `bspline`. It goes through each configuration at a time that
+is free: the times are chosen together with the control points and the duration. First there are few
+control points; then its knots are double where it passes, since the best motion's jerk may change
+quickly there.
 """
 
 from __future__ import annotations
@@ -32,7 +34,8 @@ from joulepath.optimizer.trajectories.through_samples import spline_through
 
 # control points of the first attempt: those of `bspline`, and so many for each pass
 COARSE, PER_PASS = 13, 3
-# multiplicity of the knots where it passes, and the widest span between knots as a share of an even part
+# multiplicity of the knots where it passes, and the widest span between knots as a share of an even
+# part
 REPEAT, WIDEST, FINE_WIDEST = 2, 1 / 6, 1 / 7
 # rad: a pass that is so near to the configuration before it is met with it
 SAME = 1e-9
@@ -45,7 +48,8 @@ class PassingSpline(SqpMethod):
     takes_long: ClassVar[bool] = True
 
     def solve(self) -> SolveResult:
-        """From a smooth curve through all configurations; if that finds no motion, from one that rests at each pass.
+        """From a smooth curve through all configurations; if that finds no motion, from one that
+        rests at each pass.
 
         That one is the result if nothing better is found from it.
         """
@@ -58,7 +62,9 @@ class PassingSpline(SqpMethod):
             rests = self._between_rests()
             stopping = [result.spline for result in rests if result.spline is not None]
             if len(stopping) < len(rests):
-                return with_effort(next(result for result in rests if result.spline is None), [*tried, *rests])
+                return with_effort(
+                    next(result for result in rests if result.spline is None), [*tried, *rests]
+                )
             motion = joined(stopping)
             known = lasting(motion, float(np.clip(motion.duration, self.t_min, self.t_max)))
             tried.append(self.solve_from(*sampled(known), fine=False))
@@ -73,10 +79,14 @@ class PassingSpline(SqpMethod):
         return bool(np.ptp(np.diff(np.unique(found.knots))) < 1e-9 * found.duration)
 
     def solve_from(self, q: Array, t: Array, fine: bool) -> SolveResult:
-        """From samples q (k, nq) at times t (k,) of a motion through the passes; more control points if `fine`."""
+        """From samples q (k, nq) at times t (k,) of a motion through the passes; more control
+        points if `fine`.
+        """
         duration = float(t[-1])
         at = pass_times(make_interp_spline(t, q, k=3), self.passes) / duration
-        space = bspline.graded(at, REPEAT, (FINE_WIDEST if fine else WIDEST) / (len(self.passes) + 1))
+        space = bspline.graded(
+            at, REPEAT, (FINE_WIDEST if fine else WIDEST) / (len(self.passes) + 1)
+        )
         points = space.fit(q, t / duration)
         near = self.prepared.surroundings.is_near_contact(q)
         return self.improve(Guess(space, points, duration, collision_free=near))
@@ -86,12 +96,16 @@ class PassingSpline(SqpMethod):
         return self.solve_from(q, t, fine=False)
 
     def overshoot(self, spline: Spline) -> tuple[Array, Array]:
-        """Excess (nq,) [rad] below and above the position limits: passes move control points beyond the limits."""
+        """Excess (nq,) [rad] below and above the position limits: passes move control points beyond
+        the limits.
+        """
         return sampled_overshoot(self.prepared, spline)
 
     @cached_property
     def passes(self) -> Array:
-        """Configurations (k, nq) [rad] that the motion passes through, without those at which it is just then."""
+        """Configurations (k, nq) [rad] that the motion passes through, without those at which it is
+        just then.
+        """
         kept = [self.q_start]
         for q in self.prepared.problem.passes:
             if np.abs(q - kept[-1]).max() > SAME:
@@ -108,7 +122,8 @@ class PassingSpline(SqpMethod):
     def _smooth(self, space: Basis) -> Array:
         """Control points (n, nq) of a curve through all configurations.
 
-        At a pass a joint has the speed of the parabola through it and its neighbours, and none where it turns.
+        At a pass a joint has the speed of the parabola through it and its neighbours, and none
+        where it turns.
         """
         q, limits = self._configurations, self.coordinates.limits
         lengths = np.maximum(shortest_duration(np.diff(q, axis=0), limits), LEAST_DURATION)
@@ -121,7 +136,9 @@ class PassingSpline(SqpMethod):
         return space.fit(spline_through(t, q, v, np.zeros_like(q)).curve(at), at)
 
     def _between_rests(self) -> list[SolveResult]:
-        """Motions of any duration from rest to rest between the configurations, up to the first that is not found."""
+        """Motions of any duration from rest to rest between the configurations, up to the first
+        that is not found.
+        """
         problem = replace(self.prepared.problem, passes=(), duration_min=None, duration_max=None)
         interval = replace(self.interval, t_min=LEAST_DURATION, t_max=LONGEST_DURATION)
         results = list[SolveResult]()

@@ -1,16 +1,18 @@
 """Retiming of a smooth path: the time scaling of least cost along a given curve in joint space.
 
-The path is γ(s), s ∈ [0, 1]. The time scaling s(τ) is a spline at rest at both ends, whose control values rise. They
-and the duration T are the decision variables. The motion is the spline q(τ) that fits γ(s(τ)) best, by a linear map
-that the spline space fixes. Its control points P are therefore smooth functions of the variables,
+The path is γ(s), s ∈ [0, 1]. The time scaling s(τ) is a spline at rest at both ends, whose control
+values rise. They and the duration T are the decision variables. The motion is the spline q(τ) that
+fits γ(s(τ)) best, by a linear map that the spline space fixes. Its control points P are therefore
+smooth functions of the variables,
 
     ∂P/∂c = F diag(γ'(s)) B,
 
-with the values B of the scaling's basis at the fitted instants and the map F of the fit. Cost, rates and torques are
-those of the spline itself: no error of the fit is left to check afterwards, except for its distance from the path.
+with the values B of the scaling's basis at the fitted instants and the map F of the fit. Cost,
+rates and torques are those of the spline itself: no error of the fit is left to check afterwards,
+except for its distance from the path.
 
-The NLP has few variables and many constraints: SLSQP (D. Kraft, "A software package for sequential quadratic
-programming", DFVLR-FB 88-28, 1988) by SciPy.
+The NLP has few variables and many constraints: SLSQP (D. Kraft, "A software package for sequential
+quadratic programming", DFVLR-FB 88-28, 1988) by SciPy.
 """
 
 from __future__ import annotations
@@ -39,28 +41,39 @@ from joulepath.optimizer.methods.limit_repair import (
 from joulepath.optimizer.methods.method import CONVERGED, SolveResult, SolveStatus, with_excess
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.trajectories import bspline
-from joulepath.optimizer.trajectories.spline import Spline, lasting, least_time_scale, sample, spline_of
+from joulepath.optimizer.trajectories.spline import (
+    Spline,
+    lasting,
+    least_time_scale,
+    sample,
+    spline_of,
+)
 
-# control values of the time scaling, and how many more control points than the path the motion has, up to a number
+# control values of the time scaling, and how many more control points than the path the motion has,
+# up to a number
 SCALING_POINTS, MORE_POINTS, MOST_POINTS = 17, 12, 72
-# instants per control point at which the motion is fitted to the path, and points per knot span that bound the rates
+# instants per control point at which the motion is fitted to the path, and points per knot span
+# that bound the rates
 FITTED, RATE_POINTS = 3, 4
 # first durations tried, in multiples of the shortest one of the quintic time scaling
 TIME_SCALES = (1.02, 1.2, 1.5, 2.0, 3.0, 4.5)
 # SLSQP ends when a step changes the cost by less than this share; and after so many iterations
 PROGRESS, MOST_ITERATIONS = 1e-5, 80
-# SLSQP's effort grows with the constraints: it has those whose slack 1 - ratio² fell below this, and more in each round
+# SLSQP's effort grows with the constraints: it has those whose slack 1 - ratio² fell below this,
+# and more in each round
 NEAR, MOST_ROUNDS = 0.75, 6
 # times that an NLP is solved with limits tightened after the solve before
 REPAIRS = 6
-# the largest excess of a constraint, as a ratio of the limit, that the repair between the nodes can still undo
+# the largest excess of a constraint, as a ratio of the limit, that the repair between the nodes can
+# still undo
 FEASIBLE = 1e-3
 NONE = "found no motion along a planned collision-free path within the limits"
 
 
 @dataclass(frozen=True)
 class RetimingState:
-    """The motion at one point of the NLP: cost [J], its gradient (n,), excess (rows,) and its gradients (rows, n).
+    """The motion at one point of the NLP: cost [J], its gradient (n,), excess (rows,) and its
+    gradients (rows, n).
 
     A constraint is kept if its value is at least 0.
     """
@@ -74,8 +87,8 @@ class RetimingState:
 class PathRetiming:
     """Time scalings of `path`, a spline over [0, 1], in an interval of durations.
 
-    The motion is in `space`, the time scaling in `scaling`. Unless given, both have evenly spaced knots, and the motion
-    has some more control points than the path.
+    The motion is in `space`, the time scaling in `scaling`. Unless given, both have evenly spaced
+    knots, and the motion has some more control points than the path.
     """
 
     def __init__(
@@ -88,26 +101,40 @@ class PathRetiming:
     ) -> None:
         self.prepared, self.path, self.interval = prepared, path, interval
         self.least_speed, self.floor = prepared.least_speed, 1 + REPAIR_MARGIN
-        self.space = space or bspline.uniform(min(len(path.control_points) + MORE_POINTS, MOST_POINTS))
+        self.space = space or bspline.uniform(
+            min(len(path.control_points) + MORE_POINTS, MOST_POINTS)
+        )
         self.scaling = scaling or bspline.uniform(SCALING_POINTS)
         at = np.linspace(0.0, 1.0, FITTED * self.space.n)
-        self._instants, self._at_path = self.scaling.matrix(at), self.scaling.matrix(self.space.path_points)
+        self._instants, self._at_path = (
+            self.scaling.matrix(at),
+            self.scaling.matrix(self.space.path_points),
+        )
         inner, self._ends = self.space.free, np.zeros((self.space.n, 2))
         self._ends[: self.space.resting, 0], self._ends[-self.space.resting :, 1] = 1.0, 1.0
         matrix = self.space.matrix(at)
         self._fit = np.zeros((self.space.n, len(at)))
-        self._fit[inner] = solve(matrix[:, inner].T @ matrix[:, inner], matrix[:, inner].T, assume_a="pos")
+        self._fit[inner] = solve(
+            matrix[:, inner].T @ matrix[:, inner], matrix[:, inner].T, assume_a="pos"
+        )
         self._ends -= self._fit @ matrix @ self._ends
 
     def solve(self, guess: Array | None = None) -> SolveResult:
-        """The time scaling of least cost. While the motion exceeds a limit between the nodes, the limit is tightened.
+        """The time scaling of least cost. While the motion exceeds a limit between the nodes, the
+        limit is tightened.
 
-        Without a `guess` x (n,), from the quintic time scaling. The variables where it ends are `found`.
-        Ends by DeadlinePassed if the watched deadline passes.
+        Without a `guess` x (n,), from the quintic time scaling. The variables where it ends are
+        `found`. Ends by DeadlinePassed if the watched deadline passes.
         """
         prepared = self.prepared
-        limits, bounds = prepared.problem.arm.active_limits.scaled(1 - MARGIN), initial_bounds(prepared.path)
-        x, none = self._first(limits) if guess is None else guess, np.zeros(len(self.path.control_points[0]))
+        limits, bounds = (
+            prepared.problem.arm.active_limits.scaled(1 - MARGIN),
+            initial_bounds(prepared.path),
+        )
+        x, none = (
+            self._first(limits) if guess is None else guess,
+            np.zeros(len(self.path.control_points[0])),
+        )
         iterations = 0
         for solves in range(1, REPAIRS + 1):
             program = RetimingProgram(self, limits, bounds, x)
@@ -121,7 +148,10 @@ class PathRetiming:
             if factors is not None:
                 spline = slightly_retimed(spline, factors, self.interval.t_max)
                 factors = repair_factors(prepared, spline, (none, none))
-            excess, lacking = path_excess(prepared, spline, prepared.path, None), self._lacking(spline)
+            excess, lacking = (
+                path_excess(prepared, spline, prepared.path, None),
+                self._lacking(spline),
+            )
             if factors is None and not excess.any() and lacking <= 0:
                 return SolveResult(SolveStatus.SOLVED, CONVERGED, iterations, solves, spline)
             bounds = bounds - excess
@@ -131,7 +161,9 @@ class PathRetiming:
         return SolveResult(SolveStatus.FAILED, NONE, iterations, REPAIRS)
 
     def _lacking(self, spline: Spline) -> float:
-        """By how much the least speed that is aimed at, as a ratio, has to rise: between the points it is missed."""
+        """By how much the least speed that is aimed at, as a ratio, has to rise: between the points
+        it is missed.
+        """
         if self.least_speed is None:
             return 0.0
         q, v, _ = sample(spline, np.linspace(0.0, spline.duration, PATH_SAMPLES))
@@ -150,10 +182,13 @@ class PathRetiming:
         return np.asarray(self._fit @ self.path.curve(self._fractions(x)) + self._ends @ ends)
 
     def slopes(self, x: Array) -> Array:
-        """Derivatives (n, nq, m) of the control points by the free control values of the scaling."""
+        """Derivatives (n, nq, m) of the control points by the free control values of the
+        scaling."""
         tangent = self.path.curve(self._fractions(x), 1)
         inner = self._instants[:, self.scaling.free]
-        return np.stack([(self._fit * tangent[:, j]) @ inner for j in range(tangent.shape[1])], axis=1)
+        return np.stack(
+            [(self._fit * tangent[:, j]) @ inner for j in range(tangent.shape[1])], axis=1
+        )
 
     def _fractions(self, x: Array) -> Array:
         """s (k,) at the fitted instants."""
@@ -162,7 +197,9 @@ class PathRetiming:
     def _at(self, basis: Array, x: Array) -> Array:
         """s (k,) at the instants at which the scaling's basis functions are `basis` (k, n)."""
         resting = np.zeros(self.scaling.resting)
-        return np.asarray(np.clip(basis @ np.concatenate([resting, x[:-1], resting + 1.0]), 0.0, 1.0))
+        return np.asarray(
+            np.clip(basis @ np.concatenate([resting, x[:-1], resting + 1.0]), 0.0, 1.0)
+        )
 
     def speed_slack(self, x: Array, z: Array, Z: Array) -> tuple[Array, Array]:
         """Slack (k,) of the least speed at the path points, and its derivatives (k, n) by x.
@@ -179,12 +216,16 @@ class PathRetiming:
         return found.value[:, 0] - self.floor * aim, by_x
 
     def _first(self, limits: Limits) -> Array:
-        """The quintic time scaling, in the duration of least cost among a few within the limits on its rates."""
+        """The quintic time scaling, in the duration of least cost among a few within the limits on
+        its rates.
+        """
         t_min, t_max = self.interval.t_min, self.interval.t_max
         x = np.append(self.scaling.quintic[self.scaling.free], 0.0)
         unit = spline_of(self.space, self.points(x), 1.0)
         shortest = max(least_time_scale(unit, limits.rates), t_min)
-        durations = [shortest * scale for scale in TIME_SCALES if shortest * scale < t_max] or [t_max]
+        durations = [shortest * scale for scale in TIME_SCALES if shortest * scale < t_max] or [
+            t_max
+        ]
         best = np.inf
         for duration in durations:
             cost, tau = self._cost(unit, duration)
@@ -198,17 +239,25 @@ class PathRetiming:
         """The variables of a time scaling that is near s (k,) at times t (k,) [s]."""
         x = bspline.greville(self.scaling.knots)
         control = np.linalg.solve(self.scaling.matrix(x), np.interp(x, t / t[-1], s))
-        return np.append(np.maximum.accumulate(np.clip(control, 0.0, 1.0))[self.scaling.free], np.log(t[-1]))
+        return np.append(
+            np.maximum.accumulate(np.clip(control, 0.0, 1.0))[self.scaling.free], np.log(t[-1])
+        )
 
     def _cost(self, unit: Spline, duration: float) -> tuple[float, Array]:
         """Cost [J] and limited torques (N, nq) of a motion of 1 s retimed to `duration` [s]."""
-        y = (self.space.at_nodes @ unit.control_points) / np.power(duration, np.arange(3))[:, None, None]
-        cost, tau = self.prepared.kernel.value(y.transpose(1, 0, 2).reshape(len(self.space.nodes), -1), self.interval.p)
+        y = (self.space.at_nodes @ unit.control_points) / np.power(duration, np.arange(3))[
+            :, None, None
+        ]
+        cost, tau = self.prepared.kernel.value(
+            y.transpose(1, 0, 2).reshape(len(self.space.nodes), -1), self.interval.p
+        )
         return self.interval.constant + duration * float(self.space.weights @ cost), tau
 
     @cached_property
     def at_rates(self) -> Array:
-        """First to third derivative (3, M, n) of the space's basis at the points that bound the rates."""
+        """First to third derivative (3, M, n) of the space's basis at the points that bound the
+        rates.
+        """
         edges = np.unique(self.space.knots)
         inside = np.linspace(0.0, 1.0, RATE_POINTS, endpoint=False)
         points = np.append((edges[:-1, None] + np.diff(edges)[:, None] * inside).ravel(), 1.0)
@@ -216,7 +265,9 @@ class PathRetiming:
 
 
 class RetimingProgram:
-    """The NLP of one solve, in variables x (n,): free control values of the scaling, and the duration's logarithm."""
+    """The NLP of one solve, in variables x (n,): free control values of the scaling, and the
+    duration's logarithm.
+    """
 
     def __init__(self, retiming: PathRetiming, limits: Limits, bounds: Array, first: Array) -> None:
         self.retiming, self.limits, self.bounds, self.first = retiming, limits, bounds, first
@@ -225,7 +276,8 @@ class RetimingProgram:
         # the control values rise from 0 to 1, so the scaling does
         self._rising = np.eye(m + 1, m) - np.eye(m + 1, m, -1)
         self._scale = 1 / max(abs(self.state(first).cost), 1e-9)
-        # the constraints that the NLP has: those that a motion came near, and the order of the control values
+        # the constraints that the NLP has: those that a motion came near, and the order of the
+        # control values
         self._rows = np.zeros(len(self.state(first).slack), dtype=bool)
         self._rows[-(m + 1) :] = True
 
@@ -247,7 +299,9 @@ class RetimingProgram:
             self._cost,
             x,
             jac=self._gradient,
-            bounds=Bounds(np.append(0 * control, np.log(t_min)), np.append(0 * control + 1, np.log(t_max))),
+            bounds=Bounds(
+                np.append(0 * control, np.log(t_min)), np.append(0 * control + 1, np.log(t_max))
+            ),
             constraints=NonlinearConstraint(self._slack, 0.0, np.inf, jac=self._slopes),
             method="SLSQP",
             options={"ftol": PROGRESS, "maxiter": MOST_ITERATIONS},
@@ -299,10 +353,16 @@ class RetimingProgram:
         rates = retiming.at_rates @ P / powers[1:]
         R = self._by_variables(retiming.at_rates, slopes, rates, np.arange(1.0, 4.0), T)
         limits = self.limits.rates[:, None]
-        torque, torque_slopes = tau / self.limits.tau_max, (jacobian @ Y) / self.limits.tau_max[:, None]
+        torque, torque_slopes = (
+            tau / self.limits.tau_max,
+            (jacobian @ Y) / self.limits.tau_max[:, None],
+        )
         values = [rates / limits, torque.copy()]
         slack = [1 - value.ravel() ** 2 for value in values]
-        rows = [-2 * values[0][..., None] * R / limits[..., None], -2 * values[1][..., None] * torque_slopes]
+        rows = [
+            -2 * values[0][..., None] * R / limits[..., None],
+            -2 * values[1][..., None] * torque_slopes,
+        ]
         along, along_slopes = self._path(x, P, slopes, T)
         rising = np.diff(np.concatenate([[0.0], x[:-1], [1.0]]))
         return RetimingState(
@@ -319,7 +379,9 @@ class RetimingProgram:
         )
 
     def _path(self, x: Array, P: Array, slopes: Array, T: float) -> tuple[Array, Array]:
-        """Slack of the path constraints and of the least speed at the path points, and its derivatives by x."""
+        """Slack of the path constraints and of the least speed at the path points, and its
+        derivatives by x.
+        """
         path, space = self.retiming.prepared.path, self.retiming.space
         if path is None and self.retiming.least_speed is None:
             return np.zeros(0), np.zeros((0, len(x)))
@@ -336,8 +398,11 @@ class RetimingProgram:
         )
 
     @staticmethod
-    def _by_variables(matrices: Array, slopes: Array, values: Array, orders: Array, T: float) -> Array:
-        """Derivatives (d, k, nq, n) by x of values (d, k, nq): matrices (d, k, n) on the control points, over T^d.
+    def _by_variables(
+        matrices: Array, slopes: Array, values: Array, orders: Array, T: float
+    ) -> Array:
+        """Derivatives (d, k, nq, n) by x of values (d, k, nq): matrices (d, k, n) on the control
+        points, over T^d.
 
         By the logarithm of T, a value divided by T^d has the derivative -d times itself.
         """

@@ -1,4 +1,6 @@
-"""Motions of least mechanical work with sharp corners, by the interior-point method, from motions that are near."""
+"""Motions of least mechanical work with sharp corners, by the interior-point method, from motions
+that are near.
+"""
 
 from __future__ import annotations
 
@@ -27,15 +29,19 @@ ROUNDED = 0.5
 def sharp_motion(
     prepared: PreparedProblem, points: Array, duration: float, first: float, below: float = np.inf
 ) -> tuple[SolveResult, Array]:
-    """The motion from control points (n, nq) [rad] over evenly spaced knots, with corners of `first` [W] at first.
+    """The motion from control points (n, nq) [rad] over evenly spaced knots, with corners of
+    `first` [W] at first.
 
-    It lasts `duration` [s]. It may collide: then the result has the collision, but no motion. Returned with its control
-    points (n, nq) [rad]. It is given up if it is not expected to need less than `below` [J].
+    It lasts `duration` [s]. It may collide: then the result has the collision, but no motion.
+    Returned with its control points (n, nq) [rad]. It is given up if it is not expected to need
+    less than `below` [J].
     """
     limits = prepared.problem.arm.active_limits.scaled(1 - MARGIN)
     basis, nq = bspline.uniform(len(points)), points.shape[1]
     parameters = lru_cache(lambda width: prepared.parameters(mechanical=1.0, width=width))
-    program = InteriorPoint(prepared.kernel, basis, limits, duration, parameters, prepared.frictionless_parameters)
+    program = InteriorPoint(
+        prepared.kernel, basis, limits, duration, parameters, prepared.frictionless_parameters
+    )
     ends, bounds = points[[0, -1]], program.unbounded()
     at = program.first(ends, np.clip(points[basis.free], limits.q_min, limits.q_max), first, bounds)
     most = below + ROUNDED * SHARPER_WIDTHS[-1] * duration * nq
@@ -45,15 +51,22 @@ def sharp_motion(
             return SolveResult(SolveStatus.PRUNED, COSTLIER, at.iterations, solves), points
         points = program.points(ends, at.free)
         if not at.converged:
-            return SolveResult(SolveStatus.FAILED, "it did not converge", at.iterations, solves), points
+            return SolveResult(
+                SolveStatus.FAILED, "it did not converge", at.iterations, solves
+            ), points
         spline = spline_of(basis, points, duration)
-        spans, torque = span_peak_rates(spline) / prepared.problem.arm.active_limits.rates[:, None], np.ones(nq)
+        spans, torque = (
+            span_peak_rates(spline) / prepared.problem.arm.active_limits.rates[:, None],
+            np.ones(nq),
+        )
         if (spans <= WITHIN).all():
             factors = repair_factors(prepared, spline, (np.zeros(nq), np.zeros(nq)))
             if factors is None:
                 return _checked(prepared, spline, at, solves), points
             torque = factors.tau_max
-        bounds = program.tightened(bounds, 1 / np.where(spans > WITHIN, spans + REPAIR_MARGIN, 1.0), torque)
+        bounds = program.tightened(
+            bounds, 1 / np.where(spans > WITHIN, spans + REPAIR_MARGIN, 1.0), torque
+        )
     return SolveResult(
         SolveStatus.FAILED, "the motion exceeds limits between the nodes", at.iterations, REPAIRS
     ), points

@@ -1,7 +1,7 @@
 """`time_scaling`: the straight line in joint space with the time scaling s(t) of least energy.
 
-s(t), the fraction of the line, is a quintic B-spline; its control points and the duration are optimised together. If
-the line collides, s(t) runs along smooth planned paths instead.
+s(t), the fraction of the line, is a quintic B-spline; its control points and the duration are
+optimised together. If the line collides, s(t) runs along smooth planned paths instead.
 """
 
 from __future__ import annotations
@@ -36,7 +36,9 @@ class TimeScaling(FreeSpline):
     @cached_property
     def _collision(self) -> Clearance | None:
         """The collision on the straight line; None if there is none."""
-        return self.prepared.surroundings.worst_violation(quintic_spline(self.q_start, self.q_goal, 1.0))
+        return self.prepared.surroundings.worst_violation(
+            quintic_spline(self.q_start, self.q_goal, 1.0)
+        )
 
     @property
     def collides(self) -> bool:
@@ -56,18 +58,26 @@ class TimeScaling(FreeSpline):
             return SolveResult(SolveStatus.INFEASIBLE, reason)
         self.t_min = max(self.t_min, scaling.duration_bound)
         line = self.coordinates
-        space = self.graded(float(seven_segment.shortest_duration(line.goal - line.start, line.limits)), EXACT)
+        space = self.graded(
+            float(seven_segment.shortest_duration(line.goal - line.start, line.limits)), EXACT
+        )
         # toppra's acceleration jumps: a fit with few control points smooths it before it is refined
         coarse = bspline.uniform(COARSE).knots
         points = bspline.refit(scaling.fractions(coarse)[:, None], coarse, space.knots)
         return self.improve(Guess(space, points, self.t_min))
 
-    def _solve_in(self, space: Basis, q: Array, t: Array, progress: float = PROGRESS) -> SolveResult:
-        """From samples q (k, nq) at times t (k,): on the straight line, or along the samples if the line collides."""
+    def _solve_in(
+        self, space: Basis, q: Array, t: Array, progress: float = PROGRESS
+    ) -> SolveResult:
+        """From samples q (k, nq) at times t (k,): on the straight line, or along the samples if the
+        line collides.
+        """
         if self._collision is None:
             return super()._solve_in(space, q, t, progress)
         if not self.prepared.surroundings.is_collision_free(q):
-            return SolveResult(SolveStatus.FAILED, f"on the straight line, {self._collision.message}")
+            return SolveResult(
+                SolveStatus.FAILED, f"on the straight line, {self._collision.message}"
+            )
         return along_path(self, q, self._retimed)
 
     def _retimed(self, path: Spline) -> SolveResult:

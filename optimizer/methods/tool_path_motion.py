@@ -1,4 +1,6 @@
-"""The motion of least cost along a tool path: the joints follow it from the candidate's start, its timing is chosen."""
+"""The motion of least cost along a tool path: the joints follow it from the candidate's start, its
+timing is chosen.
+"""
 
 from __future__ import annotations
 
@@ -25,27 +27,30 @@ from joulepath.optimizer.trajectories import quintic, ramped
 from joulepath.optimizer.trajectories.bspline import DEGREE, Basis, clamped
 from joulepath.optimizer.trajectories.spline import Spline, sample, sampled
 
-# spans of the first time scaling, and more of them for each bend; how much finer the second one is, and its spans
-# at most
+# spans of the first time scaling, and more of them for each bend; how much finer the second one is,
+# and its spans at most
 SPANS, BEND_SPANS, FINER_SCALING, MOST_SPANS = 12, 6, 2, 72
-# spans that the motion has more than its path, and at most at first; it has so many times as many until it keeps to
-# the path
+# spans that the motion has more than its path, and at most at first; it has so many times as many
+# until it keeps to the path
 MORE_SPANS, FIRST_SPANS, FINER = 12, 67, (1, 2, 4, 8)
 # shares of the time that each ramp of a first guess takes, at least and at most
 RAMPS = (0.1, 0.5)
 # share of the way of a ramp on which a first guess comes to speed, where there is a least one
 ON_RAMP = 0.8
-# instants at which the path's tolerances are checked; samples of the path per control point, to measure along it
+# instants at which the path's tolerances are checked; samples of the path per control point, to
+# measure along it
 CHECKED, SAMPLED = 2000, 16
 # a finer time scaling makes no motion faster by so much
 NEARLY = 1.1
 NOT_FINER = "there is no other space of time scalings"
 TOO_SLOW = (
-    "found no motion within the limits that keeps path.speed.min between its ramps: give a smaller one, a longer "
+    "found no motion within the limits that keeps path.speed.min between its ramps: give a smaller "
+    "one, a longer "
     "path.speed.ramp, or a larger path.blend"
 )
 OUT_OF_REACH = (
-    "at {0:.1%} of the path the joints' speed limits allow the TCP {1:.3g} m/s, less than path.speed.min: give a "
+    "at {0:.1%} of the path the joints' speed limits allow the TCP {1:.3g} m/s, less than "
+    "path.speed.min: give a "
     "smaller one"
 )
 NOT_KEPT = "found no motion within the path's tolerance: give a larger one, or a larger path.blend"
@@ -53,9 +58,12 @@ TOO_SHARP = "the path turns too sharply for its tolerance: give a larger path.bl
 
 
 class ToolPathMotion(Method):
-    """Solves a candidate along the problem's tool path, from its start configuration to where the path leads."""
+    """Solves a candidate along the problem's tool path, from its start configuration to where the
+    path leads.
+    """
 
-    # every candidate follows a curve of its own, which no other candidate's solution tells anything of
+    # every candidate follows a curve of its own, which no other candidate's solution tells anything
+    # of
     most_solved = 64
     takes_guesses = True
 
@@ -87,24 +95,31 @@ class ToolPathMotion(Method):
         return with_effort(found, results)
 
     def _nearly_fastest(self, path: Spline) -> list[SolveResult]:
-        """Attempts where the first space has no motion: what it cannot express, a finer one may, a motion that is
-        nearly the fastest one.
+        """Attempts where the first space has no motion: what it cannot express, a finer one may, a
+        motion that is nearly the fastest one.
 
-        In a limited time they begin from the fastest motion of the first space; if that takes far longer, none is made.
+        In a limited time they begin from the fastest motion of the first space; if that takes far
+        longer, none is made.
         """
         law, results = None, list[SolveResult]()
         if self.t_max < LONGEST_DURATION:
             fast = self._kept(path, fastest(self.prepared), self._scaling(1))
             results.append(replace(fast, status=SolveStatus.FAILED, spline=None))
             if fast.spline is not None and fast.spline.duration > NEARLY * self.t_max:
-                reason = f"along the path, the fastest motion found takes {fast.spline.duration:.4f} s"
+                reason = (
+                    f"along the path, the fastest motion found takes {fast.spline.duration:.4f} s"
+                )
                 return [*results, SolveResult(SolveStatus.INFEASIBLE, reason)]
             law = None if fast.spline is None else _on_path(path, *sampled(fast.spline))
         return [*results, self._kept(path, self.interval, self._scaling(FINER_SCALING), law)]
 
     def _clear(self, found: SolveResult) -> SolveResult:
         """The result; without a motion if that collides."""
-        hit = None if found.spline is None else self.prepared.surroundings.worst_violation(found.spline)
+        hit = (
+            None
+            if found.spline is None
+            else self.prepared.surroundings.worst_violation(found.spline)
+        )
         if hit is None:
             return found
         return SolveResult(SolveStatus.FAILED, f"along the path, {hit.message}", collision=hit)
@@ -120,14 +135,18 @@ class ToolPathMotion(Method):
         return self._tool_path.fixed_speed is not None
 
     def _may_turn(self) -> bool:
-        """Whether the tool may turn about an axis, and its turning has not been looked for before."""
+        """Whether the tool may turn about an axis, and its turning has not been looked for
+        before."""
         return self._tool_path.about is not None and not self.prepared.is_chosen(self.q_start)
 
-    def _turn(self, law: tuple[Array, Array], scaling: Basis, least: float, results: list[SolveResult]) -> None:
-        """Append to `results` motions with other turnings of the tool, looked for with a law of times [s] and fractions
-        (k,).
+    def _turn(
+        self, law: tuple[Array, Array], scaling: Basis, least: float, results: list[SolveResult]
+    ) -> None:
+        """Append to `results` motions with other turnings of the tool, looked for with a law of
+        times [s] and fractions (k,).
 
-        The path of the best one is kept if it needs less than `least` [J]; and no other is looked for again.
+        The path of the best one is kept if it needs less than `least` [J]; and no other is looked
+        for again.
         """
         prepared, best, q_start = self.prepared, least, self.q_start
         assert prepared.course is not None
@@ -160,10 +179,11 @@ class ToolPathMotion(Method):
     def _at_best_angle(
         self, turned: TurnedAtEnd, results: list[SolveResult]
     ) -> tuple[Trace, Spline, SolveResult] | None:
-        """The trace, the joints' path and a motion at the best angle of the tool at an end; None if there is none.
+        """The trace, the joints' path and a motion at the best angle of the tool at an end; None if
+        there is none.
 
-        All angles, the present one included, are compared by motions of the first time scaling. The effort for them
-        goes into `results`.
+        All angles, the present one included, are compared by motions of the first time scaling. The
+        effort for them goes into `results`.
         """
         found = list[tuple[float, Trace, Spline, SolveResult]]()
 
@@ -173,7 +193,9 @@ class ToolPathMotion(Method):
                 return np.inf
             result = self._clear(self._kept(followed[1], self.interval, self._scaling(1)))
             results.append(replace(result, status=SolveStatus.FAILED, spline=None))
-            found.append((self.cost_of(result.spline), *followed, replace(result, iterations=0, solves=0)))
+            found.append(
+                (self.cost_of(result.spline), *followed, replace(result, iterations=0, solves=0))
+            )
             return found[-1][0]
 
         try_angles(cost, cost(0.0))
@@ -182,12 +204,14 @@ class ToolPathMotion(Method):
 
     @staticmethod
     def may_refine(found: Spline) -> bool:
-        """A finer time scaling may always save some: near a corner, the speed changes within a small share of it."""
+        """A finer time scaling may always save some: near a corner, the speed changes within a
+        small share of it.
+        """
         return True
 
     def solve_from(self, q: Array, t: Array, fine: bool) -> SolveResult:
-        """The time scaling of least cost in a finer space, from samples q (k, nq) [rad] at t (k,) [s] of a motion along
-        the path; and with other turnings of the tool, if it may turn."""
+        """The time scaling of least cost in a finer space, from samples q (k, nq) [rad] at t (k,)
+        [s] of a motion along the path; and with other turnings of the tool, if it may turn."""
         path, scaling = self.prepared.joint_path(self.q_start), self._scaling(FINER_SCALING)
         if fine or path is None:
             return SolveResult(SolveStatus.FAILED, NOT_FINER)
@@ -221,14 +245,18 @@ class ToolPathMotion(Method):
 
     @cached_property
     def _ramp(self) -> float:
-        """The share of the time that each ramp takes, at an even speed between them, where there is a least speed."""
+        """The share of the time that each ramp takes, at an even speed between them, where there is
+        a least speed.
+        """
         least = self.prepared.least_speed
         assert least is not None
         way = ON_RAMP * least.ramp / float(least.gone[-1])
         return 2 * way / (1 + 2 * way)
 
     def _intervals(self) -> list[DurationInterval]:
-        """The durations that are tried. Work without friction falls with the duration, its smoothed corners do not."""
+        """The durations that are tried. Work without friction falls with the duration, its smoothed
+        corners do not.
+        """
         longest = replace(self.interval, t_min=self.t_max)
         may_be_slower = self.prepared.problem.objective == "mechanical" and self.t_min < self.t_max
         return [self.interval, longest] if may_be_slower else [self.interval]
@@ -240,10 +268,11 @@ class ToolPathMotion(Method):
         scaling: Basis,
         law: tuple[Array, Array] | None = None,
     ) -> SolveResult:
-        """The time scaling of least cost, in a space of motions that is fine enough for the tolerance.
+        """The time scaling of least cost, in a space of motions that is fine enough for the
+        tolerance.
 
-        `law` is a guess: times (k,) [s], and the fractions (k,) of the path there. At a fixed speed only the ramps are
-        chosen.
+        `law` is a guess: times (k,) [s], and the fractions (k,) of the path there. At a fixed speed
+        only the ramps are chosen.
         """
         if self._holds_speed:
             speed = self._tool_path.fixed_speed
@@ -253,7 +282,9 @@ class ToolPathMotion(Method):
         t, s = law or self._paced(path)
         spans = min(len(np.unique(path.knots)) + MORE_SPANS, FIRST_SPANS)
         for finer in FINER:
-            retiming = PathRetiming(self.prepared, path, interval, self._space(spans * finer), scaling)
+            retiming = PathRetiming(
+                self.prepared, path, interval, self._space(spans * finer), scaling
+            )
             results.append(retiming.solve(retiming.variables(s, t) if x is None else x))
             found, x = results[-1].spline, retiming.found
             if found is None and self.prepared.least_speed is not None:
@@ -264,7 +295,8 @@ class ToolPathMotion(Method):
         return with_effort(failed, results)
 
     def _paced(self, path: Spline) -> tuple[Array, Array]:
-        """Times (k,) [s], and fractions (k,) of the path where a motion is then that is slow where the path bends.
+        """Times (k,) [s], and fractions (k,) of the path where a motion is then that is slow where
+        the path bends.
 
         At every point, the speed keeps the rates of the path's own derivatives within the limits.
         """
@@ -273,10 +305,13 @@ class ToolPathMotion(Method):
         ratios = np.abs(derivatives) / self.prepared.arm.active_limits.rates[:, None]
         pace: Array = (ratios.max(axis=2) ** (1 / np.arange(1, 4))[:, None]).max(axis=0)
         if self.prepared.path is not None:
-            pace = np.maximum(pace, self.prepared.path.speed_ratios(path.curve(s), path.curve(s, 1)))
+            pace = np.maximum(
+                pace, self.prepared.path.speed_ratios(path.curve(s), path.curve(s, 1))
+            )
         t = np.asarray(cumulative_trapezoid(pace, s, initial=0))
         at = np.linspace(0.0, 1.0, CHECKED)
-        # as fast at most as this pace, whose peak is that of the quintic; in less time, with shorter ramps
+        # as fast at most as this pace, whose peak is that of the quintic; in less time, with
+        # shorter ramps
         duration = float(np.clip(quintic.PEAKS[0] * t[-1], self.t_min, self.t_max))
         law = quintic.fraction(at)
         if self.prepared.least_speed is not None:
@@ -294,7 +329,9 @@ class ToolPathMotion(Method):
 
 
 def _on_path(path: Spline, q: Array, t: Array) -> tuple[Array, Array]:
-    """Times (k,) [s], and fractions (k,) of the path where a motion is then, by the way that its joints have gone."""
+    """Times (k,) [s], and fractions (k,) of the path where a motion is then, by the way that its
+    joints have gone.
+    """
     s = np.linspace(0.0, 1.0, SAMPLED * len(path.control_points))
     gone, way = _way(q), _way(path.curve(s))
     return t, np.interp(gone / gone[-1], way / way[-1], s)

@@ -1,7 +1,9 @@
-"""The turning of a tool about the free axis of its path: the one of least cost for a time law, and then a better one.
+"""The turning of a tool about the free axis of its path: the one of least cost for a time law, and
+then a better one.
 
-First dynamic programming over the sheet of configurations, in which a step costs what the arm draws at an even speed.
-Then the values of a smooth turning are optimised for the cost of the whole motion with this time law (L-BFGS).
+First dynamic programming over the sheet of configurations, in which a step costs what the arm draws
+at an even speed. Then the values of a smooth turning are optimised for the cost of the whole motion
+with this time law (L-BFGS).
 """
 
 from __future__ import annotations
@@ -20,21 +22,36 @@ from joulepath.optimizer.energy.bus_flow import drawn_at
 from joulepath.optimizer.energy.limited_torque import limited_torque
 from joulepath.optimizer.energy.losses import power_flow
 from joulepath.optimizer.kinematics import newton
-from joulepath.optimizer.kinematics.course_tracing import Trace, chain_of, joint_path, traces, turned_start, within
+from joulepath.optimizer.kinematics.course_tracing import (
+    Trace,
+    chain_of,
+    joint_path,
+    traces,
+    turned_start,
+    within,
+)
 from joulepath.optimizer.kinematics.tcp import flange_pose
-from joulepath.optimizer.kinematics.turning_sheet import REACHED, TurningSheet, turning_of, turning_through, values_of
+from joulepath.optimizer.kinematics.turning_sheet import (
+    REACHED,
+    TurningSheet,
+    turning_of,
+    turning_through,
+    values_of,
+)
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.targets import Side
 from joulepath.optimizer.trajectories.quadrature import simpson_weights
 from joulepath.optimizer.trajectories.spline import Spline
 
-# values of a smooth turning between and at the ends, and instants at which its cost is measured (an odd number)
+# values of a smooth turning between and at the ends, and instants at which its cost is measured (an
+# odd number)
 KNOTS, INSTANTS = 10, 81
 # points of the sheet along the way, and more of them for each bend
 FIRST_STEPS, BEND_STEPS = 17, 6
 # step [rad] of a difference quotient, iterations, and the share by which the cost must fall in each
 STEP, ITERATIONS, PROGRESS = 1e-5, 25, 1e-4
-# value of an excess of a limit, as a multiple of the first cost: what exceeds one by a tenth costs a tenth more
+# value of an excess of a limit, as a multiple of the first cost: what exceeds one by a tenth costs
+# a tenth more
 EXCESS = 10.0
 # rad: where a turning leads, and where it is to lead
 SAME = 1e-6
@@ -43,10 +60,11 @@ SAME = 1e-6
 def turned_paths(
     prepared: PreparedProblem, q_start: Array, q_goal: Array, t: Array, s: Array
 ) -> Iterator[tuple[Trace, Spline]]:
-    """Traces and joint paths of turnings from q_start to q_goal (nq,) [rad] that should need less; the better one last.
+    """Traces and joint paths of turnings from q_start to q_goal (nq,) [rad] that should need less;
+    the better one last.
 
-    If an end of the course is free, they begin or end at any angle there. `s` (k,) are the fractions of the course at
-    times t (k,) [s] of a motion.
+    If an end of the course is free, they begin or end at any angle there. `s` (k,) are the
+    fractions of the course at times t (k,) [s] of a motion.
     """
     law, known = _TimeLaw(prepared, q_start, s, t), _known(prepared, q_start)
     wanted, coarse = None if law.course.free_end else q_goal, law.coarse()
@@ -57,17 +75,21 @@ def turned_paths(
 
 
 class TurnedAtEnd:
-    """Paths from q_start to q_goal (nq,) [rad] that have another angle of the tool at the `side` of a course that is
-    free: the tool turns evenly from or to it, beside what it turns now."""
+    """Paths from q_start to q_goal (nq,) [rad] that have another angle of the tool at the `side` of
+    a course that is free: the tool turns evenly from or to it, beside what it turns now."""
 
-    def __init__(self, prepared: PreparedProblem, q_start: Array, q_goal: Array, side: Side) -> None:
+    def __init__(
+        self, prepared: PreparedProblem, q_start: Array, q_goal: Array, side: Side
+    ) -> None:
         assert prepared.course is not None
         self.prepared, self.q_start, self.known = prepared, q_start, _known(prepared, q_start)
         self.free = prepared.course.free_end, prepared.course.free_start
         self.q_goal, self.side = None if prepared.course.free_end else q_goal, side
 
     def by(self, angle: float) -> tuple[Trace, Spline] | None:
-        """The trace and the joint path at an angle [rad] to the present one; None if the arm cannot follow them."""
+        """The trace and the joint path at an angle [rad] to the present one; None if the arm cannot
+        follow them.
+        """
         x = self.known.x
         angles = self.known(x) + angle * (x if self.side == "goal" else 1 - x)
         turning = turning_of(values_of(angles, *self.free), *self.free)
@@ -78,15 +100,17 @@ def _known(prepared: PreparedProblem, q_start: Array) -> CubicSpline:
     """The turning with which the course is followed from q_start (nq,) [rad]."""
     assert prepared.course is not None
     free = prepared.course.free_end, prepared.course.free_start
-    return prepared.traces[q_start.tobytes()].turning or turning_of(np.zeros(KNOTS - 2 + sum(free)), *free)
+    return prepared.traces[q_start.tobytes()].turning or turning_of(
+        np.zeros(KNOTS - 2 + sum(free)), *free
+    )
 
 
 def _followed(
     prepared: PreparedProblem, q_start: Array, q_goal: Array | None, turning: CubicSpline
 ) -> tuple[Trace, Spline] | None:
-    """The trace and the joint path of a turning from q_start to q_goal (nq,) [rad]; None if it leads elsewhere, or the
-    arm cannot follow it. Without q_goal it may lead anywhere. From a free start, it begins where the tool is turned to
-    from q_start."""
+    """The trace and the joint path of a turning from q_start to q_goal (nq,) [rad]; None if it
+    leads elsewhere, or the arm cannot follow it. Without q_goal it may lead anywhere. From a free
+    start, it begins where the tool is turned to from q_start."""
     assert prepared.course is not None
     course, limits = replace(prepared.course, turning=turning), prepared.arm.active_limits
     first = _first_of(prepared, q_start, turning)
@@ -95,14 +119,20 @@ def _followed(
     (trace,) = traces(prepared.arm, course, first[None])
     trace = replace(trace, turning=turning)
     leads_there = q_goal is None or np.abs(trace.q[-1] - q_goal).max() < SAME
-    if trace.obstacle is not None or not leads_there or not within(trace, limits.q_min, limits.q_max):
+    if (
+        trace.obstacle is not None
+        or not leads_there
+        or not within(trace, limits.q_min, limits.q_max)
+    ):
         return None
     path = joint_path(prepared.arm, course, trace)
     return None if path is None else (trace, path)
 
 
 def _first_of(prepared: PreparedProblem, q_start: Array, turning: CubicSpline) -> Array | None:
-    """The configuration (nq,) [rad] in which a turning begins, near q_start (nq,); None if there is none."""
+    """The configuration (nq,) [rad] in which a turning begins, near q_start (nq,); None if there is
+    none.
+    """
     assert prepared.course is not None
     if not prepared.course.free_start:
         return q_start
@@ -124,12 +154,21 @@ class _TimeLaw:
         self.poses = self.course.poses(self.at)
 
     def coarse(self) -> CubicSpline | None:
-        """The turning of least cost by dynamic programming; None if there is none but the one without a turn."""
+        """The turning of least cost by dynamic programming; None if there is none but the one
+        without a turn.
+        """
         free = self.course.free_end, self.course.free_start
-        most = min(float(self.prepared.arm.active_limits.v_max.max() * self.t[-1] / (1 if any(free) else 2)), np.pi)
+        most = min(
+            float(
+                self.prepared.arm.active_limits.v_max.max() * self.t[-1] / (1 if any(free) else 2)
+            ),
+            np.pi,
+        )
         steps = FIRST_STEPS + BEND_STEPS * self.course.shape.bends
         turned = float(_known(self.prepared, self.q_start)(0.0))
-        sheet = TurningSheet.of(self.prepared.arm, self.chain, self.course, self.q_start, steps, most, turned)
+        sheet = TurningSheet.of(
+            self.prepared.arm, self.chain, self.course, self.q_start, steps, most, turned
+        )
         sheet = sheet.without(self._excluded)
         lengths = np.diff(np.interp(sheet.at, self.s, self.t))
 
@@ -161,11 +200,19 @@ class _TimeLaw:
             best[0] = tried[0]
             return float(values[0]), (values[1:] - values[0]) / STEP
 
-        found = minimize(cost, values, jac=True, method="L-BFGS-B", options={"maxiter": ITERATIONS, "ftol": PROGRESS})
+        found = minimize(
+            cost,
+            values,
+            jac=True,
+            method="L-BFGS-B",
+            options={"maxiter": ITERATIONS, "ftol": PROGRESS},
+        )
         return turning_of(np.asarray(found.x, dtype=float), *free)
 
     def _first(self, turning: CubicSpline) -> Array | None:
-        """Configurations (INSTANTS, nq) [rad] of a turning, followed from its start; None without a start."""
+        """Configurations (INSTANTS, nq) [rad] of a turning, followed from its start; None without a
+        start.
+        """
         first = _first_of(self.prepared, self.q_start, turning)
         if first is None:
             return None
@@ -173,11 +220,16 @@ class _TimeLaw:
         return np.stack([np.interp(self.at, trace.at, q) for q in trace.q.T], axis=1)
 
     def _configurations(self, values: Array, near: Array) -> Array:
-        """Configurations (n, INSTANTS, nq) [rad] of turnings by their values (n, k), near others; NaN where none is."""
+        """Configurations (n, INSTANTS, nq) [rad] of turnings by their values (n, k), near others;
+        NaN where none is.
+        """
         count, nq = len(values), near.shape[1]
         free = self.course.free_end, self.course.free_start
         angles = np.concatenate([turning_of(each, *free)(self.at) for each in values])
-        T = flange_pose(self.course.turned(np.tile(self.poses, (count, 1, 1)), angles), self.prepared.arm.T_flange_tcp)
+        T = flange_pose(
+            self.course.turned(np.tile(self.poses, (count, 1, 1)), angles),
+            self.prepared.arm.T_flange_tcp,
+        )
         q, missed = newton.solved(self.chain, np.tile(near, (count, 1)), T, steps=20)
         q[missed > REACHED] = np.nan
         return q.reshape(count, INSTANTS, nq)
@@ -190,8 +242,14 @@ class _TimeLaw:
         return np.asarray(drawn.reshape(len(q), INSTANTS) @ self.weights)
 
     def _drawn(self, q: Array, v: Array, a: Array, soft: bool = False) -> Array:
-        """Cost (n,) [W] at states (n, nq); what exceeds a limit costs more if `soft`, else infinitely much."""
-        arm, limits, tau = self.prepared.arm, self.prepared.arm.active_limits, self.prepared.torques(q, v, a)
+        """Cost (n,) [W] at states (n, nq); what exceeds a limit costs more if `soft`, else
+        infinitely much.
+        """
+        arm, limits, tau = (
+            self.prepared.arm,
+            self.prepared.arm.active_limits,
+            self.prepared.torques(q, v, a),
+        )
         if self.prepared.problem.objective == "mechanical":
             cost = np.abs(tau * v).sum(axis=1)
         else:
@@ -201,7 +259,11 @@ class _TimeLaw:
         if soft:
             ratios += [np.abs(a) / limits.a_max]
         over = np.maximum(np.hstack(ratios).max(axis=1) - 1, 0.0)
-        return np.asarray(cost + EXCESS * np.abs(cost) * over) if soft else np.where(over > 0, np.inf, cost)
+        return (
+            np.asarray(cost + EXCESS * np.abs(cost) * over)
+            if soft
+            else np.where(over > 0, np.inf, cost)
+        )
 
     def _excluded(self, q: Array) -> Mask:
         """Which configurations (n, nq) are outside of the joints' range, or collide."""
@@ -209,5 +271,8 @@ class _TimeLaw:
         outside = ((q < limits.q_min) | (q > limits.q_max)).any(axis=1)
         if not (arm.collisions and len(self.prepared.surroundings.model.pairs)):
             return np.asarray(outside)
-        hits = [each.distance < 0 for each in self.prepared.surroundings.model.closest_pairs(q, within=0.0)]
+        hits = [
+            each.distance < 0
+            for each in self.prepared.surroundings.model.closest_pairs(q, within=0.0)
+        ]
         return np.asarray(outside | np.array(hits))

@@ -1,7 +1,8 @@
-"""Compiles the C library that all arms share, beside its sources: `python optimizer/native/build.py`.
+"""Compiles the C library that all arms share, beside its sources: `python
+optimizer/native/build.py`.
 
-`make` runs it in a clone, and `scripts/build_hook.py` for a wheel. It imports nothing but the standard library,
-so that it runs where no dependency is installed.
+`make` runs it in a clone, and `scripts/build_hook.py` for a wheel. It imports nothing but the
+standard library, so that it runs where no dependency is installed.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ FOLDER = Path(__file__).resolve().parent
 LIBRARY = FOLDER / "libjoulepath.so.1"
 # Without contraction of products and sums, all processors round alike.
 FLAGS = ["-O3", "-fPIC", "-shared", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off"]
-# The oldest instruction set of an architecture, as gcc and clang name it, and zig. Compilers may default to a newer
-# one.
+# The oldest instruction set of an architecture, as gcc and clang name it, and zig. Compilers may
+# default to a newer one.
 BASELINES = {"x86_64": "-march=x86-64", "aarch64": "-march=armv8-a"}
 ZIG_BASELINE = "-mcpu=baseline"
 
@@ -48,8 +49,8 @@ def compiler() -> str | None:
 def build(folder: Path = FOLDER) -> Path:
     """Compile the C files of a folder into the library beside them.
 
-    The library runs on every processor of this machine's architecture. Raises BuildFailed, and leaves an
-    earlier library in place.
+    The library runs on every processor of this machine's architecture. Raises BuildFailed, and
+    leaves an earlier library in place.
     """
     target = folder / LIBRARY.name
     define = f'-DSOURCES_DIGEST="{sources_digest(folder)}"'
@@ -60,7 +61,9 @@ def build(folder: Path = FOLDER) -> Path:
             given = [*FLAGS, define, str(folder / "library.c"), "-o", str(made), "-lm"]
             failed = []
             for command in _commands():
-                done = subprocess.run([*command, *given], capture_output=True, text=True, encoding="utf-8")
+                done = subprocess.run(
+                    [*command, *given], capture_output=True, text=True, encoding="utf-8"
+                )
                 if done.returncode == 0:
                     # whoever has loaded the one before keeps it
                     made.replace(target)
@@ -76,7 +79,8 @@ def build(folder: Path = FOLDER) -> Path:
 
 
 def _commands() -> list[list[str]]:
-    """The compiler with what makes it compile for every processor of this machine's kind; the first that works counts.
+    """The compiler with what makes it compile for every processor of this machine's kind; the first
+    that works counts.
 
     What CC names may be zig: where there is no C compiler, `make` installs it.
     """

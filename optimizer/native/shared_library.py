@@ -1,9 +1,8 @@
-"""The C library that all arms share: forward kinematics, distances and the terms of dual bounds, of many
-configurations at once.
+"""The C library that all arms share: forward kinematics, distances and the terms of dual bounds, of
+many configurations at once.
 
-`build` compiles it beside this file when a wheel is built, and `make` does in a clone. It runs on every processor of
-its
-architecture.
+`build` compiles it beside this file when a wheel is built, and `make` does in a clone. It runs on
+every processor of its architecture.
 """
 
 from __future__ import annotations
@@ -35,7 +34,8 @@ _FUNCTIONS: dict[str, tuple[list[Any], Any]] = {
     "speed_conjugate": ([*3 * [_ARRAY], *2 * [_DOUBLE], *2 * [_LONG], *5 * [_ARRAY]], None),
 }
 _REMEDY = (
-    f"`make ready` compiles it in a clone, and `python {FOLDER / 'build.py'}` wherever there is a C "
+    f"`make ready` compiles it in a clone, and `python {FOLDER / 'build.py'}` wherever there is a "
+    "C "
     "compiler. Or install joulepath anew, from a wheel for this platform or the source archive."
 )
 
@@ -48,7 +48,9 @@ class LibraryUnusable(ImportError):
 
 
 def load(path: Path) -> ctypes.CDLL:
-    """The library of a file, its functions with the types of their arguments. Raises LibraryUnusable."""
+    """The library of a file, its functions with the types of their arguments. Raises
+    LibraryUnusable.
+    """
     if not path.is_file():
         raise LibraryUnusable(path, "is missing")
     try:

@@ -1,7 +1,8 @@
-"""Constraints along the motion (tool cone, TCP and elbow speed, clearance) as rows of an NLP, with their Hessian.
+"""Constraints along the motion (tool cone, TCP and elbow speed, clearance) as rows of an NLP, with
+their Hessian.
 
-Each constraint is a ratio value / limit of the joint positions q and speeds v. The NLP bounds every ratio at the path
-points of its basis.
+Each constraint is a ratio value / limit of the joint positions q and speeds v. The NLP bounds every
+ratio at the path points of its basis.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ DIFFERENCE = 1e-6
 
 @dataclass(frozen=True)
 class PathConstraintValues:
-    """State and ratios at the M path points: q [rad] and v [rad/s] (M, nq), ratios (M, c) with gradients."""
+    """State and ratios at the M path points: q [rad] and v [rad/s] (M, nq), ratios (M, c) with
+    gradients.
+    """
 
     q: Array
     v: Array
@@ -39,18 +42,24 @@ class NearPathConstraints:
     slack: Array
 
     def __getitem__(self, chosen: Index) -> NearPathConstraints:
-        return NearPathConstraints(self.points[chosen], self.columns[chosen], self.ratio[chosen], self.slack[chosen])
+        return NearPathConstraints(
+            self.points[chosen], self.columns[chosen], self.ratio[chosen], self.slack[chosen]
+        )
 
 
-_NONE_NEAR = NearPathConstraints(*(np.zeros(0, dtype=kind) for kind in (np.intp, np.intp, float, float)))
+_NONE_NEAR = NearPathConstraints(
+    *(np.zeros(0, dtype=kind) for kind in (np.intp, np.intp, float, float))
+)
 
 
 @dataclass(frozen=True)
 class PathConstraintRows:
-    """Path constraints of one NLP as functions of its decision variables: free control points s (m, r), duration T.
+    """Path constraints of one NLP as functions of its decision variables: free control points s (m,
+    r), duration T.
 
-    `at_path` (2, M, n) and `at_path_free` (2, M, m) hold the basis functions and their first derivatives at the path
-    points, for all control points and for the free ones. `bounds` (c,) bounds the ratios.
+    `at_path` (2, M, n) and `at_path_free` (2, M, m) hold the basis functions and their first
+    derivatives at the path points, for all control points and for the free ones. `bounds` (c,)
+    bounds the ratios.
     """
 
     constraints: PathConstraints | None
@@ -73,7 +82,9 @@ class PathConstraintRows:
         """Values for all control points (n, r); empty arrays without constraints."""
         if self.constraints is None:
             none = np.zeros((0, self.nq))
-            return PathConstraintValues(none, none, ConstraintRatios(none[:, :0], none[:, None], none[:, None]))
+            return PathConstraintValues(
+                none, none, ConstraintRatios(none[:, :0], none[:, None], none[:, None])
+            )
         s, rising = self.at_path @ points
         q, v = self.coordinates.to_joints(s), rising @ self.coordinates.directions.T / T
         return PathConstraintValues(q, v, self.constraints.linearised(q, v))
@@ -100,8 +111,12 @@ class PathConstraintRows:
         result[:, :-1] = by_points.reshape(len(k), self.n - 1)
         return result
 
-    def changes(self, values: PathConstraintValues, T: float, of: NearPathConstraints, ds: Array, dT: float) -> Array:
-        """Changes (rows,) of some ratios to first order: their gradients times a step ds (m, r), dT [s]."""
+    def changes(
+        self, values: PathConstraintValues, T: float, of: NearPathConstraints, ds: Array, dT: float
+    ) -> Array:
+        """Changes (rows,) of some ratios to first order: their gradients times a step ds (m, r), dT
+        [s].
+        """
         k, c = of.points, of.columns
         dq, rising = self.at_path_free @ ds @ self.coordinates.directions.T
         change = np.einsum("rj,rj->r", values.ratios.by_q[k, c], dq[k])
@@ -111,7 +126,9 @@ class PathConstraintRows:
         return np.asarray(change)
 
     def hessian(self, values: PathConstraintValues, T: float, weights: Array) -> Array:
-        """Hessian (n, n) of Σ weights · ratios, weights (M, c), by finite differences of the ratios' gradients."""
+        """Hessian (n, n) of Σ weights · ratios, weights (M, c), by finite differences of the
+        ratios' gradients.
+        """
         k = np.flatnonzero(weights.any(axis=1))
         if self.constraints is None or not len(k):
             return np.zeros((self.n, self.n))
@@ -120,11 +137,18 @@ class PathConstraintRows:
         # what hangs on positions alone needs no steps in speed
         steps = DIFFERENCE * np.eye(2 * nq if self.constraints.limit_speeds else nq, 2 * nq)
         stepped = np.concatenate([y[None], y + steps[:, None]]).reshape(-1, 2 * nq)
-        ratios = self.constraints.linearised(stepped[:, :nq], stepped[:, nq:], np.tile(w != 0, (len(steps) + 1, 1)))
+        ratios = self.constraints.linearised(
+            stepped[:, :nq], stepped[:, nq:], np.tile(w != 0, (len(steps) + 1, 1))
+        )
         # of hundreds of pairs of bodies, few have a weight
         c = np.flatnonzero(w.any(axis=0))
-        by_state = (each[:, c].reshape(len(steps) + 1, len(k), len(c), nq) for each in (ratios.by_q, ratios.by_v))
-        slopes = np.concatenate([np.einsum("kc,skcj->skj", w[:, c], each) for each in by_state], axis=2)
+        by_state = (
+            each[:, c].reshape(len(steps) + 1, len(k), len(c), nq)
+            for each in (ratios.by_q, ratios.by_v)
+        )
+        slopes = np.concatenate(
+            [np.einsum("kc,skcj->skj", w[:, c], each) for each in by_state], axis=2
+        )
         bent = np.zeros((len(k), 2 * nq, 2 * nq))
         bent[:, : len(steps)] = (slopes[1:] - slopes[0]).transpose(1, 0, 2) / DIFFERENCE
         # differences are symmetric but for their error; what factorises a Hessian reads half of it
@@ -140,7 +164,9 @@ class PathConstraintRows:
         return hessian
 
     def _state_gradients(self, v: Array, T: float, k: Index) -> tuple[Array, Array]:
-        """Gradients of q and v, (rows, nq, n) each, at the path points k (rows,), where the speed is v (rows, nq)."""
+        """Gradients of q and v, (rows, nq, n) each, at the path points k (rows,), where the speed
+        is v (rows, nq).
+        """
         at, rising = self.at_path_free[:, k]
         P, shape = self.coordinates.directions, (len(k), self.nq, self.n - 1)
         Q = np.einsum("km,jr->kjmr", at, P).reshape(shape)

@@ -1,4 +1,6 @@
-"""Hessians by the free control points of B-splines: blocks of pairs that move the same span, and bands of these."""
+"""Hessians by the free control points of B-splines: blocks of pairs that move the same span, and
+bands of these.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,8 @@ from joulepath.optimizer.trajectories.bspline import DEGREE
 class ControlPointPairs:
     """The pairs i ≤ j of m free control points (m, r) that move the same span.
 
-    Variables are ordered row by row. A Hessian has a block (r, r) per pair, and its lower band (m r, band + 1) has the
-    columns as rows.
+    Variables are ordered row by row. A Hessian has a block (r, r) per pair, and its lower band (m
+    r, band + 1) has the columns as rows.
     """
 
     m: int
@@ -41,15 +43,21 @@ class ControlPointPairs:
         return min((DEGREE + 1) * self.r, self.m * self.r) - 1
 
     def products(self, rows: Array) -> Array:
-        """Products (pairs, k) of the entries of rows (k, m): what the square of a row adds to the blocks."""
+        """Products (pairs, k) of the entries of rows (k, m): what the square of a row adds to the
+        blocks.
+        """
         i, j = self.pairs
         return np.ascontiguousarray((rows[:, i] * rows[:, j]).T)
 
     def node_products(self, rows: Array) -> Array:
-        """Products (pairs, 9 N) of the rows (3 N, m) of q, v, a at each node: of every two of these three."""
+        """Products (pairs, 9 N) of the rows (3 N, m) of q, v, a at each node: of every two of these
+        three.
+        """
         i, j = self.pairs
         three = rows.reshape(-1, 3, self.m)
-        return np.ascontiguousarray((three[:, :, None, i] * three[:, None, :, j]).reshape(-1, len(i)).T)
+        return np.ascontiguousarray(
+            (three[:, :, None, i] * three[:, None, :, j]).reshape(-1, len(i)).T
+        )
 
     def banded(self, blocks: Array) -> Array:
         """Lower bands (..., m r, band + 1) of Hessians by their blocks (..., pairs, r, r)."""
@@ -61,7 +69,9 @@ class ControlPointPairs:
 
     @cached_property
     def _band_places(self) -> tuple[Index, Index]:
-        """The entries of the pairs' blocks that are on or below the diagonal, and where they are in the band."""
+        """The entries of the pairs' blocks that are on or below the diagonal, and where they are in
+        the band.
+        """
         (i, j), joints = self.pairs, np.arange(self.r)
         rows, columns = np.broadcast_arrays(
             j[:, None, None] * self.r + joints, i[:, None, None] * self.r + joints[:, None]

@@ -1,4 +1,5 @@
-"""Hessians made positive definite, and quadratics of banded ones: negative eigenvalues change sign."""
+"""Hessians made positive definite, and quadratics of banded ones: negative eigenvalues change
+sign."""
 
 from __future__ import annotations
 
@@ -18,13 +19,17 @@ MOST_AGAIN = 60
 
 @dataclass(frozen=True, eq=False)
 class ConvexQuadratic:
-    """A positive definite matrix (n, n): its lower band (n, width), column by column, or its upper triangle."""
+    """A positive definite matrix (n, n): its lower band (n, width), column by column, or its upper
+    triangle.
+    """
 
     matrix: Array
     banded: bool
 
     def least(self, gradient: Array, added: tuple[Array, Array] | None = None) -> Array:
-        """The least (n,) of ½ xᵀ H x + gradientᵀ x. `added` to H is a matrix as a band and as an upper triangle."""
+        """The least (n,) of ½ xᵀ H x + gradientᵀ x. `added` to H is a matrix as a band and as an
+        upper triangle.
+        """
         matrix = self.matrix if added is None else self.matrix + added[0 if self.banded else 1]
         if self.banded:
             return np.asarray(dpbtrs(dpbtrf(matrix.T, lower=1)[0], -gradient, lower=1)[0])
@@ -40,8 +45,8 @@ class ConvexQuadratic:
 class Convexity:
     """Makes the Hessians along the way of one motion positive definite.
 
-    What the last one lacked for it is tried again first: to find eigenvalues takes several times as long as to
-    factorise.
+    What the last one lacked for it is tried again first: to find eigenvalues takes several times as
+    long as to factorise.
     """
 
     def __init__(self) -> None:
@@ -65,8 +70,9 @@ class Convexity:
 
 
 def what_lacks(H: Array, most: float) -> Array:
-    """The matrix (n, n) that makes a symmetric one, by its upper triangle H (n, n), positive definite: negative
-    eigenvalues change sign, and small ones grow to EIGENVALUE_FLOOR. `most` is a bound on the size of all.
+    """The matrix (n, n) that makes a symmetric one, by its upper triangle H (n, n), positive
+    definite: negative eigenvalues change sign, and small ones grow to EIGENVALUE_FLOOR. `most` is a
+    bound on the size of all.
 
     Those that change are few: finding them takes half the time of finding all.
     """
@@ -77,7 +83,9 @@ def what_lacks(H: Array, most: float) -> Array:
 
 
 def _upper(band: Array) -> Array:
-    """The upper triangle (n, n) of a symmetric matrix by its lower band (n, width), whose columns are the rows here."""
+    """The upper triangle (n, n) of a symmetric matrix by its lower band (n, width), whose columns
+    are the rows here.
+    """
     n, width = band.shape
     H = np.zeros((n, n + 1))
     # the diagonal of the matrix is the first column here

@@ -14,7 +14,8 @@ LEAST_DISPLACEMENT = 1e-12
 
 @dataclass(frozen=True)
 class Coordinates:
-    """Coordinates s (r,) of a spline from `start` to `goal` (r,): q = origin (nq,) + directions (nq, r) · s.
+    """Coordinates s (r,) of a spline from `start` to `goal` (r,): q = origin (nq,) + directions
+    (nq, r) · s.
 
     `limits` are those of s, (r,) each, except `tau_max` (nq,) [N·m], which stays per joint.
     """
@@ -33,7 +34,8 @@ class Coordinates:
 
     @staticmethod
     def straight_line(q_start: Array, q_goal: Array, limits: Limits) -> Coordinates:
-        """All joints share one time scaling s ∈ [0, 1] along the straight line from start to goal."""
+        """All joints share one time scaling s ∈ [0, 1] along the straight line from start to
+        goal."""
         displacement = q_goal - q_start
         length = np.maximum(np.abs(displacement), LEAST_DISPLACEMENT)
         zero, one = np.zeros(1), np.ones(1)
@@ -57,10 +59,11 @@ class Coordinates:
 
 @dataclass(frozen=True)
 class GoalConstraints:
-    """Linear constraints on the displacement of the goal: lower ≤ rows · (goal - coordinates.goal) ≤ upper.
+    """Linear constraints on the displacement of the goal: lower ≤ rows · (goal - coordinates.goal)
+    ≤ upper.
 
-    rows (c, r), lower and upper (c,); equal bounds make an equation. `radius` bounds the displacement of every
-    coordinate (trust region).
+    rows (c, r), lower and upper (c,); equal bounds make an equation. `radius` bounds the
+    displacement of every coordinate (trust region).
     """
 
     rows: Array

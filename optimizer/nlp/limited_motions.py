@@ -1,4 +1,6 @@
-"""The limits of motions of one duration as bounds on ratios: what an interior-point method works with."""
+"""The limits of motions of one duration as bounds on ratios: what an interior-point method works
+with.
+"""
 
 from __future__ import annotations
 
@@ -14,15 +16,19 @@ RATE_POINTS = (2, 4, 12)
 
 
 class LimitedMotions(TimedMotions):
-    """`TimedMotions` with K limits, all on the size of a ratio: of the rates at points of every span, of the control
-    points' places in their ranges, and of the limited torques at the nodes."""
+    """`TimedMotions` with K limits, all on the size of a ratio: of the rates at points of every
+    span, of the control points' places in their ranges, and of the limited torques at the nodes."""
 
     def unbounded(self) -> Array:
         """Bounds (K,) of 1 on all ratios, for `tightened`."""
-        return np.ones(len(self._rate_limits) * self._r + self._m * self._r + len(self.basis.nodes) * self._r)
+        return np.ones(
+            len(self._rate_limits) * self._r + self._m * self._r + len(self.basis.nodes) * self._r
+        )
 
     def tightened(self, bounds: Array, spans: Array, torque: Array) -> Array:
-        """Bounds (K,) tightened by factors ≤ 1 of the rates per span (3, S, r), and of the torques (r,)."""
+        """Bounds (K,) tightened by factors ≤ 1 of the rates per span (3, S, r), and of the torques
+        (r,).
+        """
         factors = []
         for factor, count in zip(spans, RATE_POINTS, strict=True):
             # the first point of a span is the last of the one before
@@ -56,4 +62,7 @@ class LimitedMotions(TimedMotions):
         """Where speed, acceleration and jerk are limited: RATE_POINTS per span, and the end."""
         edges = np.unique(self.basis.knots)
         spans = edges[:-1, None], np.diff(edges)[:, None]
-        return [np.append((spans[0] + spans[1] * (np.arange(count) / count)).ravel(), 1.0) for count in RATE_POINTS]
+        return [
+            np.append((spans[0] + spans[1] * (np.arange(count) / count)).ravel(), 1.0)
+            for count in RATE_POINTS
+        ]

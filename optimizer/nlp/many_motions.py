@@ -1,11 +1,13 @@
-"""Many motions of one duration at a time, roughly: Newton steps on stacked arrays, with the limits as penalties.
+"""Many motions of one duration at a time, roughly: Newton steps on stacked arrays, with the limits
+as penalties.
 
-Screens, restarts and the way to sharp corners need dozens of motions that are nearly optimal and nearly within the
-limits. A step of the SQP takes some ms of Python on small arrays, and of QPs. Here all motions share the Python, and
-the square of what exceeds a limit costs something: no QP. The Hessian of a B-spline is banded.
+Screens, restarts and the way to sharp corners need dozens of motions that are nearly optimal and
+nearly within the limits. A step of the SQP takes some ms of Python on small arrays, and of QPs.
+Here all motions share the Python, and the square of what exceeds a limit costs something: no QP.
+The Hessian of a B-spline is banded.
 
-A Newton step often exceeds the limits on rates by far: then it is restrained by a price on the squares of all rates,
-which bends the step. To shorten it would leave nothing of it.
+A Newton step often exceeds the limits on rates by far: then it is restrained by a price on the
+squares of all rates, which bends the step. To shorten it would leave nothing of it.
 """
 
 from __future__ import annotations
@@ -32,13 +34,16 @@ MAX_ITERATIONS, BACKTRACKS = 40, 10
 ARMIJO = 1e-4
 # a motion is given up if even this multiple of the decrease that its step promises leaves it behind
 MOST_DECREASE = 3.0
-# restraints that are tried for one step, the least one, and the factors by which it grows, and falls after a full step
+# restraints that are tried for one step, the least one, and the factors by which it grows, and
+# falls after a full step
 RESTRAINTS, LEAST_RESTRAINT, HARDER, EASIER = 10, 1e-5, 8.0, 4.0
 
 
 @dataclass(frozen=True)
 class Motions:
-    """Free control points (B, m, nq) [rad], costs and penalties (B,) [J] of motions, and the steps that were made."""
+    """Free control points (B, m, nq) [rad], costs and penalties (B,) [J] of motions, and the steps
+    that were made.
+    """
 
     free: Array
     cost: Array
@@ -48,8 +53,8 @@ class Motions:
 
 @dataclass(frozen=True)
 class _State:
-    """Motions on the way: free control points (B, m, nq), costs, penalties (B,) and their scales [J], what of the
-    torques' ratios is beyond ±1 (B, N, nq), and restraints (B,)."""
+    """Motions on the way: free control points (B, m, nq), costs, penalties (B,) and their scales
+    [J], what of the torques' ratios is beyond ±1 (B, N, nq), and restraints (B,)."""
 
     free: Array
     cost: Array
@@ -62,20 +67,27 @@ class _State:
 
 @dataclass(frozen=True, eq=False)
 class ManyMotions(TimedMotions):
-    """The programs of motions in one spline space, of one duration T [s], with packed kernel parameters p."""
+    """The programs of motions in one spline space, of one duration T [s], with packed kernel
+    parameters p.
+    """
 
     p: Array
 
-    def minimised(self, ends: Array, free: Array, progress: float, behind: float = np.inf, sure: int = 1) -> Motions:
+    def minimised(
+        self, ends: Array, free: Array, progress: float, behind: float = np.inf, sure: int = 1
+    ) -> Motions:
         """Motions between `ends` (B, 2, nq) [rad] from free control points (B, m, nq) [rad].
 
-        Each goes on until a step promises less than the relative decrease `progress`, and is given up if it is expected
-        to need more than `behind` times the least of all; but `sure` steps are made.
+        Each goes on until a step promises less than the relative decrease `progress`, and is given
+        up if it is expected to need more than `behind` times the least of all; but `sure` steps are
+        made.
         """
         cost, penalty, beyond = self._value(ends, free, np.ones(len(free)))
         scale = np.maximum(cost, 1e-9)
         convexity = [Convexity() for _ in free]
-        now = _State(free.copy(), cost, penalty * scale, scale, beyond, np.zeros(len(free)), convexity)
+        now = _State(
+            free.copy(), cost, penalty * scale, scale, beyond, np.zeros(len(free)), convexity
+        )
         at, iterations = np.arange(len(free)), 0
         for made in range(MAX_ITERATIONS):
             checkpoint()
@@ -92,11 +104,15 @@ class ManyMotions(TimedMotions):
         return Motions(now.free, now.cost, now.penalty, iterations)
 
     def costs(self, points: Array, p: Array) -> Array:
-        """Costs (B,) [J] of motions by their control points (B, n, nq), with other kernel parameters."""
+        """Costs (B,) [J] of motions by their control points (B, n, nq), with other kernel
+        parameters.
+        """
         return np.array([self._weights @ self.kernel.value(y, p)[0] for y in self._states(points)])
 
     def _steps(self, ends: Array, now: _State, at: Index) -> tuple[Array, Array, Array]:
-        """Steps (k, m nq) of the motions `at`, the slopes along them and the decreases that they promise, (k,) [J]."""
+        """Steps (k, m nq) of the motions `at`, the slopes along them and the decreases that they
+        promise, (k,) [J].
+        """
         gradient, band = self._derivatives(ends[at], now.free[at], now.scale[at], now.beyond[at])
         ratio = self._rate_ratio(self.points(ends[at], now.free[at]))
         steps, promised = np.zeros_like(gradient), np.zeros(len(at))
@@ -104,7 +120,9 @@ class ManyMotions(TimedMotions):
             steps[k], promised[k] = self._step(gradient[k], band[k], ratio[k], now, b)
         return steps, (gradient * steps).sum(axis=1), promised
 
-    def _step(self, gradient: Array, band: Array, ratio: Array, now: _State, b: int) -> tuple[Array, float]:
+    def _step(
+        self, gradient: Array, band: Array, ratio: Array, now: _State, b: int
+    ) -> tuple[Array, float]:
         """The step (m nq,) of motion b, no longer than STEP, and the decrease [J] that it promises.
 
         It is restrained until its rates do not cost more than it promises.
@@ -114,7 +132,9 @@ class ManyMotions(TimedMotions):
         before = float((_beyond_one(ratio) ** 2).sum())
         for _ in range(RESTRAINTS):
             price = 2 * weight * float(now.restraint[b])
-            x = quadratic.least(gradient, tuple(price * each for each in self._rate_bends) if price else None)  # type: ignore[arg-type]
+            x = quadratic.least(
+                gradient, tuple(price * each for each in self._rate_bends) if price else None
+            )  # type: ignore[arg-type]
             x *= min(1.0, STEP / max(float(np.abs(x).max()), 1e-300))
             promised = -float(gradient @ x) - 0.5 * quadratic.bend(x)
             change = self._R @ x.reshape(-1, self._r) / self._rate_limits
@@ -124,7 +144,9 @@ class ManyMotions(TimedMotions):
         return x, promised
 
     def _moved(self, ends: Array, now: _State, at: Index, steps: Array, slopes: Array) -> Array:
-        """Make the steps of the motions `at`, halved until they lower cost and penalty; which of them do (k,)."""
+        """Make the steps of the motions `at`, halved until they lower cost and penalty; which of
+        them do (k,).
+        """
         todo, alpha, total = np.arange(len(at)), 1.0, now.cost + now.penalty
         for _ in range(BACKTRACKS):
             if not len(todo):
@@ -135,7 +157,9 @@ class ManyMotions(TimedMotions):
             found = free, *self._value(ends[to], free, now.scale[to], allowed)
             good = found[1] + found[2] <= allowed
             to = to[good]
-            now.free[to], now.cost[to], now.penalty[to], now.beyond[to] = (each[good] for each in found)
+            now.free[to], now.cost[to], now.penalty[to], now.beyond[to] = (
+                each[good] for each in found
+            )
             if alpha == 1.0:
                 now.restraint[to] /= EASIER
             todo, alpha = todo[~good], alpha / 2
@@ -148,13 +172,18 @@ class ManyMotions(TimedMotions):
     ) -> tuple[Array, Array, Array]:
         """Costs and penalties (B,) [J], and what of the torques' ratios is beyond ±1, (B, N, nq).
 
-        Costs and torques are left out where the penalty of the rates alone is more than `allowed` (B,) [J].
+        Costs and torques are left out where the penalty of the rates alone is more than `allowed`
+        (B,) [J].
         """
         points = self.points(ends, free)
         rates, places = _beyond_one(self._rate_ratio(points)), self._misplaced(free)
         mean = (rates**2).sum(axis=(1, 2)) / self._rate_count + (places**2).sum(axis=(1, 2))
         cost, beyond = np.zeros(len(free)), np.zeros((len(free), len(self.basis.nodes), self._r))
-        wanted = np.arange(len(free)) if allowed is None else np.flatnonzero(PENALTY * scale * mean <= allowed)
+        wanted = (
+            np.arange(len(free))
+            if allowed is None
+            else np.flatnonzero(PENALTY * scale * mean <= allowed)
+        )
         y = self._states(points)
         for b in wanted.tolist():
             power, tau = self.kernel.value(y[b], self.p)
@@ -170,9 +199,11 @@ class ManyMotions(TimedMotions):
         """What of the control points is beyond the position limits, (B, m, nq) [rad]."""
         return np.asarray(free - np.clip(free, self.limits.q_min, self.limits.q_max))
 
-    def _derivatives(self, ends: Array, free: Array, scale: Array, beyond: Array) -> tuple[Array, Array]:
-        """Gradients (B, m nq) of cost and penalties, and the lower bands (B, m nq, band + 1) of their Hessians, column
-        by column."""
+    def _derivatives(
+        self, ends: Array, free: Array, scale: Array, beyond: Array
+    ) -> tuple[Array, Array]:
+        """Gradients (B, m nq) of cost and penalties, and the lower bands (B, m nq, band + 1) of
+        their Hessians, column by column."""
         many, r, joints = len(free), self._r, np.arange(self._r)
         count, points = len(self.basis.nodes), self.points(ends, free)
         weight = 2 * PENALTY * scale
@@ -186,14 +217,18 @@ class ManyMotions(TimedMotions):
         if rates.any():
             by_limit = weight / self._rate_count / self._rate_limits
             gradient += self._R.T @ (by_limit * rates)
-            blocks[:, :, joints, joints] += self._rate_products @ (by_limit * (rates != 0) / self._rate_limits)
+            blocks[:, :, joints, joints] += self._rate_products @ (
+                by_limit * (rates != 0) / self._rate_limits
+            )
         if places.any():
             gradient += weight * places
             blocks[:, self._pairs.own[:, None], joints, joints] += weight * (places != 0)
         return gradient.reshape(many, -1), self._pairs.banded(blocks)
 
     def _node(self, y: Array, weight: Array, beyond: Array) -> tuple[Array, Array]:
-        """Gradient (N, 3 nq) and Hessian (N, 3, 3, nq, nq) by q, v, a of one motion's cost and torque penalty."""
+        """Gradient (N, 3 nq) and Hessian (N, 3, 3, nq, nq) by q, v, a of one motion's cost and
+        torque penalty.
+        """
         pull, r = weight[:, None] * beyond / self.limits.tau_max, self._r
         _, _, gradient, J, hessian = self.kernel.node(y, pull, self._weights, self.p)
         gradient = self._weights[:, None] * gradient
@@ -210,7 +245,11 @@ class ManyMotions(TimedMotions):
         """RATE_POINTS per span, and the ends."""
         edges = np.unique(self.basis.knots)
         within = (np.arange(RATE_POINTS) + 0.5) / RATE_POINTS
-        return [np.concatenate([[0.0], (edges[:-1, None] + np.diff(edges)[:, None] * within).ravel(), [1.0]])] * 3
+        return [
+            np.concatenate(
+                [[0.0], (edges[:-1, None] + np.diff(edges)[:, None] * within).ravel(), [1.0]]
+            )
+        ] * 3
 
     @property
     def _rate_count(self) -> int:
@@ -218,11 +257,15 @@ class ManyMotions(TimedMotions):
 
     @cached_property
     def _rate_bends(self) -> tuple[Array, Array]:
-        """Second derivatives of half the sum of the squares of all rates' ratios: lower band, and upper triangle."""
+        """Second derivatives of half the sum of the squares of all rates' ratios: lower band, and
+        upper triangle.
+        """
         (i, j), joints, n = self._pairs.pairs, np.arange(self._r), self._m * self._r
         row, column = (each[:, None] * self._r + joints for each in (i, j))
         band, upper = np.zeros((n, self._pairs.band + 1)), np.zeros((n, n))
-        band[row, column - row] = upper[row, column] = self._rate_products @ (1 / self._rate_limits**2)
+        band[row, column - row] = upper[row, column] = self._rate_products @ (
+            1 / self._rate_limits**2
+        )
         return band, upper
 
 

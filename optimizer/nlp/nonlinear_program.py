@@ -1,13 +1,15 @@
-"""The NLP of one candidate: a B-spline between two configurations, its cost, limits and their derivatives.
+"""The NLP of one candidate: a B-spline between two configurations, its cost, limits and their
+derivatives.
 
-Decision variables are the free control points s (m, r) and the duration T. The spline runs in coordinates s ∈ R^r with
-q = origin + directions · s: the joints themselves (r = nq) for a B-spline motion, or the fraction of the straight line
-(r = 1) for a time-scaled one. At a node τ of [0, 1]
+Decision variables are the free control points s (m, r) and the duration T. The spline runs in
+coordinates s ∈ R^r with q = origin + directions · s: the joints themselves (r = nq) for a B-spline
+motion, or the fraction of the straight line (r = 1) for a time-scaled one. At a node τ of [0, 1]
 
     q = s(τ),  v = s'(τ) / T,  a = s''(τ) / T²,       cost = T Σ_k w_k ℓ(q_k, v_k, a_k).
 
-Limits on speed, acceleration and jerk read |s^(d)(τ)| ≤ limit_d · T^d. They are linear in s, and T^d is convex: the
-linear model of such a constraint is never looser than the constraint, so a step within the model is within the limit.
+Limits on speed, acceleration and jerk read |s^(d)(τ)| ≤ limit_d · T^d. They are linear in s, and
+T^d is convex: the linear model of such a constraint is never looser than the constraint, so a step
+within the model is within the limit.
 """
 
 from __future__ import annotations
@@ -35,9 +37,9 @@ FEASIBILITY = 1e-4
 class Linearisation:
     """Value and derivatives of an NLP at one point x = (free control points row by row, T).
 
-    `cost` [J], `gradient` (n,), `hessian` (n, n) of cost + multiplier · tau, `tau` (N, nq) [N·m] the limited torque,
-    and the factors of single torques' gradients: `jacobian` (N, nq, 3, r) = ∂tau/∂(s, v, a), `rate` (N, 3, r) = ∂(s, v,
-    a)/∂T.
+    `cost` [J], `gradient` (n,), `hessian` (n, n) of cost + multiplier · tau, `tau` (N, nq) [N·m]
+    the limited torque, and the factors of single torques' gradients: `jacobian` (N, nq, 3, r) =
+    ∂tau/∂(s, v, a), `rate` (N, 3, r) = ∂(s, v, a)/∂T.
     """
 
     cost: float
@@ -52,11 +54,12 @@ class Linearisation:
 class NonlinearProgram:
     """The NLP of one candidate.
 
-    `p` is the packed parameter vector of the kernel. The duration lies in [t_min, t_max] [s]; equal bounds fix it.
-    `constant` [J] is a part of the cost that no variable changes: it keeps relative changes of the cost in proportion.
-    With `goal_constraints` or a `goal_curve` the goal is a decision variable too: the last row of the free control
-    points; `goal_holding` is what waiting there draws. With a `start_curve` the start is one, too: the first row. Every
-    ratio of `path` is bounded by `path_bounds` (c,), 1 or a little less. The spline passes through the configurations
+    `p` is the packed parameter vector of the kernel. The duration lies in [t_min, t_max] [s]; equal
+    bounds fix it. `constant` [J] is a part of the cost that no variable changes: it keeps relative
+    changes of the cost in proportion. With `goal_constraints` or a `goal_curve` the goal is a
+    decision variable too: the last row of the free control points; `goal_holding` is what waiting
+    there draws. With a `start_curve` the start is one, too: the first row. Every ratio of `path` is
+    bounded by `path_bounds` (c,), 1 or a little less. The spline passes through the configurations
     `passes` (k, r), in their order, at times that are free.
     """
 
@@ -150,7 +153,9 @@ class NonlinearProgram:
         return self.coordinates.to_joints(self.points(free))
 
     def _states(self, free: Array, T: float) -> tuple[Array, Array]:
-        """s, v, a in the spline's coordinates (N, 3, r), and q, v, a of the joints as the kernel's y (N, 3 nq)."""
+        """s, v, a in the spline's coordinates (N, 3, r), and q, v, a of the joints as the kernel's
+        y (N, 3 nq).
+        """
         z = self.basis.at_nodes @ self.points(free)
         z[1] /= T
         z[2] /= T * T
@@ -171,7 +176,9 @@ class NonlinearProgram:
         return total, tau
 
     def derivatives(self, free: Array, T: float, multiplier: Array) -> Linearisation:
-        """Cost and torques with derivatives; `multiplier` (N, nq) weighs the torques in the Hessian."""
+        """Cost and torques with derivatives; `multiplier` (N, nq) weighs the torques in the
+        Hessian.
+        """
         z, y = self._states(free, T)
         count, nq, r = len(y), self.kernel.nq, self.r
         w = self.basis.weights
@@ -191,20 +198,30 @@ class NonlinearProgram:
         slope = (w[:, None, None] * G * rate).sum()
         wG = (w[:, None, None] * G).reshape(count * 3, r)
         gradient_s = T * (D.reshape(count * 3, -1).T @ wG)
-        weighted_torque = (multiplier[:, None, :] @ J.reshape(count, nq, 3 * r)).reshape(count, 3, r)
+        weighted_torque = (multiplier[:, None, :] @ J.reshape(count, nq, 3 * r)).reshape(
+            count, 3, r
+        )
         lagrangian = T * w[:, None, None] * G + weighted_torque
         line = Linearisation(
             cost=self.constant + T * total,
             gradient=np.append(gradient_s.ravel(), total + T * slope),
-            hessian=_Nodes(T, z, D, rate, lagrangian, H, scale).hessian(self._overlaps, gradient_s, slope),
+            hessian=_Nodes(T, z, D, rate, lagrangian, H, scale).hessian(
+                self._overlaps, gradient_s, slope
+            ),
             tau=tau,
             jacobian=J,
             rate=rate,
         )
-        return line if self.goal_holding is None or not self.free_goal else self._held(line, free[-1], T)
+        return (
+            line
+            if self.goal_holding is None or not self.free_goal
+            else self._held(line, free[-1], T)
+        )
 
     def _held(self, line: Linearisation, goal: Array, T: float) -> Linearisation:
-        """The linearisation with what holding the arm at the goal (r,) draws: of the last row, and the duration."""
+        """The linearisation with what holding the arm at the goal (r,) draws: of the last row, and
+        the duration.
+        """
         assert self.goal_holding is not None
         cost, first, second = self.goal_holding.derivatives(goal, T)
         gradient, hessian, own = line.gradient.copy(), line.hessian.copy(), slice(-len(first), None)
@@ -239,15 +256,18 @@ class NonlinearProgram:
         # without constraints the basis need not be evaluated there
         at_path = np.zeros((2, 0, self.basis.n)) if self.path is None else self.basis.at_path
         at_path_free = np.ascontiguousarray(self.free_columns(at_path))
-        return PathConstraintRows(self.path, self.path_bounds, self.coordinates, at_path, at_path_free)
+        return PathConstraintRows(
+            self.path, self.path_bounds, self.coordinates, at_path, at_path_free
+        )
 
 
 @dataclass(frozen=True)
 class _Overlaps:
-    """Pairs i ≤ j of free control points that move the same nodes: a control point moves few of them.
+    """Pairs i ≤ j of free control points that move the same nodes: a control point moves few of
+    them.
 
-    `products` (pairs, 9 N) are those of basis functions and their derivatives at each node, D_kdi · D_kej in order of
-    k, d, e.
+    `products` (pairs, 9 N) are those of basis functions and their derivatives at each node, D_kdi ·
+    D_kej in order of k, d, e.
     """
 
     i: Index
@@ -276,8 +296,9 @@ class _Overlaps:
 class _Nodes:
     """States z = (s, v, a) (N, 3, r) at the nodes, and derivatives there.
 
-    D (N, 3, m) is ∂z/∂s, with `scale` (3,) the powers of T in it, and `rate` (N, 3, r) is ∂z/∂T; `lagrangian` (N, 3, r)
-    and H (N, 3, r, 3, r) are the first and second derivatives of the Lagrangian by z.
+    D (N, 3, m) is ∂z/∂s, with `scale` (3,) the powers of T in it, and `rate` (N, 3, r) is ∂z/∂T;
+    `lagrangian` (N, 3, r) and H (N, 3, r, 3, r) are the first and second derivatives of the
+    Lagrangian by z.
     """
 
     T: float
@@ -297,7 +318,9 @@ class _Nodes:
         (count, _, m), r = self.D.shape, self.z.shape[2]
         flat = self.D.reshape(count * 3, m)
         H_ss = overlaps.sum(self.H * np.outer(self.scale, self.scale)[:, None, :, None], m)
-        H_rate = (self.H.reshape(count, 3 * r, 3 * r) @ rate.reshape(count, 3 * r, 1)).reshape(count, 3, r)
+        H_rate = (self.H.reshape(count, 3 * r, 3 * r) @ rate.reshape(count, 3 * r, 1)).reshape(
+            count, 3, r
+        )
         D_rate = self.D * np.array([0.0, -1.0 / T, -2.0 / T])[:, None]
         H_sT = (
             flat.T @ H_rate.reshape(count * 3, r)

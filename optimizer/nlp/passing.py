@@ -1,9 +1,11 @@
-"""Configurations that a spline passes through, at times that are free: equations of an NLP, met by every iterate.
+"""Configurations that a spline passes through, at times that are free: equations of an NLP, met by
+every iterate.
 
-At a pass k the spline s(τ) goes through s_k at some τ_k. Along the curve the pass may slide, across it the curve is
-held: to first order, the steps of the control points that keep the pass are those whose displacement of s(τ_k) is along
-the tangent there. They form the null space in which the QP is solved. After each step the curve is put back on its
-passes exactly, by the least change of the control points.
+At a pass k the spline s(τ) goes through s_k at some τ_k. Along the curve the pass may slide, across
+it the curve is held: to first order, the steps of the control points that keep the pass are those
+whose displacement of s(τ_k) is along the tangent there. They form the null space in which the QP is
+solved. After each step the curve is put back on its passes exactly, by the least change of the
+control points.
 """
 
 from __future__ import annotations
@@ -18,7 +20,8 @@ from joulepath.optimizer.nlp.nonlinear_program import NonlinearProgram
 from joulepath.optimizer.trajectories.bspline import DEGREE
 from joulepath.optimizer.trajectories.passing import nearby, pass_times
 
-# rad per duration: a curve that is slower at a pass rests there, and has no tangent along which the pass may slide
+# rad per duration: a curve that is slower at a pass rests there, and has no tangent along which the
+# pass may slide
 RESTING = 1e-2
 # share of the time to its neighbours by which a pass may slide in one step
 SLIDE = 0.4
@@ -26,8 +29,8 @@ SLIDE = 0.4
 
 @dataclass(frozen=True)
 class Passing:
-    """Where a curve passes: times (k,) in (0, 1), the basis functions `at` (k, m) of the free control points there and
-    their `rising` (k, m), and the curve's tangent and bend (k, r) by τ."""
+    """Where a curve passes: times (k,) in (0, 1), the basis functions `at` (k, m) of the free
+    control points there and their `rising` (k, m), and the curve's tangent and bend (k, r) by τ."""
 
     times: Array
     at: Array
@@ -51,15 +54,17 @@ class Passing:
         return np.concatenate(rows)
 
     def null_space(self, n: int) -> Array:
-        """Orthonormal steps (n, count) of the n decision variables that keep the passes to first order."""
+        """Orthonormal steps (n, count) of the n decision variables that keep the passes to first
+        order.
+        """
         held = self.held()
         gradients = np.zeros((n, len(held)))
         gradients[: held.shape[1]] = held.T
         return np.linalg.qr(gradients, mode="complete")[0][:, len(held) :]
 
     def curvature(self, pull: Array, n: int) -> Array:
-        """Second derivatives (n, n) of the passes, weighed by their multipliers: the forces that balance the gradient
-        `pull` (m, r) of the cost and the limits."""
+        """Second derivatives (n, n) of the passes, weighed by their multipliers: the forces that
+        balance the gradient `pull` (m, r) of the cost and the limits."""
         multiplier = -np.linalg.lstsq(self.at.T, pull, rcond=None)[0]
         result = np.zeros((n, n))
         size = (self.tangent**2).sum(axis=1)
@@ -68,7 +73,9 @@ class Passing:
             slide = -np.outer(self.at[k], self.tangent[k] / size[k]).ravel()
             turned = np.outer(self.rising[k], force).ravel()
             both = np.outer(turned, slide)
-            result[: len(slide), : len(slide)] += both + both.T + (force @ self.bend[k]) * np.outer(slide, slide)
+            result[: len(slide), : len(slide)] += (
+                both + both.T + (force @ self.bend[k]) * np.outer(slide, slide)
+            )
         return result
 
 
@@ -105,6 +112,10 @@ class Passes:
 
 
 def _apart(times: Array) -> Array:
-    """The times (k,), each at least a thousandth of the duration after the one before and before the end."""
+    """The times (k,), each at least a thousandth of the duration after the one before and before
+    the end.
+    """
     least = 1e-3 * np.arange(1, len(times) + 1)
-    return np.asarray(np.minimum(np.maximum.accumulate(np.maximum(times, least) - least) + least, 1 - least[::-1]))
+    return np.asarray(
+        np.minimum(np.maximum.accumulate(np.maximum(times, least) - least) + least, 1 - least[::-1])
+    )

@@ -1,7 +1,7 @@
 """The rows of a QP, and its solution by DAQP (dual active set; Arnström, Bemporad, Axehill 2022).
 
-DAQP gets the QP in variables y with x = W y that make the Hessian the identity. It would factorise the Hessian for each
-QP again, and transform all rows with it, at a tenth of the speed of BLAS.
+DAQP gets the QP in variables y with x = W y that make the Hessian the identity. It would factorise
+the Hessian for each QP again, and transform all rows with it, at a tenth of the speed of BLAS.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ from joulepath.optimizer.nlp.active_path_constraints import Index
 
 # least time [s] that a QP gets: most take a millisecond
 LEAST_TIME = 0.05
-# iterations of DAQP after which a QP counts as infeasible. Most take some tens; a relaxed one that collides everywhere
-# has thousands of active rows, and each of its last iterations takes milliseconds
+# iterations of DAQP after which a QP counts as infeasible. Most take some tens; a relaxed one that
+# collides everywhere has thousands of active rows, and each of its last iterations takes
+# milliseconds
 MOST_QP_ITERATIONS = 1200
 # rows that there is room for at first: more than most QPs have
 ROOM = 320
@@ -31,7 +32,9 @@ _INFINITE = 1e30
 
 
 class Listed:
-    """Rows of one kind, and the place of each, which is so many indices: of a bound, its side and its variable."""
+    """Rows of one kind, and the place of each, which is so many indices: of a bound, its side and
+    its variable.
+    """
 
     def __init__(self, indices: int) -> None:
         none = np.zeros(0, dtype=int)
@@ -50,9 +53,10 @@ class Listed:
 class QPRows:
     """Constraints least ≤ A y ≤ most in whitened variables; rows are added at the end.
 
-    `hard` rows are never relaxed. `rates` are the rows of limits on rates, by derivative, coordinate and grid point;
-    `bounds` those of bounds, by side and variable; `path` those of path constraints, by point and column. `chosen`
-    (2, 3, r, M) marks the lower and upper limits on rates with a row, `bounded` (2, n) the lower and upper bounds.
+    `hard` rows are never relaxed. `rates` are the rows of limits on rates, by derivative,
+    coordinate and grid point; `bounds` those of bounds, by side and variable; `path` those of path
+    constraints, by point and column. `chosen` (2, 3, r, M) marks the lower and upper limits on
+    rates with a row, `bounded` (2, n) the lower and upper bounds.
     """
 
     def __init__(self, whitening: Array, grid: tuple[int, ...]) -> None:
@@ -103,13 +107,20 @@ class QPRows:
         self._fresh, self._transformed = [], self.count
 
     def add_kinematic(
-        self, gradients: Array, most: Array, places: Places, upper: Mask, active: Mask | bool = False
+        self,
+        gradients: Array,
+        most: Array,
+        places: Places,
+        upper: Mask,
+        active: Mask | bool = False,
     ) -> None:
         """Add the rows of places that have none yet for their `upper` or lower limit; see `add`."""
         self.rates.add(self.add(gradients, most, active=active), places)
         self.chosen[upper.astype(int), *places] = True
 
-    def add_path(self, gradients: Array, slack: Array, passed: tuple[Index, Index], active: Mask) -> None:
+    def add_path(
+        self, gradients: Array, slack: Array, passed: tuple[Index, Index], active: Mask
+    ) -> None:
         """Add the rows of path constraints that have none yet; see `add`."""
         self.path.add(self.add(gradients, slack, active=active), passed)
 
@@ -136,10 +147,18 @@ class QPRows:
         sense[least == most] = _EQUAL
         left = watched_time_left()
         y, _, flag, info = daqp.solve(
-            self._identity, gradient, self._A[used], most, least, sense,
-            primal_tol=1e-9, eps_prox=0.0, rho_soft=1e-6, iter_limit=MOST_QP_ITERATIONS,
+            self._identity,
+            gradient,
+            self._A[used],
+            most,
+            least,
+            sense,
+            primal_tol=1e-9,
+            eps_prox=0.0,
+            rho_soft=1e-6,
+            iter_limit=MOST_QP_ITERATIONS,
             time_limit=max(left, LEAST_TIME) if np.isfinite(left) else 0.0,  # 0: no limit
-        )  # fmt: skip
+        )
         found = bool(flag >= _DAQP_OPTIMAL)
         if found:
             # what the next solve starts from

@@ -1,4 +1,6 @@
-"""Motions of one duration in a B-spline space: matrices and limits that do not change from step to step."""
+"""Motions of one duration in a B-spline space: matrices and limits that do not change from step to
+step.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,8 @@ from joulepath.optimizer.trajectories.bspline import Basis, basis_matrix
 
 @dataclass(frozen=True, eq=False)
 class TimedMotions(ABC):
-    """Motions of duration T [s], at rest at both ends, with m free control points of r = nq joints each.
+    """Motions of duration T [s], at rest at both ends, with m free control points of r = nq joints
+    each.
 
     Arrays may have leading dimensions (...), for several motions at once.
     """
@@ -29,12 +32,17 @@ class TimedMotions(ABC):
     @property
     @abstractmethod
     def _rate_places(self) -> list[Array]:
-        """Where in [0, 1] speed, acceleration and jerk are limited: an array for each of the three."""
+        """Where in [0, 1] speed, acceleration and jerk are limited: an array for each of the
+        three."""
 
     def points(self, ends: Array, free: Array) -> Array:
-        """All control points (..., n, r) of motions between `ends` (..., 2, r), for the free ones (..., m, r)."""
+        """All control points (..., n, r) of motions between `ends` (..., 2, r), for the free ones
+        (..., m, r).
+        """
         rest = self.basis.resting
-        start, goal = (np.repeat(end, rest, axis=-2) for end in (ends[..., :1, :], ends[..., 1:, :]))
+        start, goal = (
+            np.repeat(end, rest, axis=-2) for end in (ends[..., :1, :], ends[..., 1:, :])
+        )
         return np.concatenate([start, free, goal], axis=-2)
 
     def _states(self, points: Array) -> Array:

@@ -15,9 +15,11 @@ MOST_IN_PART = 150
 
 
 def whitened(H: Array) -> tuple[Callable[[Array], Array], Array]:
-    """The product with H as a function of a vector (n,), and W (n, n) with Wᵀ H W = 1, for a symmetric H (n, n).
+    """The product with H as a function of a vector (n,), and W (n, n) with Wᵀ H W = 1, for a
+    symmetric H (n, n).
 
-    If H is not positive definite, both are those of H with the absolute values of its eigenvalues, clamped from below.
+    If H is not positive definite, both are those of H with the absolute values of its eigenvalues,
+    clamped from below.
     """
     # H.T: LAPACK takes columns first
     L, failed = dpotrf(H.T, lower=1)

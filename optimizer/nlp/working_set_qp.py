@@ -1,8 +1,9 @@
 """The QP of one SQP step, over the constraints near their limits.
 
-Speed, acceleration and jerk are limited at every point of a fine grid. Only their peaks, and the anchors of the basis,
-enter the QP when they come near a limit. If its step breaks a limit at another point, or a bound of a variable, this is
-added and the QP is solved again. Clearances are hundreds, and two or three of them hold a motion: they enter likewise.
+Speed, acceleration and jerk are limited at every point of a fine grid. Only their peaks, and the
+anchors of the basis, enter the QP when they come near a limit. If its step breaks a limit at
+another point, or a bound of a variable, this is added and the QP is solved again. Clearances are
+hundreds, and two or three of them hold a motion: they enter likewise.
 """
 
 from __future__ import annotations
@@ -14,25 +15,32 @@ import numpy as np
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.deadline import checkpoint
-from joulepath.optimizer.nlp.active_path_constraints import Index, NearPathConstraints, PathConstraintValues
+from joulepath.optimizer.nlp.active_path_constraints import (
+    Index,
+    NearPathConstraints,
+    PathConstraintValues,
+)
 from joulepath.optimizer.nlp.nonlinear_program import FEASIBILITY, Linearisation, NonlinearProgram
 from joulepath.optimizer.nlp.qp_rows import Places, QPRows
 
-# a rate enters the first QP above this ratio of its limit, and a later one above the second: there, limits that were
-# active in the QP before enter, too. With a fifth fewer rows, steps are as few and as good
+# a rate enters the first QP above this ratio of its limit, and a later one above the second: there,
+# limits that were active in the QP before enter, too. With a fifth fewer rows, steps are as few and
+# as good
 NEAR, NEAR_LATER = 0.6, 0.85
 # torques and path constraints enter any QP above these
 NEAR_TORQUE = 0.5
 NEAR_PATH = 0.5
-# clearances enter above this ratio, or if they were active in the QP before; above NEAR_PATH once a step breaks them
+# clearances enter above this ratio, or if they were active in the QP before; above NEAR_PATH once a
+# step breaks them
 NEAR_CLEARANCE = 0.9
 # no coordinate of a control point moves further in one step [rad]
 STEP = 1.5
-# solves of a QP, each with the constraints that the step before would break: of the first QPs, and of all that follow.
-# What the last solve breaks enters the QP of the next iterate: more rounds take more time than they save, unless the
-# line search fails
+# solves of a QP, each with the constraints that the step before would break: of the first QPs, and
+# of all that follow. What the last solve breaks enters the QP of the next iterate: more rounds take
+# more time than they save, unless the line search fails
 QP_ROUNDS, MOST_ROUNDS = (3, 3, 3, 2), 10
-# the same for a relaxed QP with clearance constraints: it has many rows, and none of them was active before
+# the same for a relaxed QP with clearance constraints: it has many rows, and none of them was
+# active before
 RELAXED_ROUNDS = 2
 # excess over the bound of a variable [rad, or share of the duration] at which it enters the QP
 BOUND_TOLERANCE = 1e-9
@@ -42,8 +50,9 @@ BOUND_TOLERANCE = 1e-9
 class QPInputs:
     """What the QP is made of at one iterate.
 
-    `hessian` H times a step (n,) and `gradient` (n,) are in the scaled variables. `whitening` W (n, k): Wᵀ H W = 1, for
-    steps that keep what is held. `ratio` (3, r, M): rates over their limits `rates` (3, r) on the grid.
+    `hessian` H times a step (n,) and `gradient` (n,) are in the scaled variables. `whitening` W (n,
+    k): Wᵀ H W = 1, for steps that keep what is held. `ratio` (3, r, M): rates over their limits
+    `rates` (3, r) on the grid.
     """
 
     hessian: Callable[[Array], Array]
@@ -59,11 +68,13 @@ class QPInputs:
 
 @dataclass(frozen=True)
 class QPStep:
-    """Solution of a QP: step x (n,) in the scaled variables, and the multipliers ≥ 0 of its constraints.
+    """Solution of a QP: step x (n,) in the scaled variables, and the multipliers ≥ 0 of its
+    constraints.
 
-    `relaxed`: the QP was infeasible, and x breaks its constraints as little as possible. `kinematic` are the
-    multipliers at `places`, `torque` those at `nodes` (node, joint) of torques with `signs`, `path` those at `passed`
-    (path point, column). `pull` (n,): sum of the constraints' gradients times multipliers; zero if nothing is held.
+    `relaxed`: the QP was infeasible, and x breaks its constraints as little as possible.
+    `kinematic` are the multipliers at `places`, `torque` those at `nodes` (node, joint) of torques
+    with `signs`, `path` those at `passed` (path point, column). `pull` (n,): sum of the
+    constraints' gradients times multipliers; zero if nothing is held.
     """
 
     x: Array
@@ -80,7 +91,9 @@ class QPStep:
 
 @dataclass(frozen=True)
 class _TorqueRows:
-    """Torques near their limits: node and joint, sign, gradients (rows, n) and slack, as ratios of the limit."""
+    """Torques near their limits: node and joint, sign, gradients (rows, n) and slack, as ratios of
+    the limit.
+    """
 
     nodes: tuple[Index, Index]
     signs: Array
@@ -114,8 +127,8 @@ class WorkingSetQP:
     def solve(self, at: QPInputs, rounds: int, enough: float = -np.inf) -> QPStep | None:
         """The step; None if even the relaxed QP has no solution.
 
-        It ends early with a solution that promises a relative decrease of the cost below `enough`: with further
-        constraints, the next one would promise less still.
+        It ends early with a solution that promises a relative decrease of the cost below `enough`:
+        with further constraints, the next one would promise less still.
         """
         torque = self._torque_rows(at)
         rows, bounds = QPRows(at.whitening, at.ratio.shape), np.array(self._bounds(at.free, at.T))
@@ -146,7 +159,10 @@ class WorkingSetQP:
                 break
             if self._adds_bounds(rows, bounds, x):
                 continue
-            adds_rates, (adds_path, path) = self._adds_rates(rows, at, x), self._adds_path(rows, at, path, x)
+            adds_rates, (adds_path, path) = (
+                self._adds_rates(rows, at, x),
+                self._adds_path(rows, at, path, x),
+            )
             if not (adds_rates or adds_path):
                 break
         mu = np.maximum(multipliers, 0.0)
@@ -156,17 +172,29 @@ class WorkingSetQP:
         )
         # what was active is kept for the next QP
         for marks, at_places, numbers in (
-            (self._active, places, kinematic), (self._bounded, sides, bounded), (self._passed, passed, near)
-        ):  # fmt: skip
+            (self._active, places, kinematic),
+            (self._bounded, sides, bounded),
+            (self._passed, passed, near),
+        ):
             marks[...] = False
             marks[at_places] = mu[numbers] > 0
         return QPStep(
-            _shortened(x, bounds), relaxed, places, mu[kinematic],
-            torque.nodes, torque.signs, mu[limited], passed, mu[near], pull,
-        )  # fmt: skip
+            _shortened(x, bounds),
+            relaxed,
+            places,
+            mu[kinematic],
+            torque.nodes,
+            torque.signs,
+            mu[limited],
+            passed,
+            mu[near],
+            pull,
+        )
 
     def _first_path_rows(self, rows: QPRows, at: QPInputs) -> NearPathConstraints:
-        """Adds the path constraints that the QP is first solved with, and returns the others that are near."""
+        """Adds the path constraints that the QP is first solved with, and returns the others that
+        are near.
+        """
         near = self.p.path_rows.near(at.path_values, NEAR_PATH)
         if not len(near.slack):
             return near
@@ -177,7 +205,9 @@ class WorkingSetQP:
             ]
         return self._add_path(rows, at, near, at_once)
 
-    def _add_path(self, rows: QPRows, at: QPInputs, near: NearPathConstraints, wanted: Mask) -> NearPathConstraints:
+    def _add_path(
+        self, rows: QPRows, at: QPInputs, near: NearPathConstraints, wanted: Mask
+    ) -> NearPathConstraints:
         """Adds those of the path constraints that are `wanted`, and returns the others."""
         added = near[np.flatnonzero(wanted)]
         passed = added.points, added.columns
@@ -188,12 +218,17 @@ class WorkingSetQP:
     def _adds_path(
         self, rows: QPRows, at: QPInputs, near: NearPathConstraints, x: Array
     ) -> tuple[bool, NearPathConstraints]:
-        """Whether the step x breaks any of the path constraints without a row, which it then gets; and the others."""
+        """Whether the step x breaks any of the path constraints without a row, which it then gets;
+        and the others.
+        """
         if not len(near.slack):
             return False, near
         dT = float(x[-1]) * self.time_scale if self.free_time else 0.0
         ds = x[: self.count].reshape(at.free.shape)
-        broken = self.p.path_rows.changes(at.path_values, at.T, near, ds, dT) > near.slack + FEASIBILITY / 4
+        broken = (
+            self.p.path_rows.changes(at.path_values, at.T, near, ds, dT)
+            > near.slack + FEASIBILITY / 4
+        )
         return bool(broken.any()), self._add_path(rows, at, near, broken)
 
     def _add_kinematic(self, rows: QPRows, at: QPInputs) -> None:
@@ -206,7 +241,8 @@ class WorkingSetQP:
         self._add_rates(rows, at, places, at.ratio[places] >= 0, self._active[places])
 
     def _worst(self, ratio: Array, above: Array) -> Places:
-        """The anchors and local peaks at which the size of ratios (3, r, M) exceeds the bound of its derivative (3,).
+        """The anchors and local peaks at which the size of ratios (3, r, M) exceeds the bound of
+        its derivative (3,).
 
         Most coordinates stay below it everywhere: only the others are searched.
         """
@@ -221,7 +257,10 @@ class WorkingSetQP:
 
         A step without bounds may be so long that it breaks every limit.
         """
-        if rows.bounded.all() or not ((bounds[0] - x > BOUND_TOLERANCE) | (x - bounds[1] > BOUND_TOLERANCE)).any():
+        if (
+            rows.bounded.all()
+            or not ((bounds[0] - x > BOUND_TOLERANCE) | (x - bounds[1] > BOUND_TOLERANCE)).any()
+        ):
             return False
         rows.add_bounds(bounds, np.ones_like(rows.bounded))
         return True
@@ -245,17 +284,27 @@ class WorkingSetQP:
         self._add_rates(rows, at, fresh, upper[unknown])
         return True
 
-    def _add_rates(self, rows: QPRows, at: QPInputs, places: Places, upper: Mask, active: Mask | bool = False) -> None:
+    def _add_rates(
+        self, rows: QPRows, at: QPInputs, places: Places, upper: Mask, active: Mask | bool = False
+    ) -> None:
         """Adds the `upper` or lower limits on rates at the places; `active` as in `QPRows.add`."""
         signs = np.where(upper, 1.0, -1.0)
-        rows.add_kinematic(self._kinematic_rows(at, places, signs), 1 - signs * at.ratio[places], places, upper, active)
+        rows.add_kinematic(
+            self._kinematic_rows(at, places, signs),
+            1 - signs * at.ratio[places],
+            places,
+            upper,
+            active,
+        )
 
     def _kinematic_rows(self, at: QPInputs, places: Places, signs: Array) -> Array:
         """Gradients (rows, n) of sign · value / limit at the places."""
         d, j, g = places
         A = np.zeros((len(d), self.n))
         block = (signs / at.rates[d, j])[:, None] * self._grid_free[d, g]
-        A[:, : self.count].reshape(len(d), self.p.free_count, self.p.r)[np.arange(len(d)), :, j] = block
+        A[:, : self.count].reshape(len(d), self.p.free_count, self.p.r)[np.arange(len(d)), :, j] = (
+            block
+        )
         if self.free_time:
             A[:, -1] = -(d + 1) / at.T * self.time_scale
         return A
@@ -272,13 +321,16 @@ class WorkingSetQP:
         return _TorqueRows((k, j), signs, self._scaled(gradients), 1 - np.abs(ratio[k, j]))
 
     def _scaled(self, gradients: Array) -> Array:
-        """Gradients (rows, n) by the scaled variables, for gradients (rows, count + 1) by (s, T)."""
+        """Gradients (rows, n) by the scaled variables, for gradients (rows, count + 1) by (s,
+        T)."""
         scaled = gradients.copy()
         scaled[:, -1] *= self.time_scale
         return scaled[:, : self.n]
 
     def _bounds(self, free: Array, T: float) -> tuple[Array, Array]:
-        """Least and greatest change of each variable. Within position limits, control points keep the curve inside."""
+        """Least and greatest change of each variable. Within position limits, control points keep
+        the curve inside.
+        """
         p = self.p
         lower = np.maximum(p.limits.q_min - free, -STEP).ravel()
         upper = np.minimum(p.limits.q_max - free, STEP).ravel()
@@ -292,7 +344,9 @@ class WorkingSetQP:
         return lower, upper
 
     def _add_goal(self, rows: QPRows, free: Array) -> None:
-        """Adds the goal constraints as bounds on the change of the goal; no rows if the goal is fixed."""
+        """Adds the goal constraints as bounds on the change of the goal; no rows if the goal is
+        fixed.
+        """
         constraints = self.p.goal_constraints
         if constraints is None:
             return
@@ -303,7 +357,9 @@ class WorkingSetQP:
 
 
 def _shortened(x: Array, bounds: Array) -> Array:
-    """The step, as far as the bounds (2, n) let it go: rounds may end before every bound has its row."""
+    """The step, as far as the bounds (2, n) let it go: rounds may end before every bound has its
+    row.
+    """
     most = np.where(x > 0, bounds[1], bounds[0])
     beyond = np.abs(x) > np.abs(most) + BOUND_TOLERANCE
     return np.asarray(x * np.min(np.abs(most[beyond] / x[beyond]), initial=1.0))
@@ -319,5 +375,7 @@ def _peaks(size: Array) -> Mask:
 
 
 def _places(marks: Mask) -> tuple[Index, ...]:
-    """The places of marks; a search in one dimension is several times as fast as `np.nonzero` in two or three."""
+    """The places of marks; a search in one dimension is several times as fast as `np.nonzero` in
+    two or three.
+    """
     return np.unravel_index(np.flatnonzero(marks), marks.shape)

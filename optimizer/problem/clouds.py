@@ -1,6 +1,8 @@
-"""Obstacles of many parts: point clouds, voxel grids and triangle meshes, validated on construction.
+"""Obstacles of many parts: point clouds, voxel grids and triangle meshes, validated on
+construction.
 
-Each is the union of its parts. Nothing is simplified: collision checking and the certificate use every part.
+Each is the union of its parts. Nothing is simplified: collision checking and the certificate use
+every part.
 """
 
 from __future__ import annotations
@@ -15,14 +17,14 @@ from joulepath.models.shape_sizes import SIZES, check_extent
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arrays import check_sizes, frozen, sized
 
-# most points, occupied voxels and triangles of an obstacle, and of all obstacles of a scene together: they bound the
-# memory and the time of a request
+# most points, occupied voxels and triangles of an obstacle, and of all obstacles of a scene
+# together: they bound the memory and the time of a request
 MOST_POINTS = MOST_VOXELS = MOST_TRIANGLES = 100_000
 MOST_PARTS_IN_SCENE = 200_000
 # greatest number of voxels along an edge of a grid
 MOST_ALONG_EDGE = 4096
-# least height of a triangle over its longest edge, relative to that edge: flatter ones are left out. Their edges belong
-# to their neighbours
+# least height of a triangle over its longest edge, relative to that edge: flatter ones are left
+# out. Their edges belong to their neighbours
 FLAT_TRIANGLE = 1e-9
 
 Whole = npt.NDArray[np.int64]
@@ -30,14 +32,20 @@ Whole = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Balls of `radius` [m] about `points` (n, 3) [m]. Raises InvalidProblem, with the field named."""
+    """Balls of `radius` [m] about `points` (n, 3) [m]. Raises InvalidProblem, with the field
+    named."""
 
     points: Array
     radius: float
 
     def __post_init__(self) -> None:
         points = frozen(self.points, (-1, 3), "points")
-        _count("points", len(points), MOST_POINTS, "points: thin the cloud out, for example to one point per voxel")
+        _count(
+            "points",
+            len(points),
+            MOST_POINTS,
+            "points: thin the cloud out, for example to one point per voxel",
+        )
         _within_reach("points", points)
         check_sizes("radius", self.radius)
         object.__setattr__(self, "points", points)
@@ -45,7 +53,8 @@ class Points:
 
 @dataclass(frozen=True, eq=False)
 class Voxels:
-    """Cubes with edges of `size` [m]: of the cell (i, j, k) of `cells` (n, 3), from (i, j, k) · size to one size more.
+    """Cubes with edges of `size` [m]: of the cell (i, j, k) of `cells` (n, 3), from (i, j, k) ·
+    size to one size more.
 
     Cells that are named twice count once. Raises InvalidProblem, with the field named.
     """
@@ -58,7 +67,9 @@ class Voxels:
         cells = np.unique(np.array(self.cells, dtype=np.int64).reshape(-1, 3), axis=0)
         _count("cells", len(cells), MOST_VOXELS, "occupied cells: use larger voxels")
         if np.abs(cells).max() > MOST_ALONG_EDGE:
-            raise InvalidProblem("cells", f"cells must lie within {MOST_ALONG_EDGE} cells of the origin.")
+            raise InvalidProblem(
+                "cells", f"cells must lie within {MOST_ALONG_EDGE} cells of the origin."
+            )
         _within_reach("cells", np.asarray(cells * self.size, dtype=float))
         cells.flags.writeable = False
         object.__setattr__(self, "cells", cells)
@@ -68,8 +79,9 @@ class Voxels:
 class TriangleMesh:
     """The triangles with corners `corners` (n, 3, 3) [m], of any form: no convexity is asked for.
 
-    If the mesh is closed (every edge belongs to two triangles of opposite directions), its inside counts as solid;
-    otherwise it is a surface. Triangles without an area are left out. Raises InvalidProblem, with the field named.
+    If the mesh is closed (every edge belongs to two triangles of opposite directions), its inside
+    counts as solid; otherwise it is a surface. Triangles without an area are left out. Raises
+    InvalidProblem, with the field named.
     """
 
     corners: Array
@@ -80,15 +92,20 @@ class TriangleMesh:
         _within_reach("data", corners)
         sized("data", lambda: check_extent("data", corners.reshape(-1, 3)))
         edges = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max(axis=1)
-        double_area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        double_area = np.linalg.norm(
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+        )
         kept = double_area > FLAT_TRIANGLE * edges**2
         if not kept.any():
-            raise InvalidProblem("data", "data has no triangle with an area: give a mesh with a surface.")
+            raise InvalidProblem(
+                "data", "data has no triangle with an area: give a mesh with a surface."
+            )
         object.__setattr__(self, "corners", frozen(corners[kept], (-1, 3, 3), "data"))
 
     @property
     def is_closed(self) -> bool:
-        """Whether every edge belongs to exactly two triangles, which run along it in opposite directions.
+        """Whether every edge belongs to exactly two triangles, which run along it in opposite
+        directions.
 
         Corners are compared exactly. If they differ by rounding, the mesh is not closed.
         """
@@ -118,11 +135,15 @@ def parts_of(shape: Cloud) -> int:
 
 def _count(field: str, count: int, most: int, remedy: str) -> None:
     if count == 0:
-        raise InvalidProblem(field, f"{field} is empty: give at least one part, or leave the obstacle out.")
+        raise InvalidProblem(
+            field, f"{field} is empty: give at least one part, or leave the obstacle out."
+        )
     if count > most:
         raise InvalidProblem(field, f"{field} must have at most {most} {remedy}.")
 
 
 def _within_reach(field: str, points: Array) -> None:
     if np.abs(points).max() > SIZES.largest:
-        raise InvalidProblem(field, f"{field} must lie within {SIZES.largest:g} m of the origin of the pose.")
+        raise InvalidProblem(
+            field, f"{field} must lie within {SIZES.largest:g} m of the origin of the pose."
+        )

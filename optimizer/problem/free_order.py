@@ -19,8 +19,9 @@ MOST_FREE_STOPS = 12
 
 @dataclass(frozen=True, kw_only=True)
 class FreeOrder:
-    """The stops may be visited in any order that has the first stop of each pair of `before` earlier than the second,
-    and the stops of each list of `together` one directly after the other, as they are listed."""
+    """The stops may be visited in any order that has the first stop of each pair of `before`
+    earlier than the second, and the stops of each list of `together` one directly after the other,
+    as they are listed."""
 
     before: Sequence[tuple[str, str]] = ()
     together: Sequence[Sequence[str]] = ()
@@ -56,12 +57,15 @@ def is_given_order_allowed(order: FreeOrder, stops: Sequence[Stop]) -> bool:
 
 
 def check_order(order: FreeOrder, stops: Sequence[Stop], carried: Payload) -> None:
-    """Raises InvalidProblem, with the field named, if an order contradicts itself or does not fit the stops.
+    """Raises InvalidProblem, with the field named, if an order contradicts itself or does not fit
+    the stops.
 
     `carried` is what the arm carries at the start.
     """
     if len(stops) > MOST_FREE_STOPS:
-        raise InvalidProblem("stops", f"A cycle with a free order has at most {MOST_FREE_STOPS} stops.")
+        raise InvalidProblem(
+            "stops", f"A cycle with a free order has at most {MOST_FREE_STOPS} stops."
+        )
     known = [stop.name for stop in stops]
     for field, lists in (("before", order.before), ("together", order.together)):
         for k, names in enumerate(lists):
@@ -79,8 +83,10 @@ def check_order(order: FreeOrder, stops: Sequence[Stop], carried: Payload) -> No
         if after and not _same(after[-1], carried):
             raise InvalidProblem(
                 "together",
-                f"After {group[-1].name} the arm carries something else than at the start. With a free order, name the "
-                "stops between which a part is carried together: the one where it is taken up first.",
+                f"After {group[-1].name} the arm carries something else than at the start. With a "
+                "free order, name the "
+                "stops between which a part is carried together: the one where it is taken up "
+                "first.",
             )
 
 
@@ -91,7 +97,8 @@ def _check_before(order: FreeOrder, stops: Sequence[Stop]) -> None:
             names = [stop.name for stop in group]
             if first in names and second in names and names.index(first) > names.index(second):
                 raise ContradictoryOrder(
-                    f"before asks for {first!r} before {second!r}, but together lists {second!r} first: leave out one "
+                    f"before asks for {first!r} before {second!r}, but together lists {second!r} "
+                    "first: leave out one "
                     "of them.",
                     [first, second],
                 )
@@ -99,9 +106,12 @@ def _check_before(order: FreeOrder, stops: Sequence[Stop]) -> None:
         TopologicalSorter(dict(enumerate(earlier_groups(order, groups)))).prepare()
     except CycleError as error:
         circle = [groups[k] for k in error.args[1]]
-        needed = " before ".join(" and ".join(repr(stop.name) for stop in group) for group in circle)
+        needed = " before ".join(
+            " and ".join(repr(stop.name) for stop in group) for group in circle
+        )
         raise ContradictoryOrder(
-            f"No order is possible: it would have {needed}. Leave out one of these pairs of before, or a list of "
+            f"No order is possible: it would have {needed}. Leave out one of these pairs of "
+            "before, or a list of "
             "together.",
             [stop.name for group in circle[:-1] for stop in group],
         ) from None
@@ -110,4 +120,6 @@ def _check_before(order: FreeOrder, stops: Sequence[Stop]) -> None:
 def _same(one: Payload, other: Payload) -> bool:
     """Whether two payloads are the same."""
     bodies = ((each.mass, each.com, each.inertia) for each in (one, other))
-    return one.shape is other.shape and all(np.array_equal(a, b) for a, b in zip(*bodies, strict=True))
+    return one.shape is other.shape and all(
+        np.array_equal(a, b) for a, b in zip(*bodies, strict=True)
+    )

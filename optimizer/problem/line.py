@@ -20,8 +20,8 @@ LEAST_DISTANCE, MOST_DISTANCE = 1e-4, 2.0
 class Line:
     """The TCP moves by `distance` [m] along `direction` (3,), and its orientation stays.
 
-    The direction is a vector of any length in the `frame` of the TCP at the stop, or of the base. `speed` [m/s] bounds
-    the speed of the TCP on the line.
+    The direction is a vector of any length in the `frame` of the TCP at the stop, or of the base.
+    `speed` [m/s] bounds the speed of the TCP on the line.
 
     Raises InvalidProblem, with the field named.
     """
@@ -35,10 +35,15 @@ class Line:
         direction = frozen(self.direction, (3,), "direction")
         object.__setattr__(self, "direction", direction)
         if not np.linalg.norm(direction) > 1e-9:
-            raise InvalidProblem("direction", "direction must not be zero: give the vector along which the TCP moves.")
+            raise InvalidProblem(
+                "direction",
+                "direction must not be zero: give the vector along which the TCP moves.",
+            )
         if not LEAST_DISTANCE <= self.distance <= MOST_DISTANCE:
             raise InvalidProblem(
-                "distance", f"distance must be from {LEAST_DISTANCE:g} to {MOST_DISTANCE:g} m: {self.distance!r}."
+                "distance",
+                f"distance must be from {LEAST_DISTANCE:g} to {MOST_DISTANCE:g} m: "
+                f"{self.distance!r}.",
             )
         if self.frame not in ("tcp", "base"):
             raise InvalidProblem("frame", "frame must be tcp or base.")
@@ -46,6 +51,7 @@ class Line:
             raise InvalidProblem("speed", "speed must be a positive number of metres per second.")
 
     def shift(self, T_base_tcp: Array) -> Array:
-        """The way (3,) [m] of the TCP in the base frame, at a stop with the pose T_base_tcp (4, 4)."""
+        """The way (3,) [m] of the TCP in the base frame, at a stop with the pose T_base_tcp (4,
+        4)."""
         along = self.direction / np.linalg.norm(self.direction) * self.distance
         return np.asarray(T_base_tcp[:3, :3] @ along if self.frame == "tcp" else along)

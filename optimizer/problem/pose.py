@@ -1,4 +1,6 @@
-"""A pose of the TCP in the robot's base frame, from a matrix or from any of the usual forms of an orientation."""
+"""A pose of the TCP in the robot's base frame, from a matrix or from any of the usual forms of an
+orientation.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,8 @@ QUATERNION_TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class Pose:
-    """Pose of the TCP in the robot's base frame: `T` is the homogeneous matrix T_base_tcp (4, 4), position in m.
+    """Pose of the TCP in the robot's base frame: `T` is the homogeneous matrix T_base_tcp (4, 4),
+    position in m.
 
     Raises InvalidProblem if `T` is not a rigid transform.
     """
@@ -41,7 +44,9 @@ class Pose:
 
     @classmethod
     def from_rpy(cls, position: object, rpy: object) -> Pose:
-        """From a position (3,) [m] and roll, pitch, yaw (3,) [rad] about fixed axes. Raises InvalidProblem."""
+        """From a position (3,) [m] and roll, pitch, yaw (3,) [rad] about fixed axes. Raises
+        InvalidProblem.
+        """
         return cls.from_rotation(position, rotation_from_rpy(rpy))
 
     @classmethod
@@ -59,7 +64,9 @@ def rotation_from_quaternion(quaternion: object) -> Array:
     given = frozen(quaternion, (4,), field)
     norm = float(np.linalg.norm(given))
     if abs(norm - 1) > QUATERNION_TOLERANCE:
-        raise InvalidProblem(field, f"{field} must have norm 1, to within {QUATERNION_TOLERANCE:g}.")
+        raise InvalidProblem(
+            field, f"{field} must have norm 1, to within {QUATERNION_TOLERANCE:g}."
+        )
     x, y, z, w = given / norm
     return np.array(
         [
@@ -71,17 +78,22 @@ def rotation_from_quaternion(quaternion: object) -> Array:
 
 
 def rotation_from_rpy(rpy: object) -> Array:
-    """Rotation matrix (3, 3) of roll, pitch, yaw (3,) [rad]: Rz(yaw) Ry(pitch) Rx(roll), about the fixed axes x, y, z.
+    """Rotation matrix (3, 3) of roll, pitch, yaw (3,) [rad]: Rz(yaw) Ry(pitch) Rx(roll), about the
+    fixed axes x, y, z.
 
     Raises InvalidProblem.
     """
     angles = frozen(rpy, (3,), "pose.rpy")
-    roll, pitch, yaw = (rotation_from_rotvec(angle * axis) for angle, axis in zip(angles, np.eye(3), strict=True))
+    roll, pitch, yaw = (
+        rotation_from_rotvec(angle * axis) for angle, axis in zip(angles, np.eye(3), strict=True)
+    )
     return np.asarray(yaw @ pitch @ roll)
 
 
 def rotation_from_rotvec(rotvec: object) -> Array:
-    """Rotation matrix (3, 3) of a rotation vector (3,) [rad]: unit axis times angle. Raises InvalidProblem."""
+    """Rotation matrix (3, 3) of a rotation vector (3,) [rad]: unit axis times angle. Raises
+    InvalidProblem.
+    """
     vector = frozen(rotvec, (3,), "pose.rotvec")
     angle = float(np.linalg.norm(vector))
     # sinc keeps the quaternion exact through zero

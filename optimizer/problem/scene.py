@@ -16,7 +16,8 @@ from joulepath.optimizer.problem.names import check_name, first_repeated
 
 # most obstacles in a scene, and most vertices of a mesh: they bound the work of a request
 MOST_OBSTACLES, MOST_VERTICES = 64, 256
-# clearance [m] that an obstacle asks for unless told otherwise: what the place of a body in a cell is known to
+# clearance [m] that an obstacle asks for unless told otherwise: what the place of a body in a cell
+# is known to
 DEFAULT_MARGIN = 5e-3
 
 
@@ -71,7 +72,9 @@ class HalfSpace:
 
 @dataclass(frozen=True)
 class Mesh:
-    """The convex hull of `vertices` (n, 3) [m]. Raises InvalidProblem if they lie in a plane, or close together."""
+    """The convex hull of `vertices` (n, 3) [m]. Raises InvalidProblem if they lie in a plane, or
+    close together.
+    """
 
     vertices: Array
 
@@ -80,7 +83,9 @@ class Mesh:
         if not 4 <= len(vertices) <= MOST_VERTICES:
             raise InvalidProblem("vertices", f"vertices must be 4 to {MOST_VERTICES} points.")
         if np.abs(vertices).max() > SIZES.largest:
-            raise InvalidProblem("vertices", f"vertices must lie within {SIZES.largest:g} m of the origin.")
+            raise InvalidProblem(
+                "vertices", f"vertices must lie within {SIZES.largest:g} m of the origin."
+            )
         hull = sized("vertices", lambda: hull_of_body("vertices", vertices))
         object.__setattr__(self, "vertices", frozen(hull, (-1, 3), "vertices"))
 
@@ -90,9 +95,11 @@ Shape = Sphere | Capsule | Cylinder | Box | HalfSpace | Mesh | Cloud
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A shape at `T_base_shape` (4, 4) in the base frame; its clearance from the arm must be at least `margin` [m].
+    """A shape at `T_base_shape` (4, 4) in the base frame; its clearance from the arm must be at
+    least `margin` [m].
 
-    Answers call it `name`: see `joulepath.optimizer.problem.names`. Raises InvalidProblem, with the field named.
+    Answers call it `name`: see `joulepath.optimizer.problem.names`. Raises InvalidProblem, with the
+    field named.
     """
 
     name: str
@@ -111,8 +118,8 @@ class Obstacle:
 class Attachment:
     """A shape fixed to the flange at `T_flange_shape` (4, 4): part of a tool, or the payload.
 
-    `touches` names the links that it touches by design: their distance from it is not checked. None stands for the
-    link that carries the flange.
+    `touches` names the links that it touches by design: their distance from it is not checked. None
+    stands for the link that carries the flange.
     """
 
     shape: Shape
@@ -123,7 +130,9 @@ class Attachment:
         if isinstance(self.shape, HalfSpace):
             raise InvalidProblem("shape", "A half-space cannot be carried: use a box.")
         if isinstance(self.shape, Cloud):
-            raise InvalidProblem("shape", "Points, voxels and mesh files cannot be carried: use a `mesh` or a box.")
+            raise InvalidProblem(
+                "shape", "Points, voxels and mesh files cannot be carried: use a `mesh` or a box."
+            )
         object.__setattr__(self, "T_flange_shape", placement(self.T_flange_shape, "shape"))
         if self.touches is not None:
             object.__setattr__(self, "touches", tuple(self.touches))
@@ -138,18 +147,22 @@ class Scene:
     def __post_init__(self) -> None:
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
         if len(self.obstacles) > MOST_OBSTACLES:
-            raise InvalidProblem("scene.obstacles", f"A scene has at most {MOST_OBSTACLES} obstacles.")
+            raise InvalidProblem(
+                "scene.obstacles", f"A scene has at most {MOST_OBSTACLES} obstacles."
+            )
         parts = sum(parts_of(o.shape) for o in self.obstacles if isinstance(o.shape, Cloud))
         if parts > MOST_PARTS_IN_SCENE:
             raise InvalidProblem(
                 "scene.obstacles",
-                f"The points, voxels and triangles of a scene are {parts}: give at most {MOST_PARTS_IN_SCENE} in all.",
+                f"The points, voxels and triangles of a scene are {parts}: give at most "
+                f"{MOST_PARTS_IN_SCENE} in all.",
             )
         repeated = first_repeated(self.names)
         if repeated is not None:
             raise InvalidProblem(
                 f"scene.obstacles.{repeated}.name",
-                "Two obstacles have the same name, but for case and spaces: give each another name.",
+                "Two obstacles have the same name, but for case and spaces: give each another "
+                "name.",
             )
 
     @property
@@ -158,7 +171,9 @@ class Scene:
         return [obstacle.name for obstacle in self.obstacles]
 
 
-def capsule_between(first: Array, second: Array, radius: float, touches: Sequence[str] | None = None) -> Attachment:
+def capsule_between(
+    first: Array, second: Array, radius: float, touches: Sequence[str] | None = None
+) -> Attachment:
     """A capsule fixed to the flange around a segment: a part of a tool.
 
     Args:

@@ -21,7 +21,8 @@ Single = Array | Pose | ConeOrientedPose
 
 @dataclass(frozen=True)
 class AnyOf:
-    """The one of `targets` that needs the least energy: 1 to MOST_TARGETS joint positions (nq,) [rad] or poses, mixed.
+    """The one of `targets` that needs the least energy: 1 to MOST_TARGETS joint positions (nq,)
+    [rad] or poses, mixed.
 
     Raises InvalidProblem if there are none, too many, or one of them is itself an AnyOf.
     """
@@ -38,8 +39,9 @@ class AnyOf:
 
 @dataclass(frozen=True)
 class PosesAround(AnyOf):
-    """Some of the poses that `around` allows; the bound of a cycle that has them is that of all configurations of all
-    of these poses. Without it, they are some of infinitely many that are not bounded."""
+    """Some of the poses that `around` allows; the bound of a cycle that has them is that of all
+    configurations of all of these poses. Without it, they are some of infinitely many that are not
+    bounded."""
 
     around: ConeOrientedPose | None = None
 
@@ -53,7 +55,9 @@ def members(target: Target) -> tuple[Single, ...]:
 
 
 def single(target: Target) -> Single:
-    """The target itself. Raises ValueError for an AnyOf, which must be narrowed to one target first."""
+    """The target itself. Raises ValueError for an AnyOf, which must be narrowed to one target
+    first.
+    """
     if isinstance(target, AnyOf):
         raise ValueError("narrow the problem to one of its targets first")
     return target
@@ -62,12 +66,19 @@ def single(target: Target) -> Single:
 def validated(arm: Arm, name: str, target: Target, on_path: bool = False) -> Target:
     """The target `name` (start or goal) of a problem, with its joint positions as read-only arrays.
 
-    Raises InvalidProblem, also for a start with an orientation tolerance unless it is `on_path`, and OutsideLimits for
-    joint positions out of range. Joint positions of an AnyOf may be out of range: they count as unreachable.
+    Raises InvalidProblem, also for a start with an orientation tolerance unless it is `on_path`,
+    and OutsideLimits for joint positions out of range. Joint positions of an AnyOf may be out of
+    range: they count as unreachable.
     """
-    if name == "start" and not on_path and any(isinstance(member, ConeOrientedPose) for member in members(target)):
+    if (
+        name == "start"
+        and not on_path
+        and any(isinstance(member, ConeOrientedPose) for member in members(target))
+    ):
         raise InvalidProblem(
-            name, "Only a goal's orientation may be free, or a start's with a path: give the start's in full."
+            name,
+            "Only a goal's orientation may be free, or a start's with a path: give the start's in "
+            "full.",
         )
     if isinstance(target, AnyOf):
         nq = (arm.robot.nq,)

@@ -16,10 +16,11 @@ LEAST_HALF_ANGLE = 1e-3
 
 @dataclass(frozen=True)
 class ToolCone:
-    """The tool's `axis` (3,), in the TCP frame, stays within `half_angle` [rad] of `direction` (3,), in the base frame.
+    """The tool's `axis` (3,), in the TCP frame, stays within `half_angle` [rad] of `direction`
+    (3,), in the base frame.
 
-    Both vectors are normalised. Raises InvalidProblem if one of them is zero, or if `half_angle` is not between
-    LEAST_HALF_ANGLE and pi.
+    Both vectors are normalised. Raises InvalidProblem if one of them is zero, or if `half_angle` is
+    not between LEAST_HALF_ANGLE and pi.
     """
 
     axis: Array
@@ -31,5 +32,6 @@ class ToolCone:
             object.__setattr__(self, name, unit_vector(getattr(self, name), f"tool_cone.{name}"))
         if not LEAST_HALF_ANGLE <= self.half_angle <= np.pi:
             raise InvalidProblem(
-                "tool_cone.half_angle", f"tool_cone.half_angle must be between {LEAST_HALF_ANGLE} and pi rad."
+                "tool_cone.half_angle",
+                f"tool_cone.half_angle must be between {LEAST_HALF_ANGLE} and pi rad.",
             )

@@ -20,9 +20,15 @@ from joulepath.optimizer.replay.reference import Course, course_of, reference
 from joulepath.optimizer.result.solution import BaselineName
 from joulepath.optimizer.trajectories.ruckig_motion import time_optimal_spline
 from joulepath.optimizer.trajectories.spline import lasting
-from joulepath.optimizer.trajectories.time_scalings import blend_time, default_times, quintic_spline, trapezoid_law
+from joulepath.optimizer.trajectories.time_scalings import (
+    blend_time,
+    default_times,
+    quintic_spline,
+    trapezoid_law,
+)
 
-# relative differences of a reported duration, which is exact, and of a mechanical work, which two quadratures give
+# relative differences of a reported duration, which is exact, and of a mechanical work, which two
+# quadratures give
 SAME_DURATION, SAME_WORK = 1e-6, 1e-3
 # least part of a baseline's energy that is drawn while waiting; less is the error of a quadrature
 LEAST_WAITING = 1e-3
@@ -30,8 +36,11 @@ LEAST_WAITING = 1e-3
 FINE = 1e-3
 
 
-def courses(arm: Arm, q_start: Array, q_goal: Array, duration: float) -> dict[BaselineName, tuple[Course, float]]:
-    """The baselines from q_start to q_goal (nq,) [rad], each with its duration [s]; see `search.baselines`.
+def courses(
+    arm: Arm, q_start: Array, q_goal: Array, duration: float
+) -> dict[BaselineName, tuple[Course, float]]:
+    """The baselines from q_start to q_goal (nq,) [rad], each with its duration [s]; see
+    `search.baselines`.
 
     All but `ruckig` and `controller_default` take `duration` [s].
     """
@@ -40,7 +49,9 @@ def courses(arm: Arm, q_start: Array, q_goal: Array, duration: float) -> dict[Ba
     fastest = time_optimal_spline(limits, q_start, q_goal)
     found: dict[BaselineName, tuple[Course, float]] = {
         "trapezoid": (
-            _trapezoid(q_start, way, duration, float(blend_time(limits, way, np.asarray(duration)))),
+            _trapezoid(
+                q_start, way, duration, float(blend_time(limits, way, np.asarray(duration)))
+            ),
             duration,
         ),
         "quintic": (course_of(quintic_spline(q_start, q_goal, duration)), duration),
@@ -55,7 +66,9 @@ def courses(arm: Arm, q_start: Array, q_goal: Array, duration: float) -> dict[Ba
 
 @dataclass(frozen=True)
 class ReportedBaseline:
-    """A baseline as an answer reports it: duration [s], energies [J] with the wait after it, and saving [1]."""
+    """A baseline as an answer reports it: duration [s], energies [J] with the wait after it, and
+    saving [1].
+    """
 
     name: BaselineName
     duration: float
@@ -73,9 +86,9 @@ def planned_baselines(
 ) -> list[PlannedBaseline]:
     """The baselines of an answer that starts at q_start (nq,) [rad] and takes `duration` [s].
 
-    An answer does not tell to which goal configuration its baselines go: the one that gives the durations and energies
-    it reports. `known` (nq,) [rad] are goals that it names, the first is its own. What cannot be found is left out, as
-    baselines along a tool path are.
+    An answer does not tell to which goal configuration its baselines go: the one that gives the
+    durations and energies it reports. `known` (nq,) [rad] are goals that it names, the first is its
+    own. What cannot be found is left out, as baselines along a tool path are.
     """
     by_name = {each.name: each for each in reported}
     if not {"quintic", "ruckig"} <= by_name.keys():
@@ -109,7 +122,9 @@ def _goals(arm: Arm, known: Sequence[Array]) -> Iterator[Array]:
 def _goal(
     arm: Arm, q_start: Array, goals: Iterable[Array], duration: float, fastest: float, work: float
 ) -> Array | None:
-    """The goal to which Ruckig's motion takes `fastest` [s] and the quintic of `duration` [s] does `work` [J]."""
+    """The goal to which Ruckig's motion takes `fastest` [s] and the quintic of `duration` [s] does
+    `work` [J].
+    """
     plant = Plant(arm)
     for goal in goals:
         checkpoint()

@@ -1,4 +1,6 @@
-"""The controllers under which a motion is played: torques known in advance with a PD loop, or the loop alone."""
+"""The controllers under which a motion is played: torques known in advance with a PD loop, or the
+loop alone.
+"""
 
 from __future__ import annotations
 
@@ -14,10 +16,12 @@ from joulepath.optimizer.energy.plant import Plant
 from joulepath.optimizer.replay.reference import Reference
 
 ControlName = Literal["feed_forward", "pd"]
-# error [rad] at which the loop asks for the whole torque of a joint, and the time [s] over which it looks ahead: some
-# 2000 N·m/rad and 400 N·m·s/rad for the large joints of an arm of 5 kg, 400 and 80 for its wrist
+# error [rad] at which the loop asks for the whole torque of a joint, and the time [s] over which it
+# looks ahead: some 2000 N·m/rad and 400 N·m·s/rad for the large joints of an arm of 5 kg, 400 and
+# 80 for its wrist
 FULL_TORQUE, LOOK_AHEAD = 0.07, 0.2
-# greatest part of a joint's speed error that one step takes away; from twice the error on, a loop is unstable
+# greatest part of a joint's speed error that one step takes away; from twice the error on, a loop
+# is unstable
 MOST_DAMPING = 0.25
 
 
@@ -31,7 +35,8 @@ class Gains:
 
 @dataclass(frozen=True)
 class Command:
-    """Torques [N·m] per step: `torque` (n, nq) - stiffness · q - damping · v, then cut to between the two bounds.
+    """Torques [N·m] per step: `torque` (n, nq) - stiffness · q - damping · v, then cut to between
+    the two bounds.
 
     The bounds (n, nq) are the torque limits on the side of the motor.
     """
@@ -45,17 +50,23 @@ class Command:
 def gains(plant: Plant, q: Array, step: float) -> Gains:
     """Gains of the PD loop that starts at q (nq,) [rad] and looks at the arm every `step` [s].
 
-    They are in proportion to the torque limits. The damping is less where the joint's inertia is too small for the
-    step.
+    They are in proportion to the torque limits. The damping is less where the joint's inertia is
+    too small for the step.
     """
     arm, model = plant.arm, plant.model
-    inertia = pin.crba(model, model.createData(), q).diagonal() - model.armature + arm.drives.rotor_inertia
+    inertia = (
+        pin.crba(model, model.createData(), q).diagonal()
+        - model.armature
+        + arm.drives.rotor_inertia
+    )
     stiffness = arm.active_limits.tau_max / FULL_TORQUE
     return Gains(stiffness, np.minimum(stiffness * LOOK_AHEAD, MOST_DAMPING * inertia / step))
 
 
 def command(plant: Plant, motion: Reference, control: ControlName, loop: Gains) -> Command:
-    """What a controller asks for along a motion; it knows the arm of `plant`, which may not be the one that moves."""
+    """What a controller asks for along a motion; it knows the arm of `plant`, which may not be the
+    one that moves.
+    """
     arm = plant.arm
     torque = loop.stiffness * motion.q + loop.damping * motion.v_before
     if control == "feed_forward":

@@ -19,9 +19,11 @@ from joulepath.optimizer.replay.play import Contact, Played
 from joulepath.optimizer.replay.reference import Reference
 from joulepath.optimizer.result.energy import Energy
 
-# depth [m] of a contact that no good tracking explains: motions may be planned closer than any controller follows them
+# depth [m] of a contact that no good tracking explains: motions may be planned closer than any
+# controller follows them
 TOUCH = 2.5e-4
-# rounds in which friction that grows with the load is found: each leaves a tenth of the error or less
+# rounds in which friction that grows with the load is found: each leaves a tenth of the error or
+# less
 ROUNDS = 12
 # configurations of which the pose is computed at a time
 POSES = 8192
@@ -29,7 +31,9 @@ POSES = 8192
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """The motion as the simulated arm went it. Lists have one number per joint, from base to flange."""
+    """The motion as the simulated arm went it. Lists have one number per joint, from base to
+    flange.
+    """
 
     electrical: Joules = field(init=False)
     """Energy drawn from the supply, without waiting at the goal."""
@@ -52,7 +56,8 @@ class Outcome:
     limit_ratio: Annotated[PerJoint, Unit("1")]
     """Largest torque / limit, on the side of the robot's `limits.torque_side`, per joint."""
     saturated: Annotated[PerJoint, Unit("s")]
-    """For how long the motor gave its largest torque and the controller asked for more, per joint."""
+    """For how long the motor gave its largest torque and the controller asked for more, per
+    joint."""
     collides: bool = field(init=False)
     """Whether a contact is deeper than 0.25 mm, or than `tcp_error` if that is less: a planned
     distance may be smaller than any controller's error."""
@@ -107,13 +112,16 @@ def _relative(value: float, reference: float) -> float:
 
 
 def _without_friction(arm: Arm, played: Played) -> Array:
-    """Torques of rigid bodies and rotors (n, nq) [N·m], to which friction adds up to that of the motors.
+    """Torques of rigid bodies and rotors (n, nq) [N·m], to which friction adds up to that of the
+    motors.
 
     Friction that grows with the load depends on these themselves; it is a small part of them.
     """
     tau = played.tau_motor
     for _ in range(1 if arm.friction_law.load is None else ROUNDS):
-        tau = played.tau_motor - friction_torque(arm.friction_law, arm.drives, tau, played.v, played.a)
+        tau = played.tau_motor - friction_torque(
+            arm.friction_law, arm.drives, tau, played.v, played.a
+        )
     return tau
 
 

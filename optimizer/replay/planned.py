@@ -14,7 +14,9 @@ from joulepath.optimizer.result.solution import BaselineName
 
 @dataclass(frozen=True)
 class PlannedTorques:
-    """Samples of an answer: q [rad], v [rad/s], a [rad/s²], tau [N·m] of rigid bodies and rotors, (k, nq) each."""
+    """Samples of an answer: q [rad], v [rad/s], a [rad/s²], tau [N·m] of rigid bodies and rotors,
+    (k, nq) each.
+    """
 
     q: Array
     v: Array
@@ -24,7 +26,8 @@ class PlannedTorques:
 
 @dataclass(frozen=True)
 class PlannedBaseline:
-    """A baseline of an answer: its motion over `duration` [s], and what the answer saves against it, `saving` [1].
+    """A baseline of an answer: its motion over `duration` [s], and what the answer saves against
+    it, `saving` [1].
 
     `waiting` [J] of its electrical energy is drawn after the motion.
     """
@@ -38,11 +41,12 @@ class PlannedBaseline:
 
 @dataclass(frozen=True)
 class PlannedMotion:
-    """A motion of an answer: `course` over `duration` [s], by `arm`, with the energies [J] that the answer reports.
+    """A motion of an answer: `course` over `duration` [s], by `arm`, with the energies [J] that the
+    answer reports.
 
-    `waiting` [J] of the electrical energy is drawn after the motion. `objective` is the energy that savings are of.
-    `compared`: the answer has baselines; `baselines` are those whose motions are known.
-    `torques` are None for an answer without samples.
+    `waiting` [J] of the electrical energy is drawn after the motion. `objective` is the energy that
+    savings are of. `compared`: the answer has baselines; `baselines` are those whose motions are
+    known. `torques` are None for an answer without samples.
     """
 
     arm: Arm

@@ -34,8 +34,8 @@ class Contact:
 class Played:
     """What the simulated arm did at n instants, `step` [s] apart.
 
-    q [rad], v [rad/s], a [rad/s²], torque of the motors [N·m], (n, nq) each; `saturated` (n, nq) where this was cut to
-    its limit. The `contact` is None if there was none.
+    q [rad], v [rad/s], a [rad/s²], torque of the motors [N·m], (n, nq) each; `saturated` (n, nq)
+    where this was cut to its limit. The `contact` is None if there was none.
     """
 
     step: float
@@ -54,7 +54,11 @@ def play(simulated: SimulatedArm, motion: Reference, asked: Command) -> Played:
     """
     step_on, model, data = mujoco().mj_step, simulated.model, simulated.data
     stiffness, damping = asked.gains.stiffness, asked.gains.damping
-    q, torque, speeds = np.empty_like(motion.q), np.empty_like(motion.q), np.empty((len(motion.q) + 1, model.nv))
+    q, torque, speeds = (
+        np.empty_like(motion.q),
+        np.empty_like(motion.q),
+        np.empty((len(motion.q) + 1, model.nv)),
+    )
     mujoco().mj_resetData(model, data)
     model.opt.timestep = motion.step
     rotors = simulated.arm.drives.rotor_inertia
@@ -70,7 +74,11 @@ def play(simulated: SimulatedArm, motion: Reference, asked: Command) -> Played:
         torque[k] = np.minimum(np.maximum(wanted, asked.lowest[k]), asked.highest[k])
         applied[:] = torque[k]
         # what the joints carried in the step before: friction may depend on it
-        carried = torque[k] - model.dof_damping * speed - rotors * (speeds[k] - speeds[max(k - 1, 0)]) / motion.step
+        carried = (
+            torque[k]
+            - model.dof_damping * speed
+            - rotors * (speeds[k] - speeds[max(k - 1, 0)]) / motion.step
+        )
         simulated.rub(2 * speeds[k] - speeds[max(k - 1, 0)], carried)
         step_on(model, data)
         speeds[k + 1] = speed

@@ -13,7 +13,8 @@ from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.trajectories.spline import Spline, sample
 
 Course = Callable[[Array], tuple[Array, Array, Array]]
-"""A motion as a function of time: q [rad], v [rad/s], a [rad/s²], (k, nq) each, at times (k,) [s]."""
+"""A motion as a function of time: q [rad], v [rad/s], a [rad/s²], (k, nq) each, at times (k,)
+[s]."""
 # most steps of a motion: its states take some 100 MB
 MOST_STEPS = 400_000
 # a last step shorter than this fraction of a step is rounding
@@ -24,8 +25,9 @@ ROUNDING = 1e-9
 class Reference:
     """A motion on n instants, `step` [s] apart: q [rad], v [rad/s], a [rad/s²], (n, nq) each.
 
-    `v_before` (n, nq) is the speed half a step before each instant. A step of MuJoCo changes the speed by the
-    acceleration at an instant, and the position by the new speed: its speeds lie in the middle between the instants.
+    `v_before` (n, nq) is the speed half a step before each instant. A step of MuJoCo changes the
+    speed by the acceleration at an instant, and the position by the new speed: its speeds lie in
+    the middle between the instants.
     """
 
     step: float
@@ -36,7 +38,9 @@ class Reference:
 
 
 def reference(course: Course, duration: float, step: float) -> Reference:
-    """The motion of `duration` > 0 [s] in equal steps of at most `step` [s]. Raises InvalidProblem if they are many."""
+    """The motion of `duration` > 0 [s] in equal steps of at most `step` [s]. Raises InvalidProblem
+    if they are many.
+    """
     count = math.ceil(duration / step * (1 - ROUNDING))
     if count > MOST_STEPS:
         raise InvalidProblem(

@@ -1,4 +1,5 @@
-"""Public entry point: `replay(motion)` plays a motion in MuJoCo, on the planned and on other arms."""
+"""Public entry point: `replay(motion)` plays a motion in MuJoCo, on the planned and on other
+arms."""
 
 from __future__ import annotations
 
@@ -50,7 +51,8 @@ class SimulatedSaving:
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayedChange(Outcome):
-    """The motion on a changed arm, under the first controller, which does not know of the change."""
+    """The motion on a changed arm, under the first controller, which does not know of the
+    change."""
 
     quantity: Quantity
     """What is changed."""
@@ -86,7 +88,9 @@ class SavingRange:
 
 @dataclass(frozen=True)
 class AsPlanned:
-    """Energy of the motion in the answer, without waiting at the goal, and the use of its torque limits."""
+    """Energy of the motion in the answer, without waiting at the goal, and the use of its torque
+    limits.
+    """
 
     electrical: Joules
     """Energy drawn from the supply."""
@@ -107,8 +111,8 @@ class Replay:
     planned: AsPlanned
     """What the answer says."""
     torque_error: Ratio | None
-    """Largest difference of MuJoCo's torques from those of the answer's samples / limit; null without
-    samples."""
+    """Largest difference of MuJoCo's torques from those of the answer's samples / limit; null
+    without samples."""
     runs: Annotated[list[ReplayedRun], NotEmpty]
     """The motion under each controller."""
     changes: list[ReplayedChange]
@@ -189,20 +193,27 @@ def replay(
     """
     try:
         with watch(Deadline.after(deadline, clock)):
-            found = [_Replayer(each, step).replay(controls, perturb or {}) for each in _planned(motion, problem)]
+            found = [
+                _Replayer(each, step).replay(controls, perturb or {})
+                for each in _planned(motion, problem)
+            ]
     except DeadlinePassed:
         raise DeadlineExceeded([]) from None
     return found if isinstance(motion, CycleSolution) else found[0]
 
 
-def _planned(motion: Solution | CycleSolution | PlannedMotion, problem: Problem | None) -> Iterator[PlannedMotion]:
+def _planned(
+    motion: Solution | CycleSolution | PlannedMotion, problem: Problem | None
+) -> Iterator[PlannedMotion]:
     if isinstance(motion, CycleSolution):
         for move in motion.moves:
             yield planned_motion(move.solution, move.planned.arm, motion.objective)
     elif isinstance(motion, PlannedMotion):
         yield motion
     elif problem is None:
-        raise InvalidProblem("problem", "A solution does not name its arm: give the problem that it solves.")
+        raise InvalidProblem(
+            "problem", "A solution does not name its arm: give the problem that it solves."
+        )
     else:
         yield planned_motion(motion, problem.arm, problem.objective)
 
@@ -220,10 +231,15 @@ class _Replayer:
     def replay(self, controls: Sequence[ControlName], perturb: Mapping[Quantity, float]) -> Replay:
         """The replay under these controllers."""
         torque_error, planned = self._torque_error(), self._planned
-        runs = [ReplayedRun.extended(self._outcome(control), control=control) for control in dict.fromkeys(controls)]
+        runs = [
+            ReplayedRun.extended(self._outcome(control), control=control)
+            for control in dict.fromkeys(controls)
+        ]
         first = controls[0]
         simulated = self._savings(runs[0], first) if perturb else {}
-        changes = [self._changed(quantity, factor, first) for quantity, factor in self._factors(perturb)]
+        changes = [
+            self._changed(quantity, factor, first) for quantity, factor in self._factors(perturb)
+        ]
         self._simulated.carry(planned.arm)
         return Replay(
             step=self._motion.step,
@@ -287,13 +303,20 @@ class _Replayer:
         found = self._simulated.torques(given.q, given.v, given.a)
         return float((np.abs(found - given.tau) / self._planned.arm.active_limits.tau_max).max())
 
-    def _ranges(self, simulated: Mapping[BaselineName, float], changes: Sequence[ReplayedChange]) -> list[SavingRange]:
+    def _ranges(
+        self, simulated: Mapping[BaselineName, float], changes: Sequence[ReplayedChange]
+    ) -> list[SavingRange]:
         found = list[SavingRange]()
         for each in self._planned.baselines if simulated else ():
             own = simulated[each.name]
             savings = [
                 own,
-                *(saved.saving for change in changes for saved in change.savings if saved.name == each.name),
+                *(
+                    saved.saving
+                    for change in changes
+                    for saved in change.savings
+                    if saved.name == each.name
+                ),
             ]
             found.append(
                 SavingRange(

@@ -1,7 +1,8 @@
 """The bodies of the collision model as MuJoCo's geoms, and the pairs of them that are checked.
 
-A geom collides with those it is paired with and with no other. Margins are left out: a contact is a touch. Obstacles of
-many parts (point clouds, voxels, mesh files) are left out, too, because MuJoCo knows convex shapes only.
+A geom collides with those it is paired with and with no other. Margins are left out: a contact is a
+touch. Obstacles of many parts (point clouds, voxels, mesh files) are left out, too, because MuJoCo
+knows convex shapes only.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ def unsimulated(arm: Arm) -> list[str]:
 
 
 def add_shapes(simulator: Any, spec: Any, links: list[Any], arm: Arm) -> list[str]:
-    """Adds geoms to the bodies `links` of an MjSpec, from the world to the last link, and their pairs.
+    """Adds geoms to the bodies `links` of an MjSpec, from the world to the last link, and their
+    pairs.
 
     Returns the names of the bodies by the number of their geom.
     """
@@ -62,7 +64,11 @@ def _add_geom(simulator: Any, spec: Any, link: Any, body: Body, name: str) -> No
     elif len(core.points) == 1 or (len(core.points) == 2 and np.array_equal(*core.points)):
         own = {"type": kinds.mjGEOM_SPHERE, "size": [core.radius, 0.0, 0.0]}
     elif len(core.points) == 2:
-        own = {"type": kinds.mjGEOM_CAPSULE, "size": [core.radius, 0.0, 0.0], "fromto": body.points.ravel()}
+        own = {
+            "type": kinds.mjGEOM_CAPSULE,
+            "size": [core.radius, 0.0, 0.0],
+            "fromto": body.points.ravel(),
+        }
     else:
         mesh = spec.add_mesh(name=name, uservert=core.points.ravel())
         mesh.inertia = simulator.mjtMeshInertia.mjMESH_INERTIA_CONVEX

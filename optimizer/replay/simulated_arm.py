@@ -1,4 +1,6 @@
-"""An arm as a MuJoCo model: its links with the inertias of the figures, rotors as armature, friction, bodies."""
+"""An arm as a MuJoCo model: its links with the inertias of the figures, rotors as armature,
+friction, bodies.
+"""
 
 from __future__ import annotations
 
@@ -34,10 +36,18 @@ class SimulatedArm:
         for k in range(1, joints + 1):
             placement = np.asarray(arm.robot.model.jointPlacements[k].homogeneous)
             link = links[-1].add_body(name=f"link {k}", explicitinertial=True, **pose(placement))
-            # a placeholder: the compiler refuses figures that no rigid body has, such as those of a published link.
-            # It must not coincide with the link's frame, because a model remembers that it does
-            link.mass, link.inertia, link.ipos, link.iquat = 1.0, [1.0, 1.1, 1.2], [0.1, 0.2, 0.3], [0.8, 0.6, 0.0, 0.0]
-            link.add_joint(name=f"joint {k}", type=self._simulator.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
+            # a placeholder: the compiler refuses figures that no rigid body has, such as those of a
+            # published link. It must not coincide with the link's frame, because a model remembers
+            # that it does
+            link.mass, link.inertia, link.ipos, link.iquat = (
+                1.0,
+                [1.0, 1.1, 1.2],
+                [0.1, 0.2, 0.3],
+                [0.8, 0.6, 0.0, 0.0],
+            )
+            link.add_joint(
+                name=f"joint {k}", type=self._simulator.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0]
+            )
             links.append(link)
         self.bodies = add_shapes(self._simulator, spec, links, arm)
         links[-1].add_site(name="tcp", **pose(arm.robot.T_last_flange @ arm.T_flange_tcp))
@@ -47,7 +57,9 @@ class SimulatedArm:
         self.carry(arm)
 
     def carry(self, arm: Arm) -> None:
-        """Takes masses, inertias, gravity and friction from another arm of the same robot and shapes."""
+        """Takes masses, inertias, gravity and friction from another arm of the same robot and
+        shapes.
+        """
         self.arm = arm
         figures = rigid_body_model(arm)
         for k in range(1, figures.njoints):
@@ -73,16 +85,20 @@ class SimulatedArm:
             self.model.opt.disableflags = flags
 
     def rub(self, v: Array, tau_link: Array) -> None:
-        """Sets the friction for a step that ends at about v (nq,) [rad/s], of joints that carry tau_link (nq,) [N·m].
+        """Sets the friction for a step that ends at about v (nq,) [rad/s], of joints that carry
+        tau_link (nq,) [N·m].
 
-        It is damping, the law's torque over the speed, which MuJoCo multiplies by the speed at the end of the step. The
-        knee of the law is a hundred times too steep for a torque that is known at the beginning.
+        It is damping, the law's torque over the speed, which MuJoCo multiplies by the speed at the
+        end of the step. The knee of the law is a hundred times too steep for a torque that is known
+        at the beginning.
         """
         v = np.maximum(np.abs(v), AT_REST)
         self.model.dof_damping[:] = self.arm.friction_law.torque(v, tau_link) / v
 
     def torques(self, q: Array, v: Array, a: Array) -> Array:
-        """Rigid body and rotor torques (k, nq) [N·m] by MuJoCo's inverse dynamics, friction and contacts left out."""
+        """Rigid body and rotor torques (k, nq) [N·m] by MuJoCo's inverse dynamics, friction and
+        contacts left out.
+        """
         found = np.empty_like(q)
         with self.without("constraint"):
             for k, state in enumerate(zip(q, v, a, strict=True)):
@@ -93,7 +109,8 @@ class SimulatedArm:
 
 
 def with_changes(arm: Arm, payload: float = 1.0, friction: float = 1.0) -> Arm:
-    """The arm with mass and inertia of its payload, and with its friction, multiplied by factors."""
+    """The arm with mass and inertia of its payload, and with its friction, multiplied by
+    factors."""
     load, robot = arm.payload, arm.robot
     law = arm.friction_law
     scaled = replace(

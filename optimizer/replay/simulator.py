@@ -1,4 +1,6 @@
-"""MuJoCo, which is imported when the first motion is played: no other request needs its 20 MB of memory."""
+"""MuJoCo, which is imported when the first motion is played: no other request needs its 20 MB of
+memory.
+"""
 
 from __future__ import annotations
 

@@ -8,7 +8,15 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, NamedTuple, TypedDict
 
-from joulepath.optimizer.declared import Count, Internal, Joules, NullIfInfinite, PerJoint, Seconds, Unit
+from joulepath.optimizer.declared import (
+    Count,
+    Internal,
+    Joules,
+    NullIfInfinite,
+    PerJoint,
+    Seconds,
+    Unit,
+)
 
 
 @dataclass(frozen=True)
@@ -67,13 +75,13 @@ class CandidateReport(NamedTuple):
     """Joint positions at the goal."""
     status: CandidateStatus
     """`solved`: a motion was found. `pruned`: ruled out by its lower bound or by its energy.
-    `infeasible`: has no motion, at least none of this method. `failed`: no motion was found, but one
-    may exist. `unvisited`: not solved."""
+    `infeasible`: has no motion, at least none of this method. `failed`: no motion was found, but
+    one may exist. `unvisited`: not solved."""
     reason: str
     """Reason for the status, in words."""
     lower_bound: Annotated[Joules, NullIfInfinite]
-    """Lower bound of the objective for this pair of configurations; null if no motion exists or none
-    was computed."""
+    """Lower bound of the objective for this pair of configurations; null if no motion exists or
+    none was computed."""
     energy: Joules | None = None
     """Energy of the motion found, of the objective; null if not solved."""
     duration: Seconds | None = None

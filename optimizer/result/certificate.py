@@ -22,8 +22,8 @@ class Clearance:
     time: Seconds
     """Time of this sample, from the start of the motion."""
     points: Annotated[tuple[list[float], list[float]], Unit("m")] | None = None
-    """The nearest points of the two bodies at that time, in the base frame, without the margin. Null
-    in answers of an earlier version."""
+    """The nearest points of the two bodies at that time, in the base frame, without the margin.
+    Null in answers of an earlier version."""
 
     @property
     def message(self) -> str:
@@ -33,8 +33,8 @@ class Clearance:
 
 
 class WorstRatio(TypedDict):
-    """Largest value / limit over all joints and instants: at most 1 + 1e-6. What follows `torque` is
-    there only if the request limits it."""
+    """Largest value / limit over all joints and instants: at most 1 + 1e-6. What follows `torque`
+    is there only if the request limits it."""
 
     position: Ratio
     """Joint position: distance from the middle of the range / half of the range."""
@@ -103,13 +103,16 @@ class Certificate:
 
     @property
     def valid(self) -> bool:
-        """Whether the motion is within every limit, at rest at its ends, on its passes, and of the reported energy.
+        """Whether the motion is within every limit, at rest at its ends, on its passes, and of the
+        reported energy.
 
         NaN is invalid.
         """
         return (
             all(ratio <= 1 + RATIO_TOLERANCE for ratio in self.worst_ratio.values())
-            and all(error <= self.POSITION_TOLERANCE for error in self.start_error + self.goal_error)
+            and all(
+                error <= self.POSITION_TOLERANCE for error in self.start_error + self.goal_error
+            )
             and self.rest_error <= self.REST_TOLERANCE
             and self.pass_error <= self.POSITION_TOLERANCE
             and self.energy_error <= self.ENERGY_TOLERANCE

@@ -16,9 +16,9 @@ JointJoules = Annotated[PerJoint, Unit("J")]
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """How an electrical energy depends on the figures of the arm: its `gradient` (p,) in the order of
-    `joulepath.models.uncertainty.parameters`, and by how much the mean over their errors is above the energy itself
-    [J]."""
+    """How an electrical energy depends on the figures of the arm: its `gradient` (p,) in the order
+    of `joulepath.models.uncertainty.parameters`, and by how much the mean over their errors is
+    above the energy itself [J]."""
 
     gradient: Array
     shift: float
@@ -57,7 +57,9 @@ class SavingInterval:
 
 @dataclass(frozen=True)
 class ElectricalEnergy:
-    """Energy drawn from the supply. All other fields but `interval` are its parts and add up to `total`."""
+    """Energy drawn from the supply. All other fields but `interval` are its parts and add up to
+    `total`.
+    """
 
     total: Joules
     """Energy drawn from the supply, including the wait until the end of the dwell. With energy
@@ -91,9 +93,17 @@ class ElectricalEnergy:
     def parts_sum(self) -> float:
         """Sum of the parts [J]: equal to `total` up to quadrature."""
         return (
-            self.idle + self.potential + self.kinetic + self.friction
-            + self.copper + self.inverter + self.braking + self.recovered + self.storage_loss + self.dwell
-        )  # fmt: skip
+            self.idle
+            + self.potential
+            + self.kinetic
+            + self.friction
+            + self.copper
+            + self.inverter
+            + self.braking
+            + self.recovered
+            + self.storage_loss
+            + self.dwell
+        )
 
 
 @dataclass(frozen=True)
@@ -117,8 +127,8 @@ class JointEnergy:
     inverter: JointJoules
     """Loss in the inverter, per joint."""
     shaft: JointJoules
-    """Work of the motor at the joint, ∫ tau_motor · v dt, per joint; negative if the joint drives the
-    motor."""
+    """Work of the motor at the joint, ∫ tau_motor · v dt, per joint; negative if the joint drives
+    the motor."""
 
 
 @dataclass(frozen=True)
@@ -159,4 +169,6 @@ class Energy:
     def with_dwell(self, dwell: float) -> Energy:
         """The same with energy [J] drawn while the arm waits afterwards."""
         electrical = self.electrical
-        return replace(self, electrical=replace(electrical, total=electrical.total + dwell, dwell=dwell))
+        return replace(
+            self, electrical=replace(electrical, total=electrical.total + dwell, dwell=dwell)
+        )

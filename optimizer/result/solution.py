@@ -74,14 +74,15 @@ BaselineName = Literal["trapezoid", "quintic", "ruckig", "ruckig_slowed", "contr
 
 @dataclass(frozen=True, kw_only=True)
 class Baseline:
-    """The energy of another planner's motion from the same start to the nearest goal configuration."""
+    """The energy of another planner's motion from the same start to the nearest goal
+    configuration."""
 
     name: BaselineName
     """`trapezoid`: trapezoidal velocity, in the duration of the answer. `quintic`: polynomial of
-    degree 5, in the duration of the answer. `ruckig`: time-optimal within the velocity, acceleration
-    and jerk limits. `ruckig_slowed`: the same motion, uniformly slowed down to the duration of the
-    answer. `controller_default`: the robot's own controller with its default speed and
-    acceleration."""
+    degree 5, in the duration of the answer. `ruckig`: time-optimal within the velocity,
+    acceleration and jerk limits. `ruckig_slowed`: the same motion, uniformly slowed down to the
+    duration of the answer. `controller_default`: the robot's own controller with its default speed
+    and acceleration."""
     duration: Seconds
     """Duration of this motion."""
     electrical: Joules
@@ -91,15 +92,15 @@ class Baseline:
     within_limits: bool = field(init=False)
     """Whether this motion is within every limit; collisions are checked at sample points."""
     reason: str | None
-    """What keeps this motion from being within every limit, in words: limits that it breaks, and two
-    bodies that come closer than allowed, by how much. Null if nothing does."""
+    """What keeps this motion from being within every limit, in words: limits that it breaks, and
+    two bodies that come closer than allowed, by how much. Null if nothing does."""
     saving: Ratio
     """1 - energy of the answer / energy of this motion, of the objective."""
     sensitivity: Annotated[Sensitivity, Internal] = field(repr=False)
     """Sensitivity of the electrical energy."""
     saving_interval: SavingInterval | None = None
-    """How well the saving is known. Null for the objective `mechanical`, and in answers of an earlier
-    version."""
+    """How well the saving is known. Null for the objective `mechanical`, and in answers of an
+    earlier version."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "within_limits", self.reason is None)
@@ -107,8 +108,8 @@ class Baseline:
 
 @dataclass(frozen=True)
 class LimitsInForce:
-    """The limits that the motion was held to: those of the robot, or the tighter ones of the request.
-    Lists are per joint, from base to flange; null: no limit."""
+    """The limits that the motion was held to: those of the robot, or the tighter ones of the
+    request. Lists are per joint, from base to flange; null: no limit."""
 
     position_min: Annotated[PerJoint, Unit("rad")]
     """Least joint position."""
@@ -128,8 +129,11 @@ class LimitsInForce:
     """Speed of the elbow."""
 
     @classmethod
-    def of(cls, joints: Limits, tcp_speed: float | None, elbow_speed: float | None) -> LimitsInForce:
-        """The limits of the joints, and those on the speeds of TCP and elbow [m/s]; None: no limit."""
+    def of(
+        cls, joints: Limits, tcp_speed: float | None, elbow_speed: float | None
+    ) -> LimitsInForce:
+        """The limits of the joints, and those on the speeds of TCP and elbow [m/s]; None: no
+        limit."""
         rates = (joints.v_max, joints.a_max, joints.j_max, joints.tau_max)
         return cls(joints.q_min, joints.q_max, *rates, tcp_speed, elbow_speed)
 
@@ -146,18 +150,18 @@ class SolverReport:
     nlp_solves: Count
     """Nonlinear programs solved, over all candidates."""
     stationarity: Annotated[float, Unit("1/rad")] | None
-    """Largest component of the gradient of the Lagrangian before the last step, relative to the cost.
-    Null if the answer is a baseline's motion or the method has none."""
+    """Largest component of the gradient of the Lagrangian before the last step, relative to the
+    cost. Null if the answer is a baseline's motion or the method has none."""
 
 
 @dataclass(frozen=True)
 class Solution:
     """The motion of least energy, with its lower bound and certificate.
 
-    Not `complete`: the inverse kinematics of the arm may have missed configurations at the start or goal. Then `status`
-    is `feasible`, and the lower bound covers the motions between those that may be missing.
-    `sensitivity` is that of the electrical energy. `unmodelled` are contacts of bodies that stand in for a tool or a
-    payload without a shape, see `collision.stand_ins`.
+    Not `complete`: the inverse kinematics of the arm may have missed configurations at the start or
+    goal. Then `status` is `feasible`, and the lower bound covers the motions between those that may
+    be missing. `sensitivity` is that of the electrical energy. `unmodelled` are contacts of bodies
+    that stand in for a tool or a payload without a shape, see `collision.stand_ins`.
     """
 
     status: Literal["optimal", "feasible"]

@@ -24,13 +24,19 @@ NO_END = "the arm cannot be where the turn of the tool leads"
 
 def solver_of(incumbent: Incumbent, candidate: Candidate, interval: DurationInterval) -> Method:
     """The solver of the problem's method for a candidate, in one interval of durations."""
-    solver = solver_for(incumbent.prepared, candidate.q_start, candidate.q_goal, incumbent.deadline, interval)
-    solver.is_from_planned_path = candidate.attempt is not None and FROM_PLANNED_PATH in candidate.attempt.reason
+    solver = solver_for(
+        incumbent.prepared, candidate.q_start, candidate.q_goal, incumbent.deadline, interval
+    )
+    solver.is_from_planned_path = (
+        candidate.attempt is not None and FROM_PLANNED_PATH in candidate.attempt.reason
+    )
     return solver
 
 
 def in_time(incumbent: Incumbent, attempt: Callable[[], SolveResult]) -> SolveResult:
-    """The result of an attempt, whose effort is counted; without a motion if it does not end before the deadline."""
+    """The result of an attempt, whose effort is counted; without a motion if it does not end before
+    the deadline.
+    """
     try:
         with watch(incumbent.deadline):
             return incumbent.add_effort(attempt())
@@ -66,7 +72,9 @@ def _solved(incumbent: Incumbent, candidate: Candidate, solver: Method) -> Solve
     """The result of a solver that knows what the search knows so far."""
     best, ruled_out = incumbent.best(), CandidateStatus.INFEASIBLE
     solver.is_sole = sum(each.status is not ruled_out for each in incumbent.candidates) == 1
-    solver.was_postponed = candidate.attempt is not None and candidate.attempt.status is SolveStatus.POSTPONED
+    solver.was_postponed = (
+        candidate.attempt is not None and candidate.attempt.status is SolveStatus.POSTPONED
+    )
     if best is None or best.energy is None:
         solver.other_goals = partial(_other_goals, incumbent, candidate)
     else:
@@ -75,7 +83,10 @@ def _solved(incumbent: Incumbent, candidate: Candidate, solver: Method) -> Solve
 
 
 def _attempted(
-    incumbent: Incumbent, candidate: Candidate, interval: DurationInterval, attempt: Callable[[Method], SolveResult]
+    incumbent: Incumbent,
+    candidate: Candidate,
+    interval: DurationInterval,
+    attempt: Callable[[Method], SolveResult],
 ) -> tuple[SolveResult, Candidate]:
     """The result of an attempt, and the candidate with the ends of its motion.
 
@@ -94,20 +105,32 @@ def _attempted(
         return (result if turned else replace(result, reason=f"{result.reason}{SLID}")), moved
     if turned:
         return replace(result, status=SolveStatus.FAILED, reason=NO_END, spline=None), candidate
-    return in_time(incumbent, partial(attempt, solver_of(incumbent, candidate, interval))), candidate
+    return in_time(
+        incumbent, partial(attempt, solver_of(incumbent, candidate, interval))
+    ), candidate
 
 
 def _other_goals(incumbent: Incumbent, candidate: Candidate) -> list[Array]:
-    """Goals (nq,) [rad] of open candidates from the same start, of each branch the nearest, MOST_OTHER_GOALS of all."""
+    """Goals (nq,) [rad] of open candidates from the same start, of each branch the nearest,
+    MOST_OTHER_GOALS of all.
+    """
     nearest: dict[int, Candidate] = {}
     for other in sorted(incumbent.candidates, key=lambda each: (each.shortest, each.lower_bound)):
-        is_open = other.status is CandidateStatus.UNVISITED and other.holdable and not other.deferred
-        if is_open and other.goal is not candidate.goal and (other.q_start == candidate.q_start).all():
+        is_open = (
+            other.status is CandidateStatus.UNVISITED and other.holdable and not other.deferred
+        )
+        if (
+            is_open
+            and other.goal is not candidate.goal
+            and (other.q_start == candidate.q_start).all()
+        ):
             nearest.setdefault(id(other.goal), other)
     return [other.q_goal for other in list(nearest.values())[:MOST_OTHER_GOALS]]
 
 
-def settled(incumbent: Incumbent, candidate: Candidate, result: SolveResult, message: str) -> Candidate | None:
+def settled(
+    incumbent: Incumbent, candidate: Candidate, result: SolveResult, message: str
+) -> Candidate | None:
     """A new candidate with the motion of a result as its own; None if there is no motion."""
     if result.spline is None:
         return None
@@ -126,13 +149,16 @@ def solve_from(
     surplus_value: float | None = None,
     duration: float | None = None,
 ) -> None:
-    """Optimise the candidate from samples of a motion, q (k, nq) [rad] at t (k,) [s]; accept what needs less energy.
+    """Optimise the candidate from samples of a motion, q (k, nq) [rad] at t (k,) [s]; accept what
+    needs less energy.
 
-    `fine` asks for more control points. `surplus_value` [1] is the assumed value of a joule of net surplus on a bus
-    with energy storage. `duration` [s] fixes the duration.
+    `fine` asks for more control points. `surplus_value` [1] is the assumed value of a joule of net
+    surplus on a bus with energy storage. `duration` [s] fixes the duration.
     """
     q, t = samples
-    improve(incumbent, candidate, lambda solver: solver.solve_from(q, t, fine), surplus_value, duration)
+    improve(
+        incumbent, candidate, lambda solver: solver.solve_from(q, t, fine), surplus_value, duration
+    )
 
 
 def improve(
@@ -142,7 +168,8 @@ def improve(
     surplus_value: float | None = None,
     duration: float | None = None,
 ) -> None:
-    """Optimise the candidate by an attempt in each of its duration intervals; accept what needs less energy.
+    """Optimise the candidate by an attempt in each of its duration intervals; accept what needs
+    less energy.
 
     `surplus_value` and `duration` as of `solve_from`.
     """
@@ -151,4 +178,6 @@ def improve(
             interval = replace(interval, t_min=duration, t_max=duration)
         result, moved = _attempted(incumbent, candidate, interval, attempt)
         if result.spline is not None:
-            incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(result.spline), moved)
+            incumbent.accept_if_better(
+                candidate, result, incumbent.prepared.energy(result.spline), moved
+            )

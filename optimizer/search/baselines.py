@@ -1,14 +1,18 @@
-"""Energy of other methods' motions between the same ends; these motions are also initial guesses of the optimiser.
+"""Energy of other methods' motions between the same ends; these motions are also initial guesses of
+the optimiser.
 
 - `trapezoid`: trapezoidal speed, all joints synchronised, in our duration
 - `quintic`: rest-to-rest quintic, all joints synchronised, in our duration
-- `ruckig`: time-optimal under limits of speed, acceleration and jerk (Berscheid, Kröger 2021); without torque limits
+- `ruckig`: time-optimal under limits of speed, acceleration and jerk (Berscheid, Kröger 2021);
+  without torque limits
 - `ruckig_slowed`: the same motion, its time scaled to our duration
-- `controller_default`: the robot's own controller at its default speed and acceleration, a leading-axis trapezoid; left
+- `controller_default`: the robot's own controller at its default speed and acceleration, a
+  leading-axis trapezoid; left
   out for a robot whose maker publishes none
 
-All go from the start to the nearest goal and wait there until the end of the dwell, if there is one. The acceleration
-of a trapezoid jumps: its jerk is unbounded, so it is never within a jerk limit.
+All go from the start to the nearest goal and wait there until the end of the dwell, if there is
+one. The acceleration of a trapezoid jumps: its jerk is unbounded, so it is never within a jerk
+limit.
 """
 
 from __future__ import annotations
@@ -29,7 +33,12 @@ from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.result.solution import Baseline, BaselineName
 from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE, limit_ratios, too_much
 from joulepath.optimizer.trajectories.ruckig_motion import time_optimal
-from joulepath.optimizer.trajectories.time_scalings import SampledMotion, controller_default, quintic, trapezoid
+from joulepath.optimizer.trajectories.time_scalings import (
+    SampledMotion,
+    controller_default,
+    quintic,
+    trapezoid,
+)
 
 Torques = Callable[[Array, Array, Array], Array]
 Broken = Callable[[Sequence[Array], Sequence[Array]], list[list[str]]]
@@ -45,23 +54,31 @@ def baselines(
     potential: Callable[[Array], float],
     broken_on_the_way: Broken,
 ) -> list[Baseline]:
-    """Every baseline from q_start (nq,) to the nearest of q_goals (m, nq), which are within the position limits.
+    """Every baseline from q_start (nq,) to the nearest of q_goals (m, nq), which are within the
+    position limits.
 
-    `duration` > 0 [s] and `ours` [J, of the objective] are of the motion they are compared with. `torques` maps q, v, a
-    (k, nq) to rigid-body-and-rotor torques (k, nq), `potential` joint positions (nq,) to the potential energy [J];
-    `broken_on_the_way` says of motions' samples q, v (k, nq) each which limits along the path they break, and what
-    collides.
+    `duration` > 0 [s] and `ours` [J, of the objective] are of the motion they are compared with.
+    `torques` maps q, v, a (k, nq) to rigid-body-and-rotor torques (k, nq), `potential` joint
+    positions (nq,) to the potential energy [J]; `broken_on_the_way` says of motions' samples q, v
+    (k, nq) each which limits along the path they break, and what collides.
     """
     motions = guesses(problem, q_start, nearest(problem, q_start, q_goals), duration)
     # one call for all: a compiled kernel works through samples in blocks
-    q, v, a = (np.concatenate([getattr(motion, name) for motion in motions.values()]) for name in ("q", "v", "a"))
+    q, v, a = (
+        np.concatenate([getattr(motion, name) for motion in motions.values()])
+        for name in ("q", "v", "a")
+    )
     ends = np.cumsum([len(motion.t) for motion in motions.values()])[:-1]
     result, held = [], np.zeros_like(q_start)
     if problem.dwell is not None:
         goal, still = nearest(problem, q_start, q_goals)[None], np.zeros((1, len(q_start)))
         held = torques(goal, still, still)[0]
-    broken = broken_on_the_way([motion.q for motion in motions.values()], [motion.v for motion in motions.values()])
-    for (name, motion), tau, words in zip(motions.items(), np.split(torques(q, v, a), ends), broken, strict=True):
+    broken = broken_on_the_way(
+        [motion.q for motion in motions.values()], [motion.v for motion in motions.values()]
+    )
+    for (name, motion), tau, words in zip(
+        motions.items(), np.split(torques(q, v, a), ends), broken, strict=True
+    ):
         result.append(compared(problem, name, motion, tau, held, ours, potential, words))
     return result
 
@@ -76,7 +93,8 @@ def compared(
     potential: Callable[[Array], float],
     broken: Sequence[str],
 ) -> Baseline:
-    """A motion with torques tau (k, nq) as a baseline; after it, motors hold torques `held` (nq,). See `baselines`.
+    """A motion with torques tau (k, nq) as a baseline; after it, motors hold torques `held` (nq,).
+    See `baselines`.
 
     `broken` are the limits along the path that it breaks, and what collides, in words.
     """
@@ -84,7 +102,9 @@ def compared(
     lost = friction_torque(arm.friction_law, arm.drives, tau, motion.v, motion.a)
     energy = motion_energy(problem, motion, tau, potential, lost)
     spread = arm_spread(arm)
-    sensitivity = energy_sensitivity(motion.weights, motion.q, motion.v, motion.a, tau, arm, spread, lost)
+    sensitivity = energy_sensitivity(
+        motion.weights, motion.q, motion.v, motion.a, tau, arm, spread, lost
+    )
     if problem.dwell is not None:
         hold = float(holding_power(arm, held))
         energy = energy.with_dwell(dwell_energy(problem.dwell, arm, hold, motion.duration))
@@ -102,16 +122,24 @@ def compared(
 
 
 def with_saving_intervals(table: list[Baseline], problem: Problem, ours: Known) -> list[Baseline]:
-    """The baselines with the intervals of their savings; without, where mechanical work is compared."""
+    """The baselines with the intervals of their savings; without, where mechanical work is
+    compared.
+    """
     if problem.objective != "electrical":
         return table
     known = [Known(each.electrical, each.sensitivity, each.duration) for each in table]
     intervals = saving_intervals(ours, known, problem.arm)
-    return [replace(each, saving_interval=interval) for each, interval in zip(table, intervals, strict=True)]
+    return [
+        replace(each, saving_interval=interval)
+        for each, interval in zip(table, intervals, strict=True)
+    ]
 
 
-def guesses(problem: Problem, q_start: Array, q_goal: Array, duration: float) -> dict[BaselineName, SampledMotion]:
-    """The motions behind the baselines; all but `ruckig` and `controller_default` take `duration` [s].
+def guesses(
+    problem: Problem, q_start: Array, q_goal: Array, duration: float
+) -> dict[BaselineName, SampledMotion]:
+    """The motions behind the baselines; all but `ruckig` and `controller_default` take `duration`
+    [s].
 
     The last one is left out for a robot whose controller's default motion is unknown.
     """
@@ -129,8 +157,8 @@ def guesses(problem: Problem, q_start: Array, q_goal: Array, duration: float) ->
 
 
 def nearest(problem: Problem, q_start: Array, q_goals: Array) -> Array:
-    """The goal (nq,) of q_goals (m, nq) that all joints reach first at their speed limits; of equals, least
-    displacement."""
+    """The goal (nq,) of q_goals (m, nq) that all joints reach first at their speed limits; of
+    equals, least displacement."""
     displacement = np.abs(np.asarray(q_goals) - q_start)
     times = (displacement / problem.arm.active_limits.v_max).max(axis=1)
     # rounded, so that goals that differ by rounding only count as equals
@@ -138,7 +166,9 @@ def nearest(problem: Problem, q_start: Array, q_goals: Array) -> Array:
 
 
 def saving(ours: float, theirs: float) -> float:
-    """1 - ours / theirs; the sign stays right where regeneration makes theirs negative. 0 where theirs is nothing."""
+    """1 - ours / theirs; the sign stays right where regeneration makes theirs negative. 0 where
+    theirs is nothing.
+    """
     return (theirs - ours) / abs(theirs) if theirs else 0.0
 
 
@@ -149,21 +179,28 @@ def motion_energy(
     potential: Callable[[Array], float],
     lost: Array | None = None,
 ) -> Energy:
-    """Breakdown of a motion that begins and ends at rest, waiting left out, from its torques (k, nq); `lost` (k, nq)
-    are those of friction if they are known."""
+    """Breakdown of a motion that begins and ends at rest, waiting left out, from its torques (k,
+    nq); `lost` (k, nq) are those of friction if they are known."""
     gain = potential(motion.q[-1]) - potential(motion.q[0])
     return breakdown(motion.weights, motion.v, motion.a, tau, gain, problem.arm, lost=lost)
 
 
-def broken_limits(problem: Problem, motion: SampledMotion, tau: Array, lost: Array | None = None) -> list[str]:
-    """The limits that a motion breaks, in words: its exact peaks of the rates, positions and torques at its samples.
+def broken_limits(
+    problem: Problem, motion: SampledMotion, tau: Array, lost: Array | None = None
+) -> list[str]:
+    """The limits that a motion breaks, in words: its exact peaks of the rates, positions and
+    torques at its samples.
 
     `lost` as of `motion_energy`. A motion that takes longer than the dwell breaks it, too.
     """
-    late = problem.dwell is not None and motion.duration > problem.dwell.time * (1 + RATIO_TOLERANCE)
+    late = problem.dwell is not None and motion.duration > problem.dwell.time * (
+        1 + RATIO_TOLERANCE
+    )
     limits = problem.arm.active_limits
     tau_limited = limited_torque(problem.arm, tau, motion.v, motion.a, lost)
-    jerk = np.where(np.isfinite(limits.j_max), motion.peak_jerk, 0.0)  # where none is in force, unbounded jerk is fine
+    jerk = np.where(
+        np.isfinite(limits.j_max), motion.peak_jerk, 0.0
+    )  # where none is in force, unbounded jerk is fine
     ratios = limit_ratios(limits, motion.q, motion.peak_v, motion.peak_a, jerk, tau_limited)
     return [
         *(["longer than the dwell"] if late else []),

@@ -1,4 +1,6 @@
-"""Branch and bound over boxes of joint positions: those of the least bounds are split until these are enough."""
+"""Branch and bound over boxes of joint positions: those of the least bounds are split until these
+are enough.
+"""
 
 from __future__ import annotations
 
@@ -14,14 +16,15 @@ from joulepath.optimizer.deadline import Deadline
 
 # boxes split in a round, rounds, and rounds of a tight bound
 SPLIT, ROUNDS, TIGHT_ROUNDS = 400, 80, 200
-# after so many rounds, and unless the bound is to be tight, a bound within this share of what is enough will do
+# after so many rounds, and unless the bound is to be tight, a bound within this share of what is
+# enough will do
 FEW, NEARLY = 24, 0.1
 
 
 @dataclass(frozen=True)
 class Boxes:
-    """Boxes, or tuples of boxes: middles and half sides (b, …, nq) [rad], and the bound (b,) [J], inf for one without
-    configurations."""
+    """Boxes, or tuples of boxes: middles and half sides (b, …, nq) [rad], and the bound (b,) [J],
+    inf for one without configurations."""
 
     centre: Array
     half: Array
@@ -32,7 +35,12 @@ class Boxes:
 
     def joined(self, other: Self) -> Self:
         """These boxes, then the others."""
-        return type(self)(*(np.concatenate([getattr(b, each.name) for b in (self, other)]) for each in fields(self)))
+        return type(self)(
+            *(
+                np.concatenate([getattr(b, each.name) for b in (self, other)])
+                for each in fields(self)
+            )
+        )
 
 
 B = TypeVar("B", bound=Boxes)
@@ -54,8 +62,8 @@ class BoxSearch(ABC, Generic[B]):
         """Whether a box of these half sides (…, nq) [rad] is not worth splitting."""
 
     def run(self, rounds: int, deadline: Deadline, enough: float, nearly: float) -> float:
-        """The least bound [J] of any box after at most so many rounds of splitting, or once it is enough; after FEW
-        rounds, once it is within the share `nearly` of that."""
+        """The least bound [J] of any box after at most so many rounds of splitting, or once it is
+        enough; after FEW rounds, once it is within the share `nearly` of that."""
         boxes = self.first()
         for n in range(rounds):
             boxes = boxes[np.flatnonzero(np.isfinite(boxes.value))]

@@ -1,4 +1,6 @@
-"""Best-first search over candidates: solve in order of lower bound until no bound is below the incumbent."""
+"""Best-first search over candidates: solve in order of lower bound until no bound is below the
+incumbent.
+"""
 
 from __future__ import annotations
 
@@ -20,13 +22,17 @@ def explore(
     most_solved: int | None = None,
     ended: Callable[[Candidate], None] = lambda _: None,
 ) -> Candidate | None:
-    """Solve candidates in order of lower bound until none is below the incumbent; returns it, None if there is none.
+    """Solve candidates in order of lower bound until none is below the incumbent; returns it, None
+    if there is none.
 
-    After `most_solved` solved candidates the others are not solved. A candidate that is postponed comes again after
-    those to which a path is known, and, if none is known to itself, after those whose goals do not seem enclosed.
-    `ended` gets every candidate that was solved, or tried in vain.
+    After `most_solved` solved candidates the others are not solved. A candidate that is postponed
+    comes again after those to which a path is known, and, if none is known to itself, after those
+    whose goals do not seem enclosed. `ended` gets every candidate that was solved, or tried in
+    vain.
     """
-    best = min((e for e in candidates if e.energy is not None), key=lambda e: e.energy or 0.0, default=None)
+    best = min(
+        (e for e in candidates if e.energy is not None), key=lambda e: e.energy or 0.0, default=None
+    )
     queue = sorted(candidates, key=lambda e: (e.lower_bound, e.shortest))
     while queue:
         candidate = queue.pop(0)
@@ -35,7 +41,10 @@ def explore(
         if best is not None and best.energy is not None and candidate.lower_bound >= best.energy:
             candidate.settle(CandidateStatus.PRUNED, Reason.BOUND)
             continue
-        if most_solved is not None and sum(e.status is CandidateStatus.SOLVED for e in candidates) >= most_solved:
+        if (
+            most_solved is not None
+            and sum(e.status is CandidateStatus.SOLVED for e in candidates) >= most_solved
+        ):
             message = f"the method solves no more than {most_solved} candidates"
             candidate.settle(CandidateStatus.UNVISITED, Reason.ENOUGH_SOLVED, message)
             continue

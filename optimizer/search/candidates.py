@@ -27,7 +27,8 @@ from joulepath.optimizer.search.passing import bound_through
 from joulepath.optimizer.trajectories.spline import Spline
 
 FULL_TURN = 2 * np.pi
-# 64 poses from a given start make 16384, two poses 2048; each is named in the answer with some 400 bytes
+# 64 poses from a given start make 16384, two poses 2048; each is named in the answer with some 400
+# bytes
 MOST_PAIRS = 32768
 # pairs between two looks at the deadline: some ten milliseconds
 PAIRS_PER_CHECK = 1024
@@ -36,7 +37,9 @@ SAME_TRAVEL = 1e-9
 
 
 class Reason(Enum):
-    """Why a candidate has its status. The value is the message; a candidate may carry a more exact one beside it."""
+    """Why a candidate has its status. The value is the message; a candidate may carry a more exact
+    one beside it.
+    """
 
     NOT_REACHED = "not reached before the deadline"
     DEFERRED = "other samples of the target have smaller lower bounds"
@@ -52,12 +55,14 @@ class Reason(Enum):
 
 @dataclass(slots=True)
 class Candidate:
-    """A start and goal configuration with the state of their search; `energy` [J] is the exact value of the objective.
+    """A start and goal configuration with the state of their search; `energy` [J] is the exact
+    value of the objective.
 
-    `shortest` [s] is a proven least duration. `holdable`: both ends are feasible. A candidate that is `deferred` is
-    not solved yet, because similar candidates have a smaller lower bound. `sampled`: an end is one of infinitely
-    many configurations that reach its target. `refined`: the motion is not only a first one, which the method refines.
-    `tightened`: it was solved again, within tighter limits, since the certificate rejected its motion.
+    `shortest` [s] is a proven least duration. `holdable`: both ends are feasible. A candidate that
+    is `deferred` is not solved yet, because similar candidates have a smaller lower bound.
+    `sampled`: an end is one of infinitely many configurations that reach its target. `refined`: the
+    motion is not only a first one, which the method refines. `tightened`: it was solved again,
+    within tighter limits, since the certificate rejected its motion.
     """
 
     start: EndConfiguration
@@ -84,7 +89,11 @@ class Candidate:
 
     def settle(self, status: CandidateStatus, reason: Reason, message: str | None = None) -> None:
         """Set the status with its reason; the `message` is the reason's own unless given."""
-        self.status, self.reason, self.message = status, reason, reason.value if message is None else message
+        self.status, self.reason, self.message = (
+            status,
+            reason,
+            reason.value if message is None else message,
+        )
 
     @property
     def spline(self) -> Spline:
@@ -103,13 +112,16 @@ class Candidate:
         self.lower_bound, self.shortest, self.sampled = to.lower_bound, to.shortest, to.sampled
 
     def take(self, result: SolveResult, energy: float) -> None:
-        """Take a motion of a result, whose objective is `energy` [J]; the one before stays in hand."""
+        """Take a motion of a result, whose objective is `energy` [J]; the one before stays in
+        hand."""
         self.earlier = None if self.energy is None else copy(self)
         self.attempt, self.energy = result, energy
         self.settle(CandidateStatus.SOLVED, Reason.METHOD, result.reason)
 
     def refuse(self) -> None:
-        """Go back to the motion before the last one, which the certificate did not confirm; without one, it failed."""
+        """Go back to the motion before the last one, which the certificate did not confirm; without
+        one, it failed.
+        """
         before, self.refused = self.earlier, True
         if before is None:
             self.energy = self.attempt = None
@@ -143,10 +155,11 @@ def pairs(
 ) -> list[Candidate]:
     """Every pair of branches, with every full-turn alternative that makes a motion of its own.
 
-    The dynamics has period 2π in every joint. If both ends are poses, pairs with equal joint displacement are one
-    candidate. Pairs that move a joint by more than 2π are left out: without that full turn, the same branches have less
-    displacement in this joint, no more in the others, and a bound that is never higher. Without `windings`, and for
-    samples of a free orientation or of a self-motion, only the pair of least displacement is kept.
+    The dynamics has period 2π in every joint. If both ends are poses, pairs with equal joint
+    displacement are one candidate. Pairs that move a joint by more than 2π are left out: without
+    that full turn, the same branches have less displacement in this joint, no more in the others,
+    and a bound that is never higher. Without `windings`, and for samples of a free orientation or
+    of a self-motion, only the pair of least displacement is kept.
 
     Raises InvalidProblem if several targets make too many pairs.
     """
@@ -165,7 +178,8 @@ def pairs(
             if len(result) + len(q_start) > MOST_PAIRS:
                 raise InvalidProblem(
                     "goal" if isinstance(prepared.problem.goal, AnyOf) else "start",
-                    f"These targets make more than {MOST_PAIRS} pairs of arm configurations: give fewer of them, a "
+                    f"These targets make more than {MOST_PAIRS} pairs of arm configurations: give "
+                    "fewer of them, a "
                     "`branch`, or `windings` false.",
                 )
             new = [Candidate(start, goal, *both) for both in zip(q_start, q_goal, strict=True)]
@@ -179,12 +193,18 @@ def pairs(
 
 def _only_choice(end: EndConfiguration) -> Array | None:
     """The joint positions (1, nq) [rad] of an end without full-turn alternatives; else None."""
-    return None if any(len(each) > 1 for each in end.choices) else np.array([[each[0] for each in end.choices]])
+    return (
+        None
+        if any(len(each) > 1 for each in end.choices)
+        else np.array([[each[0] for each in end.choices]])
+    )
 
 
-def _combined(start: EndConfiguration, goal: EndConfiguration, windings: bool, most: int) -> tuple[Array, Array]:
-    """Starts and goals (k, nq) [rad] of all combinations of the options of each joint, the last joint's first; of some
-    of them, if there are more than `most`."""
+def _combined(
+    start: EndConfiguration, goal: EndConfiguration, windings: bool, most: int
+) -> tuple[Array, Array]:
+    """Starts and goals (k, nq) [rad] of all combinations of the options of each joint, the last
+    joint's first; of some of them, if there are more than `most`."""
     options = [
         joint_options(s, g, start.fixed or goal.fixed, windings)
         for s, g in zip(start.choices, goal.choices, strict=True)
@@ -199,9 +219,14 @@ def _combined(start: EndConfiguration, goal: EndConfiguration, windings: bool, m
     return q_start, q_goal
 
 
-def joint_options(starts: list[float], goals: list[float], fixed: bool, windings: bool) -> list[tuple[float, float]]:
+def joint_options(
+    starts: list[float], goals: list[float], fixed: bool, windings: bool
+) -> list[tuple[float, float]]:
     """(start, goal) [rad] of one joint for each displacement, least first."""
-    both = sorted(product(starts, goals), key=lambda pair: (abs(pair[1] - pair[0]), abs(pair[0]) + abs(pair[1])))
+    both = sorted(
+        product(starts, goals),
+        key=lambda pair: (abs(pair[1] - pair[0]), abs(pair[0]) + abs(pair[1])),
+    )
     if not windings:
         return both[:1]
     if fixed:
@@ -214,15 +239,19 @@ def joint_options(starts: list[float], goals: list[float], fixed: bool, windings
     return kept
 
 
-def bound(prepared: PreparedProblem, candidates: Sequence[Candidate], checked: Sequence[Side] = SIDES) -> None:
-    """Mark the candidates with an infeasible start or goal, and give each its lower bound and least duration.
+def bound(
+    prepared: PreparedProblem, candidates: Sequence[Candidate], checked: Sequence[Side] = SIDES
+) -> None:
+    """Mark the candidates with an infeasible start or goal, and give each its lower bound and least
+    duration.
 
-    An end that keeps its margins, but not the reserve beyond them, is infeasible, although there may be motions to it:
-    its candidates keep their bounds.
+    An end that keeps its margins, but not the reserve beyond them, is infeasible, although there
+    may be motions to it: its candidates keep their bounds.
 
     Ends that are not to be `checked` are known to be feasible.
 
-    Raises InvalidProblem, StartInCollision, GoalInCollision or TorqueInfeasible if no candidate is left.
+    Raises InvalidProblem, StartInCollision, GoalInCollision or TorqueInfeasible if no candidate is
+    left.
     """
     sides = {
         "start": _Ends.of([each.start for each in candidates]),
@@ -241,19 +270,30 @@ def bound(prepared: PreparedProblem, candidates: Sequence[Candidate], checked: S
     for candidate, value, least in zip(candidates, bounds.tolist(), shortest.tolist(), strict=True):
         candidate.lower_bound, candidate.shortest = value, least
         if not math.isfinite(value):
-            candidate.settle(CandidateStatus.INFEASIBLE, Reason.TOO_SLOW, f"takes at least {least:.4f} s")
+            candidate.settle(
+                CandidateStatus.INFEASIBLE, Reason.TOO_SLOW, f"takes at least {least:.4f} s"
+            )
     ruled = {name: check_configurations(prepared, sides[name].q) for name in checked}
     for name in reversed(checked):  # of a candidate with two such ends, the start is named
         for row, ruling in enumerate(ruled[name]):
             if ruling is not None:
-                _rule_out(candidates, sides[name].rows == row, f"at the {name}, {ruling.reason}", ruling.possible)
+                _rule_out(
+                    candidates,
+                    sides[name].rows == row,
+                    f"at the {name}, {ruling.reason}",
+                    ruling.possible,
+                )
     for name in checked:
-        raise_if_none_is_left(name, [(end.label, end.target, end.q) for end in sides[name].all], ruled[name])
+        raise_if_none_is_left(
+            name, [(end.label, end.target, end.q) for end in sides[name].all], ruled[name]
+        )
 
 
 @dataclass(frozen=True)
 class _Ends:
-    """The configurations at one side of candidates, each once, and the row (P,) of that of each candidate."""
+    """The configurations at one side of candidates, each once, and the row (P,) of that of each
+    candidate.
+    """
 
     all: list[EndConfiguration]
     rows: npt.NDArray[np.intp]
@@ -277,7 +317,9 @@ class _Ends:
 
 
 def _rule_out(candidates: Sequence[Candidate], marked: Mask, message: str, possible: bool) -> None:
-    """Settle the `marked` (P,) candidates as infeasible. They keep their bounds if it is `possible` to be there."""
+    """Settle the `marked` (P,) candidates as infeasible. They keep their bounds if it is `possible`
+    to be there.
+    """
     for row in np.flatnonzero(marked).tolist():
         candidate = candidates[row]
         candidate.settle(CandidateStatus.INFEASIBLE, Reason.INVALID_END, message)

@@ -21,11 +21,14 @@ TINY = 1e-300
 
 def copper_loss(arm: Arm) -> Array:
     """c (nq,) [W/(N·m)²] of `electrical`."""
-    return np.asarray((arm.drives.copper + arm.drives.inverter_quadratic) / arm.drives.torque_constant**2)
+    return np.asarray(
+        (arm.drives.copper + arm.drives.inverter_quadratic) / arm.drives.torque_constant**2
+    )
 
 
 class Cruise:
-    """The least losses of joints that displacement `distance` (P, nq) under acceleration and jerk limits.
+    """The least losses of joints that displacement `distance` (P, nq) under acceleration and jerk
+    limits.
 
     They are ∫ g(|v|) dt of friction, and ∫ v² / c dt.
     """
@@ -48,13 +51,16 @@ class Cruise:
         T = T[:, None]
         moving, spread = T - self.jerk_ramp, self.distance * (4 / self.a)
         ramps = 4 * self.jerk_ramp * self.ramp_speed / self.a
-        with_jerk = self.a / 2 * (moving - np.sqrt(np.maximum(moving * moving + ramps - spread, 0.0)))
+        with_jerk = (
+            self.a / 2 * (moving - np.sqrt(np.maximum(moving * moving + ramps - spread, 0.0)))
+        )
         without = self.a / 2 * (T - np.sqrt(np.maximum(T * T - spread, 0.0)))
         ramped = with_jerk > self.ramp_speed
         return np.where(ramped, with_jerk, without), np.where(ramped, self.jerk_ramp, 0.0)
 
     def losses(self, T: Array) -> tuple[Array, Array, Array, Array]:
-        """Friction's loss (P,) [J] for durations T (P,) and its derivative [W]; ∫ v² / c dt (P,) and its derivative.
+        """Friction's loss (P,) [J] for durations T (P,) and its derivative [W]; ∫ v² / c dt (P,)
+        and its derivative.
 
         The losses are by parts: T g(c) - 2 ∫ g' t dh.
         """
@@ -63,10 +69,17 @@ class Cruise:
         bent = np.sqrt(square + law.speed**2)
         torque = law.curved * rise + law.viscous * v
         # ∫_0^v of g
-        below = law.curved * ((square / 2 + law.speed**2 / 4) * rise - v * bent / 4) + law.viscous * v * square / 3
+        below = (
+            law.curved * ((square / 2 + law.speed**2 / 4) * rise - v * bent / 4)
+            + law.viscous * v * square / 3
+        )
         friction = T[:, None] * v * torque - self.slowness * (square * torque - below)
         friction -= ramp * (v * torque - self._ramp_loss)
-        squares = T[:, None] * square - self.slowness * (2 / 3) * v * square - ramp * (square - self.ramp_speed**2)
+        squares = (
+            T[:, None] * square
+            - self.slowness * (2 / 3) * v * square
+            - ramp * (square - self.ramp_speed**2)
+        )
         slope = -(law.curved * square / bent + law.viscous * square)
         return friction.sum(axis=1), slope.sum(axis=1), squares @ self.copper, -square @ self.copper
 

@@ -1,10 +1,12 @@
-"""The dual bound of one pair over every duration that the plain bound does not rule out: `bounds.dual_bound`.
+"""The dual bound of one pair over every duration that the plain bound does not rule out:
+`bounds.dual_bound`.
 
-`lower_bound.electrical` at a fixed duration T is convex in T. Beyond the durations where it reaches a target it stays
-above it. In between, cells of T each have the greater of the plain bound and the dual one, which is built around the
-pair's own motion, or a straight one if it has none. Its multipliers are those nearest to the motor torque that are
-linear in time, of the joints that carry no gravity and of those that lose most by it, times a factor. With them goes a
-share of the plain bound's own multiplier of speed.
+`lower_bound.electrical` at a fixed duration T is convex in T. Beyond the durations where it reaches
+a target it stays above it. In between, cells of T each have the greater of the plain bound and the
+dual one, which is built around the pair's own motion, or a straight one if it has none. Its
+multipliers are those nearest to the motor torque that are linear in time, of the joints that carry
+no gravity and of those that lose most by it, times a factor. With them goes a share of the plain
+bound's own multiplier of speed.
 """
 
 from __future__ import annotations
@@ -35,13 +37,16 @@ from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 
 # at how many points of the straight line gravity is compared
 LINE_POINTS = 17
-# at how many durations the plain bound is compared with the target, and into how many cells one is divided at most
+# at how many durations the plain bound is compared with the target, and into how many cells one is
+# divided at most
 PROBES, MOST_CELLS = 60, 24
-# first factor of the multipliers where gravity bends as much as confinement does, the power of that ratio that it has,
-# its least and greatest; and with which shares of it κ + μ has which factors at first
+# first factor of the multipliers where gravity bends as much as confinement does, the power of that
+# ratio that it has, its least and greatest; and with which shares of it κ + μ has which factors at
+# first
 SCALE, POWER, LEAST_FACTOR, MOST_FACTOR = 0.53, -0.4, 0.2, 1.0
 STARTS = (1.0, 0.85), (0.55, 0.35)
-# by how much factors are changed at first to find better ones; share μ of κ + μ, and share of the plain η
+# by how much factors are changed at first to find better ones; share μ of κ + μ, and share of the
+# plain η
 FACTOR_STEP, MIXING, WORK = 1.6, 0.2, 0.7
 # a joint whose gravity torque changes by less than this with any joint carries none [N·m]
 WEIGHTLESS = 1e-9
@@ -53,9 +58,10 @@ GRID_JOINTS = 2
 class Effort:
     """How finely a pair is bounded.
 
-    `steps` of the path, ratio `cell` of the durations of a cell, `group` of cells that share their boxes, `spacing` of
-    the grid, numbers of `heavy` joints that have multipliers, and `rounds` of the search for weights. A group of an arm
-    of six joints takes `time` [s] at most, on a machine that does nothing else.
+    `steps` of the path, ratio `cell` of the durations of a cell, `group` of cells that share their
+    boxes, `spacing` of the grid, numbers of `heavy` joints that have multipliers, and `rounds` of
+    the search for weights. A group of an arm of six joints takes `time` [s] at most, on a machine
+    that does nothing else.
     """
 
     steps: int
@@ -76,7 +82,9 @@ class Effort:
 
 @dataclass(frozen=True)
 class PairBounds:
-    """What the dual bounds of a problem's pairs share: c [W/(N·m)²] per joint, and κ + μ of a stiffness of 1."""
+    """What the dual bounds of a problem's pairs share: c [W/(N·m)²] per joint, and κ + μ of a
+    stiffness of 1.
+    """
 
     prepared: PreparedProblem
     chain: ChainDerivatives
@@ -86,11 +94,15 @@ class PairBounds:
 
     @classmethod
     def of(cls, prepared: PreparedProblem) -> PairBounds | None:
-        """None where the bound does not hold or has nothing to add: another objective, a friction law that is not
-        concave or has the same torque at every speed, a single joint."""
+        """None where the bound does not hold or has nothing to add: another objective, a friction
+        law that is not concave or has the same torque at every speed, a single joint."""
         arm = prepared.arm
         friction = FrictionConjugate.of(arm.friction_law, arm.active_limits.v_max)
-        if prepared.problem.objective != "electrical" or friction is None or arm.robot.nq < GRID_JOINTS:
+        if (
+            prepared.problem.objective != "electrical"
+            or friction is None
+            or arm.robot.nq < GRID_JOINTS
+        ):
             return None
         stiffness = friction.stiffness(arm.friction_law)
         # friction of the same torque at every speed has no convexity to spare
@@ -100,14 +112,20 @@ class PairBounds:
 
 
 class DurationCells:
-    """One pair's bounds in cells of durations between which waiting draws constant - power · T, up to a target [J].
+    """One pair's bounds in cells of durations between which waiting draws constant - power · T, up
+    to a target [J].
 
-    `edges` (n + 1,) [s] are the cells', `values` (n,) [J] their bounds without the wait. Where the plain bound is above
-    the target everywhere there are no cells.
+    `edges` (n + 1,) [s] are the cells', `values` (n,) [J] their bounds without the wait. Where the
+    plain bound is above the target everywhere there are no cells.
     """
 
     def __init__(
-        self, pairs: PairBounds, candidate: Candidate, dwell: LinearDwell, durations: tuple[float, float], target: float
+        self,
+        pairs: PairBounds,
+        candidate: Candidate,
+        dwell: LinearDwell,
+        durations: tuple[float, float],
+        target: float,
     ) -> None:
         self.pairs, self.candidate, self.dwell = pairs, candidate, dwell
         self.target = target - float(dwell.constant[0])
@@ -115,7 +133,9 @@ class DurationCells:
         self.edges, self.values, self.least_outside = np.zeros(1), np.zeros(0), np.inf
         self._factors: tuple[float, float] | None = None
         shortest, longest = durations
-        probes = np.geomspace(shortest, longest, PROBES) if longest > shortest else np.array([shortest])
+        probes = (
+            np.geomspace(shortest, longest, PROBES) if longest > shortest else np.array([shortest])
+        )
         probes[0], probes[-1] = shortest, longest
         low = np.flatnonzero(self._plain(probes, probes) < self.target)
         if not len(low):
@@ -123,7 +143,11 @@ class DurationCells:
             self.least_outside = float(self._plain(probes[:1], probes[-1:])[0])
             return
         ends = probes[[max(low[0] - 1, 0), min(low[-1] + 1, len(probes) - 1)]]
-        self.edges, self.values, self.least_outside = ends, self._plain(ends[:1], ends[1:]), self.target
+        self.edges, self.values, self.least_outside = (
+            ends,
+            self._plain(ends[:1], ends[1:]),
+            self.target,
+        )
 
     @property
     def least(self) -> float:
@@ -132,8 +156,8 @@ class DurationCells:
         return float(least + self.dwell.constant[0])
 
     def raise_bounds(self, effort: Effort, deadline: Deadline) -> None:
-        """Raise the cells' bounds with some effort, the lowest first, until those left are above the least of the
-        others, or time is short."""
+        """Raise the cells' bounds with some effort, the lowest first, until those left are above
+        the least of the others, or time is short."""
         self._divide(effort.cell)
         left = self.values < self.target
         while True:
@@ -141,7 +165,9 @@ class DurationCells:
             if not len(open_) or deadline.left < effort.takes(self.pairs.chain.nq):
                 return
             group = slice(open_[0], open_[open_ < open_[0] + effort.group][-1] + 1)
-            for value in self._bounds(self.edges[group.start : group.stop + 1], self.values[group], effort, deadline):
+            for value in self._bounds(
+                self.edges[group.start : group.stop + 1], self.values[group], effort, deadline
+            ):
                 self.values[group] = np.maximum(self.values[group], value)
             left[group] = False
 
@@ -156,7 +182,9 @@ class DurationCells:
             edges.append(inner[1:])
             values.append(np.full(count, value))
         self.edges = np.concatenate(edges)
-        self.values = np.maximum(np.concatenate([*values, np.zeros(0)]), self._plain(self.edges[:-1], self.edges[1:]))
+        self.values = np.maximum(
+            np.concatenate([*values, np.zeros(0)]), self._plain(self.edges[:-1], self.edges[1:])
+        )
 
     def _plain(self, shortest: Array, longest: Array) -> Array:
         """The plain bound (n,) [J] for durations between these (n,) [s]."""
@@ -170,9 +198,11 @@ class DurationCells:
         prepared, candidate = self.pairs.prepared, self.candidate
         return prepared.potential(candidate.q_goal) - prepared.potential(candidate.q_start)
 
-    def _bounds(self, edges: Array, values: Array, effort: Effort, deadline: Deadline) -> Iterator[Array]:
-        """Dual bounds (n,) [J] of cells between these edges (n + 1,) [s], whose bounds are `values` (n,) [J] so far,
-        with the multipliers of more and more joints."""
+    def _bounds(
+        self, edges: Array, values: Array, effort: Effort, deadline: Deadline
+    ) -> Iterator[Array]:
+        """Dual bounds (n,) [J] of cells between these edges (n + 1,) [s], whose bounds are `values`
+        (n,) [J] so far, with the multipliers of more and more joints."""
         middles = np.sqrt(edges[:-1] * edges[1:])
         middle = float(np.sqrt(edges[0] * edges[-1]))
         (x, torque), work = self._motion(effort.steps, middle), self._work(middle)
@@ -189,10 +219,21 @@ class DurationCells:
             if deadline.left < effort.takes(self.pairs.chain.nq):
                 return
 
-    def _best_factors(self, dual: DualBound, duration: float, work: float, rounds: int) -> tuple[float, float]:
-        """Factors of the multipliers and of κ + μ near which the bound for a duration is greatest."""
-        cell, first, step = dual.over(np.full(2, duration)), self._first_factor(dual, duration), FACTOR_STEP
-        starts = [self._factors] if self._factors else [(first * share, stiffness) for share, stiffness in STARTS]
+    def _best_factors(
+        self, dual: DualBound, duration: float, work: float, rounds: int
+    ) -> tuple[float, float]:
+        """Factors of the multipliers and of κ + μ near which the bound for a duration is
+        greatest."""
+        cell, first, step = (
+            dual.over(np.full(2, duration)),
+            self._first_factor(dual, duration),
+            FACTOR_STEP,
+        )
+        starts = (
+            [self._factors]
+            if self._factors
+            else [(first * share, stiffness) for share, stiffness in STARTS]
+        )
         value, best = max((float(self._with_factors(cell, each, work)[0]), each) for each in starts)
         for _ in range(rounds):
             for stiffer, factor in product((True, False), (1 / step, step)):
@@ -213,7 +254,10 @@ class DurationCells:
     def _first_factor(self, dual: DualBound, duration: float) -> float:
         """A factor of the multipliers that is near the best one in many trials."""
         grid = list(dual.terms.grid)
-        bending = np.abs(dual.terms.omega).mean(axis=0) @ self.pairs.chain.potential_bound(3)[:, grid, grid]
+        bending = (
+            np.abs(dual.terms.omega).mean(axis=0)
+            @ self.pairs.chain.potential_bound(3)[:, grid, grid]
+        )
         confinement = (1 - MIXING) * self.pairs.stiffness[grid] * (np.pi / duration) ** 2
         ratio = float((bending / confinement).max())
         return float(np.clip(SCALE * max(ratio, TINY) ** POWER, LEAST_FACTOR, MOST_FACTOR))
@@ -239,7 +283,9 @@ class DurationCells:
         return np.asarray(self.pairs.chain.potential_bound(2).max(axis=1) > WEIGHTLESS)
 
     def _kept(self, heavy: tuple[int, ...]) -> list[Mask]:
-        """The joints (nq,) that have multipliers: those that carry no gravity, and some of those that lose most."""
+        """The joints (nq,) that have multipliers: those that carry no gravity, and some of those
+        that lose most.
+        """
         rank = np.argsort(np.argsort(-self._hold, kind="stable"))
         return [~self._carries | (rank < count) for count in heavy]
 
@@ -264,7 +310,9 @@ class DurationCells:
         return WORK * copper_multiplier(self.pairs.prepared, displacement, self._gain, duration)
 
     def _motion(self, steps: int, duration: float) -> tuple[Array, Array]:
-        """Positions and motor torques (steps + 1, nq) of the pair's motion in this duration, or of a straight one."""
+        """Positions and motor torques (steps + 1, nq) of the pair's motion in this duration, or of
+        a straight one.
+        """
         prepared, candidate = self.pairs.prepared, self.candidate
         if candidate.attempt is not None and candidate.attempt.spline is not None:
             spline = candidate.attempt.spline

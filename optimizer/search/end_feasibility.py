@@ -1,4 +1,5 @@
-"""Whether a start or goal configuration is feasible: tool within its cone, no collision, torque to hold the load.
+"""Whether a start or goal configuration is feasible: tool within its cone, no collision, torque to
+hold the load.
 
 Infeasible configurations are ruled out before any motion is computed.
 """
@@ -25,9 +26,11 @@ EDGE = 1e-9
 
 @dataclass(frozen=True)
 class InvalidReason:
-    """Why a configuration is infeasible: a message and its cause (an angle [rad] beyond the cone, a pair, a joint).
+    """Why a configuration is infeasible: a message and its cause (an angle [rad] beyond the cone, a
+    pair, a joint).
 
-    `possible`: the margins are kept, but not RESERVE beyond them. No motion is sought, although there may be one.
+    `possible`: the margins are kept, but not RESERVE beyond them. No motion is sought, although
+    there may be one.
     """
 
     reason: str
@@ -36,15 +39,20 @@ class InvalidReason:
 
 
 def check_configurations(prepared: PreparedProblem, q: Array) -> list[InvalidReason | None]:
-    """The reason why each configuration of q (n, nq) [rad] is infeasible; None for a feasible one."""
+    """The reason why each configuration of q (n, nq) [rad] is infeasible; None for a feasible
+    one."""
     result: list[InvalidReason | None] = [*_overloads(prepared, q)]
     # later reasons replace earlier ones: they do not depend on the load
     for k, contact in enumerate(
-        prepared.surroundings.model.closest_pairs(q, within=RESERVE) if prepared.problem.arm.collisions else ()
+        prepared.surroundings.model.closest_pairs(q, within=RESERVE)
+        if prepared.problem.arm.collisions
+        else ()
     ):
         if contact.distance < RESERVE:
             first, second = contact.pair
-            message = f"{first} and {second}: clearance {RESERVE - contact.distance:.5f} m too small"
+            message = (
+                f"{first} and {second}: clearance {RESERVE - contact.distance:.5f} m too small"
+            )
             result[k] = InvalidReason(message, contact, contact.distance >= 0 and result[k] is None)
     for k, beyond in enumerate(_beyond_cone(prepared, q)):
         if beyond > 0:
@@ -55,7 +63,8 @@ def check_configurations(prepared: PreparedProblem, q: Array) -> list[InvalidRea
 def raise_if_none_is_left(
     name: str, branches: Sequence[tuple[str, int, Array]], ruled: Sequence[InvalidReason | None]
 ) -> None:
-    """Raise the error for the branches (label, target, q) at the `name`, start, goal or a stop, if none is feasible.
+    """Raise the error for the branches (label, target, q) at the `name`, start, goal or a stop, if
+    none is feasible.
 
     Raises InvalidProblem, InCollision or TorqueInfeasible.
     """
@@ -67,7 +76,8 @@ def raise_if_none_is_left(
     if len(beyond) == len(causes):
         raise InvalidProblem(
             "tool_cone",
-            f"At the {name} the tool points {min(beyond):.4f} rad outside tool_cone: widen half_angle by as much or "
+            f"At the {name} the tool points {min(beyond):.4f} rad outside tool_cone: widen "
+            "half_angle by as much or "
             f"turn the {name}.",
         )
     if overloads:
@@ -82,14 +92,19 @@ def raise_if_none_is_left(
 
 def _overloads(prepared: PreparedProblem, q: Array) -> list[InvalidReason | None]:
     """For each of q (n, nq) [rad] the joint that cannot hold the load, if any."""
-    tau_max, joints = prepared.problem.arm.active_limits.tau_max, prepared.problem.arm.robot.joint_names
+    tau_max, joints = (
+        prepared.problem.arm.active_limits.tau_max,
+        prepared.problem.arm.robot.joint_names,
+    )
     still = np.zeros_like(q)
     needed = np.abs(prepared.torques(q, still, still))
     found: list[InvalidReason | None] = []
     for k, j in enumerate((needed / tau_max).argmax(axis=1).tolist()):
         overload = needed[k, j] > tau_max[j]
         error = TorqueInfeasible(joints[j], float(needed[k, j]), float(tau_max[j]))
-        found.append(InvalidReason(f"{joints[j]} cannot hold the load", error) if overload else None)
+        found.append(
+            InvalidReason(f"{joints[j]} cannot hold the load", error) if overload else None
+        )
     return found
 
 
@@ -99,5 +114,10 @@ def _beyond_cone(prepared: PreparedProblem, q: Array) -> list[float]:
     if problem.arm.tool_cone is None:
         return []
     frames = link_frames(joint_placements(problem.arm.robot.model), q)
-    share = ToolConeConstraint.of(problem.arm, problem.arm.tool_cone).ratios(frames, q, np.zeros_like(q))[:, 0]
-    return [float(each) for each in np.where(share > 1 + EDGE, (share - 1) * problem.arm.tool_cone.half_angle, 0.0)]
+    share = ToolConeConstraint.of(problem.arm, problem.arm.tool_cone).ratios(
+        frames, q, np.zeros_like(q)
+    )[:, 0]
+    return [
+        float(each)
+        for each in np.where(share > 1 + EDGE, (share - 1) * problem.arm.tool_cone.half_angle, 0.0)
+    ]

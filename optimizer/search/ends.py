@@ -8,7 +8,12 @@ import numpy as np
 
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.deadline import checkpoint
-from joulepath.optimizer.exceptions import OutsideLimits, SingularPose, UnreachablePose, UnreachableTargets
+from joulepath.optimizer.exceptions import (
+    OutsideLimits,
+    SingularPose,
+    UnreachablePose,
+    UnreachableTargets,
+)
 from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives
 from joulepath.optimizer.kinematics.inverse import (
     inverse_kinematics_for,
@@ -29,7 +34,8 @@ SAMPLES, LEAST_SAMPLES = 96, 12
 MEMBERS, FEW_MEMBERS = 24, 4
 # samples between two looks at the deadline: some ten milliseconds
 SAMPLES_PER_CHECK = 24
-# share of the tool's cone that a goal of free orientation may use: on its edge the motion could not leave the goal
+# share of the tool's cone that a goal of free orientation may use: on its edge the motion could not
+# leave the goal
 INSIDE = 0.999
 # label of joint positions of an arm without named branches
 GIVEN = "given"
@@ -37,11 +43,12 @@ GIVEN = "given"
 
 @dataclass(frozen=True)
 class EndConfiguration:
-    """One branch at the start or goal: its label, and per joint its full-turn alternatives within the limits [rad].
+    """One branch at the start or goal: its label, and per joint its full-turn alternatives within
+    the limits [rad].
 
-    `fixed`: the joint positions are given. `target` is the index of the target that it reaches. `tolerance` is this
-    target if its orientation is free in part: then the configuration is a sample of it. Of a pose that is held on a
-    `self_motion`, too, the configuration is a sample.
+    `fixed`: the joint positions are given. `target` is the index of the target that it reaches.
+    `tolerance` is this target if its orientation is free in part: then the configuration is a
+    sample of it. Of a pose that is held on a `self_motion`, too, the configuration is a sample.
     """
 
     label: str
@@ -58,20 +65,26 @@ class EndConfiguration:
         return self.tolerance is not None or self.self_motion is not None
 
 
-def ends(prepared: PreparedProblem, name: str) -> tuple[list[EndConfiguration], list[UnreachableTarget]]:
-    """The branches at `start` or `goal` that the problem allows; and the targets without any: see `ends_of`."""
+def ends(
+    prepared: PreparedProblem, name: str
+) -> tuple[list[EndConfiguration], list[UnreachableTarget]]:
+    """The branches at `start` or `goal` that the problem allows; and the targets without any: see
+    `ends_of`.
+    """
     return ends_of(prepared, name, getattr(prepared.problem, name))
 
 
 def ends_of(
     prepared: PreparedProblem, name: str, target: Target, samples: int = SAMPLES
 ) -> tuple[list[EndConfiguration], list[UnreachableTarget]]:
-    """The branches of a target, called `name`, that the problem allows; and its members without any.
+    """The branches of a target, called `name`, that the problem allows; and its members without
+    any.
 
     Of all of its poses of free orientation together so many `samples` are taken, or a few more.
 
-    Raises UnreachableTargets if none of several targets has a branch; for a single pose UnreachablePose (also if the
-    branch asked for does not reach it) or SingularPose; InvalidProblem for a pose of an arm without inverse kinematics.
+    Raises UnreachableTargets if none of several targets has a branch; for a single pose
+    UnreachablePose (also if the branch asked for does not reach it) or SingularPose; InvalidProblem
+    for a pose of an arm without inverse kinematics.
     """
     if not isinstance(target, AnyOf):
         return _ends_of(prepared, name, target, 0, samples), []
@@ -81,7 +94,9 @@ def ends_of(
     for index, member in enumerate(target.targets):
         checkpoint()
         try:
-            reached += _ends_of(prepared, name, member, index, max(samples // max(tolerance, 1), LEAST_SAMPLES))
+            reached += _ends_of(
+                prepared, name, member, index, max(samples // max(tolerance, 1), LEAST_SAMPLES)
+            )
         except (UnreachablePose, SingularPose, OutsideLimits) as error:
             unreachable.append(UnreachableTarget(name, index, str(error)))
     if not reached:
@@ -96,14 +111,25 @@ def label_of(robot: Robot, q: Array) -> str:
 
 
 def _ends_of(
-    prepared: PreparedProblem, name: str, target: Single, index: int, samples: int = SAMPLES, on_curve: int = MEMBERS
+    prepared: PreparedProblem,
+    name: str,
+    target: Single,
+    index: int,
+    samples: int = SAMPLES,
+    on_curve: int = MEMBERS,
 ) -> list[EndConfiguration]:
-    """The branches of one target: `samples` orientations of a free one, `on_curve` members of a self-motion."""
+    """The branches of one target: `samples` orientations of a free one, `on_curve` members of a
+    self-motion.
+    """
     problem = prepared.problem
     robot, limits = problem.arm.robot, problem.arm.active_limits
     if not isinstance(target, Pose | ConeOrientedPose):
         problem.arm.check_inside(name, target)
-        return [EndConfiguration(label_of(robot, target), target, [[value] for value in target.tolist()], True, index)]
+        return [
+            EndConfiguration(
+                label_of(robot, target), target, [[value] for value in target.tolist()], True, index
+            )
+        ]
     kinematics = required_inverse_kinematics(robot, name)
     if isinstance(target, ConeOrientedPose):
         return _ends_of_samples(prepared, name, target, index, samples)
@@ -114,7 +140,10 @@ def _ends_of(
         solutions = [s for s in solutions if problem.branch.allows(s.label, s.singular)]
     if not solutions:
         raise UnreachablePose(
-            name, None, f"The branch asked for does not reach the {name} pose: leave `branch` out to try them all."
+            name,
+            None,
+            f"The branch asked for does not reach the {name} pose: leave `branch` out to try them "
+            "all.",
         )
     return [
         EndConfiguration(
@@ -132,7 +161,9 @@ def _ends_of(
 def _ends_of_samples(
     prepared: PreparedProblem, name: str, pose: ConeOrientedPose, index: int, samples: int
 ) -> list[EndConfiguration]:
-    """The branches of orientations sampled evenly from those that the pose and the tool's cone allow."""
+    """The branches of orientations sampled evenly from those that the pose and the tool's cone
+    allow.
+    """
     pose = within_cone(prepared, pose, INSIDE)
     found: list[EndConfiguration] = []
     errors: list[UnreachablePose | SingularPose] = []
@@ -143,7 +174,9 @@ def _ends_of_samples(
         try:
             found += [
                 replace(end, tolerance=pose, self_motion=None)
-                for end in _ends_of(prepared, name, pose.with_orientation(R), index, on_curve=FEW_MEMBERS)
+                for end in _ends_of(
+                    prepared, name, pose.with_orientation(R), index, on_curve=FEW_MEMBERS
+                )
             ]
         except (UnreachablePose, SingularPose) as error:
             errors.append(error)
@@ -156,20 +189,29 @@ def _ends_of_samples(
     raise UnreachablePose(
         name,
         min(distances, default=None),
-        f"The {name} is out of reach in each of the {tried} orientations tried: move it closer to the robot's "
+        f"The {name} is out of reach in each of the {tried} orientations tried: move it closer to "
+        "the robot's "
         "workspace, widen limits.position or leave `branch` out.",
     )
 
 
-def within_cone(prepared: PreparedProblem, pose: ConeOrientedPose, share: float = 1.0) -> ConeOrientedPose:
-    """The pose with no more freedom than a share of the tool's cone leaves it, if both have the same axes.
+def within_cone(
+    prepared: PreparedProblem, pose: ConeOrientedPose, share: float = 1.0
+) -> ConeOrientedPose:
+    """The pose with no more freedom than a share of the tool's cone leaves it, if both have the
+    same axes.
 
-    Else few samples of a free orientation would lie in a narrow cone, and a bound would count what the cone excludes.
+    Else few samples of a free orientation would lie in a narrow cone, and a bound would count what
+    the cone excludes.
     """
     cone = prepared.problem.arm.tool_cone
     if cone is None:
         return pose
     free = pose.half_angle == np.pi
-    if not free and not (np.allclose(pose.axis, cone.axis) and np.allclose(pose.direction, cone.direction)):
+    if not free and not (
+        np.allclose(pose.axis, cone.axis) and np.allclose(pose.direction, cone.direction)
+    ):
         return pose
-    return ConeOrientedPose(pose.position, cone.axis, cone.direction, min(pose.half_angle, share * cone.half_angle))
+    return ConeOrientedPose(
+        pose.position, cone.axis, cone.direction, min(pose.half_angle, share * cone.half_angle)
+    )

@@ -1,4 +1,6 @@
-"""The fastest motion over all candidates of a problem, and what to do if only that one is short enough."""
+"""The fastest motion over all candidates of a problem, and what to do if only that one is short
+enough.
+"""
 
 from __future__ import annotations
 
@@ -26,8 +28,8 @@ from joulepath.optimizer.trajectories.spline import Spline, lasting, sampled
 
 # motions that obstacles stop are not too slow if so many times the shortest duration is allowed
 AMPLE = 20.0
-# share of the time after which candidates, none of which has had a motion in the time that is allowed, give way to the
-# search for the fastest motion
+# share of the time after which candidates, none of which has had a motion in the time that is
+# allowed, give way to the search for the fastest motion
 SHARE_IN_VAIN = 0.5
 # samples whose ends are moved to where they are quicker, at most: each takes some 50 ms
 MOST_MOVED = 12
@@ -37,10 +39,11 @@ SAME = 1e-9
 
 @dataclass(frozen=True)
 class Fastest:
-    """The fastest motion found over all candidates, which the certificate confirms, and its candidate.
+    """The fastest motion found over all candidates, which the certificate confirms, and its
+    candidate.
 
-    No motion takes less than `bound` [s], 0 where that is not known. `proven`: none is faster, but for the share that
-    `FastestSettings` allows. `cut_short`: the deadline ended the search.
+    No motion takes less than `bound` [s], 0 where that is not known. `proven`: none is faster, but
+    for the share that `FastestSettings` allows. `cut_short`: the deadline ended the search.
     """
 
     candidate: Candidate
@@ -74,7 +77,9 @@ class _FastestOfCandidate(FastestMotion):
         ends = np.array([candidate.q_start, candidate.q_goal])
         own = [each for each in known if np.abs(each.control_points[[0, -1]] - ends).max() < SAME]
         self.incumbent, self.candidate = incumbent, candidate
-        super().__init__(incumbent.prepared, candidate.q_start, candidate.q_goal, own, settings, wanted)
+        super().__init__(
+            incumbent.prepared, candidate.q_start, candidate.q_goal, own, settings, wanted
+        )
 
     @property
     def deadline(self) -> Deadline:
@@ -90,12 +95,14 @@ class _FastestOfCandidate(FastestMotion):
         super().take_note(self.incumbent.add_effort(result))
 
 
-def fastest(incumbent: Incumbent, known: Sequence[Spline] = (), wanted: float | None = None) -> Fastest | None:
-    """The fastest motion over all candidates; None if none is found. The durations that the problem allows do not
-    count.
+def fastest(
+    incumbent: Incumbent, known: Sequence[Spline] = (), wanted: float | None = None
+) -> Fastest | None:
+    """The fastest motion over all candidates; None if none is found. The durations that the problem
+    allows do not count.
 
-    It is no slower than the motions `known` between ends of candidates, if the certificate confirms them. With `wanted`
-    [s] it is the first motion found that takes no longer, if there is one.
+    It is no slower than the motions `known` between ends of candidates, if the certificate confirms
+    them. With `wanted` [s] it is the first motion found that takes no longer, if there is one.
     """
     settings = FastestSettings()
     open_candidates = _tried(incumbent)
@@ -134,11 +141,15 @@ def fastest(incumbent: Incumbent, known: Sequence[Spline] = (), wanted: float | 
 
 
 def _tried(incumbent: Incumbent) -> list[Candidate]:
-    """The candidates of which the fastest may be one: all but samples, the samples of least duration, and others of the
-    same targets that are quicker still."""
+    """The candidates of which the fastest may be one: all but samples, the samples of least
+    duration, and others of the same targets that are quicker still."""
     candidates, prepared = incumbent.candidates, incumbent.prepared
-    tried = [each for each in candidates if each.holdable and not each.deferred] + fastest_samples(candidates)
-    samples = [] if prepared.problem.tool_path is not None else [each for each in tried if each.sampled]
+    tried = [each for each in candidates if each.holdable and not each.deferred] + fastest_samples(
+        candidates
+    )
+    samples = (
+        [] if prepared.problem.tool_path is not None else [each for each in tried if each.sampled]
+    )
     quicker = list[Candidate | None]()
     with suppress(DeadlinePassed), watch(incumbent.deadline):
         for each in sorted(samples, key=lambda each: each.shortest)[:MOST_MOVED]:
@@ -146,13 +157,19 @@ def _tried(incumbent: Incumbent) -> list[Candidate]:
     return tried + [each for each in quicker if each is not None and each.holdable]
 
 
-def fastest_of(incumbent: Incumbent, candidate: Candidate, known: Sequence[Spline] = ()) -> Spline | None:
-    """The fastest motion of one candidate, whatever durations the problem allows; None if none is found."""
+def fastest_of(
+    incumbent: Incumbent, candidate: Candidate, known: Sequence[Spline] = ()
+) -> Spline | None:
+    """The fastest motion of one candidate, whatever durations the problem allows; None if none is
+    found.
+    """
     return _FastestOfCandidate(incumbent, candidate, known).run()
 
 
 def least_duration(incumbent: Incumbent) -> float:
-    """What no motion of a problem takes less than [s]; 0 where some configurations of its ends are not known."""
+    """What no motion of a problem takes less than [s]; 0 where some configurations of its ends are
+    not known.
+    """
     candidates = incumbent.candidates
     if any(each.sampled for each in candidates) or not all_known(incumbent.problem):
         return 0.0
@@ -165,10 +182,11 @@ def explore_or_find_fastest(
     known: Sequence[Spline] = (),
     beside: tuple[Candidate, SolveResult, Energy] | None = None,
 ) -> None:
-    """Solve candidates by `explore`; if none has a motion in the time that is allowed, take the fastest motion.
+    """Solve candidates by `explore`; if none has a motion in the time that is allowed, take the
+    fastest motion.
 
-    The motion `beside` counts as well. While several candidates are tried in vain, time is left for the search of the
-    fastest motion. Raises DurationTooShort.
+    The motion `beside` counts as well. While several candidates are tried in vain, time is left for
+    the search of the fastest motion. Raises DurationTooShort.
     """
     limited, candidates = incumbent.problem.duration_max is not None, incumbent.candidates
     if limited and len(candidates) > 1 and not families_of(incumbent):
@@ -179,7 +197,9 @@ def explore_or_find_fastest(
             find_fastest(incumbent, known)
         if was_late:
             # what was left open is solved in the rest of the time
-            incumbent.cut_short = any(each.attempt is not None and each.attempt.cut_short for each in candidates)
+            incumbent.cut_short = any(
+                each.attempt is not None and each.attempt.cut_short for each in candidates
+            )
             explore()
     else:
         explore()
@@ -190,7 +210,8 @@ def explore_or_find_fastest(
 
 
 def find_fastest(incumbent: Incumbent, known: Sequence[Spline] = (), improve: bool = True) -> None:
-    """Called when no candidate has a motion within `duration_max`: take the fastest motion if it is in time.
+    """Called when no candidate has a motion within `duration_max`: take the fastest motion if it is
+    in time.
 
     It is slowed to the least duration allowed, and optimised from there if it is to `improve`.
 
@@ -207,7 +228,9 @@ def find_fastest(incumbent: Incumbent, known: Sequence[Spline] = (), improve: bo
         return
     candidate = found.candidate
     # rounding may leave it a little longer than the same motion that was found before
-    spline = incumbent.allowed(lasting(found.spline, max(found.duration, incumbent.problem.duration_min or 0.0)))
+    spline = incumbent.allowed(
+        lasting(found.spline, max(found.duration, incumbent.problem.duration_min or 0.0))
+    )
     if spline is None:
         raise found.too_slow
     candidate.deferred = False

@@ -1,9 +1,11 @@
-"""A lower bound on motions between two poses, of which the start, or both, leave the rotation about an axis free.
+"""A lower bound on motions between two poses, of which the start, or both, leave the rotation about
+an axis free.
 
-The bound of a motion grows with the displacement of its joints and with its gain of potential energy; it has no
-direction. So a motion from a free start has that of its way back under gravity turned round: a motion to a free goal.
-Where both ends are free, the boxes of joint positions of each end are halved until they are small: then the bound of a
-pair of them says something. Pairs with the least bounds are halved further, the end that moves the TCP more first. See
+The bound of a motion grows with the displacement of its joints and with its gain of potential
+energy; it has no direction. So a motion from a free start has that of its way back under gravity
+turned round: a motion to a free goal. Where both ends are free, the boxes of joint positions of
+each end are halved until they are small: then the bound of a pair of them says something. Pairs
+with the least bounds are halved further, the end that moves the TCP more first. See
 `free_goal_bound`.
 """
 
@@ -26,23 +28,27 @@ from joulepath.optimizer.search.free_goal_bound import Family, halved, whole_tur
 from joulepath.optimizer.search.least_displacement import least_displacement
 from joulepath.optimizer.search.lower_bound import LeastBound
 
-# boxes along each inner joint at first, of either end; how often they are halved before they are paired, as long as an
-# end has not more boxes, nor both together more pairs
+# boxes along each inner joint at first, of either end; how often they are halved before they are
+# paired, as long as an end has not more boxes, nor both together more pairs
 ALONG, HALVINGS, MOST_BOXES, MOST_PAIRS = 2, 21, 2000, 50_000
 
 
 def backwards(problem: Problem, start: Target, goal: Target) -> Problem:
-    """The problem of the way back, from `start` to `goal`, under gravity turned round: its motions have the bounds of
-    those there."""
+    """The problem of the way back, from `start` to `goal`, under gravity turned round: its motions
+    have the bounds of those there."""
     arm = replace(problem.arm, gravity=-np.asarray(problem.arm.gravity))
     return replace(problem, arm=arm, start=start, goal=goal, tool_path=None)
 
 
 def bound_between(
-    prepared: PreparedProblem, start: ConeOrientedPose, goal: ConeOrientedPose, deadline: Deadline, enough: float
+    prepared: PreparedProblem,
+    start: ConeOrientedPose,
+    goal: ConeOrientedPose,
+    deadline: Deadline,
+    enough: float,
 ) -> float:
-    """Lower bound [J] on motions from any configuration of `start` to any of `goal`; the search for it ends once it
-    reaches `enough` [J]."""
+    """Lower bound [J] on motions from any configuration of `start` to any of `goal`; the search for
+    it ends once it reaches `enough` [J]."""
     search = _PairSearch(prepared, within_cone(prepared, start), within_cone(prepared, goal))
     tight = prepared.problem.bound == "tight"
     return search.run(TIGHT_ROUNDS if tight else ROUNDS, deadline, enough, 0.0 if tight else NEARLY)
@@ -51,7 +57,9 @@ def bound_between(
 class _PairSearch(BoxSearch[Boxes]):
     """Branch and bound over pairs of boxes: (b, 2, nq), at the start and the goal."""
 
-    def __init__(self, prepared: PreparedProblem, start: ConeOrientedPose, goal: ConeOrientedPose) -> None:
+    def __init__(
+        self, prepared: PreparedProblem, start: ConeOrientedPose, goal: ConeOrientedPose
+    ) -> None:
         problem = prepared.problem
         back = PreparedProblem.of(backwards(problem, problem.start, problem.goal))
         self.limits, self.bound = prepared.arm.active_limits, LeastBound(prepared)
@@ -63,13 +71,16 @@ class _PairSearch(BoxSearch[Boxes]):
         return all(family.settled(each) for family, each in zip(self.families, half, strict=True))
 
     def first(self) -> Boxes:
-        """Pairs that cover every position of the joints at both ends: of the smallest boxes of which there are not too
-        many."""
+        """Pairs that cover every position of the joints at both ends: of the smallest boxes of
+        which there are not too many."""
         nq = len(self.limits.q_min)
         sides = [_held(family, *whole_turns(nq, ALONG)) for family in self.families]
         chosen = sides
         for _ in range(HALVINGS):
-            sides = [_held(family, *halved(family, *side)) for family, side in zip(self.families, sides, strict=True)]
+            sides = [
+                _held(family, *halved(family, *side))
+                for family, side in zip(self.families, sides, strict=True)
+            ]
             counts = [len(centre) for centre, _ in sides]
             if max(counts) > MOST_BOXES:
                 break
@@ -81,7 +92,9 @@ class _PairSearch(BoxSearch[Boxes]):
 
     def halved(self, pairs: Boxes) -> Boxes:
         """Both halves of every pair, split along the side of the box that moves the TCP most."""
-        sizes = np.stack([family.sizes(pairs.half[:, k]) for k, family in enumerate(self.families)], axis=1)
+        sizes = np.stack(
+            [family.sizes(pairs.half[:, k]) for k, family in enumerate(self.families)], axis=1
+        )
         end = sizes.max(axis=2).argmax(axis=1)
         centre, half = np.tile(pairs.centre, (2, 1, 1)), np.tile(pairs.half, (2, 1, 1))
         held, ends = np.ones(len(centre), dtype=bool), np.tile(end, 2)

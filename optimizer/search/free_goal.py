@@ -1,9 +1,10 @@
 """Goals that infinitely many configurations reach: how the best samples are refined.
 
-The configurations of a goal whose orientation is free in part, or that is held on a self-motion, form a manifold. From
-the best solved samples, the goal configuration becomes a decision variable of the nonlinear program, restricted to the
-tangent space of the goal manifold. Inverse kinematics projects the new goal onto the manifold, and the motion is solved
-again with this goal fixed, until the energy no longer decreases.
+The configurations of a goal whose orientation is free in part, or that is held on a self-motion,
+form a manifold. From the best solved samples, the goal configuration becomes a decision variable of
+the nonlinear program, restricted to the tangent space of the goal manifold. Inverse kinematics
+projects the new goal onto the manifold, and the motion is solved again with this goal fixed, until
+the energy no longer decreases.
 """
 
 from __future__ import annotations
@@ -34,11 +35,11 @@ from joulepath.optimizer.trajectories.spline import sample
 
 # rounds of refinement, the trust region of a goal joint in one of them [rad], and the least one
 ROUNDS, RADIUS, LEAST_RADIUS = 8, 0.6, 0.01
-# relative decrease of the energy below which no further round follows, and that a step to a proposal must promise: the
-# motion to it is solved again
+# relative decrease of the energy below which no further round follows, and that a step to a
+# proposal must promise: the motion to it is solved again
 GAIN, PROGRESS = 2e-4, 5e-4
-# relative decrease of the energy that is worth another solve, and share of the promised decrease below which the
-# manifold bends too much within the trust region
+# relative decrease of the energy that is worth another solve, and share of the promised decrease
+# below which the manifold bends too much within the trust region
 LEAST_GAIN, KEPT = 1e-4, 0.1
 # a goal that moves by less is where it should be [rad]
 LEAST_MOVE = 1e-3
@@ -55,10 +56,14 @@ SIDES = 12
 def refine_goals(incumbent: Incumbent) -> list[Candidate]:
     """New candidates, found by refining the goal orientation of the best solved samples.
 
-    One sample per pair of branches is refined, at most MOST_REFINED of them; only candidates of less energy than their
-    sample are returned.
+    One sample per pair of branches is refined, at most MOST_REFINED of them; only candidates of
+    less energy than their sample are returned.
     """
-    solved = [each for each in incumbent.candidates if each.energy is not None and each.goal.tolerance is not None]
+    solved = [
+        each
+        for each in incumbent.candidates
+        if each.energy is not None and each.goal.tolerance is not None
+    ]
     return refine_best(
         solved,
         lambda each: (each.start.label, each.goal.label, each.goal.target),
@@ -67,7 +72,8 @@ def refine_goals(incumbent: Incumbent) -> list[Candidate]:
 
 
 def refine_goal(incumbent: Incumbent, candidate: Candidate, rounds: int = ROUNDS) -> Candidate:
-    """The candidate with its goal moved over the goal set while the energy decreases; itself if it never does.
+    """The candidate with its goal moved over the goal set while the energy decreases; itself if it
+    never does.
 
     The candidate must be solved, and its goal a sample.
     """
@@ -91,9 +97,12 @@ def refine_goal(incumbent: Incumbent, candidate: Candidate, rounds: int = ROUNDS
     return best
 
 
-def _moved(incumbent: Incumbent, candidate: Candidate, radius: float) -> tuple[Candidate | None, float]:
-    """The candidate with its goal moved by at most `radius` [rad] in each joint, solved, None if it has no motion; and
-    the energy [J] that was promised to first order, -inf if the first order has no motion either."""
+def _moved(
+    incumbent: Incumbent, candidate: Candidate, radius: float
+) -> tuple[Candidate | None, float]:
+    """The candidate with its goal moved by at most `radius` [rad] in each joint, solved, None if it
+    has no motion; and the energy [J] that was promised to first order, -inf if the first order has
+    no motion either."""
     guess, promised = _proposal(incumbent, candidate, radius)
     if guess is None:
         return None, -np.inf
@@ -102,7 +111,8 @@ def _moved(incumbent: Incumbent, candidate: Candidate, radius: float) -> tuple[C
     if np.abs(guess.points[-1] - candidate.q_goal).max() < LEAST_MOVE:
         return None, candidate.energy or 0.0
     for share in SHARES:
-        # where the set bends, its configuration next to the proposed one may be outside of a limit that this one is on
+        # where the set bends, its configuration next to the proposed one may be outside of a limit
+        # that this one is on
         asked = candidate.q_goal + share * (guess.points[-1] - candidate.q_goal)
         found = _nearest_goal(incumbent, candidate, asked)
         if found is not None:
@@ -110,9 +120,11 @@ def _moved(incumbent: Incumbent, candidate: Candidate, radius: float) -> tuple[C
     return None, promised
 
 
-def _nearest_goal(incumbent: Incumbent, candidate: Candidate, q: Array) -> tuple[EndConfiguration, Array] | None:
-    """The configuration (nq,) of the candidate's goal that is nearest to q (nq,), with its end; None if none is within
-    the limits.
+def _nearest_goal(
+    incumbent: Incumbent, candidate: Candidate, q: Array
+) -> tuple[EndConfiguration, Array] | None:
+    """The configuration (nq,) of the candidate's goal that is nearest to q (nq,), with its end;
+    None if none is within the limits.
 
     Where two curves of a redundant arm meet, it may be on the other one.
     """
@@ -138,13 +150,19 @@ def _solved(
     solver = solver_of(incumbent, fresh, _interval_of(prepared, q_goal, guess.duration))
     guess.points[-REST_POINTS:] = q_goal
     # the guess is a motion of the free spline's own kind; other methods only take its goal
-    result = incumbent.add_effort(solver.improve(guess) if type(solver) is FreeSpline else solver.solve())
-    return settled(incumbent, fresh, result, REFINED_GOAL if candidate.goal.self_motion is None else REFINED)
+    result = incumbent.add_effort(
+        solver.improve(guess) if type(solver) is FreeSpline else solver.solve()
+    )
+    return settled(
+        incumbent, fresh, result, REFINED_GOAL if candidate.goal.self_motion is None else REFINED
+    )
 
 
-def _proposal(incumbent: Incumbent, candidate: Candidate, radius: float) -> tuple[Guess | None, float]:
-    """The motion of least energy to any goal in the tangent space of the goal set, at most `radius` [rad] away, and its
-    energy [J]; inf without a motion."""
+def _proposal(
+    incumbent: Incumbent, candidate: Candidate, radius: float
+) -> tuple[Guess | None, float]:
+    """The motion of least energy to any goal in the tangent space of the goal set, at most `radius`
+    [rad] away, and its energy [J]; inf without a motion."""
     prepared, spline = incumbent.prepared, candidate.spline
     space = bspline.uniform(COARSE)
     if incumbent.method is FreeSpline and spline.degree == space.degree:
@@ -152,7 +170,9 @@ def _proposal(incumbent: Incumbent, candidate: Candidate, radius: float) -> tupl
     else:
         at = np.linspace(0.0, 1.0, FIT_SAMPLES)
         points = space.fit(sample(spline, at * spline.duration)[0], at)
-    coordinates = Coordinates.joints(candidate.q_start, candidate.q_goal, prepared.problem.arm.active_limits)
+    coordinates = Coordinates.joints(
+        candidate.q_start, candidate.q_goal, prepared.problem.arm.active_limits
+    )
     interval = _interval_of(prepared, candidate.q_goal, spline.duration)
     pose = candidate.goal.tolerance
     if pose is None:
@@ -181,19 +201,26 @@ def _proposal(incumbent: Incumbent, candidate: Candidate, radius: float) -> tupl
 def _interval_of(prepared: PreparedProblem, q_goal: Array, duration: float) -> DurationInterval:
     """The interval of durations that holds `duration` [s], else the nearest."""
     return min(
-        duration_intervals(prepared, q_goal), key=lambda each: max(each.t_min - duration, duration - each.t_max, 0.0)
+        duration_intervals(prepared, q_goal),
+        key=lambda each: max(each.t_min - duration, duration - each.t_max, 0.0),
     )
 
 
 def held_pose(prepared: PreparedProblem, q_goal: Array, radius: float) -> GoalConstraints:
-    """To first order, how the goal (nq,) may change while the TCP keeps its pose: along the self-motion."""
-    return GoalConstraints(tcp_jacobian(prepared.problem.arm, q_goal), np.zeros(6), np.zeros(6), radius)
+    """To first order, how the goal (nq,) may change while the TCP keeps its pose: along the
+    self-motion.
+    """
+    return GoalConstraints(
+        tcp_jacobian(prepared.problem.arm, q_goal), np.zeros(6), np.zeros(6), radius
+    )
 
 
 def goal_constraints(
     prepared: PreparedProblem, pose: ConeOrientedPose, q_goal: Array, radius: float
 ) -> GoalConstraints:
-    """To first order, how the goal (nq,) may change: the TCP keeps its place, and its axis stays within the cone."""
+    """To first order, how the goal (nq,) may change: the TCP keeps its place, and its axis stays
+    within the cone.
+    """
     arm = prepared.problem.arm
     R, jacobian = tcp_pose(arm, q_goal)[:3, :3], tcp_jacobian(arm, q_goal)
     rows, lower, upper = [jacobian[:3]], [np.zeros(3)], [np.zeros(3)]
@@ -212,4 +239,6 @@ def goal_constraints(
         rows.append(normals @ jacobian[3:])
         lower.append(upper_bound if pose.half_angle == 0 else np.full(SIDES, -1e30))
         upper.append(upper_bound)
-    return GoalConstraints(np.concatenate(rows), np.concatenate(lower), np.concatenate(upper), radius)
+    return GoalConstraints(
+        np.concatenate(rows), np.concatenate(lower), np.concatenate(upper), radius
+    )

@@ -1,12 +1,15 @@
-"""A lower bound on the motions to a goal whose orientation is free in part: to all of its configurations at once.
+"""A lower bound on the motions to a goal whose orientation is free in part: to all of its
+configurations at once.
 
-Branch and bound over boxes of joint positions. A box holds no configuration of the goal if its inner joints cannot
-bring the wrist near enough to the goal, or not far enough from it (`kinematics.wrist_geometry`, which tells while the
-wrist may still be anywhere). `kinematics.pose_boxes` narrows the others, the more the smaller they are, so that they
-shrink onto the goal's configurations. For every box, the joint displacement is at least that to the box, and the
-potential energy at least that in its middle less what it can fall. `lower_bounds` of the least displacement and the
-least gain of potential energy bounds every motion into the box, since it falls with neither. The least value over all
-boxes bounds the family; it grows towards the least bound of any pair.
+Branch and bound over boxes of joint positions. A box holds no configuration of the goal if its
+inner joints cannot bring the wrist near enough to the goal, or not far enough from it
+(`kinematics.wrist_geometry`, which tells while the wrist may still be anywhere).
+`kinematics.pose_boxes` narrows the others, the more the smaller they are, so that they shrink onto
+the goal's configurations. For every box, the joint displacement is at least that to the box, and
+the potential energy at least that in its middle less what it can fall. `lower_bounds` of the least
+displacement and the least gain of potential energy bounds every motion into the box, since it falls
+with neither. The least value over all boxes bounds the family; it grows towards the least bound of
+any pair.
 """
 
 from __future__ import annotations
@@ -23,7 +26,13 @@ from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.deadline import NEVER, Deadline
 from joulepath.optimizer.kinematics.pose_boxes import PoseBoxes
 from joulepath.optimizer.kinematics.wrist_boxes import WristBoxes
-from joulepath.optimizer.kinematics.wrist_geometry import OUTER, Shell, WristBody, WristGeometry, potential_rates
+from joulepath.optimizer.kinematics.wrist_geometry import (
+    OUTER,
+    Shell,
+    WristBody,
+    WristGeometry,
+    potential_rates,
+)
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.targets import AnyOf
@@ -34,24 +43,30 @@ from joulepath.optimizer.search.least_displacement import least_displacement
 from joulepath.optimizer.search.lower_bound import LeastBound
 from joulepath.optimizer.search.self_motion_bound import EndCurves
 
-# boxes along each inner joint at first, but for so many starts that there would be more than MOST_FIRST in all
+# boxes along each inner joint at first, but for so many starts that there would be more than
+# MOST_FIRST in all
 FIRST_BOXES, MOST_FIRST = (4, 2, 1), 4096
 # a box is not split once its widest side is below this [rad]
 SMALLEST = 0.002
-# where a side is chosen to split: what a radian of any joint counts as [m] beside the path that it moves the TCP by,
-# and the half side [rad] from which on a box is as wide as can be, so that inner joints come first
+# where a side is chosen to split: what a radian of any joint counts as [m] beside the path that it
+# moves the TCP by, and the half side [rad] from which on a box is as wide as can be, so that inner
+# joints come first
 RADIAN, WIDE = 0.3, 0.3
 # sum of half sides [rad] below which narrowing in all joints pays
 SMALL = 2.0
 
 
 def family_bound_of(
-    prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: Deadline, enough: float = np.inf
+    prepared: PreparedProblem,
+    candidates: Sequence[Candidate],
+    deadline: Deadline,
+    enough: float = np.inf,
 ) -> float:
-    """Bound [J] on the motions to those goals whose orientation is free in part; inf if there are none.
+    """Bound [J] on the motions to those goals whose orientation is free in part; inf if there are
+    none.
 
-    The search ends once the bound reaches `enough` [J]. The bound covers the whole of a tool's cone; samples leave out
-    its rim, at which no motion could end.
+    The search ends once the bound reaches `enough` [J]. The bound covers the whole of a tool's
+    cone; samples leave out its rim, at which no motion could end.
     """
     goal = prepared.problem.goal
     targets = goal.targets if isinstance(goal, AnyOf) else (goal,)
@@ -68,7 +83,8 @@ def family_bound_of(
     tight = prepared.problem.bound == "tight"
     rounds, nearly = (TIGHT_ROUNDS if tight else ROUNDS) // len(poses), 0.0 if tight else NEARLY
     return min(
-        family_bound(prepared, pose, starts, rounds, deadline, half, enough, curves.given, nearly) for pose in poses
+        family_bound(prepared, pose, starts, rounds, deadline, half, enough, curves.given, nearly)
+        for pose in poses
     )
 
 
@@ -83,14 +99,17 @@ def family_bound(
     given: bool = False,
     nearly: float = 0.0,
 ) -> float:
-    """Lower bound [J] on the objective of motions from any of `starts` (s, nq) to any configuration of `pose`.
+    """Lower bound [J] on the objective of motions from any of `starts` (s, nq) to any configuration
+    of `pose`.
 
-    Starts that are `given` stand as they are, others with any full turn that the limits allow.
-    With `half` (s, nq) [rad] the starts are boxes, `starts` their middles and `half` their half sides. Fewer rounds, or
-    a deadline, give a weaker bound; the search ends once it reaches `enough` [J], after FEW rounds once it is within
-    the share `nearly` of that.
+    Starts that are `given` stand as they are, others with any full turn that the limits allow. With
+    `half` (s, nq) [rad] the starts are boxes, `starts` their middles and `half` their half sides.
+    Fewer rounds, or a deadline, give a weaker bound; the search ends once it reaches `enough` [J],
+    after FEW rounds once it is within the share `nearly` of that.
     """
-    return _BoxSearch(Family(prepared, pose, given), starts, half).run(rounds, deadline, enough, nearly)
+    return _BoxSearch(Family(prepared, pose, given), starts, half).run(
+        rounds, deadline, enough, nearly
+    )
 
 
 def _greatest_potentials(prepared: PreparedProblem, centre: Array, half: Array | None) -> Array:
@@ -102,8 +121,8 @@ def _greatest_potentials(prepared: PreparedProblem, centre: Array, half: Array |
 
 
 def whole_turns(nq: int, along: int) -> tuple[Array, Array]:
-    """Middles and half sides (b, nq) [rad] of boxes that cover one turn of every joint, so many along each inner
-    one."""
+    """Middles and half sides (b, nq) [rad] of boxes that cover one turn of every joint, so many
+    along each inner one."""
     inner, side = max(nq - OUTER, 0), np.pi / along
     one_side = -np.pi + side * (2 * np.arange(along) + 1)
     # both ways of bending the wrist
@@ -135,17 +154,23 @@ class _BoxSearch(BoxSearch[_Boxes]):
         return self.family.settled(half)
 
     def first(self) -> _Boxes:
-        """Boxes that cover every position of the joints, for every start: the inner joints' range in parts."""
+        """Boxes that cover every position of the joints, for every start: the inner joints' range
+        in parts.
+        """
         nq, count = self.starts.shape[1], len(self.starts)
         inner = max(nq - OUTER, 0)
-        along = next((n for n in FIRST_BOXES if 2 * n**inner * count <= MOST_FIRST), FIRST_BOXES[-1])
+        along = next(
+            (n for n in FIRST_BOXES if 2 * n**inner * count <= MOST_FIRST), FIRST_BOXES[-1]
+        )
         centre, half = whole_turns(nq, along)
         start = np.repeat(np.arange(count), len(centre))
         return self.bounded(start, np.tile(centre, (count, 1)), np.tile(half, (count, 1)))
 
     def halved(self, boxes: _Boxes) -> _Boxes:
         """Both halves of every box, with their bounds."""
-        halves = self.bounded(np.tile(boxes.start, 2), *halved(self.family, boxes.centre, boxes.half))
+        halves = self.bounded(
+            np.tile(boxes.start, 2), *halved(self.family, boxes.centre, boxes.half)
+        )
         # the bound of a part is at least that of the whole
         value = np.maximum(halves.value, np.concatenate([boxes.value, boxes.value]))
         return _Boxes(halves.centre, halves.half, value, halves.start)
@@ -154,14 +179,18 @@ class _BoxSearch(BoxSearch[_Boxes]):
         """The boxes, narrowed, with their bounds."""
         centre, half, held = self.family.narrowed(centre, half)
         value = np.full(len(centre), np.inf)
-        starts, start_half, potentials = (each[start[held]] for each in (self.starts, self.start_half, self.potentials))
+        starts, start_half, potentials = (
+            each[start[held]] for each in (self.starts, self.start_half, self.potentials)
+        )
         value[held] = self.family.bounds(starts, start_half, potentials, centre[held], half[held])
         return _Boxes(centre, half, value, start)
 
 
 @dataclass(frozen=True)
 class Family:
-    """The configurations that reach a pose with any orientation that it allows. `given`: see `EndCurves`."""
+    """The configurations that reach a pose with any orientation that it allows. `given`: see
+    `EndCurves`.
+    """
 
     prepared: PreparedProblem
     pose: ConeOrientedPose
@@ -193,11 +222,14 @@ class Family:
 
     @cached_property
     def weights(self) -> Array:
-        """Path of the TCP [m/rad] per joint (nq,), nearly; 0 for a joint that the pose leaves free."""
+        """Path of the TCP [m/rad] per joint (nq,), nearly; 0 for a joint that the pose leaves
+        free."""
         return np.where(self._boxes.free, 0.0, self._boxes.levers + RADIAN)
 
     def sizes(self, half: Array) -> Array:
-        """How much the sides of boxes, by their halves (b, nq) [rad], move the TCP (b, nq) [m], nearly."""
+        """How much the sides of boxes, by their halves (b, nq) [rad], move the TCP (b, nq) [m],
+        nearly.
+        """
         return np.minimum(half, WIDE) * self.weights
 
     def settled(self, half: Array) -> bool:
@@ -205,7 +237,9 @@ class Family:
         return bool(half[~self._boxes.free].max(initial=0.0) < SMALLEST)
 
     def narrowed(self, centre: Array, half: Array) -> tuple[Array, Array, Mask]:
-        """Boxes (b, nq) that hold what of the given ones reaches the pose, and which of them (b,) may hold anything."""
+        """Boxes (b, nq) that hold what of the given ones reaches the pose, and which of them (b,)
+        may hold anything.
+        """
         held = np.ones(len(centre), dtype=bool)
         if self._geometry is not None:
             inner = self._geometry.inner
@@ -217,25 +251,40 @@ class Family:
         centre, half = centre.copy(), half.copy()
         if held.any() and self._wrist is not None:
             centre[held], half[held], held[held] = self._wrist.narrowed(centre[held], half[held])
-        small = np.flatnonzero(held & (half.sum(axis=1) - self._boxes.free[-1] * half[:, -1] < SMALL))
+        small = np.flatnonzero(
+            held & (half.sum(axis=1) - self._boxes.free[-1] * half[:, -1] < SMALL)
+        )
         if len(small):
-            centre[small], half[small], held[small] = self._boxes.narrowed(centre[small], half[small])
+            centre[small], half[small], held[small] = self._boxes.narrowed(
+                centre[small], half[small]
+            )
         return centre, half, held
 
-    def bounds(self, starts: Array, start_halves: Array, potentials: Array, centres: Array, halves: Array) -> Array:
-        """Bounds (b,) [J] on motions from boxes around starts (b, nq), of potential energy at most (b,) [J], into boxes
-        (b, nq)."""
+    def bounds(
+        self, starts: Array, start_halves: Array, potentials: Array, centres: Array, halves: Array
+    ) -> Array:
+        """Bounds (b,) [J] on motions from boxes around starts (b, nq), of potential energy at most
+        (b,) [J], into boxes (b, nq)."""
         limits = self.prepared.arm.active_limits
-        displacement, possible = least_displacement(limits, starts, start_halves, centres, halves, self.given)
-        return np.where(possible, self._bound.of(displacement, self.lowest(centres, halves) - potentials), np.inf)
+        displacement, possible = least_displacement(
+            limits, starts, start_halves, centres, halves, self.given
+        )
+        return np.where(
+            possible,
+            self._bound.of(displacement, self.lowest(centres, halves) - potentials),
+            np.inf,
+        )
 
     def lowest(self, centres: Array, halves: Array) -> Array:
-        """Least potential energy (b,) [J] of configurations of the pose in boxes (b, nq), or less."""
-        return np.maximum(self._boxes.least_potential(centres, halves), self._hanging(centres, halves))
+        """Least potential energy (b,) [J] of configurations of the pose in boxes (b, nq), or
+        less."""
+        return np.maximum(
+            self._boxes.least_potential(centres, halves), self._hanging(centres, halves)
+        )
 
     def _hanging(self, centres: Array, halves: Array) -> Array:
-        """Bound (b,) [J] on the potential energy in boxes, whatever the wrist does: it hangs from the inner joints, and
-        from the goal."""
+        """Bound (b,) [J] on the potential energy in boxes, whatever the wrist does: it hangs from
+        the inner joints, and from the goal."""
         geometry = self._geometry
         if geometry is None:
             return np.full(len(centres), -np.inf)
@@ -250,7 +299,9 @@ class Family:
 
 
 def halved(family: Family, centre: Array, half: Array) -> tuple[Array, Array]:
-    """Both halves (2 b, nq) of boxes (b, nq), split along the side that moves the TCP most: the lower ones first."""
+    """Both halves (2 b, nq) of boxes (b, nq), split along the side that moves the TCP most: the
+    lower ones first.
+    """
     widest, rows = family.sizes(half).argmax(axis=1), np.arange(len(half))
     step = np.zeros_like(half)
     step[rows, widest] = half[rows, widest] / 2

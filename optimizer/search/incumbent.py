@@ -1,4 +1,6 @@
-"""The incumbent of a search: the best motion found so far, among the candidates, with the effort spent on them."""
+"""The incumbent of a search: the best motion found so far, among the candidates, with the effort
+spent on them.
+"""
 
 from __future__ import annotations
 
@@ -29,11 +31,12 @@ SLACK = 1e-6
 class Incumbent:
     """State of one search, shared by all of its stages.
 
-    `candidates` are all start and goal pairs, `iterations` and `solves` the effort over all attempts. `cut_short` says
-    that the deadline ended a part of the search although there is a motion, or that this was not optimised: there might
-    be a better one.
-    `end` is the instant at which the answer is due, `longest` [s] the longest duration that the answer is known to
-    have, perhaps. `tell` gets what is found; `proven` [J] is what no motion goes below, None if that is not known yet.
+    `candidates` are all start and goal pairs, `iterations` and `solves` the effort over all
+    attempts. `cut_short` says that the deadline ended a part of the search although there is a
+    motion, or that this was not optimised: there might be a better one. `end` is the instant at
+    which the answer is due, `longest` [s] the longest duration that the answer is known to have,
+    perhaps. `tell` gets what is found; `proven` [J] is what no motion goes below, None if that is
+    not known yet.
     """
 
     prepared: PreparedProblem
@@ -48,7 +51,9 @@ class Incumbent:
 
     @property
     def deadline(self) -> Deadline:
-        """The deadline of the search: `end`, less the time to certify and report a motion like those known so far."""
+        """The deadline of the search: `end`, less the time to certify and report a motion like
+        those known so far.
+        """
         return self.end.earlier_by(reserve(self.problem, self.longest, len(self.candidates)))
 
     @property
@@ -89,8 +94,9 @@ class Incumbent:
     ) -> None:
         """Take a result as the candidate's own if the candidate has none or one of more energy.
 
-        `moved` is the candidate with the ends of the motion, if these have moved. A candidate of which the certificate
-        refused a motion takes no further result, unless that is `certified` already.
+        `moved` is the candidate with the ends of the motion, if these have moved. A candidate of
+        which the certificate refused a motion takes no further result, unless that is `certified`
+        already.
         """
         objective, closed = energy.of(self.problem.objective), candidate.refused and not certified
         if not closed and (candidate.energy is None or objective < candidate.energy):
@@ -100,7 +106,8 @@ class Incumbent:
             self.tell_best()
 
     def reject(self, candidate: Candidate) -> None:
-        """Drop a motion that the certificate did not confirm: the candidate has the one before it again.
+        """Drop a motion that the certificate did not confirm: the candidate has the one before it
+        again.
 
         Candidates that its energy pruned are open again.
         """
@@ -110,12 +117,15 @@ class Incumbent:
                 other.settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
 
     def certified(self, candidate: Candidate, spline: Spline, energy: Energy) -> Certificate:
-        """The certificate of a candidate's motion, checked against the targets of this candidate."""
+        """The certificate of a candidate's motion, checked against the targets of this
+        candidate."""
         asked = narrowed(self.problem, candidate.start.target, candidate.goal.target)
         return certify(asked, spline, candidate.q_start, candidate.q_goal, energy)
 
     def confirmed_energy(self, candidate: Candidate, spline: Spline) -> Energy | None:
-        """The energy of a motion of a candidate; None if its certificate does not confirm it before the deadline."""
+        """The energy of a motion of a candidate; None if its certificate does not confirm it before
+        the deadline.
+        """
         try:
             with watch(self.deadline):
                 energy = self.prepared.energy(spline)
@@ -152,12 +162,18 @@ class Incumbent:
         return self.problem.duration_min or LEAST_DURATION, self.problem.duration_max or np.inf
 
     def allows(self, duration: float) -> bool:
-        """Whether the problem allows a duration [s]; a baseline between equal ends has the duration 0."""
+        """Whether the problem allows a duration [s]; a baseline between equal ends has the duration
+        0.
+        """
         least, most = self._durations
         return bool(least * (1 - SLACK) <= duration <= most * (1 + SLACK))
 
     def allowed(self, spline: Spline) -> Spline | None:
-        """The motion, with a duration that rounding takes out of bounds brought back; None if it is not allowed."""
+        """The motion, with a duration that rounding takes out of bounds brought back; None if it is
+        not allowed.
+        """
         return (
-            lasting(spline, float(np.clip(spline.duration, *self._durations))) if self.allows(spline.duration) else None
+            lasting(spline, float(np.clip(spline.duration, *self._durations)))
+            if self.allows(spline.duration)
+            else None
         )

@@ -1,4 +1,6 @@
-"""How far joints must move between boxes of joint positions, with what full turns the position limits leave."""
+"""How far joints must move between boxes of joint positions, with what full turns the position
+limits leave.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +15,15 @@ ROUNDING = 1e-9
 def least_displacement(
     limits: Limits, start: Array, start_half: Array, goal: Array, goal_half: Array, given: bool
 ) -> tuple[Array, Mask]:
-    """The least displacement (n, nq) [rad] of each joint from boxes around `start` into boxes around `goal` (n, nq),
-    and which (n,) pairs of boxes have any within the limits.
+    """The least displacement (n, nq) [rad] of each joint from boxes around `start` into boxes
+    around `goal` (n, nq), and which (n,) pairs of boxes have any within the limits.
 
-    A box counts with every full turn of a joint that brings a part of it within the limits. Starts that are `given`
-    stand as they are.
+    A box counts with every full turn of a joint that brings a part of it within the limits. Starts
+    that are `given` stand as they are.
     """
-    starts = [(start, np.ones(start.shape, dtype=bool))] if given else turned(start, start_half, limits)
+    starts = (
+        [(start, np.ones(start.shape, dtype=bool))] if given else turned(start, start_half, limits)
+    )
     least = np.full(np.broadcast_shapes(start.shape, goal.shape), np.inf)
     half = start_half + goal_half
     for to, reached in turned(goal, goal_half, limits):
@@ -31,7 +35,9 @@ def least_displacement(
 
 
 def turned(q: Array, half: Array, limits: Limits) -> list[tuple[Array, Mask]]:
-    """Boxes (n, nq) with every full turn that may bring some of them within limits, and which parts (n, nq) it does."""
+    """Boxes (n, nq) with every full turn that may bring some of them within limits, and which parts
+    (n, nq) it does.
+    """
     q_min, q_max = limits.q_min - ROUNDING, limits.q_max + ROUNDING
     least = np.ceil((q_min - half - q) / (2 * np.pi))
     most = np.floor((q_max + half - q) / (2 * np.pi))

@@ -1,11 +1,14 @@
-"""Least mechanical work at a fixed duration: candidates are compared by rough motions, and few are solved.
+"""Least mechanical work at a fixed duration: candidates are compared by rough motions, and few are
+solved.
 
-The bound on mechanical work rules out little, and a motion has many local optima. Rough motions take a fifth of the
-time of solves (`many_motions`): those of tens of candidates, then of the best on more control points and from random
-guesses. They may collide, and exceed a limit by a little. So the motion of least work among those that do not collide
-is solved, with sharp corners. Then every candidate is solved whose rough motion promises less than what is found.
+The bound on mechanical work rules out little, and a motion has many local optima. Rough motions
+take a fifth of the time of solves (`many_motions`): those of tens of candidates, then of the best
+on more control points and from random guesses. They may collide, and exceed a limit by a little. So
+the motion of least work among those that do not collide is solved, with sharp corners. Then every
+candidate is solved whose rough motion promises less than what is found.
 
-Where no motion is found here, all candidates are solved as with other objectives: by `outer_turns` and `sharpening`.
+Where no motion is found here, all candidates are solved as with other objectives: by `outer_turns`
+and `sharpening`.
 """
 
 from __future__ import annotations
@@ -30,40 +33,53 @@ from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.outer_turns import FAMILIES, MEMBERS, NEAR, families_of, leave
 from joulepath.optimizer.search.rough_work import COARSE, Rough, RoughWork, best_of_each
-from joulepath.optimizer.search.sharpening import DENSE, LAST_PROGRESS, LEAST_FREEDOM, MIDDLE, PROGRESS, follow_in_time
+from joulepath.optimizer.search.sharpening import (
+    DENSE,
+    LAST_PROGRESS,
+    LEAST_FREEDOM,
+    MIDDLE,
+    PROGRESS,
+    follow_in_time,
+)
 
 # time [s] that the search needs to be sure of a motion
 LEAST_TIME = 3.0
 # candidates whose rough motions are found at a time, in order of their lower bounds
 AT_ONCE = 12
-# relative decreases that a further step must promise: on few control points, from random guesses, and on more control
-# points
+# relative decreases that a further step must promise: on few control points, from random guesses,
+# and on more control points
 COARSE_PROGRESS, RESTART_PROGRESS, MIDDLE_PROGRESS = 2e-2, 2e-3, 2e-3
 # motions are given up if they are expected to need more than this ratio of the least of all
 BEHIND = 1.4
-# those that need at most this ratio of the least work on few control points are solved on more of them, and so many
+# those that need at most this ratio of the least work on few control points are solved on more of
+# them, and so many
 CONTENDING, CONTENDERS = 1.35, 8
-# motions from random guesses that need more than this ratio of the least work on few control points are dropped. Half
-# of them do: more control points take longest from there, and hardly ever make the best motion of one
+# motions from random guesses that need more than this ratio of the least work on few control points
+# are dropped. Half of them do: more control points take longest from there, and hardly ever make
+# the best motion of one
 HOPELESS = 1.6
-# a batch of guesses has helped if a motion from one needs at most this ratio of the least work before
+# a batch of guesses has helped if a motion from one needs at most this ratio of the least work
+# before
 HELPFUL = 0.99
 # motions without collisions that need at most this ratio of the least are followed, and so many
 NEAR_BEST, RIVALS = 1.05, 6
 # width of their corners [W] at first
 FIRST_WIDTH = 0.2
-# on as many control points as the last motion, and with sharp corners, a motion needs about this ratio of its work
+# on as many control points as the last motion, and with sharp corners, a motion needs about this
+# ratio of its work
 PROMISE = 0.97
-# a motion that collides must be below this multiple of the best energy without clearance constraints, and below this
-# one before its corners are sharpened
+# a motion that collides must be below this multiple of the best energy without clearance
+# constraints, and below this one before its corners are sharpened
 WORTH, WORTH_SHARPENING = 1.05, 1.04
 
 
 def explore_least_work(incumbent: Incumbent, explore: Callable[[], object]) -> bool:
-    """Find motions as the module says; `explore` solves the candidates that are left open. False if none was found.
+    """Find motions as the module says; `explore` solves the candidates that are left open. False if
+    none was found.
 
-    Does nothing with another objective, a free duration, constraints along the path, or a tight bound, for which every
-    candidate is solved; nor with little time, as the first motion comes late.
+    Does nothing with another objective, a free duration, constraints along the path, or a tight
+    bound, for which every candidate is solved; nor with little time, as the first motion comes
+    late.
     """
     asked = incumbent.problem
     if incumbent.deadline.left < LEAST_TIME or not incumbent.prepared.kernel.compiled:
@@ -71,9 +87,13 @@ def explore_least_work(incumbent: Incumbent, explore: Callable[[], object]) -> b
     families = families_of(incumbent)
     fixed = asked.duration_max is not None and asked.duration_min == asked.duration_max
     free = incumbent.prepared.path is None and not asked.passes and asked.tool_path is None
-    if not (families and fixed and free) or any(each.attempt for family in families for each in family):
+    if not (families and fixed and free) or any(
+        each.attempt for family in families for each in family
+    ):
         return False
-    work = _LeastWork(incumbent, families, RoughWork(incumbent.prepared, float(asked.duration_max or 0.0)))
+    work = _LeastWork(
+        incumbent, families, RoughWork(incumbent.prepared, float(asked.duration_max or 0.0))
+    )
     waiting = [each for family in families for each in family[1:]]
     try:
         with watch(incumbent.deadline):
@@ -95,8 +115,9 @@ def explore_least_work(incumbent: Incumbent, explore: Callable[[], object]) -> b
 
 @dataclass(frozen=True)
 class _Effort:
-    """`restarts`: random guesses of the best candidate at most, in batches of `at_once`; one that does not help is the
-    last. `sharpened`: how many of all motions get sharp corners, if they need at most `near` times the least before."""
+    """`restarts`: random guesses of the best candidate at most, in batches of `at_once`; one that
+    does not help is the last. `sharpened`: how many of all motions get sharp corners, if they need
+    at most `near` times the least before."""
 
     restarts: int
     at_once: int
@@ -104,16 +125,18 @@ class _Effort:
     near: float
 
 
-# The motion of least work often is a wide swing. Some percent of the guesses lead to it, and on few control points it
-# does not stand out. Rough motions within some percent do not tell which needs the least once its corners are sharp.
-# Where there are several candidates, finding the best of them has taken time already
+# The motion of least work often is a wide swing. Some percent of the guesses lead to it, and on few
+# control points it does not stand out. Rough motions within some percent do not tell which needs
+# the least once its corners are sharp. Where there are several candidates, finding the best of them
+# has taken time already
 SOLE, SEVERAL = _Effort(32, 32, 4, 1.03), _Effort(32, 8, 1, 1.0)
 
 
 @dataclass(eq=False)
 class _LeastWork:
-    """The search. `rough` are the motions of least work that are known of its candidates by their ids, `tried` the
-    candidates that were solved, `behind` those that turned out to need more than another one on the way."""
+    """The search. `rough` are the motions of least work that are known of its candidates by their
+    ids, `tried` the candidates that were solved, `behind` those that turned out to need more than
+    another one on the way."""
 
     incumbent: Incumbent
     families: list[list[Candidate]]
@@ -128,18 +151,29 @@ class _LeastWork:
         if not self.rough:
             return
         least = min(each.work for each in self.rough.values())
-        contenders = [each for each in self._known() if each.work <= CONTENDING * least][:CONTENDERS]
-        contenders = self._note(self.work.solved(contenders, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND))
+        contenders = [each for each in self._known() if each.work <= CONTENDING * least][
+            :CONTENDERS
+        ]
+        contenders = self._note(
+            self.work.solved(contenders, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND)
+        )
         effort = SOLE if len(contenders) == 1 else SEVERAL
         again = self._restarted(contenders[0], effort)
         self._follow(self._clear(sorted([*contenders, *again], key=lambda each: each.work)), effort)
         self._solve_promising()
 
     def _restarted(self, best: Rough, effort: _Effort) -> list[Rough]:
-        """Motions from random guesses of the best candidate, batch by batch as long as they help."""
-        guesses, found, least = self.work.random(best.candidate, effort.restarts), list[Rough](), best.work
+        """Motions from random guesses of the best candidate, batch by batch as long as they
+        help."""
+        guesses, found, least = (
+            self.work.random(best.candidate, effort.restarts),
+            list[Rough](),
+            best.work,
+        )
         for k in range(0, len(guesses), effort.at_once):
-            coarse = self.work.solved(guesses[k : k + effort.at_once], COARSE, WIDTH, RESTART_PROGRESS, BEHIND)
+            coarse = self.work.solved(
+                guesses[k : k + effort.at_once], COARSE, WIDTH, RESTART_PROGRESS, BEHIND
+            )
             worth = [each for each in coarse if each.work <= HOPELESS * least]
             middle = self._note(self.work.solved(worth, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND))
             found += middle
@@ -154,7 +188,9 @@ class _LeastWork:
         for k in range(0, len(firsts), AT_ONCE):
             self._find(firsts[k : k + AT_ONCE])
         works = [self._work_of(family[0]) for family in self.families]
-        near = [k for k in np.argsort(works, kind="stable").tolist() if works[k] <= NEAR * min(works)]
+        near = [
+            k for k in np.argsort(works, kind="stable").tolist() if works[k] <= NEAR * min(works)
+        ]
         self._find([each for k in near[:FAMILIES] for each in self.families[k][1:MEMBERS]])
 
     def _find(self, candidates: Sequence[Candidate]) -> None:
@@ -179,7 +215,9 @@ class _LeastWork:
         return sorted(self.rough.values(), key=lambda each: each.work)
 
     def _clear(self, found: list[Rough]) -> list[Rough]:
-        """Of motions in order of work, the first that does not collide, and others near it that do not, either."""
+        """Of motions in order of work, the first that does not collide, and others near it that do
+        not, either.
+        """
         clear: list[Rough] = []
         for each in found:
             if clear and (each.work > NEAR_BEST * clear[0].work or len(clear) == RIVALS):
@@ -189,9 +227,17 @@ class _LeastWork:
         return clear
 
     def _is_clear(self, rough: Rough) -> bool:
-        """Whether corners may be sharpened from a motion: it does not collide, and its time is not too short."""
+        """Whether corners may be sharpened from a motion: it does not collide, and its time is not
+        too short.
+        """
         roomy = self.work.duration >= LEAST_FREEDOM * rough.candidate.shortest
-        return roomy and self.incumbent.prepared.surroundings.worst_violation(rough.spline(self.work.duration)) is None
+        return (
+            roomy
+            and self.incumbent.prepared.surroundings.worst_violation(
+                rough.spline(self.work.duration)
+            )
+            is None
+        )
 
     def _follow(self, clear: list[Rough], effort: _Effort) -> None:
         """Follow motions to sharp corners, the best first."""
@@ -207,7 +253,9 @@ class _LeastWork:
         self.behind -= self.tried
 
     def _sharpen(self, rough: Rough) -> bool:
-        """Follow a motion to sharp corners, unless it is left behind on the way; whether one was found."""
+        """Follow a motion to sharp corners, unless it is left behind on the way; whether one was
+        found.
+        """
         result = self._sharpened(rough)
         if result.spline is not None:
             self.tried.add(id(rough.candidate))
@@ -216,12 +264,16 @@ class _LeastWork:
         return result.spline is not None
 
     def _sharpened(self, rough: Rough) -> SolveResult:
-        """A candidate's solve with sharp corners, from a rough motion; by the SQP, if it collides or fails."""
+        """A candidate's solve with sharp corners, from a rough motion; by the SQP, if it collides
+        or fails.
+        """
         incumbent, found = self.incumbent, list[Array]()
 
         def sharpen() -> SolveResult:
             points, first = rough.on(DENSE), FIRST_WIDTH
-            result, points = sharp_motion(incumbent.prepared, points, self.work.duration, first, self._least_known)
+            result, points = sharp_motion(
+                incumbent.prepared, points, self.work.duration, first, self._least_known
+            )
             found.append(points)
             return result
 
@@ -229,12 +281,16 @@ class _LeastWork:
         if result.spline is None and result.status is not SolveStatus.PRUNED and found:
             return self._solved(rough, found[0], SHARPER_WIDTHS[-1], LAST_PROGRESS)
         if result.spline is not None:
-            incumbent.accept_if_better(rough.candidate, result, incumbent.prepared.energy(result.spline))
+            incumbent.accept_if_better(
+                rough.candidate, result, incumbent.prepared.energy(result.spline)
+            )
             incumbent.tell_tried(rough.candidate)
         return result
 
     def _solve_promising(self) -> None:
-        """Solve the candidates whose rough motions promise less than what is known, the most promising first."""
+        """Solve the candidates whose rough motions promise less than what is known, the most
+        promising first.
+        """
         for rough in self._known():
             candidate, known = rough.candidate, self._least_known
             if self._is_settled(candidate) or PROMISE * rough.work >= known:
@@ -244,7 +300,9 @@ class _LeastWork:
             if not self._is_settled(candidate):
                 self.tried.add(id(candidate))
                 result = self._solved(rough, rough.on(MIDDLE), WIDTH, PROGRESS, above(known, WORTH))
-                if result.spline is not None and (candidate.energy or np.inf) < above(known, WORTH_SHARPENING):
+                if result.spline is not None and (candidate.energy or np.inf) < above(
+                    known, WORTH_SHARPENING
+                ):
                     follow_in_time(self.incumbent, candidate, known)
 
     def _is_settled(self, candidate: Candidate) -> bool:
@@ -257,17 +315,24 @@ class _LeastWork:
         best = self.incumbent.best()
         return np.inf if best is None or best.energy is None else best.energy
 
-    def _solved(self, rough: Rough, points: Array, width: float, progress: float, below: float = np.inf) -> SolveResult:
-        """A candidate's solve from control points (n, nq) [rad], which it keeps; from nothing if that fails while no
-        motion is known, or time is so short that knots must be at the switches of jerk."""
+    def _solved(
+        self, rough: Rough, points: Array, width: float, progress: float, below: float = np.inf
+    ) -> SolveResult:
+        """A candidate's solve from control points (n, nq) [rad], which it keeps; from nothing if
+        that fails while no motion is known, or time is so short that knots must be at the switches
+        of jerk."""
         incumbent, candidate = self.incumbent, rough.candidate
         interval = duration_intervals(incumbent.prepared, candidate.q_goal, width=width)[0]
         solver = solver_of(incumbent, candidate, interval)
         assert isinstance(solver, FreeSpline)
         solver.best_known = below
-        result = SolveResult(SolveStatus.FAILED, "time is too short for evenly spaced control points")
+        result = SolveResult(
+            SolveStatus.FAILED, "time is too short for evenly spaced control points"
+        )
         if self.work.duration >= TIGHT * candidate.shortest or len(points) == DENSE:
-            result = in_time(incumbent, partial(solver.solve_points, points, self.work.duration, progress))
+            result = in_time(
+                incumbent, partial(solver.solve_points, points, self.work.duration, progress)
+            )
         if result.status is SolveStatus.FAILED and len(points) != DENSE:
             result = in_time(incumbent, solver.solve)
         incumbent.cut_short |= result.cut_short
@@ -281,7 +346,8 @@ class _LeastWork:
         return result
 
     def not_promising(self) -> list[Candidate]:
-        """The candidates that are left whose rough motions do not promise less than what is known."""
+        """The candidates that are left whose rough motions do not promise less than what is
+        known."""
         known = self._least_known
         return [
             each.candidate

@@ -1,45 +1,60 @@
-"""Lower bound on the mechanical work of all motions between two configurations, from the energy of the arm.
+"""Lower bound on the mechanical work of all motions between two configurations, from the energy of
+the arm.
 
-Let E = K + U be kinetic and potential energy of rigid bodies and rotors, W = ∫ Σ_j |tau_j v_j| dt the mechanical work.
-The torques tau are those of rigid bodies and rotors, without friction, so that dE/dt = Σ_j tau_j v_j (U and K do not
-depend on time) and
+Let E = K + U be kinetic and potential energy of rigid bodies and rotors, W = ∫ Σ_j |tau_j v_j| dt
+the mechanical work. The torques tau are those of rigid bodies and rotors, without friction, so that
+dE/dt = Σ_j tau_j v_j (U and K do not depend on time) and
 
     W ≥ ∫ |dE/dt| dt,                                                                            (1)
 
 the total variation of E between two rests, E(0) = U_0 and E(T) = U_1.
 
-**Range.** If E reaches h ≥ max(U_0, U_1) and l ≤ min(U_0, U_1), it first reaches the one, then the other:
+**Range.** If E reaches h ≥ max(U_0, U_1) and l ≤ min(U_0, U_1), it first reaches the one, then the
+  other:
 
-    W ≥ h - l + min((h - U_0) + (U_1 - l), (U_0 - l) + (h - U_1)).                                 (2)
+    W ≥ h - l + min((h - U_0) + (U_1 - l), (U_0 - l) + (h - U_1)).
+    (2)
 
 Nothing else is known: h = max(U_0, U_1) and l = min(U_0, U_1) give |U_1 - U_0|.
 
-**Barrier.** Joints whose axes are parallel to gravity turn the arm about the vertical and leave U as it is. Let k be
-the first other joint. With the links beyond k lumped at the origin of joint k + 1, potential energy is a function of
-q_k alone, u(q_k) = constant + a cos q_k + b sin q_k. The true one differs by at most R = Σ_i m_i |g| r_i over the links
-i beyond k, where r_i, the length of the chain from that origin to the centre of mass of link i, is never less than
-their distance. On its way q_k takes every value between its ends, so E ≥ U ≥ u - R holds at the greatest of them:
-h = max u - R. At the least of them U ≤ u + R, so that l = min u + R + K_max, where K_max is the most kinetic energy
-under the limits on speed and acceleration: each link's centre of mass is no faster than Σ_j |v_j| times its greatest
+**Barrier.** Joints whose axes are parallel to gravity turn the arm about the vertical and leave U
+  as it is. Let k be
+the first other joint. With the links beyond k lumped at the origin of joint k + 1, potential energy
+is a function of
+q_k alone, u(q_k) = constant + a cos q_k + b sin q_k. The true one differs by at most R = Σ_i m_i
+|g| r_i over the links
+i beyond k, where r_i, the length of the chain from that origin to the centre of mass of link i, is
+never less than
+their distance. On its way q_k takes every value between its ends, so E ≥ U ≥ u - R holds at the
+greatest of them:
+h = max u - R. At the least of them U ≤ u + R, so that l = min u + R + K_max, where K_max is the
+most kinetic energy
+under the limits on speed and acceleration: each link's centre of mass is no faster than Σ_j |v_j|
+times its greatest
 distance from the axis of joint j, and turns no faster than Σ_j |v_j|.
 
-**Travel.** From (2) with l = min(U_0, U_1), E(t) ≤ e = (W + U_0 + U_1) / 2 at all times. The mass matrix is that of the
-rotors, D = diag(rotor inertia), plus that of the links, which is positive semidefinite. With |v|_D² = vᵀ D v,
+**Travel.** From (2) with l = min(U_0, U_1), E(t) ≤ e = (W + U_0 + U_1) / 2 at all times. The mass
+  matrix is that of the
+rotors, D = diag(rotor inertia), plus that of the links, which is positive semidefinite. With |v|_D²
+= vᵀ D v,
 
-    |q_1 - q_0|_D ≤ ∫ |v|_D dt ≤ ∫ min( sqrt(2 max(e - U(q(t)), 0)), A min(t, T - t) ) dt,         (3)
+    |q_1 - q_0|_D ≤ ∫ |v|_D dt ≤ ∫ min( sqrt(2 max(e - U(q(t)), 0)), A min(t, T - t) ) dt,
+      (3)
 
-A = |a_max|_D, as v starts and ends at zero. U is bounded from below by the time that the arm has for falling: joint j
-is at most s_j(t) = min(v_max t, a_max t² / 2, j_max t³ / 6) from its start, and |∂U/∂q_j| ≤ G_j, the weight of the
-links that it carries times their greatest distances from its axis (zero for the joints before k). So
+A = |a_max|_D, as v starts and ends at zero. U is bounded from below by the time that the arm has
+for falling: joint j is at most s_j(t) = min(v_max t, a_max t² / 2, j_max t³ / 6) from its start,
+and |∂U/∂q_j| ≤ G_j, the weight of the links that it carries times their greatest distances from its
+axis (zero for the joints before k). So
 
     U(q(t)) ≥ max(U_0 - Σ_j G_j s_j(t), U_1 - Σ_j G_j s_j(T - t), least u - R).
 
-The right-hand side of (3) grows with e. The least e for which (3) holds gives W ≥ 2 e - U_0 - U_1. The integral is
-replaced by the sum of upper bounds on CELLS cells. A motion that takes less than T and then rests until T does the same
-work: the bound for the longest allowed duration holds for all.
+The right-hand side of (3) grows with e. The least e for which (3) holds gives W ≥ 2 e - U_0 - U_1.
+The integral is replaced by the sum of upper bounds on CELLS cells. A motion that takes less than T
+and then rests until T does the same work: the bound for the longest allowed duration holds for all.
 
-The bound is tight neither for a motion that pays in one joint what gravity gives in another, as (1) adds up the joints
-before the absolute value, nor for one that could swing through a potential well and does not.
+The bound is tight neither for a motion that pays in one joint what gravity gives in another, as (1)
+adds up the joints before the absolute value, nor for one that could swing through a potential well
+and does not.
 """
 
 from __future__ import annotations
@@ -58,7 +73,8 @@ from joulepath.optimizer.problem.problem import LONGEST_DURATION
 CELLS, BISECTIONS = 32, 30
 # an axis counts as parallel to gravity up to this sine of the angle, the rounding of a placement
 PARALLEL = 1e-8
-# error of a potential energy as a share of weight times length of the arm: rounding, and the angle of PARALLEL axes
+# error of a potential energy as a share of weight times length of the arm: rounding, and the angle
+# of PARALLEL axes
 ROUNDING = 1e-7
 
 
@@ -66,8 +82,8 @@ ROUNDING = 1e-7
 class EnergyRange:
     """What bounds the energy of an arm: see the module's text.
 
-    `lengths` (nq, nq) [m] at [j, i] is the greatest distance of link i's centre of mass from the axis of joint j, zero
-    for i < j.
+    `lengths` (nq, nq) [m] at [j, i] is the greatest distance of link i's centre of mass from the
+    axis of joint j, zero for i < j.
     """
 
     prepared: PreparedProblem
@@ -94,7 +110,8 @@ class EnergyRange:
         n = self.model.nq
         result = np.zeros((n, n))
         for j in range(n):
-            # about its own axis, link j moves only what is off the axis; later links may turn any way
+            # about its own axis, link j moves only what is off the axis; later links may turn any
+            # way
             along = 0.0
             for i in range(j, n):
                 offset = np.array(bodies[i + 1].lever)
@@ -106,7 +123,8 @@ class EnergyRange:
 
     @cached_property
     def leading(self) -> int | None:
-        """Index of the first joint whose angle changes the potential energy; None if there is none."""
+        """Index of the first joint whose angle changes the potential energy; None if there is
+        none."""
         strength, R = float(np.linalg.norm(self.gravity)), np.eye(3)
         for k in range(self.model.nq):
             R = R @ np.array(self.model.jointPlacements[k + 1].rotation)
@@ -123,7 +141,9 @@ class EnergyRange:
 
     @cached_property
     def lumped(self) -> tuple[Array, float, float]:
-        """The wave (a, b) [J], the constant and R [J]: |U(q) - constant - a cos q_k - b sin q_k| ≤ R."""
+        """The wave (a, b) [J], the constant and R [J]: |U(q) - constant - a cos q_k - b sin q_k| ≤
+        R.
+        """
         k, placements, bodies = self.leading, self.model.jointPlacements, self.model.inertias
         assert k is not None
         T, constant = pin.SE3.Identity(), 0.0
@@ -136,7 +156,9 @@ class EnergyRange:
         if distal:
             moment = moment + distal * np.array(placements[k + 2].translation)
         g = np.array(T.rotation).T @ self.gravity
-        constant -= float((bodies[k + 1].mass + distal) * (self.gravity @ T.translation) + g[2] * moment[2])
+        constant -= float(
+            (bodies[k + 1].mass + distal) * (self.gravity @ T.translation) + g[2] * moment[2]
+        )
         wave = -np.array([g[0] * moment[0] + g[1] * moment[1], g[1] * moment[0] - g[0] * moment[1]])
         return wave, constant, float(np.linalg.norm(self.gravity)) * self._beyond(k)
 
@@ -153,21 +175,32 @@ class EnergyRange:
     @cached_property
     def rounding(self) -> float:
         """Greatest error of a potential energy [J]; the bound gives it away."""
-        return ROUNDING * float(np.linalg.norm(self.gravity)) * float(self.lengths.sum(axis=0) @ self.masses)
+        return (
+            ROUNDING
+            * float(np.linalg.norm(self.gravity))
+            * float(self.lengths.sum(axis=0) @ self.masses)
+        )
 
     def most_kinetic(self, duration: Array) -> Array:
         """The most kinetic energy (P,) [J] of a motion from rest to rest in `duration` (P,) [s]."""
         limits = self.prepared.problem.arm.active_limits
         v = np.minimum(limits.v_max, limits.a_max * duration[:, None] / 2)
-        spin = np.array([float(np.linalg.eigvalsh(np.array(body.inertia))[-1]) for body in self.model.inertias[1:]])
+        spin = np.array(
+            [
+                float(np.linalg.eigvalsh(np.array(body.inertia))[-1])
+                for body in self.model.inertias[1:]
+            ]
+        )
         rotors = v**2 @ self.prepared.problem.arm.drives.rotor_inertia
         links = (v @ self.lengths) ** 2 @ self.masses + np.cumsum(v, axis=1) ** 2 @ spin
         return np.asarray((rotors + links) / 2)
 
     def fall(self, ends: Array, least: Array, duration: Array) -> tuple[Array, Array]:
-        """Least potential energy and A min(t, T - t), both (P, CELLS), in the cells of motions of `duration` (P,) [s].
+        """Least potential energy and A min(t, T - t), both (P, CELLS), in the cells of motions of
+        `duration` (P,) [s].
 
-        `ends` (P, 2) [J] are the potential energies of start and goal, `least` (P,) [J] is that of all configurations.
+        `ends` (P, 2) [J] are the potential energies of start and goal, `least` (P,) [J] is that of
+        all configurations.
         """
         limits = self.prepared.problem.arm.active_limits
         edges = duration[:, None] * np.linspace(0.0, 1.0, CELLS + 1)
@@ -175,10 +208,14 @@ class EnergyRange:
 
         def fallen(t: Array) -> Array:
             t = t[..., None]
-            rates = np.minimum(np.minimum(limits.v_max * t, limits.a_max * t**2 / 2), limits.j_max * t**3 / 6)
+            rates = np.minimum(
+                np.minimum(limits.v_max * t, limits.a_max * t**2 / 2), limits.j_max * t**3 / 6
+            )
             return np.asarray(rates @ self.slopes)
 
-        near = np.maximum(ends[:, :1] - fallen(right), ends[:, 1:] - fallen(duration[:, None] - left))
+        near = np.maximum(
+            ends[:, :1] - fallen(right), ends[:, 1:] - fallen(duration[:, None] - left)
+        )
         most = float(np.sqrt(limits.a_max**2 @ self.prepared.problem.arm.drives.rotor_inertia))
         return np.maximum(near, least[:, None]), most * np.minimum(right, duration[:, None] - left)
 
@@ -187,9 +224,9 @@ class EnergyRange:
 class Swing:
     """How high and how low motions have to go on their way: potential energies (P,) [J].
 
-    `ends` (P, 2) are those of start and goal. Every motion comes to `top` at least, if it does not start or end higher,
-    and down to `bottom` at least, if what it has there is not kinetic (`variation` allows for that). No configuration
-    has less than `least`.
+    `ends` (P, 2) are those of start and goal. Every motion comes to `top` at least, if it does not
+    start or end higher, and down to `bottom` at least, if what it has there is not kinetic
+    (`variation` allows for that). No configuration has less than `least`.
     """
 
     arm: EnergyRange
@@ -207,7 +244,13 @@ class Swing:
         wave, constant, beyond = arm.lumped
         crest, trough = _extremes(wave, q_start[:, arm.leading], q_goal[:, arm.leading])
         least = np.full(len(ends), constant - float(np.hypot(*wave)) - beyond)
-        return cls(arm, ends, np.maximum(high, constant + crest - beyond), constant + trough + beyond, least)
+        return cls(
+            arm,
+            ends,
+            np.maximum(high, constant + crest - beyond),
+            constant + trough + beyond,
+            least,
+        )
 
     def variation(self, duration: Array) -> Array:
         """(2) (P,) [J] for motions of at most `duration` (P,) [s]."""
@@ -216,46 +259,67 @@ class Swing:
         fast = 0.0 if self.arm.leading is None else self.arm.most_kinetic(duration)
         bottom = np.minimum(low, self.bottom + fast)
         span = self.top - bottom
-        return np.asarray(span + np.minimum(self.top - first + last - bottom, first - bottom + self.top - last))
+        return np.asarray(
+            span + np.minimum(self.top - first + last - bottom, first - bottom + self.top - last)
+        )
 
 
-def mechanical_bounds(prepared: PreparedProblem, q_start: Array, q_goal: Array, potentials: Array) -> Array:
+def mechanical_bounds(
+    prepared: PreparedProblem, q_start: Array, q_goal: Array, potentials: Array
+) -> Array:
     """Bounds (P,) [J] on the mechanical work of motions from q_start to q_goal (P, nq) [rad].
 
     `potentials` (P, 2) [J] are the potential energies of start and goal.
     """
     arm, problem = EnergyRange(prepared), prepared.problem
-    longest = np.full(len(q_start), LONGEST_DURATION if problem.duration_max is None else problem.duration_max)
+    longest = np.full(
+        len(q_start), LONGEST_DURATION if problem.duration_max is None else problem.duration_max
+    )
     swing = Swing.of(arm, q_start, q_goal, potentials)
-    travelled = 2 * _least_energy(arm, q_goal - q_start, potentials, swing.least, longest) - potentials.sum(axis=1)
-    return np.asarray(np.maximum(np.maximum(swing.variation(longest), travelled) - 4 * arm.rounding, 0.0))
+    travelled = 2 * _least_energy(
+        arm, q_goal - q_start, potentials, swing.least, longest
+    ) - potentials.sum(axis=1)
+    return np.asarray(
+        np.maximum(np.maximum(swing.variation(longest), travelled) - 4 * arm.rounding, 0.0)
+    )
 
 
 def _extremes(wave: Array, one: Array, other: Array) -> tuple[Array, Array]:
-    """Greatest and least (P,) of wave[0] cos q + wave[1] sin q over the angles between `one` and `other` (P,) [rad]."""
+    """Greatest and least (P,) of wave[0] cos q + wave[1] sin q over the angles between `one` and
+    `other` (P,) [rad].
+    """
     low, high = np.minimum(one, other), np.maximum(one, other)
     ends = np.stack([wave[0] * np.cos(q) + wave[1] * np.sin(q) for q in (low, high)])
     size, phase = float(np.hypot(*wave)), float(np.arctan2(wave[1], wave[0]))
 
     def holds(angle: float) -> Array:
-        return np.asarray(np.floor((high - angle) / (2 * np.pi)) >= np.ceil((low - angle) / (2 * np.pi)))
+        return np.asarray(
+            np.floor((high - angle) / (2 * np.pi)) >= np.ceil((low - angle) / (2 * np.pi))
+        )
 
     crest = np.where(holds(phase), size, ends.max(axis=0))
     return crest, np.where(holds(phase + np.pi), -size, ends.min(axis=0))
 
 
 def most_travel(potential: Array, fastest: Array, energy: Array, duration: Array | float) -> Array:
-    """The right-hand side (P,) of (3) with `energy` (P, 1) [J]; the others as `EnergyRange.fall` gives them."""
+    """The right-hand side (P,) of (3) with `energy` (P, 1) [J]; the others as `EnergyRange.fall`
+    gives them.
+    """
     speed = np.minimum(np.sqrt(2 * np.maximum(energy - potential, 0.0)), fastest)
     return np.asarray(speed.sum(axis=1) * duration / CELLS)
 
 
-def _least_energy(arm: EnergyRange, displacement: Array, potentials: Array, least: Array, duration: Array) -> Array:
-    """The least e (P,) [J] for which (3) holds, rounded down, at least the greater potential energy of the ends."""
+def _least_energy(
+    arm: EnergyRange, displacement: Array, potentials: Array, least: Array, duration: Array
+) -> Array:
+    """The least e (P,) [J] for which (3) holds, rounded down, at least the greater potential energy
+    of the ends.
+    """
     needed = np.sqrt(displacement**2 @ arm.prepared.problem.arm.drives.rotor_inertia)
     potential, fastest = arm.fall(potentials, least, duration)
     low = potentials.max(axis=1)
-    # an average speed of |Δq|_D / T needs this much above the greatest bound of the potential energy, or less
+    # an average speed of |Δq|_D / T needs this much above the greatest bound of the potential
+    # energy, or less
     high = np.maximum(low, potential.max(axis=1)) + 2 * (needed / duration) ** 2
     for _ in range(BISECTIONS):
         middle = (low + high) / 2

@@ -27,7 +27,9 @@ from joulepath.optimizer.search.self_motion_bound import EndCurves, bound_betwee
 def all_known(problem: Problem) -> bool:
     """Whether every branch of every pose among the targets is found, if it is reached at all."""
     kinematics = inverse_kinematics_for(problem.arm.robot)
-    return (kinematics is None or kinematics.complete) or not (_poses(problem.start) + _poses(problem.goal))
+    return (kinematics is None or kinematics.complete) or not (
+        _poses(problem.start) + _poses(problem.goal)
+    )
 
 
 def bound_of_others(
@@ -36,35 +38,47 @@ def bound_of_others(
     deadline: Deadline = NEVER,
     enough: float = np.inf,
 ) -> float:
-    """Lower bound [J] on the motions between poses in configurations that are none of the candidates; inf if there are
-    none.
+    """Lower bound [J] on the motions between poses in configurations that are none of the
+    candidates; inf if there are none.
 
-    If all branches are known, the others are on self-motions. Else they may be anywhere. Of an arm that is nearly of a
-    form whose curves are known, they are on `covering_sheets`. From given joint positions of any other arm the bound is
-    that of the motions to the goal poses with any rotation about their z axes, by boxes of joint positions that need no
-    inverse kinematics. From poses it is that of the motions between any two configurations. `enough` [J]: see
-    `self_motion_bound`.
+    If all branches are known, the others are on self-motions. Else they may be anywhere. Of an arm
+    that is nearly of a form whose curves are known, they are on `covering_sheets`. From given joint
+    positions of any other arm the bound is that of the motions to the goal poses with any rotation
+    about their z axes, by boxes of joint positions that need no inverse kinematics. From poses it
+    is that of the motions between any two configurations. `enough` [J]: see `self_motion_bound`.
     """
     problem = prepared.problem
     if all_known(problem):
         return self_motion_bound(prepared, candidates, deadline, enough)
     between_poses = bool(_poses(problem.start))
-    if not (between_poses and any(isinstance(each, ConeOrientedPose) for each in members(problem.goal))):
-        starts, goals = _covered(prepared, candidates, "start"), _covered(prepared, candidates, "goal")
+    if not (
+        between_poses and any(isinstance(each, ConeOrientedPose) for each in members(problem.goal))
+    ):
+        starts, goals = (
+            _covered(prepared, candidates, "start"),
+            _covered(prepared, candidates, "goal"),
+        )
         if starts is not None and goals is not None:
             return bound_between(prepared, starts, goals, deadline, enough)
     if between_poses:
         return _bound_of_any(prepared)
-    poses = [ConeOrientedPose.about(pose, np.array([0.0, 0.0, 1.0])) for pose in _poses(problem.goal)]
+    poses = [
+        ConeOrientedPose.about(pose, np.array([0.0, 0.0, 1.0])) for pose in _poses(problem.goal)
+    ]
     curves = EndCurves.of([each.start for each in candidates])
     boxes, half = curves.boxes(curves.first())
     rounds = max(1, (TIGHT_ROUNDS if problem.bound == "tight" else FEW) // len(poses))
-    return min(family_bound(prepared, pose, boxes, rounds, deadline, half, given=curves.given) for pose in poses)
+    return min(
+        family_bound(prepared, pose, boxes, rounds, deadline, half, given=curves.given)
+        for pose in poses
+    )
 
 
-def _covered(prepared: PreparedProblem, candidates: Sequence[Candidate], name: Side) -> EndCurves | None:
-    """Joint positions that are given at one end, and all that reaches its poses; None of an arm whose poses are not
-    covered. Poses of free orientation are left to `free_goal_bound`."""
+def _covered(
+    prepared: PreparedProblem, candidates: Sequence[Candidate], name: Side
+) -> EndCurves | None:
+    """Joint positions that are given at one end, and all that reaches its poses; None of an arm
+    whose poses are not covered. Poses of free orientation are left to `free_goal_bound`."""
     arm, curves = prepared.arm, dict[int, Array | CoveringSheet]()
     for end in (getattr(candidate, name) for candidate in candidates):
         if end.fixed and not end.sampled:
@@ -82,13 +96,18 @@ def _covered(prepared: PreparedProblem, candidates: Sequence[Candidate], name: S
 def _bound_of_any(prepared: PreparedProblem) -> float:
     """Lower bound [J] on the motions between any two configurations.
 
-    Between two configurations no joint need move. But for full turns, which change no potential energy, they differ by
-    at most half a turn in each joint: the potential energy falls by at most its greatest rate over that.
+    Between two configurations no joint need move. But for full turns, which change no potential
+    energy, they differ by at most half a turn in each joint: the potential energy falls by at most
+    its greatest rate over that.
     """
     fall = np.pi * float(potential_rates(prepared.model, prepared.arm.gravity).sum())
-    return float(LeastBound(prepared).of(np.zeros((1, prepared.arm.robot.nq)), np.array([-fall]))[0])
+    return float(
+        LeastBound(prepared).of(np.zeros((1, prepared.arm.robot.nq)), np.array([-fall]))[0]
+    )
 
 
 def _poses(target: Target) -> list[Pose]:
-    """The poses among targets. Of a pose whose orientation is free in part, only samples are solved in any case."""
+    """The poses among targets. Of a pose whose orientation is free in part, only samples are solved
+    in any case.
+    """
     return [each for each in members(target) if isinstance(each, Pose)]

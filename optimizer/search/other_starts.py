@@ -1,8 +1,9 @@
 """Another start for ends that slide: postures a step to each side of the one found.
 
-A motion has several local optima, of energies that differ by some tenths of a percent, by which limits it touches and
-when. An end that slides takes the motion along, so that both stay in the one from which they began. A motion solved by
-itself to a posture beside may be in a better one; from there both ends slide again.
+A motion has several local optima, of energies that differ by some tenths of a percent, by which
+limits it touches and when. An end that slides takes the motion along, so that both stay in the one
+from which they began. A motion solved by itself to a posture beside may be in a better one; from
+there both ends slide again.
 """
 
 from __future__ import annotations
@@ -26,16 +27,17 @@ from joulepath.optimizer.trajectories.spline import sampled
 
 # length of the step along a curve [rad]
 STEP = 0.15
-# a solve is given up only if it is not expected to come below this multiple of the energy that it must come below: its
-# first steps promise less than it finds
+# a solve is given up only if it is not expected to come below this multiple of the energy that it
+# must come below: its first steps promise less than it finds
 MARGIN = 1.003
 
 
 def start_beside(incumbent: Incumbent, best: Candidate) -> Candidate:
-    """The best solved candidate, or one that needs less, found from a posture beside; it is added to the candidates.
+    """The best solved candidate, or one that needs less, found from a posture beside; it is added
+    to the candidates.
 
-    Only motions of as few control points as the first solve has are compared, and only where no joint's power has a
-    corner of its own: those are started again by `sharpening`.
+    Only motions of as few control points as the first solve has are compared, and only where no
+    joint's power has a corner of its own: those are started again by `sharpening`.
     """
     prepared = incumbent.prepared
     cornered = has_corners(incumbent.problem.objective, prepared.arm)
@@ -60,8 +62,8 @@ def start_beside(incumbent: Incumbent, best: Candidate) -> Candidate:
 
 
 def _solved(incumbent: Incumbent, candidate: Candidate, below: float) -> bool:
-    """Solve a candidate as it is, and then with its ends sliding, if it needs less energy than `below` [J]; whether it
-    does."""
+    """Solve a candidate as it is, and then with its ends sliding, if it needs less energy than
+    `below` [J]; whether it does."""
     for interval in duration_intervals(incumbent.prepared, candidate.q_goal):
         solver = solver_of(incumbent, candidate, interval)
         solver.best_known = above(below, MARGIN)

@@ -1,13 +1,16 @@
-"""Least mechanical work: of candidates that differ by full turns of the outer joints, one is solved for all at first.
+"""Least mechanical work: of candidates that differ by full turns of the outer joints, one is solved
+for all at first.
 
-The bound on mechanical work rules out little: tens to hundreds of candidates are left, and most of them need far more
-energy than the best. Those between the same branches that differ only by full turns of the outer half of the joints
-move the heavy links alike, and their energies are alike, too. They are a family. At first, the member that can be the
-fastest is solved for all of it. Then those of the best families are solved.
+The bound on mechanical work rules out little: tens to hundreds of candidates are left, and most of
+them need far more energy than the best. Those between the same branches that differ only by full
+turns of the outer half of the joints move the heavy links alike, and their energies are alike, too.
+They are a family. At first, the member that can be the fastest is solved for all of it. Then those
+of the best families are solved.
 
-Nothing here is proven. On 96 random moves from joint positions to a pose, the family of the answer was among the three
-whose first members need the least, at most 1.42 times as much as the best of them; the answer was at most its fifth.
-Of 102 others, two need 12 and 1 % less than if all are solved, and one needs 2 % more.
+Nothing here is proven. On 96 random moves from joint positions to a pose, the family of the answer
+was among the three whose first members need the least, at most 1.42 times as much as the best of
+them; the answer was at most its fifth. Of 102 others, two need 12 and 1 % less than if all are
+solved, and one needs 2 % more.
 """
 
 from __future__ import annotations
@@ -18,15 +21,16 @@ from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.incumbent import Incumbent
 
-# families are solved further if the energy of one of their members is at most this ratio of the best energy, so many
-# of them, and so many members of each
+# families are solved further if the energy of one of their members is at most this ratio of the
+# best energy, so many of them, and so many members of each
 NEAR, FAMILIES, MEMBERS = 1.6, 4, 6
 # digits of displacements [rad] that are the same
 DIGITS = 6
 
 
 def explore_families(incumbent: Incumbent, explore: Callable[[], object]) -> None:
-    """Solve one member of each family by `explore`, which solves all candidates that are open, then the best families.
+    """Solve one member of each family by `explore`, which solves all candidates that are open, then
+    the best families.
 
     What neither a solve nor a bound rules out is left unvisited.
     """
@@ -55,8 +59,8 @@ def explore_families(incumbent: Incumbent, explore: Callable[[], object]) -> Non
 def families_of(incumbent: Incumbent) -> list[list[Candidate]]:
     """The open and the solved candidates by family, the one of least possible duration first.
 
-    None with another objective, whose bounds rule out enough, another method, or a tight bound, for which everything
-    is solved.
+    None with another objective, whose bounds rule out enough, another method, or a tight bound, for
+    which everything is solved.
     """
     asked = incumbent.problem
     if (asked.objective, asked.method) != ("mechanical", "bspline") or asked.bound == "tight":
@@ -68,7 +72,9 @@ def families_of(incumbent: Incumbent) -> list[list[Candidate]]:
     for each in sorted(open_, key=lambda each: (each.shortest, each.lower_bound)):
         inner = (each.q_goal - each.q_start)[: len(each.q_start) // 2].round(DIGITS)
         # adding zero makes -0 the same as 0
-        families.setdefault((id(each.start), id(each.goal), (inner + 0.0).tobytes()), []).append(each)
+        families.setdefault((id(each.start), id(each.goal), (inner + 0.0).tobytes()), []).append(
+            each
+        )
     return list(families.values())
 
 
@@ -78,15 +84,22 @@ def _energy(family: Sequence[Candidate]) -> float:
 
 
 def _replace_hindered(incumbent: Incumbent, families: Sequence[Sequence[Candidate]]) -> bool:
-    """Let another member stand for each family of which all that were tried collide; whether there is any.
+    """Let another member stand for each family of which all that were tried collide; whether there
+    is any.
 
-    Another turn of the wrist may be clear. What the limits do not allow, they allow no slower member either.
+    Another turn of the wrist may be clear. What the limits do not allow, they allow no slower
+    member either.
     """
     found = False
     for family in families:
         tried = [each for each in family if each.attempt is not None]
         waiting = [each for each in family if each.deferred]
-        if not tried or not waiting or incumbent.deadline.passed or not all(_collides(each) for each in tried):
+        if (
+            not tried
+            or not waiting
+            or incumbent.deadline.passed
+            or not all(_collides(each) for each in tried)
+        ):
             continue
         _release(waiting[:1])
         found = True
@@ -104,9 +117,11 @@ def _release(candidates: Sequence[Candidate]) -> None:
         each.deferred = False
 
 
-def leave(incumbent: Incumbent, waiting: Sequence[Candidate], reason: Reason = Reason.FAMILY) -> None:
-    """Say why those that still wait are not solved, unless the deadline ended the search: their bound, or this
-    reason."""
+def leave(
+    incumbent: Incumbent, waiting: Sequence[Candidate], reason: Reason = Reason.FAMILY
+) -> None:
+    """Say why those that still wait are not solved, unless the deadline ended the search: their
+    bound, or this reason."""
     left = [each for each in waiting if each.deferred]
     _release(left)
     best = incumbent.best()

@@ -20,7 +20,9 @@ from joulepath.optimizer.trajectories.spline import Spline
 
 
 def bound_through(prepared: PreparedProblem, q_start: Array, q_goal: Array) -> float:
-    """Lower bound [J] on the objective of all motions from q_start through the passes to q_goal (nq,) [rad]."""
+    """Lower bound [J] on the objective of all motions from q_start through the passes to q_goal
+    (nq,) [rad].
+    """
     problem = prepared.problem
     if problem.objective == "mechanical" or problem.dwell is not None:
         return -np.inf
@@ -31,7 +33,8 @@ def bound_through(prepared: PreparedProblem, q_start: Array, q_goal: Array) -> f
 
 
 def stopping_baselines(prepared: PreparedProblem, spline: Spline, ours: float) -> list[Baseline]:
-    """The baselines from rest to rest, one after the other, each part in the time that our motion takes for it.
+    """The baselines from rest to rest, one after the other, each part in the time that our motion
+    takes for it.
 
     `ours` [J] is our objective. A baseline that some part does not have is left out.
     """
@@ -40,16 +43,26 @@ def stopping_baselines(prepared: PreparedProblem, spline: Spline, ours: float) -
     times = [0.0, *pass_times(spline.curve, q[1:-1]).tolist(), spline.duration]
     oracle = prepared.torques, prepared.potential, prepared.broken_on_the_way
     parts = [
-        {each.name: each for each in baselines(problem, a, b[None], max(end - begin, LEAST_DURATION), ours, *oracle)}
+        {
+            each.name: each
+            for each in baselines(
+                problem, a, b[None], max(end - begin, LEAST_DURATION), ours, *oracle
+            )
+        }
         for (a, b), (begin, end) in zip(pairwise(q), pairwise(times), strict=True)
     ]
-    tables = [[part[name] for part in parts] for name in parts[0] if all(name in part for part in parts)]
+    tables = [
+        [part[name] for part in parts] for name in parts[0] if all(name in part for part in parts)
+    ]
     return [_joined(problem, table, ours) for table in tables]
 
 
 def _joined(problem: Problem, parts: list[Baseline], ours: float) -> Baseline:
     """One baseline of those of the parts."""
-    electrical, mechanical = sum(each.electrical for each in parts), sum(each.mechanical for each in parts)
+    electrical, mechanical = (
+        sum(each.electrical for each in parts),
+        sum(each.mechanical for each in parts),
+    )
     return replace(
         parts[0],
         duration=sum(each.duration for each in parts),

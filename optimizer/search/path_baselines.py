@@ -1,4 +1,6 @@
-"""The baseline along a tool path: an even speed on the way, with ramps of a third of the duration each."""
+"""The baseline along a tool path: an even speed on the way, with ramps of a third of the duration
+each.
+"""
 
 from __future__ import annotations
 
@@ -16,20 +18,36 @@ from joulepath.optimizer.trajectories.time_scalings import SampledMotion, even_s
 
 def path_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseline]:
     """The `trapezoid` along the path of the best candidate's joints, in its duration."""
-    prepared, problem, path = incumbent.prepared, incumbent.problem, incumbent.prepared.joint_path(best.q_start)
+    prepared, problem, path = (
+        incumbent.prepared,
+        incumbent.problem,
+        incumbent.prepared.joint_path(best.q_start),
+    )
     assert path is not None and best.energy is not None
     motion = along(path, even_speed(best.duration))
     tau = prepared.torques(motion.q, motion.v, motion.a)
     still = np.zeros_like(best.q_goal)[None]
     held = prepared.torques(best.q_goal[None], still, still)[0]
     (broken,) = prepared.broken_on_the_way([motion.q], [motion.v])
-    return [compared(problem, "trapezoid", motion, tau, held, best.energy, prepared.potential, broken)]
+    return [
+        compared(problem, "trapezoid", motion, tau, held, best.energy, prepared.potential, broken)
+    ]
 
 
 def along(path: Spline, law: SampledMotion) -> SampledMotion:
-    """The motion along a path over [0, 1] whose fraction of the way is that of `law`, of one coordinate."""
+    """The motion along a path over [0, 1] whose fraction of the way is that of `law`, of one
+    coordinate.
+    """
     s, rate, acceleration = law.q[:, 0], law.v, law.a
     tangent, bend = path.curve(s, 1), path.curve(s, 2)
     v, a = tangent * rate, bend * rate**2 + tangent * acceleration
     peak_v, peak_a = np.abs(v).max(axis=0), np.abs(a).max(axis=0)
-    return replace(law, q=path.curve(s), v=v, a=a, peak_v=peak_v, peak_a=peak_a, peak_jerk=np.full_like(peak_v, np.inf))
+    return replace(
+        law,
+        q=path.curve(s),
+        v=v,
+        a=a,
+        peak_v=peak_v,
+        peak_a=peak_a,
+        peak_jerk=np.full_like(peak_v, np.inf),
+    )

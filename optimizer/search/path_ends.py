@@ -1,4 +1,6 @@
-"""The candidates along a tool path: one for each configuration of its first pose from which the arm can follow it."""
+"""The candidates along a tool path: one for each configuration of its first pose from which the arm
+can follow it.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,13 @@ import numpy as np
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.kinematics.angles import wrapped
-from joulepath.optimizer.kinematics.course_tracing import Trace, traces, turned, with_turning, within
+from joulepath.optimizer.kinematics.course_tracing import (
+    Trace,
+    traces,
+    turned,
+    with_turning,
+    within,
+)
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.problem import Problem
@@ -24,7 +32,8 @@ from joulepath.optimizer.search.missed_branches import bound_of_others
 
 # rad: where a path leads, and joint positions that are given for its end
 SAME = 1e-6
-# samples of a start whose orientation is free, of any rotation: of one about an axis a quarter of them
+# samples of a start whose orientation is free, of any rotation: of one about an axis a quarter of
+# them
 ANGLES = 48
 
 
@@ -40,7 +49,11 @@ def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
     for start, trace in zip(starts, _traces(prepared, starts), strict=True):
         choices = _choices(start, trace, prepared.problem.goal)
         whole = trace if start.fixed else turned(trace, limits.q_min, limits.q_max, choices)
-        if trace.obstacle is None and whole is not None and within(whole, limits.q_min, limits.q_max):
+        if (
+            trace.obstacle is None
+            and whole is not None
+            and within(whole, limits.q_min, limits.q_max)
+        ):
             candidate = _candidate(prepared, start, whole)
             if candidate is not None:
                 found.append(candidate)
@@ -55,7 +68,8 @@ def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
 def _traces(prepared: PreparedProblem, starts: Sequence[EndConfiguration]) -> list[Trace]:
     """The tool path as it is followed from each start.
 
-    From a free start the tool turns evenly; where no angle of a branch leads to the end so, as it must from one.
+    From a free start the tool turns evenly; where no angle of a branch leads to the end so, as it
+    must from one.
     """
     course, arm = prepared.course, prepared.arm
     assert course is not None
@@ -65,7 +79,9 @@ def _traces(prepared: PreparedProblem, starts: Sequence[EndConfiguration]) -> li
         found = traces(arm, course, np.array([each.q for each in starts]))
     if not course.free_start:
         return found
-    followed = {start.label for start, trace in zip(starts, found, strict=True) if trace.obstacle is None}
+    followed = {
+        start.label for start, trace in zip(starts, found, strict=True) if trace.obstacle is None
+    }
     for k, start in enumerate(starts):
         if start.label not in followed:
             followed.add(start.label)
@@ -73,20 +89,26 @@ def _traces(prepared: PreparedProblem, starts: Sequence[EndConfiguration]) -> li
     return found
 
 
-def bound_beside(prepared: PreparedProblem, followed: Sequence[Candidate], deadline: Deadline, enough: float) -> float:
-    """Lower bound [J] on motions along the tool path to which none of the `followed` candidates leads.
+def bound_beside(
+    prepared: PreparedProblem, followed: Sequence[Candidate], deadline: Deadline, enough: float
+) -> float:
+    """Lower bound [J] on motions along the tool path to which none of the `followed` candidates
+    leads.
 
-    A path may come so near to a singularity that a motion within its tolerance goes on in another branch than the one
-    that was followed; and of a self-motion at its start only samples were followed. So this is the bound of all motions
-    between the first pose and the last one, in any other configurations; and where an end leaves a rotation free, of
-    all of them: that of these ends once it reaches `enough` [J].
+    A path may come so near to a singularity that a motion within its tolerance goes on in another
+    branch than the one that was followed; and of a self-motion at its start only samples were
+    followed. So this is the bound of all motions between the first pose and the last one, in any
+    other configurations; and where an end leaves a rotation free, of all of them: that of these
+    ends once it reaches `enough` [J].
     """
     start, goal = prepared.problem.start, prepared.problem.goal
     if isinstance(start, ConeOrientedPose) and isinstance(goal, ConeOrientedPose):
         known = prepared.freed(start=followed[0].q_start)
         return bound_between(PreparedProblem.of(known), start, goal, deadline, enough)
     if isinstance(start, ConeOrientedPose):
-        return _bound_to_free(backwards(prepared.freed(goal, start), goal, start), followed[0].start, deadline, enough)
+        return _bound_to_free(
+            backwards(prepared.freed(goal, start), goal, start), followed[0].start, deadline, enough
+        )
     problem = prepared.freed()
     if isinstance(goal, ConeOrientedPose):
         return _bound_to_free(problem, followed[0].goal, deadline, enough)
@@ -94,15 +116,26 @@ def bound_beside(prepared: PreparedProblem, followed: Sequence[Candidate], deadl
     starts, _ = ends(free, "start")
     candidates = pairs(free, starts, ends(free, "goal")[0])
     bound(free, candidates)
-    others = (each.lower_bound for each in candidates if not each.sampled and not _is_among(each, followed))
+    others = (
+        each.lower_bound
+        for each in candidates
+        if not each.sampled and not _is_among(each, followed)
+    )
     return min([bound_of_others(free, candidates, deadline), *others])
 
 
-def _bound_to_free(problem: Problem, goal: EndConfiguration, deadline: Deadline, enough: float) -> float:
-    """Lower bound [J] on motions to any configuration of a goal that is free in part, of which one is given."""
+def _bound_to_free(
+    problem: Problem, goal: EndConfiguration, deadline: Deadline, enough: float
+) -> float:
+    """Lower bound [J] on motions to any configuration of a goal that is free in part, of which one
+    is given.
+    """
     prepared = PreparedProblem.of(problem)
     anywhere = [Candidate(start, goal, start.q, goal.q) for start in ends(prepared, "start")[0]]
-    return min(family_bound_of(prepared, anywhere, deadline, enough), bound_of_others(prepared, anywhere, deadline))
+    return min(
+        family_bound_of(prepared, anywhere, deadline, enough),
+        bound_of_others(prepared, anywhere, deadline),
+    )
 
 
 def _is_among(pair: Candidate, followed: Sequence[Candidate]) -> bool:
@@ -114,8 +147,12 @@ def _is_among(pair: Candidate, followed: Sequence[Candidate]) -> bool:
     )
 
 
-def _candidate(prepared: PreparedProblem, start: EndConfiguration, trace: Trace) -> Candidate | None:
-    """The candidate of a whole trace; None if it leads to other joint positions than those given for the goal."""
+def _candidate(
+    prepared: PreparedProblem, start: EndConfiguration, trace: Trace
+) -> Candidate | None:
+    """The candidate of a whole trace; None if it leads to other joint positions than those given
+    for the goal.
+    """
     q_start, q_goal, given = trace.q[0], trace.q[-1], prepared.problem.goal
     if isinstance(given, np.ndarray):
         if np.abs(q_goal - given).max() > SAME:
@@ -137,11 +174,16 @@ def _candidate(prepared: PreparedProblem, start: EndConfiguration, trace: Trace)
 
 
 def _choices(start: EndConfiguration, trace: Trace, goal: Target) -> list[list[float]]:
-    """The positions of each joint at the start: those from which it comes to the given one of the goal, if any does."""
+    """The positions of each joint at the start: those from which it comes to the given one of the
+    goal, if any does.
+    """
     if not isinstance(goal, np.ndarray):
         return start.choices
     needed = goal - (trace.q[-1] - trace.q[0])
-    reaching = [[x for x in each if abs(x - q) < SAME] for each, q in zip(start.choices, needed, strict=True)]
+    reaching = [
+        [x for x in each if abs(x - q) < SAME]
+        for each, q in zip(start.choices, needed, strict=True)
+    ]
     return [some or each for some, each in zip(reaching, start.choices, strict=True)]
 
 

@@ -1,4 +1,6 @@
-"""Ends of a candidate that are samples of a target, moved within it to where the joints need the least time."""
+"""Ends of a candidate that are samples of a target, moved within it to where the joints need the
+least time.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ class QuickerEndsSettings:
     """How long quicker ends are looked for."""
 
     trials: int = 120
-    """Random steps from the best ends so far: with the steps below, the last ones are some 1e-3 rad."""
+    """Random steps from the best ends so far: with the steps below, the last ones are some 1e-3
+    rad.
+    """
 
     first_step: float = 0.3
     """Standard deviation of the first steps [rad]: about the distance of neighbouring samples."""
@@ -39,13 +43,19 @@ class QuickerEndsSettings:
 def with_quicker_ends(
     prepared: PreparedProblem, candidate: Candidate, settings: QuickerEndsSettings | None = None
 ) -> Candidate | None:
-    """A candidate for the same targets whose proven least duration is shorter; None if none is found near by.
+    """A candidate for the same targets whose proven least duration is shorter; None if none is
+    found near by.
 
     Ends by DeadlinePassed if the watched deadline passes.
     """
     settings = settings or QuickerEndsSettings()
     limits, rng = prepared.arm.active_limits, np.random.default_rng(0)
-    q_start, q_goal, least, step = candidate.q_start, candidate.q_goal, candidate.shortest, settings.first_step
+    q_start, q_goal, least, step = (
+        candidate.q_start,
+        candidate.q_goal,
+        candidate.shortest,
+        settings.first_step,
+    )
     for _ in range(settings.trials):
         checkpoint()
         ends = [
@@ -65,8 +75,8 @@ def with_quicker_ends(
 
 
 def _moved(prepared: PreparedProblem, end: EndConfiguration, q: Array, by: Array) -> Array | None:
-    """The configuration (nq,) [rad] of a sampled end that is nearest to one moved from q, in the same turn; q itself of
-    another end, None if the target is not reached there."""
+    """The configuration (nq,) [rad] of a sampled end that is nearest to one moved from q, in the
+    same turn; q itself of another end, None if the target is not reached there."""
     if not end.sampled:
         return q
     found = nearest_configuration(prepared, end, q + by)

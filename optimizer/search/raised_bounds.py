@@ -1,11 +1,14 @@
-"""Lower bounds of pairs, raised by the copper loss of holding against gravity and of acceleration: `dual_cells`.
+"""Lower bounds of pairs, raised by the copper loss of holding against gravity and of acceleration:
+`dual_cells`.
 
-The plain bound leaves most of that loss out, which is most of the gap. A pair takes some milliseconds, so that only
-those are raised whose bounds would be the answer's, the lowest first, and with more effort where the gap stays wide.
-With `"bound": "tight"` every pair below the best energy is then raised as far as it goes, and may be ruled out: no
-bound falls by that. Where the dual bound does not apply the plain one stays.
+The plain bound leaves most of that loss out, which is most of the gap. A pair takes some
+milliseconds, so that only those are raised whose bounds would be the answer's, the lowest first,
+and with more effort where the gap stays wide. With `"bound": "tight"` every pair below the best
+energy is then raised as far as it goes, and may be ruled out: no bound falls by that. Where the
+dual bound does not apply the plain one stays.
 
-A raised bound is no higher than the plain one of full turns that no candidate has (`turns_left_out`).
+A raised bound is no higher than the plain one of full turns that no candidate has
+(`turns_left_out`).
 """
 
 from __future__ import annotations
@@ -41,14 +44,23 @@ FURTHER = Stage(Effort(24, 1.03, 8, Spacing(0.12, 1.25), heavy=(2,), rounds=1, t
 EVERY = QUICK.effort, Effort(64, 1.01, 4, Spacing(0.08, 1.2), heavy=(3, 2, 1), rounds=2, time=0.4)
 
 
-def raise_bounds(prepared: PreparedProblem, candidates: Sequence[Candidate], energy: float, deadline: Deadline) -> None:
-    """Raise the lower bounds of candidates that lie below `energy` [J], that of a motion, in time."""
-    below = [each for each in candidates if each.lower_bound < energy and each.goal.tolerance is None]
+def raise_bounds(
+    prepared: PreparedProblem, candidates: Sequence[Candidate], energy: float, deadline: Deadline
+) -> None:
+    """Raise the lower bounds of candidates that lie below `energy` [J], that of a motion, in
+    time."""
+    below = [
+        each for each in candidates if each.lower_bound < energy and each.goal.tolerance is None
+    ]
     shared = PairBounds.of(prepared) if below else None
     if shared is None:
         return
     target = energy - LEAST_GAP * abs(energy)
-    pairs = [_Pair(shared, each, target) for each in below if not each.sampled and each.lower_bound < target]
+    pairs = [
+        _Pair(shared, each, target)
+        for each in below
+        if not each.sampled and each.lower_bound < target
+    ]
     for stage in (QUICK, FURTHER):
         for pair in _least_ones(pairs):
             if _bound_of(pair) >= energy - stage.gap * abs(energy):
@@ -73,7 +85,9 @@ def _least_ones(pairs: Sequence[_Pair]) -> Iterator[_Pair]:
 
 
 class _Pair:
-    """A candidate whose bound may be raised up to a target [J]; what that takes is prepared when it is wanted first."""
+    """A candidate whose bound may be raised up to a target [J]; what that takes is prepared when it
+    is wanted first.
+    """
 
     def __init__(self, shared: PairBounds, candidate: Candidate, target: float) -> None:
         self.shared, self.candidate, self.target = shared, candidate, target
@@ -89,7 +103,9 @@ class _Pair:
         problem, dwell = prepared.problem, prepared.problem.dwell
         dwells = [LinearDwell.none()]
         if dwell is not None:
-            dwells = linear_dwells(dwell, prepared.arm, prepared.holding_power(candidate.q_goal[None]))
+            dwells = linear_dwells(
+                dwell, prepared.arm, prepared.holding_power(candidate.q_goal[None])
+            )
         shortest = max(candidate.shortest, LEAST_DURATION, problem.duration_min or 0.0)
         longest = problem.duration_max or LONGEST_DURATION
         return [
@@ -100,7 +116,10 @@ class _Pair:
 
     def raise_bound(self, effort: Effort, deadline: Deadline) -> None:
         """Raise the candidate's bound with some effort, in time."""
-        if deadline.left < effort.takes(self.shared.chain.nq) or self.candidate.lower_bound >= self.target:
+        if (
+            deadline.left < effort.takes(self.shared.chain.nq)
+            or self.candidate.lower_bound >= self.target
+        ):
             return
         for cells in self._cells:
             cells.raise_bounds(effort, deadline)

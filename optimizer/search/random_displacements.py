@@ -1,4 +1,6 @@
-"""Random displacements of a motion, from which other local optima are found: half waves that vanish at both ends."""
+"""Random displacements of a motion, from which other local optima are found: half waves that vanish
+at both ends.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +10,19 @@ import numpy as np
 
 from joulepath.models.robot import Array, Limits
 
-# half waves, least and largest standard deviation of their amplitudes [rad]: the motions of least work swing far
+# half waves, least and largest standard deviation of their amplitudes [rad]: the motions of least
+# work swing far
 WAVES, AMPLITUDES = 3, (1.0, 5.0)
-# share of each limit on speed, acceleration and jerk that a displacement may use: far beyond the limits, solves would
-# spend their time on getting back
+# share of each limit on speed, acceleration and jerk that a displacement may use: far beyond the
+# limits, solves would spend their time on getting back
 SHARE = 1.0
 SEED = 0
 
 
 def random_displacements(limits: Limits, duration: float, at: Array, count: int) -> Iterator[Array]:
-    """`count` displacements (k, nq) [rad] of a motion of `duration` [s] at fractions `at` (k,) of it."""
+    """`count` displacements (k, nq) [rad] of a motion of `duration` [s] at fractions `at` (k,) of
+    it.
+    """
     half_waves = np.arange(1, WAVES + 1)
     waves = np.sin(np.pi * np.outer(at, half_waves))
     # greatest rate of a wave of amplitude 1 (derivative, wave) per limit
@@ -26,5 +31,7 @@ def random_displacements(limits: Limits, duration: float, at: Array, count: int)
     for _ in range(count):
         size = np.exp(rng.uniform(*np.log(AMPLITUDES)))
         amplitude = rng.normal(size=(WAVES, limits.q_min.size)) * (size / half_waves[:, None])
-        amplitude *= np.minimum(1.0, (SHARE * limits.rates / (steepest @ np.abs(amplitude))).min(axis=0))
+        amplitude *= np.minimum(
+            1.0, (SHARE * limits.rates / (steepest @ np.abs(amplitude))).min(axis=0)
+        )
         yield waves @ amplitude

@@ -1,4 +1,6 @@
-"""Refinement of the incumbent: finer motions, other values of the surplus, and the comparison with the baselines."""
+"""Refinement of the incumbent: finer motions, other values of the surplus, and the comparison with
+the baselines.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +28,11 @@ from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 from joulepath.optimizer.trajectories.spline import Spline, least_time_scale, retimed, sampled
 from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 
-# assumed values of a joule of surplus if the storage cannot take all of it: shares of the way from what the supply
-# pays for it to what the storage gives back
+# assumed values of a joule of surplus if the storage cannot take all of it: shares of the way from
+# what the supply pays for it to what the storage gives back
 SURPLUS_VALUES = (0.75, 0.5, 0.25)
-# factors tried for the duration of a baseline: where jumps of jerk are close, rounding takes jerk beyond its limit
+# factors tried for the duration of a baseline: where jumps of jerk are close, rounding takes jerk
+# beyond its limit
 SLOWER = (1.0, 1 + 1e-5)
 # why a baseline of less energy is not the answer
 NOT_CONFIRMED = "the certificate did not confirm it, or not before the deadline"
@@ -57,7 +60,9 @@ def refine(incumbent: Incumbent, candidate: Candidate) -> None:
         for share in SURPLUS_VALUES:
             if not deadline.passed:
                 value = supply + share * max(problem.arm.bus.efficiency - supply, 0.0)
-                solve_from(incumbent, candidate, sampled(candidate.spline), fine=False, surplus_value=value)
+                solve_from(
+                    incumbent, candidate, sampled(candidate.spline), fine=False, surplus_value=value
+                )
     longest, spline = problem.duration_max or 0.0, candidate.spline
     may_be_slower = problem.objective == "mechanical" and spline.duration < longest * (1 - SLACK)
     if may_be_slower and not deadline.passed:
@@ -71,21 +76,24 @@ def refine(incumbent: Incumbent, candidate: Candidate) -> None:
 class RivalSettings:
     """Which other candidates are refined, relative to the gain of refining the best one.
 
-    A rival is refined if this multiple of the gain would bring its energy below that of the best candidate.
+    A rival is refined if this multiple of the gain would bring its energy below that of the best
+    candidate.
     """
 
     gain: float = 1.25
-    """With a free duration. Under a limit on the TCP's speed, refining gained 2 % of one candidate and 3 % of the
-    next."""
+    """With a free duration. Under a limit on the TCP's speed, refining gained 2 % of one candidate
+    and 3 % of the next."""
     gain_in_time: float = 3.0
     """With a fixed duration: 2 % of one candidate and 6 % of the next."""
 
 
-def refine_rivals(incumbent: Incumbent, best: Candidate, coarse: float, settings: RivalSettings | None = None) -> None:
+def refine_rivals(
+    incumbent: Incumbent, best: Candidate, coarse: float, settings: RivalSettings | None = None
+) -> None:
     """Refine the other candidates that may come below the best one.
 
-    Samples of one pose are left out, because the refined best candidate is their optimum, too. Where powers
-    have corners, `sharpen` has followed the rivals already.
+    Samples of one pose are left out, because the refined best candidate is their optimum, too.
+    Where powers have corners, `sharpen` has followed the rivals already.
 
     Args:
         incumbent: state of the search.
@@ -98,10 +106,21 @@ def refine_rivals(incumbent: Incumbent, best: Candidate, coarse: float, settings
     if has_corners(problem.objective, problem.arm) or best.energy is None:
         return
     in_time = problem.duration_max is not None and problem.duration_min == problem.duration_max
-    most = best.energy + (settings.gain_in_time if in_time else settings.gain) * (coarse - best.energy)
+    most = best.energy + (settings.gain_in_time if in_time else settings.gain) * (
+        coarse - best.energy
+    )
     for rival in incumbent.candidates:
-        is_open = rival.energy is not None and rival.energy < most and not rival.refined and not rival.refused
-        if is_open and not (rival.start.sampled or rival.goal.sampled) and not incumbent.deadline.passed:
+        is_open = (
+            rival.energy is not None
+            and rival.energy < most
+            and not rival.refined
+            and not rival.refused
+        )
+        if (
+            is_open
+            and not (rival.start.sampled or rival.goal.sampled)
+            and not incumbent.deadline.passed
+        ):
             refine(incumbent, rival)
 
 
@@ -117,10 +136,12 @@ def lasts_below(ratio: float, incumbent: Incumbent, candidate: Candidate) -> boo
 
 
 def compare_with_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseline]:
-    """The baselines, after a feasible baseline of less energy was used as initial guess, first coarse, then fine.
+    """The baselines, after a feasible baseline of less energy was used as initial guess, first
+    coarse, then fine.
 
-    Only the method's `guess_baselines` are initial guesses. If one still needs less energy and is of the method's own
-    kind (`accepted_baselines`), it becomes the answer itself: what another parametrisation does better is not.
+    Only the method's `guess_baselines` are initial guesses. If one still needs less energy and is
+    of the method's own kind (`accepted_baselines`), it becomes the answer itself: what another
+    parametrisation does better is not.
     """
     if incumbent.problem.tool_path is not None or incumbent.problem.passes:
         return baselines_of(incumbent, best)
@@ -147,12 +168,19 @@ def compare_with_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseli
     return [replace(each, reason=NOT_CONFIRMED) if each.name in better else each for each in table]
 
 
-def _better(incumbent: Incumbent, table: list[Baseline], names: Sequence[BaselineName]) -> list[BaselineName]:
-    """Those of the named baselines that are feasible and need less than the motion they are compared with."""
+def _better(
+    incumbent: Incumbent, table: list[Baseline], names: Sequence[BaselineName]
+) -> list[BaselineName]:
+    """Those of the named baselines that are feasible and need less than the motion they are
+    compared with.
+    """
     return [
         each.name
         for each in table
-        if each.name in names and each.within_limits and each.saving < -SLACK and incumbent.allows(each.duration)
+        if each.name in names
+        and each.within_limits
+        and each.saving < -SLACK
+        and incumbent.allows(each.duration)
     ]
 
 
@@ -167,7 +195,9 @@ def baselines_of(incumbent: Incumbent, best: Candidate) -> list[Baseline]:
 
 
 def _table(incumbent: Incumbent, best: Candidate) -> tuple[list[Baseline], Candidate]:
-    """The baselines from the start of the best candidate to the nearest goal, and the candidate between these."""
+    """The baselines from the start of the best candidate to the nearest goal, and the candidate
+    between these.
+    """
     assert best.energy is not None
     prepared, problem = incumbent.prepared, incumbent.problem
     candidates = incumbent.candidates
@@ -176,12 +206,17 @@ def _table(incumbent: Incumbent, best: Candidate) -> tuple[list[Baseline], Candi
     oracle = prepared.torques, prepared.potential, prepared.broken_on_the_way
     table = baselines(problem, best.q_start, q_goals, best.duration, best.energy, *oracle)
     q_nearest = nearest(problem, best.q_start, q_goals)
-    at = (each for each in candidates if (each.q_start == best.q_start).all() and (each.q_goal == q_nearest).all())
+    at = (
+        each
+        for each in candidates
+        if (each.q_start == best.q_start).all() and (each.q_goal == q_nearest).all()
+    )
     return table, next(at)
 
 
 def accept_baseline(incumbent: Incumbent, candidate: Candidate, better: list[BaselineName]) -> None:
-    """Accept the baselines `better` as motions of the candidate, each as an exact spline, if they are certified.
+    """Accept the baselines `better` as motions of the candidate, each as an exact spline, if they
+    are certified.
 
     Those that are not certified before the deadline do not count.
     """
@@ -192,7 +227,9 @@ def accept_baseline(incumbent: Incumbent, candidate: Candidate, better: list[Bas
         return
 
 
-def _accept_certified(incumbent: Incumbent, candidate: Candidate, better: list[BaselineName]) -> None:
+def _accept_certified(
+    incumbent: Incumbent, candidate: Candidate, better: list[BaselineName]
+) -> None:
     best = incumbent.best()
     assert best is not None
     limits, duration = incumbent.problem.arm.active_limits, best.duration
@@ -204,7 +241,9 @@ def _accept_certified(incumbent: Incumbent, candidate: Candidate, better: list[B
     }
     for name in better:
         scale = max(least_time_scale(motions[name], limits.rates), 1.0)
-        for spline in (incumbent.allowed(retimed(motions[name], slower * scale)) for slower in SLOWER):
+        for spline in (
+            incumbent.allowed(retimed(motions[name], slower * scale)) for slower in SLOWER
+        ):
             if spline is None:
                 continue
             energy = incumbent.prepared.energy(spline)

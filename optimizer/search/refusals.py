@@ -10,9 +10,15 @@ from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory
 
 
 def no_trajectory(candidates: Sequence[Candidate]) -> NoTrajectory:
-    """The error for no motion at all; it names the collision that stopped the best candidate, if there is one."""
+    """The error for no motion at all; it names the collision that stopped the best candidate, if
+    there is one.
+    """
     reports = [candidate.report() for candidate in candidates]
-    hits = [(each, each.attempt.collision) for each in candidates if each.attempt and each.attempt.collision]
+    hits = [
+        (each, each.attempt.collision)
+        for each in candidates
+        if each.attempt and each.attempt.collision
+    ]
     if not hits:
         return NoTrajectory(reports)
     candidate, hit = max(hits, key=lambda each: each[1].min_clearance)

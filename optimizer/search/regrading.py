@@ -1,7 +1,9 @@
-"""Finer motions whose ends slide: where jerk switches depends on the posture that is found, so the knots follow it.
+"""Finer motions whose ends slide: where jerk switches depends on the posture that is found, so the
+knots follow it.
 
-The first solve with knots at the switches of jerk ends early, since the posture has moved by then. Each further one
-begins from its motion, with the knots at the switches of the motion to the posture found.
+The first solve with knots at the switches of jerk ends early, since the posture has moved by then.
+Each further one begins from its motion, with the knots at the switches of the motion to the posture
+found.
 """
 
 from __future__ import annotations
@@ -20,7 +22,9 @@ REGRADED, SAVED = 2, 1e-3
 
 
 def grade(incumbent: Incumbent, candidate: Candidate) -> None:
-    """Solve again with knots at the switches of jerk, and then at those of the motion to the posture found."""
+    """Solve again with knots at the switches of jerk, and then at those of the motion to the
+    posture found.
+    """
     coarse = candidate.spline
     _solve_from(incumbent, candidate, coarse)
     if candidate.spline is coarse:
@@ -35,7 +39,8 @@ def grade(incumbent: Incumbent, candidate: Candidate) -> None:
 
 
 def _solve_from(incumbent: Incumbent, candidate: Candidate, spline: Spline) -> None:
-    """Solve from a motion, of which the knots follow the posture if they are at switches already."""
+    """Solve from a motion, of which the knots follow the posture if they are at switches
+    already."""
 
     def attempt(solver: Method) -> SolveResult:
         assert isinstance(solver, FreeSpline)

@@ -1,4 +1,6 @@
-"""Rough motions of least mechanical work, of many candidates at a time: nearly optimal, nearly within the limits."""
+"""Rough motions of least mechanical work, of many candidates at a time: nearly optimal, nearly
+within the limits.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,8 @@ from joulepath.optimizer.trajectories.spline import Spline, spline_of
 
 # width of corners that counts as none [W]
 SHARP = 1e-6
-# control points of guesses, and steps from one that are made whatever they promise: the first promise little
+# control points of guesses, and steps from one that are made whatever they promise: the first
+# promise little
 COARSE, SURE = 13, 3
 # distance of all control points [rad] below which two motions count as one
 ALIKE = 0.02
@@ -27,8 +30,8 @@ ALIKE = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Rough:
-    """A rough motion of a candidate: all its control points (n, nq) [rad] over evenly spaced knots, and its work with
-    the penalties of what exceeds a limit [J]."""
+    """A rough motion of a candidate: all its control points (n, nq) [rad] over evenly spaced knots,
+    and its work with the penalties of what exceeds a limit [J]."""
 
     candidate: Candidate
     points: Array
@@ -44,12 +47,14 @@ class Rough:
         return same and bool(np.abs(self.points - other.points).max() < ALIKE)
 
     def on(self, count: int) -> Array:
-        """The motion's `count` control points (count, nq) [rad]: through the same places, not quite the same motion if
-        they are others."""
+        """The motion's `count` control points (count, nq) [rad]: through the same places, not quite
+        the same motion if they are others."""
         points, rest = self.points, bspline.REST_POINTS
         if len(points) == count:
             return points
-        fitted = bspline.refit(points, bspline.uniform(len(points)).knots, bspline.uniform(count).knots)
+        fitted = bspline.refit(
+            points, bspline.uniform(len(points)).knots, bspline.uniform(count).knots
+        )
         fitted[:rest], fitted[-rest:] = points[0], points[-1]
         return fitted
 
@@ -63,8 +68,13 @@ class RoughWork:
     _programs: dict[tuple[int, float], ManyMotions] = field(default_factory=dict)
 
     def first(self, candidates: Sequence[Candidate]) -> list[Rough]:
-        """Guesses of candidates: smoothed time-optimal motions, as of the first solves of `FreeSpline`."""
-        limits, at = self.prepared.problem.arm.active_limits, bspline.greville(bspline.uniform(COARSE).knots)
+        """Guesses of candidates: smoothed time-optimal motions, as of the first solves of
+        `FreeSpline`.
+        """
+        limits, at = (
+            self.prepared.problem.arm.active_limits,
+            bspline.greville(bspline.uniform(COARSE).knots),
+        )
         found = []
         for each in candidates:
             points = time_optimal_positions(limits, each.q_start, each.q_goal, at)
@@ -72,7 +82,9 @@ class RoughWork:
         return found
 
     def random(self, candidate: Candidate, count: int) -> list[Rough]:
-        """As many guesses of a candidate: random displacements of the quintic, within the limits but for places."""
+        """As many guesses of a candidate: random displacements of the quintic, within the limits
+        but for places.
+        """
         limits, line = self.prepared.problem.arm.active_limits, _line(candidate)
         at = bspline.greville(bspline.uniform(COARSE).knots)
         return [
@@ -80,8 +92,11 @@ class RoughWork:
             for each in random_displacements(limits, self.duration, at, count)
         ]
 
-    def solved(self, guesses: Sequence[Rough], count: int, width: float, progress: float, behind: float) -> list[Rough]:
-        """Motions solved from others on `count` control points with corners of `width` [W], that of least work first.
+    def solved(
+        self, guesses: Sequence[Rough], count: int, width: float, progress: float, behind: float
+    ) -> list[Rough]:
+        """Motions solved from others on `count` control points with corners of `width` [W], that of
+        least work first.
 
         `progress` and `behind` as of `ManyMotions.minimised`.
         """
@@ -92,8 +107,14 @@ class RoughWork:
         ends, free = points[:, [0, -1]], points[:, program.basis.free]
         found = program.minimised(ends, free, progress, behind, SURE if count == COARSE else 1)
         points = program.points(ends, found.free)
-        work = program.costs(points, self.prepared.parameters(mechanical=1.0, width=SHARP)) + found.penalty
-        solved = [replace(each, points=p, work=float(w)) for each, p, w in zip(guesses, points, work, strict=True)]
+        work = (
+            program.costs(points, self.prepared.parameters(mechanical=1.0, width=SHARP))
+            + found.penalty
+        )
+        solved = [
+            replace(each, points=p, work=float(w))
+            for each, p, w in zip(guesses, points, work, strict=True)
+        ]
         return sorted(solved, key=lambda each: each.work)
 
     def _program(self, count: int, width: float) -> ManyMotions:
@@ -102,7 +123,9 @@ class RoughWork:
             prepared = self.prepared
             limits = prepared.problem.arm.active_limits.scaled(1 - MARGIN)
             p = prepared.parameters(mechanical=1.0, width=width)
-            self._programs[key] = ManyMotions(prepared.kernel, bspline.uniform(count), limits, self.duration, p)
+            self._programs[key] = ManyMotions(
+                prepared.kernel, bspline.uniform(count), limits, self.duration, p
+            )
         return self._programs[key]
 
 
@@ -121,5 +144,8 @@ def _line(candidate: Candidate) -> Array:
 
 
 def _at_rest(points: Array, candidate: Candidate) -> Array:
-    points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = candidate.q_start, candidate.q_goal
+    points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = (
+        candidate.q_start,
+        candidate.q_goal,
+    )
     return points

@@ -18,7 +18,13 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.progress import Improved, Tell, nobody
 from joulepath.optimizer.result.candidates import CandidateStatus, UnreachableTarget
 from joulepath.optimizer.result.energy import Energy
-from joulepath.optimizer.result.solution import Baseline, Configuration, LimitsInForce, Solution, SolverReport
+from joulepath.optimizer.result.solution import (
+    Baseline,
+    Configuration,
+    LimitsInForce,
+    Solution,
+    SolverReport,
+)
 from joulepath.optimizer.search import free_goal, self_motions
 from joulepath.optimizer.search.attempts import solve, solve_from
 from joulepath.optimizer.search.baselines import with_saving_intervals
@@ -36,7 +42,12 @@ from joulepath.optimizer.search.near_goals import activate_near_goals
 from joulepath.optimizer.search.other_starts import start_beside
 from joulepath.optimizer.search.outer_turns import explore_families
 from joulepath.optimizer.search.path_ends import path_candidates
-from joulepath.optimizer.search.refinement import baselines_of, compare_with_baselines, refine, refine_rivals
+from joulepath.optimizer.search.refinement import (
+    baselines_of,
+    compare_with_baselines,
+    refine,
+    refine_rivals,
+)
 from joulepath.optimizer.search.refusals import no_trajectory
 from joulepath.optimizer.search.ruled_out import ruled_out
 from joulepath.optimizer.search.sampled_ends import activate_deferred, between
@@ -45,14 +56,17 @@ from joulepath.optimizer.search.seeds import activate_seeds
 from joulepath.optimizer.search.sliding import slides
 from joulepath.optimizer.trajectories.spline import Spline, lasting, sampled
 
-# time after the deadline [s] at which a certificate is given up: better a little late than no answer
+# time after the deadline [s] at which a certificate is given up: better a little late than no
+# answer
 OVERTIME = 0.1
 
 
 class Run:
-    """One search. `known` are motions between the problem's ends, of any duration, that warm-start it.
+    """One search. `known` are motions between the problem's ends, of any duration, that warm-start
+    it.
 
-    `tell` gets what is found. `like` is another problem of the same arm, whose models are used again.
+    `tell` gets what is found. `like` is another problem of the same arm, whose models are used
+    again.
     """
 
     def __init__(
@@ -71,7 +85,9 @@ class Run:
         self.moved = self.lost = False
 
     def prepare(self) -> None:
-        """Find the candidates, and give each its lower bound. Raises the errors of `optimize` that need no search."""
+        """Find the candidates, and give each its lower bound. Raises the errors of `optimize` that
+        need no search.
+        """
         try:
             with watch(self.incumbent.end):
                 self._prepare()
@@ -83,7 +99,9 @@ class Run:
         if problem.tool_path is not None:
             self.incumbent.candidates = path_candidates(prepared)
         else:
-            (starts, no_starts), (goals, no_goals) = (ends(prepared, name) for name in ("start", "goal"))
+            (starts, no_starts), (goals, no_goals) = (
+                ends(prepared, name) for name in ("start", "goal")
+            )
             self.unreachable = no_starts + no_goals
             self.incumbent.candidates = pairs(prepared, starts, goals)
         bound(prepared, self.incumbent.candidates)
@@ -95,28 +113,43 @@ class Run:
         self.incumbent.tell_candidates()
 
     def _proven(self) -> float | None:
-        """What no motion goes below [J]; None if candidates that are not known, or not solved, have to be bounded."""
+        """What no motion goes below [J]; None if candidates that are not known, or not solved, have
+        to be bounded.
+        """
         candidates = self.incumbent.candidates
-        if self.problem.tool_path or any(each.sampled for each in candidates) or not all_known(self.problem):
+        if (
+            self.problem.tool_path
+            or any(each.sampled for each in candidates)
+            or not all_known(self.problem)
+        ):
             return None
         return min(each.lower_bound for each in candidates)
 
     def solution(self) -> Solution:
-        """The motion of least energy that the certificate confirms. Raises the errors of `optimize`."""
+        """The motion of least energy that the certificate confirms. Raises the errors of
+        `optimize`.
+        """
         self.prepare()
         for spline in self.known:
             self.warm_start(spline)
         return self.search()
 
-    def as_it_is(self, spline: Spline, stationarity: float | None = None, is_optimal: bool = False) -> Solution:
-        """The solution that a known motion is, without any search. Raises NoTrajectory if it is not certified.
+    def as_it_is(
+        self, spline: Spline, stationarity: float | None = None, is_optimal: bool = False
+    ) -> Solution:
+        """The solution that a known motion is, without any search. Raises NoTrajectory if it is not
+        certified.
 
         `is_optimal`: a search found it, which ended with this `stationarity`.
         """
         self.prepare()
         incumbent = self.incumbent
-        candidate = between(incumbent.prepared, incumbent.candidates, *spline.control_points[[0, -1]])
-        result = SolveResult(SolveStatus.SOLVED, "a known motion", spline=spline, stationarity=stationarity)
+        candidate = between(
+            incumbent.prepared, incumbent.candidates, *spline.control_points[[0, -1]]
+        )
+        result = SolveResult(
+            SolveStatus.SOLVED, "a known motion", spline=spline, stationarity=stationarity
+        )
         incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(spline))
         incumbent.cut_short = not is_optimal
         answer = self.answer(candidate, baselines_of(incumbent, candidate))
@@ -126,17 +159,25 @@ class Run:
         return answer
 
     def search(self) -> Solution:
-        """The solution, from candidates that are prepared, and of which some may be solved. Raises as `solution`."""
+        """The solution, from candidates that are prepared, and of which some may be solved. Raises
+        as `solution`.
+        """
         incumbent = self.incumbent
         problem, without = self.problem, None
         if incumbent.uses_storage:
             # storage never makes a motion need more energy
-            without = self.solved_beside(replace(problem, arm=replace(problem.arm, bus=Bus())), share=0.5)
+            without = self.solved_beside(
+                replace(problem, arm=replace(problem.arm, bus=Bus())), share=0.5
+            )
         # rest does no work: any motion may rest for the time that is left
-        may_rest = problem.objective == "mechanical" and problem.duration_min != problem.duration_max
+        may_rest = (
+            problem.objective == "mechanical" and problem.duration_min != problem.duration_max
+        )
         explore_or_find_fastest(incumbent, self.explore, self.known, without)
         if incumbent.method.most_solved is None:
-            incumbent.candidates += free_goal.refine_goals(incumbent) + self_motions.refine(incumbent)
+            incumbent.candidates += free_goal.refine_goals(incumbent) + self_motions.refine(
+                incumbent
+            )
             incumbent.tell_candidates()
             incumbent.tell_best()
         while (best := incumbent.best()) is not None:
@@ -147,7 +188,11 @@ class Run:
                 refine_rivals(incumbent, best, coarse)
                 best = incumbent.best() or best
                 start_from_free_duration(incumbent, best)
-            longest = self.solved_beside(replace(problem, duration_min=problem.duration_max)) if may_rest else None
+            longest = (
+                self.solved_beside(replace(problem, duration_min=problem.duration_max))
+                if may_rest
+                else None
+            )
             if longest is not None:
                 incumbent.accept_if_better(*longest)
             best, may_rest = incumbent.best() or best, False
@@ -162,7 +207,9 @@ class Run:
             self.explore()
         if any(each.reason is Reason.NOT_CONFIRMED for each in incumbent.candidates):
             find_fastest(incumbent, self.known, improve=False)
-            if (last := incumbent.best()) is not None and (answer := self.answer(last, baselines_of(incumbent, last))):
+            if (last := incumbent.best()) is not None and (
+                answer := self.answer(last, baselines_of(incumbent, last))
+            ):
                 return answer
         if any(candidate.status is CandidateStatus.UNVISITED for candidate in incumbent.candidates):
             raise self.too_late()
@@ -173,7 +220,9 @@ class Run:
         return DeadlineExceeded([candidate.report() for candidate in self.incumbent.candidates])
 
     def explore(self) -> None:
-        """Solve candidates until no lower bound is below the incumbent; deferred ones too while nothing is solved."""
+        """Solve candidates until no lower bound is below the incumbent; deferred ones too while
+        nothing is solved.
+        """
         incumbent = self.incumbent
         candidates, most_solved = incumbent.candidates, incumbent.method.most_solved
         self.activate()
@@ -197,12 +246,15 @@ class Run:
                 break
 
     def has_lost_a_goal(self) -> bool:
-        """Whether, for the first time, no motion was found to one of the best goals of free orientation.
+        """Whether, for the first time, no motion was found to one of the best goals of free
+        orientation.
 
         Where torque hardly suffices, there may be one to a goal beside it.
         """
         lost = any(
-            each.status is CandidateStatus.FAILED and each.attempt is not None and each.attempt.collision is None
+            each.status is CandidateStatus.FAILED
+            and each.attempt is not None
+            and each.attempt.collision is None
             for each in self.incumbent.candidates
             if each.goal.tolerance is not None
         )
@@ -225,8 +277,11 @@ class Run:
             return activate_seeds(self.incumbent.prepared, candidates)
         return activate_deferred(candidates)
 
-    def solved_beside(self, other: Problem, share: float = 1.0) -> tuple[Candidate, SolveResult, Energy] | None:
-        """The answer to another problem, whose motions this one allows, as a motion of it: no dearer than there.
+    def solved_beside(
+        self, other: Problem, share: float = 1.0
+    ) -> tuple[Candidate, SolveResult, Energy] | None:
+        """The answer to another problem, whose motions this one allows, as a motion of it: no
+        dearer than there.
 
         It gets a `share` of the time left. None if it has no answer by then.
         """
@@ -234,22 +289,33 @@ class Run:
         if left <= 0:
             return None
         try:
-            found = Run(replace(other, bound="normal", deadline=share * left), clock=self.clock).solution()
+            found = Run(
+                replace(other, bound="normal", deadline=share * left), clock=self.clock
+            ).solution()
         except (DeadlineExceeded, DurationTooShort, NoTrajectory):
             return None
         incumbent.iterations += found.solver.iterations
         incumbent.solves += found.solver.nlp_solves
         targets = found.start.target, found.goal.target
-        same = [each for each in incumbent.candidates if (each.start.target, each.goal.target) == targets]
-        candidate = between(incumbent.prepared, incumbent.candidates, found.start.q, found.goal.q, same)
+        same = [
+            each
+            for each in incumbent.candidates
+            if (each.start.target, each.goal.target) == targets
+        ]
+        candidate = between(
+            incumbent.prepared, incumbent.candidates, found.start.q, found.goal.q, same
+        )
         spline = found.trajectory.spline
-        result = SolveResult(SolveStatus.SOLVED, "converged", spline=spline, stationarity=found.solver.stationarity)
+        result = SolveResult(
+            SolveStatus.SOLVED, "converged", spline=spline, stationarity=found.solver.stationarity
+        )
         return candidate, result, incumbent.prepared.energy(spline)
 
     def warm_start(self, spline: Spline) -> None:
         """Solve the candidate of a known motion from it, and without it; the better result counts.
 
-        The motion is rescaled in time to the allowed durations. It is accepted as it is if its certificate is valid.
+        The motion is rescaled in time to the allowed durations. It is accepted as it is if its
+        certificate is valid.
         """
         incumbent = self.incumbent
         prepared = incumbent.prepared
@@ -262,22 +328,30 @@ class Run:
         energy = incumbent.confirmed_energy(candidate, known)
         if energy is not None:
             incumbent.accept_if_better(
-                candidate, SolveResult(SolveStatus.SOLVED, "a known motion, retimed", spline=known), energy
+                candidate,
+                SolveResult(SolveStatus.SOLVED, "a known motion, retimed", spline=known),
+                energy,
             )
         solve_from(incumbent, candidate, sampled(known), fine=self.problem.method == "time_scaling")
         result = solve(incumbent, candidate)
         if result.spline is None:
-            # a known motion is no optimum if solves from it fail; it may be one if they end early, being no better
+            # a known motion is no optimum if solves from it fail; it may be one if they end early,
+            # being no better
             failed = result.status is not SolveStatus.PRUNED
-            incumbent.cut_short |= failed and candidate.attempt is not None and candidate.attempt.spline is known
+            incumbent.cut_short |= (
+                failed and candidate.attempt is not None and candidate.attempt.spline is known
+            )
             return
         incumbent.accept_if_better(candidate, result, prepared.energy(result.spline))
         if incumbent.method.may_refine(result.spline) and candidate.attempt is not result:
-            # with few control points it needs more energy than the known motion, but may lead to a better optimum
+            # with few control points it needs more energy than the known motion, but may lead to a
+            # better optimum
             solve_from(incumbent, candidate, sampled(result.spline), fine=False)
 
     def answer(self, best: Candidate, table: list[Baseline]) -> Solution | None:
-        """The solution around the best candidate; None if its certificate fails. Raises DeadlineExceeded."""
+        """The solution around the best candidate; None if its certificate fails. Raises
+        DeadlineExceeded.
+        """
         incumbent, spline, prepared = self.incumbent, best.spline, self.incumbent.prepared
         try:
             with watch(incumbent.end.earlier_by(-OVERTIME)):
@@ -292,7 +366,9 @@ class Run:
             raise self.too_late() from None
         objective = energy.of(self.problem.objective)
         least, done = ruled_out(incumbent, objective)
-        is_proven = not incumbent.cut_short and may_be_optimal(self.problem.objective, objective, least)
+        is_proven = not incumbent.cut_short and may_be_optimal(
+            self.problem.objective, objective, least
+        )
         assert best.attempt is not None
         incumbent.tell(Improved(objective, spline.duration, least, best.q_goal))
         arm = self.problem.arm

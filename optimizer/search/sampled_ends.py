@@ -1,7 +1,8 @@
-"""Targets that infinitely many configurations reach: which samples are solved, and configurations between samples.
+"""Targets that infinitely many configurations reach: which samples are solved, and configurations
+between samples.
 
-Such a target is a pose whose orientation is free in part, or a pose that an arm holds on a self-motion. Its samples are
-ordered by lower bound, and those of least bound are solved.
+Such a target is a pose whose orientation is free in part, or a pose that an arm holds on a
+self-motion. Its samples are ordered by lower bound, and those of least bound are solved.
 """
 
 from __future__ import annotations
@@ -25,23 +26,32 @@ from joulepath.optimizer.search.ends import SIDES, EndConfiguration, label_of
 
 # samples solved before any is refined: in all, and of one pair of branches
 BATCH, ALIKE = 12, 2
-# solved samples that are refined, each of a kind of its own: so many, of at most this ratio of the least energy
+# solved samples that are refined, each of a kind of its own: so many, of at most this ratio of the
+# least energy
 MOST_REFINED, WORTH_REFINING = 4, 1.3
 # configurations that differ by less are the same [rad]
 SAME = 1e-6
 
 
-def activate_deferred(candidates: Sequence[Candidate], batch: int = BATCH, most_alike: int = ALIKE) -> bool:
+def activate_deferred(
+    candidates: Sequence[Candidate], batch: int = BATCH, most_alike: int = ALIKE
+) -> bool:
     """Activate the deferred samples of least lower bound; false if there are none.
 
-    At most `batch` of them, so that at most `most_alike` of a pair of branches are active then, unless all are.
+    At most `batch` of them, so that at most `most_alike` of a pair of branches are active then,
+    unless all are.
     """
     alike: Counter[tuple[str, str, int]] = Counter()
     if most_alike < ALIKE:
         alike.update(_kind(each) for each in candidates if not each.deferred)
     opened = 0
-    for candidate in sorted((e for e in candidates if e.deferred), key=lambda e: (e.lower_bound, e.shortest)):
-        if candidate.status is not CandidateStatus.UNVISITED or alike[_kind(candidate)] >= most_alike:
+    for candidate in sorted(
+        (e for e in candidates if e.deferred), key=lambda e: (e.lower_bound, e.shortest)
+    ):
+        if (
+            candidate.status is not CandidateStatus.UNVISITED
+            or alike[_kind(candidate)] >= most_alike
+        ):
             continue
         alike[_kind(candidate)] += 1
         candidate.deferred = False
@@ -53,9 +63,13 @@ def activate_deferred(candidates: Sequence[Candidate], batch: int = BATCH, most_
 
 
 def fastest_samples(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """The deferred samples of least proven duration: at most BATCH, and at most ALIKE of a pair of branches."""
+    """The deferred samples of least proven duration: at most BATCH, and at most ALIKE of a pair of
+    branches.
+    """
     alike, chosen = Counter[tuple[str, str, int]](), list[Candidate]()
-    for candidate in sorted((e for e in candidates if e.deferred and e.holdable), key=lambda e: e.shortest):
+    for candidate in sorted(
+        (e for e in candidates if e.deferred and e.holdable), key=lambda e: e.shortest
+    ):
         alike[_kind(candidate)] += 1
         if alike[_kind(candidate)] <= ALIKE and len(chosen) < BATCH:
             chosen.append(candidate)
@@ -74,9 +88,11 @@ def between(
     q_goal: Array,
     among: Sequence[Candidate] | None = None,
 ) -> Candidate:
-    """The candidate (of `among`, default all) between two configurations (nq,) [rad], else the nearest one.
+    """The candidate (of `among`, default all) between two configurations (nq,) [rad], else the
+    nearest one.
 
-    If it is missing only because an end is not among the samples of its target, it is added to `candidates`.
+    If it is missing only because an end is not among the samples of its target, it is added to
+    `candidates`.
     """
     known = candidates if among is None else among
     nearest = min(known, key=lambda e: _distance(e.q_start, q_start) + _distance(e.q_goal, q_goal))
@@ -89,7 +105,9 @@ def between(
         if same_start and same_goal:
             kinds[id(each.start.self_motion), id(each.goal.self_motion), each.goal.target] = each
     for candidate in kinds.values():
-        if _reaches(prepared, candidate.start, q_start) and _reaches(prepared, candidate.goal, q_goal):
+        if _reaches(prepared, candidate.start, q_start) and _reaches(
+            prepared, candidate.goal, q_goal
+        ):
             fresh = with_ends(prepared, candidate, q_start, q_goal)
             if fresh is not None:
                 candidates.append(fresh)
@@ -98,10 +116,12 @@ def between(
 
 
 def refine_best(
-    solved: Sequence[Candidate], kind: Callable[[Candidate], Hashable], refine: Callable[[Candidate], Candidate]
+    solved: Sequence[Candidate],
+    kind: Callable[[Candidate], Hashable],
+    refine: Callable[[Candidate], Candidate],
 ) -> list[Candidate]:
-    """The candidates that `refine` makes of the best sample of each kind, at most MOST_REFINED of them, if its energy
-    is not far above that of the best of all.
+    """The candidates that `refine` makes of the best sample of each kind, at most MOST_REFINED of
+    them, if its energy is not far above that of the best of all.
 
     `solved` are solved samples. A sample that `refine` returns unchanged is left out.
     """
@@ -115,12 +135,18 @@ def refine_best(
     return [better for candidate, better in refined if better is not candidate]
 
 
-def with_ends(prepared: PreparedProblem, candidate: Candidate, q_start: Array, q_goal: Array) -> Candidate | None:
-    """The candidate between other configurations (nq,) of its targets, with its bounds; None if that is infeasible.
+def with_ends(
+    prepared: PreparedProblem, candidate: Candidate, q_start: Array, q_goal: Array
+) -> Candidate | None:
+    """The candidate between other configurations (nq,) of its targets, with its bounds; None if
+    that is infeasible.
 
     An end that is no sample stays where it is.
     """
-    start, goal = moved_end(prepared, candidate.start, q_start), moved_end(prepared, candidate.goal, q_goal)
+    start, goal = (
+        moved_end(prepared, candidate.start, q_start),
+        moved_end(prepared, candidate.goal, q_goal),
+    )
     fresh = Candidate(start, goal, q_start, q_goal)
     try:
         sampled = [name for name in SIDES if getattr(candidate, name).sampled]
@@ -130,8 +156,12 @@ def with_ends(prepared: PreparedProblem, candidate: Candidate, q_start: Array, q
     return fresh
 
 
-def nearest_configuration(prepared: PreparedProblem, end: EndConfiguration, q: Array) -> Array | None:
-    """The configuration (nq,) of a sampled end's target that is nearest to q (nq,), if any is within the limits."""
+def nearest_configuration(
+    prepared: PreparedProblem, end: EndConfiguration, q: Array
+) -> Array | None:
+    """The configuration (nq,) of a sampled end's target that is nearest to q (nq,), if any is
+    within the limits.
+    """
     arm = prepared.problem.arm
     if end.self_motion is None:
         assert end.tolerance is not None

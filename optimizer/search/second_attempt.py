@@ -1,4 +1,6 @@
-"""What follows when the certificate rejects a motion: the candidate is solved once more, within tighter limits."""
+"""What follows when the certificate rejects a motion: the candidate is solved once more, within
+tighter limits.
+"""
 
 from __future__ import annotations
 
@@ -15,14 +17,16 @@ from joulepath.optimizer.search.refinement import refine
 
 # limits become tighter by what the motion exceeded them by, and by this share
 BEYOND = 2e-3
-WITHIN_TIGHTER = "converged within tighter limits, after the certificate did not confirm the first motion"
+WITHIN_TIGHTER = (
+    "converged within tighter limits, after the certificate did not confirm the first motion"
+)
 
 
 def reject(incumbent: Incumbent, candidate: Candidate) -> None:
     """Drop a motion that the certificate did not confirm.
 
-    If it exceeded a limit, the candidate is solved again within limits that are tighter by the excess, once. What the
-    certificate confirms of that becomes its motion.
+    If it exceeded a limit, the candidate is solved again within limits that are tighter by the
+    excess, once. What the certificate confirms of that becomes its motion.
     """
     tighter = None if candidate.tightened else _tightened(incumbent, candidate)
     incumbent.reject(candidate)
@@ -42,16 +46,22 @@ def reject(incumbent: Incumbent, candidate: Candidate) -> None:
 
 
 def _tightened(incumbent: Incumbent, candidate: Candidate) -> Arm | None:
-    """The arm with tighter limits; None if the motion of the candidate exceeds none of them, or follows a path."""
+    """The arm with tighter limits; None if the motion of the candidate exceeds none of them, or
+    follows a path.
+    """
     problem, arm, spline = incumbent.problem, incumbent.problem.arm, candidate.spline
     if problem.tool_path is not None or problem.passes:
         return None
     try:
         with watch(incumbent.deadline):
-            worst = incumbent.certified(candidate, spline, incumbent.prepared.energy(spline)).worst_ratio
+            worst = incumbent.certified(
+                candidate, spline, incumbent.prepared.energy(spline)
+            ).worst_ratio
     except DeadlinePassed:
         return None
-    share = {name: 1 / (ratio * (1 + BEYOND)) if ratio > 1 else 1.0 for name, ratio in worst.items()}
+    share = {
+        name: 1 / (ratio * (1 + BEYOND)) if ratio > 1 else 1.0 for name, ratio in worst.items()
+    }
     if all(each == 1.0 for name, each in share.items() if name != "position"):
         return None
     limits, cone = arm.active_limits, arm.tool_cone
@@ -66,12 +76,16 @@ def _tightened(incumbent: Incumbent, candidate: Candidate) -> Arm | None:
         ),
         tcp_speed=None if arm.tcp_speed is None else arm.tcp_speed * share["tcp_speed"],
         elbow_speed=None if arm.elbow_speed is None else arm.elbow_speed * share["elbow_speed"],
-        tool_cone=None if cone is None else replace(cone, half_angle=cone.half_angle * share["tool_cone"]),
+        tool_cone=None
+        if cone is None
+        else replace(cone, half_angle=cone.half_angle * share["tool_cone"]),
     )
 
 
 def _take(incumbent: Incumbent, candidate: Candidate, twin: Candidate) -> None:
-    """Give the candidate the motion of `twin` if the certificate confirms it for the limits that were asked for."""
+    """Give the candidate the motion of `twin` if the certificate confirms it for the limits that
+    were asked for.
+    """
     energy = incumbent.confirmed_energy(twin, twin.spline)
     if energy is not None:
         candidate.move(twin)

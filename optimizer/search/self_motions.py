@@ -1,8 +1,10 @@
-"""Poses that the arm holds on a self-motion: how the best of their samples are refined where ends do not slide.
+"""Poses that the arm holds on a self-motion: how the best of their samples are refined where ends
+do not slide.
 
-The posture at the goal of a singular arm is an unknown of the program, as in `free_goal`. At the start, and for methods
-that are not the free spline, the parameter of the self-motion moves in steps while the energy decreases; each step is
-solved as a candidate of its own, and the steps are halved until they tell nothing.
+The posture at the goal of a singular arm is an unknown of the program, as in `free_goal`. At the
+start, and for methods that are not the free spline, the parameter of the self-motion moves in steps
+while the energy decreases; each step is solved as a candidate of its own, and the steps are halved
+until they tell nothing.
 """
 
 from __future__ import annotations
@@ -22,21 +24,31 @@ from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
 from joulepath.optimizer.search.sliding import slides
 
-# first step of a parameter, half the way between two samples on a whole circle, and the least one [rad]
+# first step of a parameter, half the way between two samples on a whole circle, and the least one
+# [rad]
 FIRST_STEP, LEAST_STEP = np.pi / MEMBERS, 2e-3
 
 
 def refine(incumbent: Incumbent) -> list[Candidate]:
     """New candidates, found by moving the best solved samples along their self-motions.
 
-    One sample per pair of branches is refined, at most MOST_REFINED of them; only candidates of less energy than their
-    sample are returned.
+    One sample per pair of branches is refined, at most MOST_REFINED of them; only candidates of
+    less energy than their sample are returned.
     """
     prepared = incumbent.prepared
-    solved = [e for e in incumbent.candidates if e.energy is not None and _sides(e) and not slides(prepared, e)]
+    solved = [
+        e
+        for e in incumbent.candidates
+        if e.energy is not None and _sides(e) and not slides(prepared, e)
+    ]
     return refine_best(
         solved,
-        lambda each: (id(each.start.self_motion), id(each.goal.self_motion), each.start.label, each.goal.label),
+        lambda each: (
+            id(each.start.self_motion),
+            id(each.goal.self_motion),
+            each.start.label,
+            each.goal.label,
+        ),
         lambda each: _moved_along(incumbent, each),
     )
 
@@ -61,13 +73,20 @@ def _sides(candidate: Candidate) -> list[Side]:
 
 
 def _descend(incumbent: Incumbent, candidate: Candidate, sides: Sequence[Side]) -> Candidate:
-    """The candidate of least energy found along the self-motions of these ends; itself if no step is better."""
+    """The candidate of least energy found along the self-motions of these ends; itself if no step
+    is better.
+    """
     best, step = candidate, float(FIRST_STEP)
     while sides and step > LEAST_STEP and not incumbent.deadline.passed:
         steps = [(side, sign * step) for side in sides for sign in (1, -1)]
         tried = (_moved(incumbent, best, side, by) for side, by in steps)
         better = next(
-            (each for each in tried if each is not None and (each.energy or 0.0) < (best.energy or 0.0)), None
+            (
+                each
+                for each in tried
+                if each is not None and (each.energy or 0.0) < (best.energy or 0.0)
+            ),
+            None,
         )
         if better is None:
             step /= 2
@@ -77,10 +96,15 @@ def _descend(incumbent: Incumbent, candidate: Candidate, sides: Sequence[Side]) 
 
 
 def _moved(incumbent: Incumbent, candidate: Candidate, side: Side, step: float) -> Candidate | None:
-    """The candidate with one end moved by `step` [rad] along its self-motion, solved; None if it has no motion."""
+    """The candidate with one end moved by `step` [rad] along its self-motion, solved; None if it
+    has no motion.
+    """
     if incumbent.deadline.passed:
         return None
-    ends = {"start": (candidate.start, candidate.q_start), "goal": (candidate.goal, candidate.q_goal)}
+    ends = {
+        "start": (candidate.start, candidate.q_start),
+        "goal": (candidate.goal, candidate.q_goal),
+    }
     end, q = ends[side]
     motion = end.self_motion
     assert motion is not None

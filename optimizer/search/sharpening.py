@@ -1,12 +1,15 @@
-"""Motions of least energy where every joint's power has a corner of its own: restarts, finer motions, sharper corners.
+"""Motions of least energy where every joint's power has a corner of its own: restarts, finer
+motions, sharper corners.
 
-The mechanical objective is the integral of Σ_j |tau_j v_j|, and an isolated bus draws Σ_j max(P_j, 0). The NLP smooths
-these corners over `WIDTH`. Every joint has one, so that the optimum of the smoothed cost lies some percent above the
-least energy. Sharp corners from the start would leave the SQP in poor local optima. So the optimum is followed from one
-width to the next, in a space fine enough for the short pushes of such motions.
+The mechanical objective is the integral of Σ_j |tau_j v_j|, and an isolated bus draws Σ_j max(P_j,
+0). The NLP smooths these corners over `WIDTH`. Every joint has one, so that the optimum of the
+smoothed cost lies some percent above the least energy. Sharp corners from the start would leave the
+SQP in poor local optima. So the optimum is followed from one width to the next, in a space fine
+enough for the short pushes of such motions.
 
-The mechanical work of a motion has many local optima. As rest costs nothing, the best of them swing, push and rest,
-which few control points hardly show. Coarse solves from random motions are cheap; the best of them are followed.
+The mechanical work of a motion has many local optima. As rest costs nothing, the best of them
+swing, push and rest, which few control points hardly show. Coarse solves from random motions are
+cheap; the best of them are followed.
 """
 
 from __future__ import annotations
@@ -28,32 +31,37 @@ from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 from joulepath.optimizer.trajectories.spline import Spline, lasting, sampled
 from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 
-# random motions from which the coarse problem is solved, and how many of its solutions are solved in the middle space
+# random motions from which the coarse problem is solved, and how many of its solutions are solved
+# in the middle space
 RESTARTS, FOLLOWED = 8, 3
 # control points of the restarts, between them and the last motion, and of that
 FEW, MIDDLE, DENSE = 13, 24, 40
-# fixed durations, in multiples of the one found, in which the first motion on an isolated bus is solved in the middle
-# space, too: from one duration to the next, the optimum of a free one may be in another basin, up to 1.7 % better
+# fixed durations, in multiples of the one found, in which the first motion on an isolated bus is
+# solved in the middle space, too: from one duration to the next, the optimum of a free one may be
+# in another basin, up to 1.7 % better
 AROUND = (0.93, 0.95, 0.97, 0.99, 1.0, 1.02)
 # relative decrease of the cost that a further step must promise, and in the last solve
 PROGRESS, LAST_PROGRESS = 1e-3, 2e-4
-# first solves are rough and coarse: those that need at most this ratio of the least energy are solved in the middle
-# space, and so many of them
+# first solves are rough and coarse: those that need at most this ratio of the least energy are
+# solved in the middle space, and so many of them
 CONTENDING, CONTENDERS = 1.35, 6
-# then other candidates are followed if they need at most this ratio of the least energy, and so many of them; they are
-# given up once they need more than the last ratio of what the best one needed at the same width
+# then other candidates are followed if they need at most this ratio of the least energy, and so
+# many of them; they are given up once they need more than the last ratio of what the best one
+# needed at the same width
 NEAR, RIVALS, BEHIND = 1.03, 2, 1.005
 # share by which a motion needs more before its corners are as sharp as they become
 ROUNDER = 1.015
-# a motion shorter than this ratio of the shortest duration switches at its limits: even spacing cannot represent it,
-# and there is next to nothing to gain
+# a motion shorter than this ratio of the shortest duration switches at its limits: even spacing
+# cannot represent it, and there is next to nothing to gain
 LEAST_FREEDOM = 1.03
 
 
 def sharpen(incumbent: Incumbent, best: Candidate) -> None:
-    """Follow the best candidate, and those that need little more, to motions of sharp corners, while time is left.
+    """Follow the best candidate, and those that need little more, to motions of sharp corners,
+    while time is left.
 
-    Does nothing if the objective has no corner per joint, or if the method has no evenly spaced control points.
+    Does nothing if the objective has no corner per joint, or if the method has no evenly spaced
+    control points.
     """
     problem = incumbent.problem
     if not incumbent.method.evenly_spaced or not has_corners(problem.objective, problem.arm):
@@ -78,20 +86,26 @@ def sharpen(incumbent: Incumbent, best: Candidate) -> None:
 
 
 def follow_in_time(incumbent: Incumbent, candidate: Candidate, best: float) -> None:
-    """Follow a solved candidate to sharp corners, unless it turns out to need more than `best` [J]; inf if none is
-    known."""
+    """Follow a solved candidate to sharp corners, unless it turns out to need more than `best` [J];
+    inf if none is known."""
     follower = _Follower(incumbent, candidate)
     if len(candidate.spline.control_points) != MIDDLE:
         follower.solved(candidate.spline, WIDTH, MIDDLE, PROGRESS)
     # with rounder corners it needs more
-    follower.follow(restarts=0, ahead=[ROUNDER * best] * (len(SHARPER_WIDTHS) - 1) if np.isfinite(best) else [])
+    follower.follow(
+        restarts=0, ahead=[ROUNDER * best] * (len(SHARPER_WIDTHS) - 1) if np.isfinite(best) else []
+    )
 
 
 def _near(incumbent: Incumbent, best: Candidate, ratio: float) -> list[Candidate]:
-    """The candidates with a motion of at most this ratio of the best one's energy, which comes first."""
+    """The candidates with a motion of at most this ratio of the best one's energy, which comes
+    first.
+    """
     solved = [each for each in incumbent.candidates if each.energy is not None]
     most = ratio * (best.energy or 0.0)
-    return sorted((each for each in solved if each is best or (each.energy or 0.0) <= most), key=_energy_of)
+    return sorted(
+        (each for each in solved if each is best or (each.energy or 0.0) <= most), key=_energy_of
+    )
 
 
 def _energy_of(candidate: Candidate) -> float:
@@ -106,14 +120,18 @@ class _Follower:
     candidate: Candidate
 
     def follow(self, restarts: int, ahead: Sequence[float] = ()) -> list[float]:
-        """Solve with sharper and sharper corners, from the candidate's motion or from the best of random ones.
+        """Solve with sharper and sharper corners, from the candidate's motion or from the best of
+        random ones.
 
-        Returns the energies [J] at each width, inf without a motion. Ends early if one is far above that of `ahead`.
+        Returns the energies [J] at each width, inf without a motion. Ends early if one is far above
+        that of `ahead`.
         """
         cost_of = self.incumbent.prepared.cost_of
         coarse = sorted(self._restarted(restarts), key=cost_of)[:FOLLOWED]
         middle = [self.solved(motion, WIDTH, MIDDLE, PROGRESS) for motion in coarse]
-        best: Spline | None = min([self.candidate.spline, *(each for each in middle if each is not None)], key=cost_of)
+        best: Spline | None = min(
+            [self.candidate.spline, *(each for each in middle if each is not None)], key=cost_of
+        )
         energies: list[float] = []
         for width in SHARPER_WIDTHS:
             progress = LAST_PROGRESS if width == SHARPER_WIDTHS[-1] else PROGRESS
@@ -147,7 +165,9 @@ class _Follower:
         return found
 
     def solved(self, spline: Spline, width: float, count: int, progress: float) -> Spline | None:
-        """The motion solved with corners of `width` [W] on `count` control points; None if there is none in time."""
+        """The motion solved with corners of `width` [W] on `count` control points; None if there is
+        none in time.
+        """
         interval = self._interval(spline.duration, width)
         duration = float(np.clip(spline.duration, interval.t_min, interval.t_max))
         return self._from_samples(*sampled(lasting(spline, duration)), width, count, progress)
@@ -155,7 +175,8 @@ class _Follower:
     def _from_samples(
         self, q: Array, t: Array, width: float, count: int, progress: float, fixed: bool = False
     ) -> Spline | None:
-        """The motion solved from samples q (k, nq) [rad] at t (k,) [s]; None if there is none or no time is left.
+        """The motion solved from samples q (k, nq) [rad] at t (k,) [s]; None if there is none or no
+        time is left.
 
         `fixed`: it keeps its duration.
         """
@@ -173,10 +194,17 @@ class _Follower:
         return result.spline
 
     def _interval(self, duration: float, width: float = WIDTH) -> DurationInterval:
-        """The interval of durations that holds `duration` [s]; the longest duration alone for mechanical work.
+        """The interval of durations that holds `duration` [s]; the longest duration alone for
+        mechanical work.
 
         Waiting needs no mechanical work: no duration needs less than the longest.
         """
         intervals = duration_intervals(self.incumbent.prepared, self.candidate.q_goal, width=width)
-        interval = min(intervals, key=lambda each: max(each.t_min - duration, duration - each.t_max))
-        return replace(interval, t_min=interval.t_max) if self.incumbent.problem.objective == "mechanical" else interval
+        interval = min(
+            intervals, key=lambda each: max(each.t_min - duration, duration - each.t_max)
+        )
+        return (
+            replace(interval, t_min=interval.t_max)
+            if self.incumbent.problem.objective == "mechanical"
+            else interval
+        )

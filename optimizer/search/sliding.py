@@ -1,4 +1,6 @@
-"""Ends of a redundant arm that slide along their self-motions while the motion between them is optimised."""
+"""Ends of a redundant arm that slide along their self-motions while the motion between them is
+optimised.
+"""
 
 from __future__ import annotations
 
@@ -29,9 +31,13 @@ SLID = "; refined along the self-motion that holds the pose"
 
 
 def slides(prepared: PreparedProblem, candidate: Candidate) -> bool:
-    """Whether an end of the candidate may slide: on a self-motion of an arm with one joint more than a pose fixes."""
+    """Whether an end of the candidate may slide: on a self-motion of an arm with one joint more
+    than a pose fixes.
+    """
     able = prepared.arm.robot.nq == FIXED + 1 and method_of(prepared.problem) is FreeSpline
-    return able and (candidate.start.self_motion is not None or candidate.goal.self_motion is not None)
+    return able and (
+        candidate.start.self_motion is not None or candidate.goal.self_motion is not None
+    )
 
 
 def released(prepared: PreparedProblem, candidate: Candidate, solver: Method) -> bool:
@@ -48,23 +54,33 @@ def released(prepared: PreparedProblem, candidate: Candidate, solver: Method) ->
 def moved_to(
     prepared: PreparedProblem, candidates: Sequence[Candidate], candidate: Candidate, spline: Spline
 ) -> Candidate | None:
-    """The candidate with the ends of a motion, and its bounds; None if the problem does not allow these ends.
+    """The candidate with the ends of a motion, and its bounds; None if the problem does not allow
+    these ends.
 
     `candidates` are all of the problem: where curves meet, an end may go on along the next one.
     """
     q_start, q_goal = spline.control_points[[0, -1]]
-    start, goal = _end(candidates, candidate, "start", q_start), _end(candidates, candidate, "goal", q_goal)
+    start, goal = (
+        _end(candidates, candidate, "start", q_start),
+        _end(candidates, candidate, "goal", q_goal),
+    )
     if start is None or goal is None:
         return None
     return with_ends(prepared, replace(candidate, start=start, goal=goal), q_start, q_goal)
 
 
-def _end(candidates: Sequence[Candidate], candidate: Candidate, side: Side, q: Array) -> EndConfiguration | None:
-    """The end of the same target on whose self-motion q (nq,) is; None if it is on none that the problem allows."""
+def _end(
+    candidates: Sequence[Candidate], candidate: Candidate, side: Side, q: Array
+) -> EndConfiguration | None:
+    """The end of the same target on whose self-motion q (nq,) is; None if it is on none that the
+    problem allows.
+    """
     own: EndConfiguration = getattr(candidate, side)
     if own.self_motion is None:
         return own
-    ends = {id(end): end for each in candidates if (end := getattr(each, side)).target == own.target}
+    ends = {
+        id(end): end for each in candidates if (end := getattr(each, side)).target == own.target
+    }
     nearest: dict[int, tuple[float, EndConfiguration]] = {}
     for end in ends.values():
         if end.self_motion is not None:
@@ -73,6 +89,9 @@ def _end(candidates: Sequence[Candidate], candidate: Candidate, side: Side, q: A
     for _, end in sorted(nearest.values(), key=itemgetter(0)):
         motion = end.self_motion
         # on a joint's limit the member may be beyond it by rounding
-        if motion is not None and np.abs(wrapped(motion.at(np.array([motion.parameter(q)]))[0] - q)).max() < ON_CURVE:
+        if (
+            motion is not None
+            and np.abs(wrapped(motion.at(np.array([motion.parameter(q)]))[0] - q)).max() < ON_CURVE
+        ):
             return end
     return None

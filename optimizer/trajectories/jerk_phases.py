@@ -12,27 +12,38 @@ from joulepath.optimizer.trajectories.spline import Spline
 ELSEWHERE = 1e-3
 
 
-def spline_of_phases(ends: Array, jerk: Array, q_start: Array, q_goal: Array, closest: float) -> Spline:
-    """The motion from q_start to q_goal (nq,) [rad] with jerk (nq, p) [rad/s³] in phases that last to `ends` (nq, p).
+def spline_of_phases(
+    ends: Array, jerk: Array, q_start: Array, q_goal: Array, closest: float
+) -> Spline:
+    """The motion from q_start to q_goal (nq,) [rad] with jerk (nq, p) [rad/s³] in phases that last
+    to `ends` (nq, p).
 
-    The last end [s] is the duration. Knots are threefold where the jerk of a joint jumps. Jumps closer than `closest`,
-    as a fraction of the duration, become one, since rounding makes jerk of its own between them; then the jerk changes
-    a little, so that the motion still ends at rest at its goal.
+    The last end [s] is the duration. Knots are threefold where the jerk of a joint jumps. Jumps
+    closer than `closest`, as a fraction of the duration, become one, since rounding makes jerk of
+    its own between them; then the jerk changes a little, so that the motion still ends at rest at
+    its goal.
     """
     duration = float(ends.max())
     breaks, ends = _joined(ends / duration, closest)
     breaks, ends = breaks * duration, ends * duration
     middle = (breaks[1:] + breaks[:-1]) / 2
-    spans = np.array([own[np.searchsorted(end, middle)] for end, own in zip(ends, jerk, strict=True)]).T
+    spans = np.array(
+        [own[np.searchsorted(end, middle)] for end, own in zip(ends, jerk, strict=True)]
+    ).T
     spans = _ending(np.diff(breaks), spans, np.abs(jerk).max(axis=1), q_goal - q_start)
-    knots = bspline.clamped(np.concatenate([[0.0], np.repeat(breaks[1:-1], 3), [duration]]) / duration) * duration
+    knots = (
+        bspline.clamped(np.concatenate([[0.0], np.repeat(breaks[1:-1], 3), [duration]]) / duration)
+        * duration
+    )
     points = _control_points(knots, breaks, _states(breaks, spans, q_start), spans)
     points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = q_start, q_goal
     return Spline(bspline.DEGREE, knots, points)
 
 
 def _joined(ends: Array, closest: float) -> tuple[Array, Array]:
-    """The breaks (b,) in [0, 1], those that are close as one, with both ends; and the phases' ends at these breaks."""
+    """The breaks (b,) in [0, 1], those that are close as one, with both ends; and the phases' ends
+    at these breaks.
+    """
     every, where = np.unique(np.append(ends, [0.0, 1.0]), return_inverse=True)
     group = np.append(0, np.cumsum(np.diff(every) > closest))
     breaks = np.bincount(group, every) / np.bincount(group)
@@ -41,8 +52,9 @@ def _joined(ends: Array, closest: float) -> tuple[Array, Array]:
 
 
 def _ending(lengths: Array, spans: Array, greatest: Array, step: Array) -> Array:
-    """The jerks (b - 1, nq) near `spans`, of these lengths (b - 1,) [s], that lead from rest to rest over a step (nq,)
-    [rad]. They change where a joint has jerk, and elsewhere only if that does not do; `greatest` (nq,) is that of each.
+    """The jerks (b - 1, nq) near `spans`, of these lengths (b - 1,) [s], that lead from rest to
+    rest over a step (nq,) [rad]. They change where a joint has jerk, and elsewhere only if that
+    does not do; `greatest` (nq,) is that of each.
     """
     left = lengths.sum() - np.cumsum(lengths)
     speed = lengths * (lengths / 2 + left)
@@ -53,12 +65,16 @@ def _ending(lengths: Array, spans: Array, greatest: Array, step: Array) -> Array
     for joint, weight in enumerate((np.abs(spans) + ELSEWHERE * greatest).T):
         own = rows * weight
         scale = np.maximum(np.linalg.norm(own, axis=1), 1e-300)
-        changed[:, joint] += weight * np.linalg.lstsq(own / scale[:, None], missing[:, joint] / scale, rcond=None)[0]
+        changed[:, joint] += (
+            weight * np.linalg.lstsq(own / scale[:, None], missing[:, joint] / scale, rcond=None)[0]
+        )
     return changed
 
 
 def _states(breaks: Array, spans: Array, q_start: Array) -> tuple[Array, Array, Array]:
-    """Positions, speeds and accelerations (b - 1, nq) at the beginning of every span, of jerk `spans` (b - 1, nq)."""
+    """Positions, speeds and accelerations (b - 1, nq) at the beginning of every span, of jerk
+    `spans` (b - 1, nq).
+    """
     length = np.diff(breaks)[:, None]
 
     def summed(steps: Array) -> Array:
@@ -70,8 +86,11 @@ def _states(breaks: Array, spans: Array, q_start: Array) -> tuple[Array, Array, 
     return q, v, a
 
 
-def _control_points(knots: Array, breaks: Array, states: tuple[Array, Array, Array], spans: Array) -> Array:
-    """Control points (n, nq): the blossom, at its inner knots, of the cubic in the widest span that each one reaches.
+def _control_points(
+    knots: Array, breaks: Array, states: tuple[Array, Array, Array], spans: Array
+) -> Array:
+    """Control points (n, nq): the blossom, at its inner knots, of the cubic in the widest span that
+    each one reaches.
 
     The blossom of t^m at u_1 … u_5 is the mean of the products of m of them (Ramshaw 1989).
     """

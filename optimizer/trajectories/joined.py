@@ -11,12 +11,17 @@ from joulepath.optimizer.trajectories.spline import Spline
 
 
 def joined(motions: Sequence[Spline]) -> Spline:
-    """One motion of several of degree DEGREE, each of which begins at rest where the one before comes to rest.
+    """One motion of several of degree DEGREE, each of which begins at rest where the one before
+    comes to rest.
 
-    At rest, three control points coincide at the end of one, and at the start of the next: three of the six are enough
-    at a knot of multiplicity three, where speed and acceleration are zero.
+    At rest, three control points coincide at the end of one, and at the start of the next: three of
+    the six are enough at a knot of multiplicity three, where speed and acceleration are zero.
     """
-    knots, points, t = [motions[0].knots[:-REST_POINTS]], [motions[0].control_points], motions[0].duration
+    knots, points, t = (
+        [motions[0].knots[:-REST_POINTS]],
+        [motions[0].control_points],
+        motions[0].duration,
+    )
     for motion in motions[1:]:
         knots.append(motion.knots[DEGREE + 1 : -REST_POINTS] + t)
         points.append(motion.control_points[REST_POINTS:])

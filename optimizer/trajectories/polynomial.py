@@ -1,8 +1,10 @@
-"""Polynomials on [0, 1] given by their values at Chebyshev nodes, at rest at both ends: Lagrange interpolation.
+"""Polynomials on [0, 1] given by their values at Chebyshev nodes, at rest at both ends: Lagrange
+interpolation.
 
-A polynomial of degree m + 5 is given by its values at m nodes inside (0, 1) and, at both ends, by its value and zero
-speed and acceleration. It is evaluated in Bernstein's form, a B-spline with one span. There, rest fixes the first and
-the last three coefficients; the m coefficients between them follow from the values.
+A polynomial of degree m + 5 is given by its values at m nodes inside (0, 1) and, at both ends, by
+its value and zero speed and acceleration. It is evaluated in Bernstein's form, a B-spline with one
+span. There, rest fixes the first and the last three coefficients; the m coefficients between them
+follow from the values.
 """
 
 from __future__ import annotations
@@ -26,7 +28,8 @@ ANCHOR_STEP = 16
 
 @dataclass(frozen=True, eq=False)
 class PolynomialBasis(Basis):
-    """The space of polynomials with values at the nodes `at` (m,); its points (m + 2, r) are start, values, goal.
+    """The space of polynomials with values at the nodes `at` (m,); its points (m + 2, r) are start,
+    values, goal.
 
     `bernstein` (m + 6, m + 2) maps the points to Bernstein's coefficients.
     """
@@ -52,7 +55,9 @@ class PolynomialBasis(Basis):
         return cardinals(self.knots, self.bernstein, points, derivative)
 
     def fit(self, samples: Array, at: Array) -> Array:
-        """Points (m + 2, r) of the least-squares fit to samples (k, r) at (k,) in [0, 1]; the ends are exact."""
+        """Points (m + 2, r) of the least-squares fit to samples (k, r) at (k,) in [0, 1]; the ends
+        are exact.
+        """
         points = np.zeros((self.n, samples.shape[1]))
         points[0], points[-1] = samples[0], samples[-1]
         matrix = cardinals(self.knots, self.bernstein, at)
@@ -61,15 +66,18 @@ class PolynomialBasis(Basis):
 
 
 def cardinals(knots: Array, bernstein: Array, at: Array, derivative: int = 0) -> Array:
-    """Derivatives (k, m + 2) at points (k,) of the cardinal functions: 1 at their own node, 0 at the others."""
+    """Derivatives (k, m + 2) at points (k,) of the cardinal functions: 1 at their own node, 0 at
+    the others.
+    """
     return np.ascontiguousarray(BSpline(knots, bernstein, len(bernstein) - 1)(at, derivative))
 
 
 def chebyshev(m: int) -> Array:
     """The inner m of m + 6 Chebyshev nodes of the second kind on [0, 1], ascending.
 
-    The outer three on either side coincide at the end: its value, speed and acceleration replace them. With m nodes as
-    close to the ends as Chebyshev's m nodes are, cardinal functions would reach values of thousands between the nodes.
+    The outer three on either side coincide at the end: its value, speed and acceleration replace
+    them. With m nodes as close to the ends as Chebyshev's m nodes are, cardinal functions would
+    reach values of thousands between the nodes.
     """
     return np.asarray((1 - np.cos(np.pi * np.arange(REST_POINTS, m + REST_POINTS) / (m + 5))) / 2)
 

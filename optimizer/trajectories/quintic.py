@@ -1,4 +1,6 @@
-"""The rest-to-rest quintic s(τ) = 10 τ³ - 15 τ⁴ + 6 τ⁵ from 0 to 1, with s' = s'' = 0 at τ = 0 and τ = 1."""
+"""The rest-to-rest quintic s(τ) = 10 τ³ - 15 τ⁴ + 6 τ⁵ from 0 to 1, with s' = s'' = 0 at τ = 0 and
+τ = 1.
+"""
 
 from __future__ import annotations
 
@@ -19,10 +21,14 @@ def fraction(tau: Array) -> Array:
 
 def derivatives(tau: Array) -> Array:
     """s, s' and s'' by τ, (3, k), at τ (k,)."""
-    return np.stack([fraction(tau), 30 * (tau * (1 - tau)) ** 2, 60 * tau * (1 - tau) * (1 - 2 * tau)])
+    return np.stack(
+        [fraction(tau), 30 * (tau * (1 - tau)) ** 2, 60 * tau * (1 - tau) * (1 - 2 * tau)]
+    )
 
 
 def coefficients(duration: Array) -> list[Array]:
-    """Coefficients of s(t / T) as a polynomial in t [s], highest power first, one array of the shape of T [s] each."""
+    """Coefficients of s(t / T) as a polynomial in t [s], highest power first, one array of the
+    shape of T [s] each.
+    """
     none = 0 * duration
     return [6 / duration**5, -15 / duration**4, 10 / duration**3, none, none, none]

@@ -1,4 +1,6 @@
-"""Ruckig's time-optimal motion under limits of speed, acceleration and jerk (Berscheid, Kröger 2021)."""
+"""Ruckig's time-optimal motion under limits of speed, acceleration and jerk (Berscheid, Kröger
+2021).
+"""
 
 from __future__ import annotations
 
@@ -12,15 +14,17 @@ from joulepath.optimizer.trajectories.quadrature import lobatto_nodes
 from joulepath.optimizer.trajectories.spline import Spline, least_time_scale
 from joulepath.optimizer.trajectories.time_scalings import SampledMotion, standstill
 
-# shares of the jerk limits with which a motion is asked for in turn: where a joint just reaches its greatest
-# acceleration, Ruckig may find the lengths of its phases negative by rounding
+# shares of the jerk limits with which a motion is asked for in turn: where a joint just reaches its
+# greatest acceleration, Ruckig may find the lengths of its phases negative by rounding
 JERKS = (1.0, 1 - 1e-9, 1 - 1e-7, 1 - 1e-5)
-# fractions of the duration within which jumps of jerk become one, as long as the motion exceeds its limits by more
+# fractions of the duration within which jumps of jerk become one, as long as the motion exceeds its
+# limits by more
 CLOSEST, WITHIN = (1e-5, 4e-5, 2e-4, 1e-3), 1 + 1e-6
 
 
 def time_optimal(limits: Limits, q_start: Array, q_goal: Array) -> SampledMotion:
-    """Ruckig's motion from rest to rest. All joints end together, each after up to seven phases of constant jerk.
+    """Ruckig's motion from rest to rest. All joints end together, each after up to seven phases of
+    constant jerk.
 
     Raises RuntimeError if Ruckig finds no motion; between configurations at rest one always exists.
     """
@@ -46,12 +50,17 @@ def time_optimal(limits: Limits, q_start: Array, q_goal: Array) -> SampledMotion
 def time_optimal_spline(limits: Limits, q_start: Array, q_goal: Array) -> Spline:
     """Ruckig's motion as a spline, with threefold knots where the jerk of a joint jumps.
 
-    It is exact, but where jumps are close to each other: then that of a few splines which exceeds the limits least.
-    Between equal configurations Ruckig's motion takes no time: the spline stands still for one second.
+    It is exact, but where jumps are close to each other: then that of a few splines which exceeds
+    the limits least. Between equal configurations Ruckig's motion takes no time: the spline stands
+    still for one second.
     """
     found = _ruckig(limits, q_start, q_goal)
     if found.duration == 0:
-        return Spline(bspline.DEGREE, bspline.clamped(np.array([0.0, 1.0])), np.tile(q_start, (bspline.DEGREE + 1, 1)))
+        return Spline(
+            bspline.DEGREE,
+            bspline.clamped(np.array([0.0, 1.0])),
+            np.tile(q_start, (bspline.DEGREE + 1, 1)),
+        )
     profiles = found.profiles[0]
     ends = np.array([profile.t for profile in profiles]).cumsum(axis=1)
     ends[:, -1] = found.duration
@@ -72,8 +81,8 @@ def time_optimal_positions(limits: Limits, q_start: Array, q_goal: Array, at: Ar
 
 
 def _states(found: ruckig.Trajectory, t: Array) -> tuple[Array, Array, Array]:
-    """q [rad], v [rad/s] and a [rad/s²] (k, nq) at times t (k,) [s], from the phases of constant jerk: those of
-    `found.at_time`, which takes an instant at a time."""
+    """q [rad], v [rad/s] and a [rad/s²] (k, nq) at times t (k,) [s], from the phases of constant
+    jerk: those of `found.at_time`, which takes an instant at a time."""
     profiles = found.profiles[0]
     length, jerk = np.array([(profile.t, profile.j) for profile in profiles]).transpose(1, 0, 2)
     at_start = np.array([(profile.p[:-1], profile.v[:-1], profile.a[:-1]) for profile in profiles])
@@ -102,7 +111,9 @@ def _ruckig(limits: Limits, q_start: Array, q_goal: Array) -> ruckig.Trajectory:
 
 
 def _breaks(found: ruckig.Trajectory) -> Array:
-    """Fractions in [0, 1] of the duration at which the jerk of any joint jumps, with both ends, ascending."""
+    """Fractions in [0, 1] of the duration at which the jerk of any joint jumps, with both ends,
+    ascending.
+    """
     phases = np.array([profile.t for profile in found.profiles[0]])
     ends = np.append(phases.cumsum(axis=1), [0.0, found.duration]) / found.duration
     return np.asarray(np.unique(np.round(ends, 12)))

@@ -1,7 +1,8 @@
-"""The seven-segment profile: the time-optimal rest-to-rest motion of a joint under speed, acceleration and jerk limits.
+"""The seven-segment profile: the time-optimal rest-to-rest motion of a joint under speed,
+acceleration and jerk limits.
 
-Segments of constant jerk: acceleration rises, is constant, falls; cruise; the same in reverse (Biagiotti, Melchiorri
-2008, sec. 3.4).
+Segments of constant jerk: acceleration rises, is constant, falls; cruise; the same in reverse
+(Biagiotti, Melchiorri 2008, sec. 3.4).
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ CLOSEST = 1e-3
 
 
 def shortest_duration(displacement: Array, limits: Limits) -> Array:
-    """Least duration (...) [s] of a rest-to-rest motion over a displacement (..., nq) [rad], without torque limits.
+    """Least duration (...) [s] of a rest-to-rest motion over a displacement (..., nq) [rad],
+    without torque limits.
 
     It is the duration of the longest profile of all joints.
     """
@@ -37,22 +39,30 @@ def _durations(distance: Array, limits: Limits) -> Array:
 
 
 def _jerk_limited(speed: float, distance: float, jerk: float) -> float:
-    """Duration [s] over a distance > 0 [rad] with a cruising speed that is reached without constant acceleration."""
+    """Duration [s] over a distance > 0 [rad] with a cruising speed that is reached without constant
+    acceleration.
+    """
     return float(distance / speed + 2 * np.sqrt(speed / jerk))
 
 
 def ramp(displacement: Array, limits: Limits) -> float:
-    """Time [s] in which the leading joint gets to its greatest speed in the fastest motion over a displacement."""
+    """Time [s] in which the leading joint gets to its greatest speed in the fastest motion over a
+    displacement.
+    """
     shortest = float(shortest_duration(displacement, limits))
     early = switches(displacement, shortest, limits, closest=0.0)
     return shortest * float(early[early <= 0.5].max(initial=0.0))
 
 
-def switches(displacement: Array, duration: float, limits: Limits, closest: float = CLOSEST) -> Array:
-    """Switches of the leading joint's jerk as fractions of `duration` [s], ascending, for a displacement (nq,) [rad].
+def switches(
+    displacement: Array, duration: float, limits: Limits, closest: float = CLOSEST
+) -> Array:
+    """Switches of the leading joint's jerk as fractions of `duration` [s], ascending, for a
+    displacement (nq,) [rad].
 
-    The leading joint has the longest profile. In a longer duration it cruises at a lower speed; a shorter duration
-    counts as its own. Switches closer than the fraction `closest` of the duration count as one.
+    The leading joint has the longest profile. In a longer duration it cruises at a lower speed; a
+    shorter duration counts as its own. Switches closer than the fraction `closest` of the duration
+    count as one.
     """
     distance = np.abs(displacement)
     own = _durations(distance, limits)
@@ -65,10 +75,15 @@ def switches(displacement: Array, duration: float, limits: Limits, closest: floa
     moving = duration - a / j
     speed = a / 2 * (moving - np.sqrt(max(moving * moving - 4 * d / a, 0.0)))
     if speed < a * a / j:
-        # no constant acceleration: duration = d / v + 2 sqrt(v / j), which falls with v until there is no cruise
+        # no constant acceleration: duration = d / v + 2 sqrt(v / j), which falls with v until there
+        # is no cruise
         top = min(a * a / j, float(np.cbrt(d * d * j / 4)))
         needed = functools.partial(_jerk_limited, distance=d, jerk=j)
-        speed = top if needed(top) >= duration else brentq(lambda v: needed(v) - duration, d / duration, top)
+        speed = (
+            top
+            if needed(top) >= duration
+            else brentq(lambda v: needed(v) - duration, d / duration, top)
+        )
         ramp = np.sqrt(speed / j)
         early = np.array([ramp, 2 * ramp]) / duration
     else:

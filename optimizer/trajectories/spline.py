@@ -15,7 +15,8 @@ from joulepath.optimizer.declared import Axes, Count, Unit
 from joulepath.optimizer.trajectories import bspline
 from joulepath.optimizer.trajectories.quadrature import quadrature
 
-# quadrature panels: their greatest length [s], and their least and greatest number unless knot spans ask for more
+# quadrature panels: their greatest length [s], and their least and greatest number unless knot
+# spans ask for more
 LONGEST_PANEL, LEAST_PANELS, MOST_PANELS = 0.2, 64, 2000
 # samples per knot span at which the peaks of speed, acceleration and jerk are searched
 RATE_POINTS = 33
@@ -58,13 +59,17 @@ def sample(spline: Spline, t: Array) -> tuple[Array, Array, Array]:
 
 
 def sampled(spline: Spline) -> tuple[Array, Array]:
-    """At least FIT_SAMPLES samples q (k, nq) [rad] at times t (k,) [s] in all knot spans, to fit another spline to."""
+    """At least FIT_SAMPLES samples q (k, nq) [rad] at times t (k,) [s] in all knot spans, to fit
+    another spline to.
+    """
     t = bspline.in_all_spans(spline.knots, FIT_SAMPLES)
     return np.asarray(spline.curve(t)), t
 
 
 def fine_samples(spline: Spline, per_panel: int) -> tuple[Array, Array, Array, Array]:
-    """Quadrature weights (k,) [s] and q, v, a (k, nq) at the Gauss-Legendre points of panels within the knot spans."""
+    """Quadrature weights (k,) [s] and q, v, a (k, nq) at the Gauss-Legendre points of panels within
+    the knot spans.
+    """
     longest = max(min(LONGEST_PANEL, spline.duration / LEAST_PANELS), spline.duration / MOST_PANELS)
     points, weights = quadrature(spline.knots, per_panel, longest)
     return weights, *sample(spline, points)
@@ -76,11 +81,12 @@ def peak_rates(spline: Spline) -> Array:
 
 
 def span_peak_rates(spline: Spline) -> Array:
-    """Greatest absolute speed, acceleration and jerk of every joint in every knot span, (3, spans, nq).
+    """Greatest absolute speed, acceleration and jerk of every joint in every knot span, (3, spans,
+    nq).
 
-    Every knot span is expanded around its middle, so that both sides of a repeated knot count. Every sample is raised
-    to the vertex of the parabola through it and its neighbours: exact for a quintic's jerk, which is such a parabola.
-    Samples are denser if the degree is higher.
+    Every knot span is expanded around its middle, so that both sides of a repeated knot count.
+    Every sample is raised to the vertex of the parabola through it and its neighbours: exact for a
+    quintic's jerk, which is such a parabola. Samples are denser if the degree is higher.
     """
     terms, curve = spline.degree + 1, spline.curve
     edges = np.unique(spline.knots)
@@ -94,7 +100,9 @@ def span_peak_rates(spline: Spline) -> Array:
     # the vertex counts only between the two outer samples
     vertex = np.where(np.abs(high - low) <= 2 * bend, (high - low) ** 2 / (8 * bend + 1e-300), 0.0)
     peaks = np.maximum(size[:, [0, -1]].max(axis=1), (top + vertex).max(axis=1))
-    return np.asarray(peaks.reshape(3, len(half), -1) / half[:, None] ** np.arange(1, 4)[:, None, None])
+    return np.asarray(
+        peaks.reshape(3, len(half), -1) / half[:, None] ** np.arange(1, 4)[:, None, None]
+    )
 
 
 @cache
@@ -105,7 +113,8 @@ def _powers(degree: int) -> Array:
 
 
 def time_scales(ratios: Array) -> Array:
-    """The factors (...) on the duration that bring all ratios of speed, acceleration and jerk (..., 3, nq) to ≤ 1.
+    """The factors (...) on the duration that bring all ratios of speed, acceleration and jerk (...,
+    3, nq) to ≤ 1.
 
     With time scaled by k, speed falls with k, acceleration with k², jerk with k³.
     """
@@ -118,7 +127,9 @@ def time_scale(ratios: Array) -> float:
 
 
 def least_time_scale(spline: Spline, rates: Array) -> float:
-    """The least factor on the duration at which the motion is within the limits `rates` (3, nq) of `Limits.rates`."""
+    """The least factor on the duration at which the motion is within the limits `rates` (3, nq) of
+    `Limits.rates`.
+    """
     return time_scale(peak_rates(spline) / rates)
 
 
@@ -129,4 +140,8 @@ def retimed(spline: Spline, factor: float) -> Spline:
 
 def lasting(spline: Spline, duration: float) -> Spline:
     """The motion along the same path with time scaled so that it takes exactly `duration` [s]."""
-    return spline if duration == spline.duration else replace(spline, knots=spline.knots / spline.duration * duration)
+    return (
+        spline
+        if duration == spline.duration
+        else replace(spline, knots=spline.knots / spline.duration * duration)
+    )

@@ -1,4 +1,6 @@
-"""The service as tests reach it: in this process, with searches or with recorded ones, and as a server of its own."""
+"""The service as tests reach it: in this process, with searches or with recorded ones, and as a
+server of its own.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,9 @@ from tests.app.recorded import recorded_service
 def _database(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """No test touches the user's own database."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("JOULEPATH_DATABASE_URL", f"sqlite:///{tmp_path_factory.mktemp('store')}/joulepath.db")
+        patch.setenv(
+            "JOULEPATH_DATABASE_URL", f"sqlite:///{tmp_path_factory.mktemp('store')}/joulepath.db"
+        )
         yield
 
 

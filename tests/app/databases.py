@@ -1,4 +1,6 @@
-"""Databases that tests run against: SQLite in a file, and a PostgreSQL server of their own where there is one."""
+"""Databases that tests run against: SQLite in a file, and a PostgreSQL server of their own where
+there is one.
+"""
 
 from __future__ import annotations
 
@@ -47,10 +49,21 @@ class Postgres:
         return f"postgresql://tester:secret-word@127.0.0.1:{self.port}/postgres"
 
     def start(self) -> None:
-        command = [_binary("postgres"), "-D", self.folder / "data", "-p", self.port, "-k", self.folder]
+        command = [
+            _binary("postgres"),
+            "-D",
+            self.folder / "data",
+            "-p",
+            self.port,
+            "-k",
+            self.folder,
+        ]
         command += ["-c", "listen_addresses=127.0.0.1", "-c", "max_connections=30"]
         self.process = subprocess.Popen(
-            [str(part) for part in command], user=_user(), stderr=(self.folder / "log").open("ab"), cwd=self.folder
+            [str(part) for part in command],
+            user=_user(),
+            stderr=(self.folder / "log").open("ab"),
+            cwd=self.folder,
         )
         end = time.monotonic() + START
         while b"ready to accept" not in (self.folder / "log").read_bytes():
@@ -81,9 +94,25 @@ def postgres() -> Iterator[Postgres]:
         words = folder / "password"
         words.write_text("secret-word")
         words.chmod(0o644)
-        command = [_binary("initdb"), "-D", folder / "data", "-U", "tester", "--pwfile", words, "-A", "scram-sha-256"]
+        command = [
+            _binary("initdb"),
+            "-D",
+            folder / "data",
+            "-U",
+            "tester",
+            "--pwfile",
+            words,
+            "-A",
+            "scram-sha-256",
+        ]
         command += ["-E", "UTF8", "--locale=C"]
-        subprocess.run([str(part) for part in command], check=True, user=_user(), stdout=subprocess.DEVNULL, cwd=folder)
+        subprocess.run(
+            [str(part) for part in command],
+            check=True,
+            user=_user(),
+            stdout=subprocess.DEVNULL,
+            cwd=folder,
+        )
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             port = free.getsockname()[1]

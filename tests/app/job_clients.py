@@ -1,4 +1,6 @@
-"""What tests do with jobs over HTTP, and a service that is killed and started again while a job runs."""
+"""What tests do with jobs over HTTP, and a service that is killed and started again while a job
+runs.
+"""
 
 from __future__ import annotations
 
@@ -96,7 +98,9 @@ MOMENT = 0.03
 
 
 class KilledService:
-    """A service on one database that is killed again and again, and a client that follows the events of its job."""
+    """A service on one database that is killed again and again, and a client that follows the
+    events of its job.
+    """
 
     def __init__(self, folder: Path, seed: int, **settings: Any) -> None:
         self._settings = {"database_url": f"sqlite:///{folder}/joulepath.db", **settings}
@@ -106,8 +110,8 @@ class KilledService:
         self.progress_at_kills: list[float] = []
 
     def run(self, requests: list[Any], kills: int) -> tuple[list[dict[str, Any]], dict[str, Any]]:
-        """Sends a job, kills the service `kills` times while the job runs, each time after random requests of the next
-        part of it, and returns the results of the job and the job."""
+        """Sends a job, kills the service `kills` times while the job runs, each time after random
+        requests of the next part of it, and returns the results of the job and the job."""
         path = ""
         while True:
             with serving(**self._settings) as server:

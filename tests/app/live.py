@@ -23,7 +23,9 @@ LOCAL = "http://localhost"
 """Where a client in the same process finds the service: a name that it is always known by."""
 ROOT = Path(__file__).parents[2]
 WARM_UP = 150.0
-"""Most that a cold start may take on a busy machine [s]: imports, loading the kernels, a first solve. Alone: 3 s."""
+"""Most that a cold start may take on a busy machine [s]: imports, loading the kernels, a first
+solve. Alone: 3 s.
+"""
 EXIT = 60.0
 """Most that may pass from SIGTERM to the end of the process on a busy machine [s]."""
 GRACE = 60.0
@@ -31,9 +33,15 @@ GRACE = 60.0
 ANSWER = 120.0
 """Most that an answer may take on a busy machine [s]."""
 COMPUTED = {"Cache-Control": "no-cache"}
-"""Headers of a request whose answer is to be computed, although an equal request was answered before."""
-CLIENT = httpx2.Client(timeout=ANSWER, limits=httpx2.Limits(max_keepalive_connections=0), headers=COMPUTED)
-"""For any thread, with a connection of its own for every request. To make one loads the certificates of all issuers."""
+"""Headers of a request whose answer is to be computed, although an equal request was answered
+before.
+"""
+CLIENT = httpx2.Client(
+    timeout=ANSWER, limits=httpx2.Limits(max_keepalive_connections=0), headers=COMPUTED
+)
+"""For any thread, with a connection of its own for every request. To make one loads the
+certificates of all issuers.
+"""
 
 
 @dataclass(frozen=True)
@@ -76,15 +84,26 @@ class Server:
         """A POST whose answer nobody waits for, over a connection of its own."""
         host, port = self.url.removeprefix("http://").split(":")
         content = json.dumps(body).encode()
-        head = {"Host": host, "Content-Type": "application/json", "Content-Length": str(len(content))}
+        head = {
+            "Host": host,
+            "Content-Type": "application/json",
+            "Content-Length": str(len(content)),
+        }
         head |= COMPUTED | headers
-        lines = [f"POST {path} HTTP/1.1", *(f"{name}: {value}" for name, value in head.items()), "", ""]
+        lines = [
+            f"POST {path} HTTP/1.1",
+            *(f"{name}: {value}" for name, value in head.items()),
+            "",
+            "",
+        ]
         connection = socket.create_connection((host, int(port)), timeout=ANSWER)
         connection.sendall("\r\n".join(lines).encode() + content)
         return OpenRequest(connection)
 
     def logged(self) -> list[dict[str, Any]]:
-        """Every line logged so far: each must be JSON. A line that is still being written is left for the next time."""
+        """Every line logged so far: each must be JSON. A line that is still being written is left
+        for the next time.
+        """
         finished, _, _ = self.log.read_bytes().rpartition(b"\n")
         return [json.loads(line) for line in finished.splitlines()]
 
@@ -100,7 +119,11 @@ class Server:
     def workers(self) -> list[int]:
         """Process ids of the workers that became warm and live."""
         alive = self.descendants()
-        return [entry["pid"] for entry in self.logged() if entry["message"] == "worker warm" and entry["pid"] in alive]
+        return [
+            entry["pid"]
+            for entry in self.logged()
+            if entry["message"] == "worker warm" and entry["pid"] in alive
+        ]
 
     def terminate(self) -> int:
         """Exit code after a SIGTERM."""
@@ -116,7 +139,11 @@ class Server:
         """The log's line about the last request for this path, which was answered before."""
         end = time.monotonic() + ANSWER
         while True:
-            found = [entry for entry in self.logged() if entry["message"] == "request" and entry["path"] == path]
+            found = [
+                entry
+                for entry in self.logged()
+                if entry["message"] == "request" and entry["path"] == path
+            ]
             if found:
                 return found[-1]
             assert time.monotonic() < end, f"no request for {path} is logged"
@@ -145,9 +172,11 @@ class Server:
 
 @contextmanager
 def serving(warm: bool = True, recorded: bool = False, **settings: Any) -> Iterator[Server]:
-    """A server with these settings, by default waited for until it is warm and with an empty database of its own.
+    """A server with these settings, by default waited for until it is warm and with an empty
+    database of its own.
 
-    With `recorded`, its searches are recorded (see `tests.app.recorded`): it has no worker processes.
+    With `recorded`, its searches are recorded (see `tests.app.recorded`): it has no worker
+    processes.
     """
     module = "tests.app.recorded" if recorded else "joulepath.app"
     with socket.socket() as free:
@@ -155,12 +184,19 @@ def serving(warm: bool = True, recorded: bool = False, **settings: Any) -> Itera
         port = free.getsockname()[1]
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder, "log")
-        settings = {"database_url": f"sqlite:///{folder}/joulepath.db", "host": "127.0.0.1", **settings}
+        settings = {
+            "database_url": f"sqlite:///{folder}/joulepath.db",
+            "host": "127.0.0.1",
+            **settings,
+        }
         environment = {f"JOULEPATH_{name.upper()}": str(value) for name, value in settings.items()}
         environment |= {"JOULEPATH_LOG_LEVEL": "debug", "PORT": str(port)}
         with log.open("ab") as appended:
             process = subprocess.Popen(
-                [sys.executable, "-m", module], cwd=ROOT, env=os.environ | environment, stderr=appended
+                [sys.executable, "-m", module],
+                cwd=ROOT,
+                env=os.environ | environment,
+                stderr=appended,
             )
         server = Server(process, f"http://127.0.0.1:{port}", log)
         try:

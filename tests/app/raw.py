@@ -30,7 +30,9 @@ class RawAnswer:
         return content
 
 
-def connected(server: Server, address: str = "127.0.0.1", receive_buffer: int | None = None) -> socket.socket:
+def connected(
+    server: Server, address: str = "127.0.0.1", receive_buffer: int | None = None
+) -> socket.socket:
     """A connection from a loopback address."""
     host, port = server.url.removeprefix("http://").split(":")
     connection = socket.socket()
@@ -42,10 +44,15 @@ def connected(server: Server, address: str = "127.0.0.1", receive_buffer: int | 
     return connection
 
 
-def post(path: str, body: bytes = b"", declared: int | None = None, kind: str = "application/json") -> bytes:
+def post(
+    path: str, body: bytes = b"", declared: int | None = None, kind: str = "application/json"
+) -> bytes:
     """A request, whose declared size may be larger than what is sent."""
     size = len(body) if declared is None else declared
-    head = f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: {kind}\r\nContent-Length: {size}\r\n"
+    head = (
+        f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: {kind}\r\nContent-Length: "
+        f"{size}\r\n"
+    )
     return f"{head}Cache-Control: no-cache\r\n\r\n".encode() + body
 
 
@@ -54,7 +61,10 @@ def answer_on(connection: socket.socket) -> RawAnswer:
     with connection.makefile("rb", buffering=0) as stream:
         status = int(stream.readline().split()[1])
         lines = iter(lambda: stream.readline().strip().decode(), "")
-        headers = {name.lower(): value.strip() for name, _, value in (line.partition(":") for line in lines)}
+        headers = {
+            name.lower(): value.strip()
+            for name, _, value in (line.partition(":") for line in lines)
+        }
         body = b""
         while len(body) < int(headers["content-length"]):
             body += stream.read(int(headers["content-length"]) - len(body)) or b""

@@ -1,6 +1,8 @@
-"""The service with recorded results: what searches for motions answers at once, so that tests of HTTP need no search.
+"""The service with recorded results: what searches for motions answers at once, so that tests of
+HTTP need no search.
 
-`python -m tests.app.recorded` is such a service, `python -m tests.app.recorded record` writes the recordings anew.
+`python -m tests.app.recorded` is such a service, `python -m tests.app.recorded record` writes the
+recordings anew.
 """
 
 from __future__ import annotations
@@ -41,11 +43,22 @@ from tests.app.requests import HOME, NEAR, PATIENT
 FOLDER = Path(__file__).parent / "recordings"
 SENT = "recorded"
 """Id of the recorded requests."""
-MOVE: dict[str, Any] = {"start": {"q": HOME}, "goal": {"q": NEAR}, "candidates": "none", "sample_period": 0.25}
-CYCLE: dict[str, Any] = {"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], "candidates": "none"}
+MOVE: dict[str, Any] = {
+    "start": {"q": HOME},
+    "goal": {"q": NEAR},
+    "candidates": "none",
+    "sample_period": 0.25,
+}
+CYCLE: dict[str, Any] = {
+    "start": {"q": HOME},
+    "stops": [{"target": {"q": NEAR}}],
+    "candidates": "none",
+}
 TASKS: dict[str, Task] = {
     "optimize": OptimizeTask(OptimizeRequest.model_validate(MOVE), SENT),
-    "compare": CompareTask(CompareRequest.model_validate(MOVE | {"methods": ["time_scaling"]}), SENT),
+    "compare": CompareTask(
+        CompareRequest.model_validate(MOVE | {"methods": ["time_scaling"]}), SENT
+    ),
     "pareto": ParetoTask(ParetoRequest.model_validate(MOVE | {"points": 2}), SENT, "json"),
     "cycle": CycleTask(CycleRequest.model_validate(CYCLE | {"sample_period": 0.25}), SENT),
 }
@@ -66,7 +79,9 @@ def record(kind: str) -> dict[str, Any]:
 
 
 def recorded(kind: str, request_id: str) -> TaskResult:
-    """The recorded result as that of a request. All ids are new, and the wall time is another one each time."""
+    """The recorded result as that of a request. All ids are new, and the wall time is another one
+    each time.
+    """
     text = (FOLDER / f"{kind}.json").read_bytes()
     for number, old in enumerate(dict.fromkeys(_ID.findall(text))):
         text = text.replace(old, b"%08x%s" % (next(_count) * 64 + number, old[8:]))
@@ -86,7 +101,9 @@ def _stored(document: dict[str, Any]) -> StoredAnswer:
     return StoredAnswer(document["id"], orjson.dumps(document))
 
 
-def _instead_of(kind: str, run: Callable[[Any, float], TaskResult]) -> Callable[[Any, float], TaskResult]:
+def _instead_of(
+    kind: str, run: Callable[[Any, float], TaskResult]
+) -> Callable[[Any, float], TaskResult]:
     def instead(task: Any, deadline: float) -> TaskResult:
         return recorded(kind, task.request_id) if _is_recorded.get() else run(task, deadline)
 
@@ -94,7 +111,8 @@ def _instead_of(kind: str, run: Callable[[Any, float], TaskResult]) -> Callable[
 
 
 class RecordedWorker:
-    """A worker in a thread of the service, whose searches have been recorded. Other tasks are run."""
+    """A worker in a thread of the service, whose searches have been recorded. Other tasks are
+    run."""
 
     alive, is_free, pid = True, True, None
 
@@ -113,7 +131,9 @@ class RecordedWorker:
             return ended
         raise ended
 
-    async def ask_all(self, first: Work, take: Take, turn: Callable[[Work, Ended, Work | None], object]) -> None:
+    async def ask_all(
+        self, first: Work, take: Take, turn: Callable[[Work, Ended, Work | None], object]
+    ) -> None:
         work: Work | None = first
         while work is not None:
             ended = await asyncio.to_thread(_ended, work.task, work.deadline)
@@ -137,7 +157,8 @@ def _ended(task: Task, deadline: float) -> Ended:
 
 @contextmanager
 def recorded_workers() -> Iterator[None]:
-    """A context in which services start with recorded workers; those that have started keep them."""
+    """A context in which services start with recorded workers; those that have started keep
+    them."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pool, "Worker", RecordedWorker)
         for module in (pool, forkserver):

@@ -1,4 +1,6 @@
-"""The numbers that the documentation prints beside a request are those of the service's own answer to it."""
+"""The numbers that the documentation prints beside a request are those of the service's own answer
+to it.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,9 @@ import pytest
 from tests.app.live import ROOT, Server
 
 ENERGY = 5e-3
-"""Relative: the last digits of an optimum depend on the processor and on the compiler of the kernel."""
+"""Relative: the last digits of an optimum depend on the processor and on the compiler of the
+kernel.
+"""
 SHARE = 0.5
 """[%] of a gap or a saving, for the same reason."""
 
@@ -21,13 +25,26 @@ BUSES: dict[str, dict[str, Any]] = {
     "recuperating": {"mode": "recuperating", "efficiency": 0.9},
 }
 TOTAL, BOUND, GAP = ("energy/electrical/total", "energy/lower_bound", "energy/optimality_gap")
-# where it stands, what it looks like, the path and file of the request, what is changed of it, and the field it states
+# where it stands, what it looks like, the path and file of the request, what is changed of it, and
+# the field it states
 SAID: list[tuple[str, str, str, dict[str, Any], str]] = [
     ("README.md", r"saves more than another ([\d.]+) %", "optimize/paper_pose_1", {}, GAP),
     ("docs/optimize.md", r"can save at most ([\d.]+) %", "optimize/pose_to_pose", {}, GAP),
     ("docs/collisions.md", r"The motion needs ([\d.]+) J", "optimize/bin_to_shelf", {}, TOTAL),
-    ("docs/collisions.md", r"it\nneeds ([\d.]+) J", "optimize/bin_to_shelf", {"collisions": False}, TOTAL),
-    ("docs/evaluate.md", r'"nearest": \{"distance": ([\d.]+)', "evaluate/paper_motion_1", {}, "nearest/distance"),
+    (
+        "docs/collisions.md",
+        r"it\nneeds ([\d.]+) J",
+        "optimize/bin_to_shelf",
+        {"collisions": False},
+        TOTAL,
+    ),
+    (
+        "docs/evaluate.md",
+        r'"nearest": \{"distance": ([\d.]+)',
+        "evaluate/paper_motion_1",
+        {},
+        "nearest/distance",
+    ),
     ("docs/whatif.md", r"base needs ([\d.]+) J", "whatif/lighter_arm", {}, "base/electrical/total"),
     *(
         (
@@ -40,15 +57,30 @@ SAID: list[tuple[str, str, str, dict[str, Any], str]] = [
         for name, bus in BUSES.items()
     ),
     *(
-        ("docs/targets.md", rf"\| {row} \| .*? \| {number} \|", f"optimize/paper_position_{row}", {}, field)
+        (
+            "docs/targets.md",
+            rf"\| {row} \| .*? \| {number} \|",
+            f"optimize/paper_position_{row}",
+            {},
+            field,
+        )
         for row in (1, 2, 3)
-        for number, field in ((r"([\d.]+) \| [\d.]+ \| optimal", TOTAL), (r"[\d.]+ \| ([\d.]+) \| optimal", BOUND))
+        for number, field in (
+            (r"([\d.]+) \| [\d.]+ \| optimal", TOTAL),
+            (r"[\d.]+ \| ([\d.]+) \| optimal", BOUND),
+        )
     ),
 ]
 SLOW: list[tuple[str, str, str, dict[str, Any], str]] = [
     ("docs/paths.md", r"a seam of 0.4 m needs ([\d.]+) J", "optimize/seam_any_turn", {}, TOTAL),
     ("docs/cycles.md", r"along lines: the cycle needs\n([\d.]+) J", "cycle/round_parts", {}, TOTAL),
-    ("docs/cycles.md", r"a seam of 0.4 m: the cycle needs ([\d.]+) J", "cycle/seam_any_turn", {}, TOTAL),
+    (
+        "docs/cycles.md",
+        r"a seam of 0.4 m: the cycle needs ([\d.]+) J",
+        "cycle/seam_any_turn",
+        {},
+        TOTAL,
+    ),
 ]
 # pages with a shortened answer, and its request
 SHOWN = {
@@ -89,7 +121,9 @@ def test_a_number_in_the_text(
 @pytest.mark.parametrize(("page", "request_file"), SHOWN.items())
 def test_a_shortened_answer(server: Server, page: str, request_file: str) -> None:
     answer = answer_to(server, request_file, {})
-    assert re.findall(r'"duration": [\d.]+,\s"status": "(\w+)"', (ROOT / page).read_text()) == [answer["status"]]
+    assert re.findall(r'"duration": [\d.]+,\s"status": "(\w+)"', (ROOT / page).read_text()) == [
+        answer["status"]
+    ]
     assert stated(page, r'"electrical": \{"total": ([\d.]+)') == pytest.approx(
         answer["energy"]["electrical"]["total"], rel=ENERGY
     )
@@ -102,7 +136,10 @@ def test_what_the_readme_says_of_mechanical_work(server: Server) -> None:
     answer = answer_to(server, "optimize/mechanical_fixed_duration", {})
     counts = answer["candidate_counts"]
     text = " ".join((ROOT / "README.md").read_text().split())
-    assert f"{counts['infeasible']} of 256 take too long, bounds rule out {counts['pruned']}, one is solved" in text
+    assert (
+        f"{counts['infeasible']} of 256 take too long, bounds rule out {counts['pruned']}, one is "
+        "solved" in text
+    )
     assert answer["status"] == "feasible"
     assert f"here it is {100 * answer['energy']['optimality_gap']:.0f} %" in text
 
@@ -111,9 +148,13 @@ def test_what_the_readme_says_of_mechanical_work(server: Server) -> None:
 def test_the_table_of_the_front(server: Server) -> None:
     answer = answer_to(server, "pareto/branch_switch", {})
     rows = re.findall(
-        r"^\| ([\d.]+) \| ([\d.]+) \| `([\w/]+)` .* `(\w+)` \|$", (ROOT / "docs/pareto.md").read_text(), re.M
+        r"^\| ([\d.]+) \| ([\d.]+) \| `([\w/]+)` .* `(\w+)` \|$",
+        (ROOT / "docs/pareto.md").read_text(),
+        re.M,
     )
-    assert [(goal, status) for _, _, goal, status in rows] == [(p["goal"], p["status"]) for p in answer["points"]]
+    assert [(goal, status) for _, _, goal, status in rows] == [
+        (p["goal"], p["status"]) for p in answer["points"]
+    ]
     assert [float(energy) for _, energy, _, _ in rows] == pytest.approx(
         [p["energy"] for p in answer["points"]], rel=ENERGY
     )

@@ -1,4 +1,6 @@
-"""The programs in `examples` run with the commands that their own first lines and the documentation name."""
+"""The programs in `examples` run with the commands that their own first lines and the documentation
+name.
+"""
 
 from __future__ import annotations
 
@@ -28,12 +30,17 @@ COMPUTING = {
     "plot_swept_arm": ("examples/optimize/bin_to_shelf.json", "{}"),
 }
 TESTED_ELSEWHERE = {"make_paper_requests", "study_loop"}
-PICTURES = [pytest.param(name, marks=pytest.mark.long) if name in SLOW else name for name in sorted(ASKING | COMPUTING)]
+PICTURES = [
+    pytest.param(name, marks=pytest.mark.long) if name in SLOW else name
+    for name in sorted(ASKING | COMPUTING)
+]
 
 
 def run(*command: str) -> str:
     """What a program prints that ends without an error."""
-    done = subprocess.run([sys.executable, *command], cwd=ROOT, capture_output=True, text=True, timeout=5 * ANSWER)
+    done = subprocess.run(
+        [sys.executable, *command], cwd=ROOT, capture_output=True, text=True, timeout=5 * ANSWER
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -57,9 +64,15 @@ def test_program_draws_a_picture(name: str, server: Server, tmp_path: Path) -> N
 
 
 def test_only_programs_without_imports_from_the_repository_are_run_as_files() -> None:
-    """Run as a file, a program finds no room of the repository: the command must be `python -m examples.NAME`."""
+    """Run as a file, a program finds no room of the repository: the command must be `python -m
+    examples.NAME`.
+    """
     pages = [*(ROOT / "docs").glob("*.md"), ROOT / "README.md", *EXAMPLES.glob("*.py")]
-    named = {name for page in pages for name in re.findall(r"python3? examples/(\w+)\.py", page.read_text())}
+    named = {
+        name
+        for page in pages
+        for name in re.findall(r"python3? examples/(\w+)\.py", page.read_text())
+    }
     assert named
     room = re.compile(r"^from (app|examples|models|optimizer)\b", re.MULTILINE)
     assert [name for name in named if room.search((EXAMPLES / f"{name}.py").read_text())] == []

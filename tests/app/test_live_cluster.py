@@ -1,4 +1,6 @@
-"""A cluster from plain processes: a scheduler, two machines, two services. A machine and the scheduler are killed."""
+"""A cluster from plain processes: a scheduler, two machines, two services. A machine and the
+scheduler are killed.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,11 @@ def process(log: Path, *arguments: str, **settings: str) -> Iterator[subprocess.
     """A Python process of this repository, killed at the end."""
     with log.open("ab") as appended:
         started = subprocess.Popen(
-            [sys.executable, "-m", *arguments], cwd=ROOT, env=os.environ | settings, stdout=appended, stderr=appended
+            [sys.executable, "-m", *arguments],
+            cwd=ROOT,
+            env=os.environ | settings,
+            stdout=appended,
+            stderr=appended,
         )
     try:
         yield started
@@ -44,7 +50,9 @@ def process(log: Path, *arguments: str, **settings: str) -> Iterator[subprocess.
 def scheduler(folder: Path, port: int) -> ExitStack:
     started = ExitStack()
     where = ("--host", "127.0.0.1", "--port", str(port), "--no-dashboard")
-    started.enter_context(process(folder / "scheduler.log", "distributed.cli.dask_scheduler", *where))
+    started.enter_context(
+        process(folder / "scheduler.log", "distributed.cli.dask_scheduler", *where)
+    )
     return started
 
 
@@ -74,11 +82,22 @@ def test_what_is_killed_loses_and_doubles_nothing(tmp_path: Path) -> None:
         patient = {"JOULEPATH_STOP_GRACE": str(GRACE)}
         started = [
             stack.enter_context(
-                process(log, "joulepath.app.cli", "cluster-worker", address, JOULEPATH_WORKERS="1", **patient)
+                process(
+                    log,
+                    "joulepath.app.cli",
+                    "cluster-worker",
+                    address,
+                    JOULEPATH_WORKERS="1",
+                    **patient,
+                )
             )
             for log in logs
         ]
-        shared = {"database_url": f"sqlite:///{tmp_path}/joulepath.db", "cluster": address, "workers": 1}
+        shared = {
+            "database_url": f"sqlite:///{tmp_path}/joulepath.db",
+            "cluster": address,
+            "workers": 1,
+        }
         services = [stack.enter_context(serving(**shared, deadline_grace=GRACE)) for _ in range(2)]
         for server in services:
             until(lambda server=server: machines(server) == [1, 1])  # type: ignore[misc]

@@ -1,5 +1,5 @@
-"""Jobs in `python -m joulepath.app` over a real socket: killed services and workers, several services, cancelling,
-callers."""
+"""Jobs in `python -m joulepath.app` over a real socket: killed services and workers, several
+services, cancelling, callers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,17 @@ from sqlalchemy import text
 
 from joulepath.app.store.database import create_database_engine
 from tests.app.databases import postgres, why_no_postgres
-from tests.app.job_clients import Event, KilledService, ended, evaluation, events, optimization, over, sent, shown
+from tests.app.job_clients import (
+    Event,
+    KilledService,
+    ended,
+    evaluation,
+    events,
+    optimization,
+    over,
+    sent,
+    shown,
+)
 from tests.app.live import GRACE, Server, serving, until
 from tests.app.requests import long_search, move
 
@@ -37,14 +47,20 @@ def check_each_once(lines: list[dict[str, Any]], job: dict[str, Any], requests: 
     for line, request in zip(lines, requests, strict=True):
         assert line["result"]["request"] == f"{job['id']}.{line['index']}"
         if line["kind"] == "evaluate":
-            assert line["result"]["duration"] == pytest.approx(request["evaluate"]["time_per_segment"])
+            assert line["result"]["duration"] == pytest.approx(
+                request["evaluate"]["time_per_segment"]
+            )
 
 
 @pytest.mark.parametrize(
-    ("kills", "count"), [(1, 30), pytest.param(20, 500, marks=pytest.mark.long)], ids=["short", "long"]
+    ("kills", "count"),
+    [(1, 30), pytest.param(20, 500, marks=pytest.mark.long)],
+    ids=["short", "long"],
 )
 def test_a_killed_service_loses_and_doubles_nothing(kills: int, count: int, tmp_path: Path) -> None:
-    """Neither answers nor events: the client knows the number of the last event that it received whole."""
+    """Neither answers nor events: the client knows the number of the last event that it received
+    whole.
+    """
     requests = mixture(count)
     service = KilledService(tmp_path, seed=kills, workers=1, deadline_grace=GRACE)
     lines, job = service.run(requests, kills)
@@ -57,7 +73,9 @@ def test_a_killed_service_loses_and_doubles_nothing(kills: int, count: int, tmp_
 def check_events(found: list[Event], count: int) -> None:
     """None is lost, and none comes twice."""
     assert [event.number for event in found] == list(range(1, len(found) + 1))
-    assert sorted(event.data["index"] for event in found if event.name == "request") == list(range(count))
+    assert sorted(event.data["index"] for event in found if event.name == "request") == list(
+        range(count)
+    )
     assert [event.name for event in found].count("end") == 1 and found[-1].name == "end"
 
 
@@ -117,7 +135,9 @@ def test_a_stop_ends_event_streams_and_gives_the_work_back(tmp_path: Path) -> No
 def test_services_share_one_postgresql() -> None:
     requests = mixture(60)
     with postgres() as database, ExitStack() as services:
-        servers = [services.enter_context(serving(database_url=database.url, workers=1)) for _ in range(2)]
+        servers = [
+            services.enter_context(serving(database_url=database.url, workers=1)) for _ in range(2)
+        ]
         path = sent(over(servers[0]), requests)
         until(lambda: shown(over(servers[1]), path)["counts"]["done"] > 5)
         servers[0].process.kill()

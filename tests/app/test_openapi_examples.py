@@ -1,4 +1,6 @@
-"""Every example of the OpenAPI document, sent as it is served: the documentation page sends it like that."""
+"""Every example of the OpenAPI document, sent as it is served: the documentation page sends it like
+that.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ from tests.app.live import LOCAL
 from tests.app.requests import HOME, NEAR
 
 # the document is served before the workers run
-DOCUMENT: dict[str, Any] = json.loads(TestClient(create_app(), base_url=LOCAL).get("/openapi.json").content)
+DOCUMENT: dict[str, Any] = json.loads(
+    TestClient(create_app(), base_url=LOCAL).get("/openapi.json").content
+)
 CSV = "q1,q2,q3,q4,q5,q6\n0,-1.57,1.57,-1.57,-1.57,0\n0.3,-1.4,1.4,-1.5,-1.57,0.2\n"
 
 
@@ -37,7 +41,11 @@ class Operation:
 
     def parameters(self, where: str) -> dict[str, Any]:
         """The examples of the parameters in the path, the query or the headers, by name."""
-        return {own["name"]: example_of(own) for own in self.content.get("parameters", ()) if own["in"] == where}
+        return {
+            own["name"]: example_of(own)
+            for own in self.content.get("parameters", ())
+            if own["in"] == where
+        }
 
     def bodies(self) -> Iterator[tuple[str, str, dict[str, Any]]]:
         """Media type, name and content of every example of the body."""
@@ -54,18 +62,26 @@ class Operation:
 
 
 def example_of(parameter: dict[str, Any]) -> Any:
-    """The example of a parameter's schema; a parameter whose values are JSON has its schema in `content`."""
+    """The example of a parameter's schema; a parameter whose values are JSON has its schema in
+    `content`.
+    """
     schema = parameter.get("schema") or parameter["content"]["application/json"]["schema"]
     return schema["examples"][0]
 
 
-OPERATIONS = [Operation(method, path, own) for path, all in DOCUMENT["paths"].items() for method, own in all.items()]
+OPERATIONS = [
+    Operation(method, path, own)
+    for path, all in DOCUMENT["paths"].items()
+    for method, own in all.items()
+]
 BODIES = {
     f"{operation} {media_type} {name}": (operation, media_type, example)
     for operation in OPERATIONS
     for media_type, name, example in operation.bodies()
 }
-EVALUATE, LOGS = (next(each for each in OPERATIONS if each.path == path) for path in ("/evaluate", "/logs"))
+EVALUATE, LOGS = (
+    next(each for each in OPERATIONS if each.path == path) for path in ("/evaluate", "/logs")
+)
 
 
 @pytest.fixture
@@ -80,7 +96,10 @@ def study(client: TestClient) -> str:
 def job(client: TestClient) -> str:
     """The id of a new job."""
     answer = client.post(
-        "/jobs", json={"requests": [{"evaluate": {"configurations": [HOME, NEAR], "time_per_segment": 1.5}}]}
+        "/jobs",
+        json={
+            "requests": [{"evaluate": {"configurations": [HOME, NEAR], "time_per_segment": 1.5}}]
+        },
     )
     assert answer.status_code == 202, answer.text
     return str(answer.json()["id"])
@@ -92,8 +111,8 @@ def test_every_body_has_an_example() -> None:
         assert {media_type for media_type, *_ in operation.bodies()} == declared.keys(), operation
 
 
-# a front of dozens of durations, all methods, cycles in a given time, among obstacles or along a path, an excitation
-# of all parameters
+# a front of dozens of durations, all methods, cycles in a given time, among obstacles or along a
+# path, an excitation of all parameters
 SLOW = (
     "post /cycle application/json glue_path",
     "post /cycle application/json out_of_a_tray",
@@ -122,27 +141,37 @@ def log(client: TestClient) -> str:
     return str(answer.json()["id"])
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.long) if n in SLOW else n for n in BODIES])
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.long) if n in SLOW else n for n in BODIES]
+)
 def test_body_is_answered(name: str, client: TestClient, study: str, robot: str, log: str) -> None:
     operation, media_type, example = BODIES[name]
-    content, url = example["value"], operation.path.format(id=study, name=robot, format=name.split()[-1])
+    content, url = (
+        example["value"],
+        operation.path.format(id=study, name=robot, format=name.split()[-1]),
+    )
     if media_type == "text/csv":
         # the settings of a CSV file are query parameters, which the example's summary names
         query = re.search(r"\?\S+", example["summary"])
         url += query[0] if query else ""
     else:
         content = json.dumps(content | ({"logs": [log]} if "logs" in content else {}))
-    answer = client.request(operation.method, url, content=content, headers={"Content-Type": media_type})
+    answer = client.request(
+        operation.method, url, content=content, headers={"Content-Type": media_type}
+    )
     assert answer.is_success, answer.text
     operation.check(answer)
 
 
-@pytest.mark.parametrize("operation", [own for own in OPERATIONS if own.parameters("path")], ids=str)
+@pytest.mark.parametrize(
+    "operation", [own for own in OPERATIONS if own.parameters("path")], ids=str
+)
 def test_path_is_answered(operation: Operation, client: TestClient, robot: str) -> None:
     names = operation.parameters("path")
     if operation.method in ("put", "delete"):
         names |= {"name": robot}
-    # an id stands for something that was made before; the example's was not, and the document says what then comes
+    # an id stands for something that was made before; the example's was not, and the document says
+    # what then comes
     expected = 404 if "id" in names else 204 if operation.method == "delete" else 200
     body = next((example["value"] for _, _, example in operation.bodies()), None)
     answer = client.request(operation.method, operation.path.format(**names), json=body)
@@ -151,7 +180,9 @@ def test_path_is_answered(operation: Operation, client: TestClient, robot: str) 
 
 
 @pytest.mark.parametrize(
-    "operation", [own for own in OPERATIONS if own.method == "get" and own.parameters("query")], ids=str
+    "operation",
+    [own for own in OPERATIONS if own.method == "get" and own.parameters("query")],
+    ids=str,
 )
 def test_query_is_answered(operation: Operation, client: TestClient, study: str, job: str) -> None:
     step = {"evaluate": {"configurations": [HOME, NEAR], "time_per_segment": 1.5}}
@@ -167,8 +198,13 @@ def test_setting_of_a_csv_file_is_answered(name: str, client: TestClient) -> Non
     if name == "figures":
         assert client.put("/figures", json=FIGURES).json()["id"] == FIGURES_ID
     example = EVALUATE.parameters("query")[name]
-    query = {"time_per_segment": "1.5", name: example if isinstance(example, str) else json.dumps(example)}
-    answer = client.post("/evaluate", content=CSV, headers={"Content-Type": "text/csv"}, params=query)
+    query = {
+        "time_per_segment": "1.5",
+        name: example if isinstance(example, str) else json.dumps(example),
+    }
+    answer = client.post(
+        "/evaluate", content=CSV, headers={"Content-Type": "text/csv"}, params=query
+    )
     assert answer.status_code == 200, answer.text
     EVALUATE.check(answer)
 
@@ -178,20 +214,25 @@ def test_setting_of_a_log_is_answered(name: str, client: TestClient) -> None:
     example = LOGS.parameters("query")[name]
     query = {name: example if isinstance(example, str) else json.dumps(example)}
     (_, _, body) = next(LOGS.bodies())
-    answer = client.post("/logs", content=body["value"], headers={"Content-Type": "text/csv"}, params=query)
+    answer = client.post(
+        "/logs", content=body["value"], headers={"Content-Type": "text/csv"}, params=query
+    )
     assert answer.status_code == 201, answer.text
     LOGS.check(answer)
 
 
 @pytest.mark.parametrize(
-    "operation", [own for own in OPERATIONS if own.parameters("header") and any(own.bodies())], ids=str
+    "operation",
+    [own for own in OPERATIONS if own.parameters("header") and any(own.bodies())],
+    ids=str,
 )
 def test_headers_are_taken(operation: Operation, client: TestClient, study: str, log: str) -> None:
     _, _, example = next(operation.bodies())
     url, headers = operation.path.format(id=study), operation.parameters("header")
     # a key is for one request
     headers = {
-        name: f"{value} {url}".replace(" ", "_") if name == KEY_HEADER else value for name, value in headers.items()
+        name: f"{value} {url}".replace(" ", "_") if name == KEY_HEADER else value
+        for name, value in headers.items()
     }
     value = example["value"] | ({"logs": [log]} if "logs" in example["value"] else {})
     answer = client.request(operation.method, url, json=value, headers=headers)

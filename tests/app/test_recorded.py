@@ -25,12 +25,18 @@ SCHEMAS: dict[str, type[BaseModel]] = {
 
 
 def shape(value: Any) -> Any:
-    """A document without its values: names of fields, and types. Lists have the shapes of their entries."""
+    """A document without its values: names of fields, and types. Lists have the shapes of their
+    entries.
+    """
     if isinstance(value, dict):
         return {name: shape(each) for name, each in value.items()}
     if isinstance(value, list):
         return [shape(each) for each in value[:1]]
-    return "number" if isinstance(value, int | float) and not isinstance(value, bool) else type(value).__name__
+    return (
+        "number"
+        if isinstance(value, int | float) and not isinstance(value, bool)
+        else type(value).__name__
+    )
 
 
 @pytest.mark.parametrize("kind", TASKS)

@@ -1,4 +1,6 @@
-"""`python -m joulepath.app` over a real socket: concurrency, overload, crashes, hang-ups, logs and shutdown."""
+"""`python -m joulepath.app` over a real socket: concurrency, overload, crashes, hang-ups, logs and
+shutdown.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,17 @@ from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.api.replay.task import ReplayAnswer
 from joulepath.app.exceptions.queue import Busy, ShuttingDown
 from joulepath.app.exceptions.transport import BodyTooLarge, MalformedHttp
-from tests.app.live import CLIENT, EXIT, ROOT, WARM_UP, Server, alive, processor_time, serving, until
+from tests.app.live import (
+    CLIENT,
+    EXIT,
+    ROOT,
+    WARM_UP,
+    Server,
+    alive,
+    processor_time,
+    serving,
+    until,
+)
 from tests.app.problems import checked
 from tests.app.requests import EXAMPLES, long_search, move
 
@@ -37,10 +49,14 @@ AT_WORK = 0.1
 
 def received(server: Server) -> int:
     """Number of requests to /optimize so far."""
-    return sum(entry["message"] == "received" and entry["path"] == "/optimize" for entry in server.logged())
+    return sum(
+        entry["message"] == "received" and entry["path"] == "/optimize" for entry in server.logged()
+    )
 
 
-def in_background(pool: ThreadPoolExecutor, server: Server, body: Any, count: int = 1) -> list[Future[httpx2.Response]]:
+def in_background(
+    pool: ThreadPoolExecutor, server: Server, body: Any, count: int = 1
+) -> list[Future[httpx2.Response]]:
     """Requests that the server has received."""
     expected = received(server) + count
     futures = [pool.submit(server.post, "/optimize", body) for _ in range(count)]
@@ -80,7 +96,9 @@ def until_free(server: Server, before: list[int]) -> None:
 def test_an_answer_is_played_in_mujoco(server: Server) -> None:
     """By its path alone: the payload is in the answer."""
     found = server.post("/optimize", move(payload={"mass": 2.0, "com": [0.0, 0.0, 0.06]})).json()
-    answer = server.post("/replay", {"answer": found["answer"], "perturb": {"payload": 0.1}, "step": 1e-3})
+    answer = server.post(
+        "/replay", {"answer": found["answer"], "perturb": {"payload": 0.1}, "step": 1e-3}
+    )
     content: Any = model_of(ReplayAnswer).model_validate_json(answer.content)
     (motion,) = content.motions
     assert motion.planned.electrical == found["energy"]["electrical"]["total"]
@@ -99,9 +117,13 @@ def test_answers(server: Server) -> None:
 def test_the_page_for_newcomers_shows_what_its_script_prints(server: Server) -> None:
     page = (ROOT / "docs" / "first_saving.md").read_text()
     (request,) = re.findall(r"```\n(\{.*?\})\n```", page, re.DOTALL)
-    assert json.loads(request) == json.loads((ROOT / "examples" / "optimize" / "pick_to_place.json").read_text())
+    assert json.loads(request) == json.loads(
+        (ROOT / "examples" / "optimize" / "pick_to_place.json").read_text()
+    )
     command = re.findall(r"```\npython3 (\S+) (\S+)\n```", page)
-    run = subprocess.run(["python3", *command[0], server.url], cwd=ROOT, capture_output=True, text=True, check=True)
+    run = subprocess.run(
+        ["python3", *command[0], server.url], cwd=ROOT, capture_output=True, text=True, check=True
+    )
     assert f"```\n{run.stdout}```" in page
 
 
@@ -126,7 +148,9 @@ def test_refuses_what_it_cannot_queue(server: Server) -> None:
     # 2 workers and 4 places in the queue
     before = server.workers()
     with ExitStack() as connections:
-        requests = [connections.enter_context(server.open("/optimize", long_search(LONG))) for _ in range(8)]
+        requests = [
+            connections.enter_context(server.open("/optimize", long_search(LONG))) for _ in range(8)
+        ]
         until(lambda: sum(request.answered for request in requests) == 2)
         assert [request.status() for request in requests if request.answered] == [503, 503]
         answer = server.post("/optimize", move())
@@ -142,10 +166,14 @@ def test_a_crash_costs_no_answer(server: Server) -> None:
     assert len(before) == 2
     with ThreadPoolExecutor() as pool:
         # two, so that the one worker that is killed has one of them
-        futures = start_work(server, lambda: in_background(pool, server, long_search(deadline=6), 2), workers=2)
+        futures = start_work(
+            server, lambda: in_background(pool, server, long_search(deadline=6), 2), workers=2
+        )
         os.kill(before[0], signal.SIGKILL)
         answers = [future.result() for future in futures]
-    assert [answer.status_code for answer in answers] == [200, 200], "it begins again on another worker"
+    assert [answer.status_code for answer in answers] == [200, 200], (
+        "it begins again on another worker"
+    )
     until_replaced(server, before, 1)
     assert server.post("/optimize", move()).status_code == 200
 
@@ -153,9 +181,16 @@ def test_a_crash_costs_no_answer(server: Server) -> None:
 def test_hanging_up_frees_the_worker(server: Server) -> None:
     before = server.workers()
     headers = {"X-Request-ID": "gone"}
-    with start_work(server, lambda: server.open("/optimize", long_search(LONG), **headers), workers=1):
+    with start_work(
+        server, lambda: server.open("/optimize", long_search(LONG), **headers), workers=1
+    ):
         assert before == server.workers()
-    until(lambda: any(entry.get("request_id") == "gone" and entry.get("status") == 499 for entry in server.logged()))
+    until(
+        lambda: any(
+            entry.get("request_id") == "gone" and entry.get("status") == 499
+            for entry in server.logged()
+        )
+    )
     until_free(server, before)
 
 
@@ -170,13 +205,18 @@ def test_logs_one_line_per_request(server: Server) -> None:
 
     def entries() -> list[dict[str, Any]]:
         return [
-            entry for entry in server.logged() if entry.get("request_id") == "logged-once" and entry["level"] == "info"
+            entry
+            for entry in server.logged()
+            if entry.get("request_id") == "logged-once" and entry["level"] == "info"
         ]
 
     until(lambda: bool(entries()))
     (entry,) = entries()
     assert entry["time"].endswith("+00:00")
-    assert entry.items() >= {"level": "info", "method": "POST", "path": "/optimize", "status": 422}.items()
+    assert (
+        entry.items()
+        >= {"level": "info", "method": "POST", "path": "/optimize", "status": 422}.items()
+    )
     assert entry["duration"] > 0
 
 
@@ -207,8 +247,13 @@ def test_garbage_on_the_socket_is_answered_with_a_problem(server: Server, garbag
 
 def test_sigterm_answers_or_refuses_all_in_flight() -> None:
     # the grace is ample for the short ones on a busy machine, and too short for those that wait
-    with serving(workers=2, queue_size=4, shutdown_grace=6) as server, ThreadPoolExecutor(5) as pool:
-        short = start_work(server, lambda: in_background(pool, server, long_search(deadline=1), 2), workers=2)
+    with (
+        serving(workers=2, queue_size=4, shutdown_grace=6) as server,
+        ThreadPoolExecutor(5) as pool,
+    ):
+        short = start_work(
+            server, lambda: in_background(pool, server, long_search(deadline=1), 2), workers=2
+        )
         waiting = in_background(pool, server, long_search(deadline=60), 3)
         everyone = server.descendants()
         # a service manager signals every process
@@ -255,7 +300,9 @@ def test_ctrl_c_in_a_terminal_ends_cleanly() -> None:
 def test_workers_do_not_outlive_a_killed_parent() -> None:
     with serving(workers=1) as server, ThreadPoolExecutor() as pool:
         everyone = server.descendants()
-        (future,) = start_work(server, lambda: in_background(pool, server, long_search(LONG)), workers=1)
+        (future,) = start_work(
+            server, lambda: in_background(pool, server, long_search(LONG)), workers=1
+        )
         server.process.kill()
         until(lambda: not any(alive(pid) for pid in everyone))
         assert isinstance(future.exception(), httpx2.TransportError)

@@ -18,17 +18,25 @@ def test_robots_are_names_separated_by_commas(monkeypatch: pytest.MonkeyPatch) -
     assert Settings().robots == ()
 
 
-def test_an_unknown_robot_stops_the_start_with_the_known_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unknown_robot_stops_the_start_with_the_known_ones(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setenv("JOULEPATH_ROBOTS", "ur5e,r2d2")
     with pytest.raises(ValidationError, match=r"'r2d2': use some of .*ur3e, ur5e"):
         Settings()
 
 
 def test_every_wrong_variable_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, value in {"JOULEPATH_PORT": "http", "JOULEPATH_WORKERS": "0", "JOULEPATH_ROBOTS": "r2d2"}.items():
+    for name, value in {
+        "JOULEPATH_PORT": "http",
+        "JOULEPATH_WORKERS": "0",
+        "JOULEPATH_ROBOTS": "r2d2",
+    }.items():
         monkeypatch.setenv(name, value)
     with pytest.raises(WrongSettings) as found:
         read_settings()
     port, workers, robots = str(found.value).splitlines()
-    assert port.startswith("JOULEPATH_PORT='http': ") and workers.startswith("JOULEPATH_WORKERS='0': ")
+    assert port.startswith("JOULEPATH_PORT='http': ") and workers.startswith(
+        "JOULEPATH_WORKERS='0': "
+    )
     assert robots.endswith(f"'r2d2': use some of {', '.join(robot_names())}")

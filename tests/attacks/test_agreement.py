@@ -1,5 +1,5 @@
-"""The same motion, asked for in different ways: with and without a duration, as a front, by a pose or its joint
-positions, with all branches or one."""
+"""The same motion, asked for in different ways: with and without a duration, as a front, by a pose
+or its joint positions, with all branches or one."""
 
 from __future__ import annotations
 
@@ -81,17 +81,24 @@ def test_on_an_isolated_bus_no_fixed_duration_needs_less_than_a_free_one() -> No
 
 @pytest.mark.parametrize("index", long_but([5, 64, 95], [5, 13, 21, 64, 95]))
 def test_its_own_duration_as_a_fixed_one_gives_the_same_energy(index: int) -> None:
-    """Moves with tight limits, with a payload, without either, the fastest motion, and one beside a saddle."""
+    """Moves with tight limits, with a payload, without either, the fastest motion, and one beside a
+    saddle.
+    """
     _, body = request(0, index)
     free = solved(body)
     assert energy(solved(body, duration=free.duration)) == pytest.approx(energy(free), rel=AGREED)
 
 
-@pytest.mark.parametrize("index", [73, 3, 7], ids=["a stretched wrist", "a redundant arm", "two near branches"])
+@pytest.mark.parametrize(
+    "index", [73, 3, 7], ids=["a stretched wrist", "a redundant arm", "two near branches"]
+)
 def test_a_cycle_of_one_stop_gives_the_same_energy(index: int) -> None:
     _, body = request(0, index)
     stops = [{"name": "goal", "target": body["goal"]}]
-    asked = {name: value for name, value in body.items() if name != "goal"} | {"stops": stops, "closed": False}
+    asked = {name: value for name, value in body.items() if name != "goal"} | {
+        "stops": stops,
+        "closed": False,
+    }
     found = plan_cycle(to_cycle(CycleRequest.model_validate(asked), DEADLINE))
     assert found.energy.electrical.total == pytest.approx(energy(solved(body)), rel=AGREED)
 
@@ -143,5 +150,9 @@ def test_a_candidate_that_is_not_refined_says_so() -> None:
     listed = {each.goal: each for each in every.candidates if each.energy is not None}
     assert listed[every.goal.label].refined
     other = listed[alone.goal.label]
-    assert other.energy is not None and other.energy > (1 + AGREED) * energy(alone) and other.refined is False
+    assert (
+        other.energy is not None
+        and other.energy > (1 + AGREED) * energy(alone)
+        and other.refined is False
+    )
     assert all(each.refined is None for each in every.candidates if each.energy is None)

@@ -1,4 +1,6 @@
-"""What answers claim: branches at the edge of the reach, torque between samples, and the word `optimal`."""
+"""What answers claim: branches at the edge of the reach, torque between samples, and the word
+`optimal`.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ SAME = 1e-4
 
 
 def stretched(robot: str, seed: int) -> tuple[Array, Array, Array]:
-    """A configuration (nq,) with a stretched elbow, its flange pose (4, 4), and the direction (3,) out of reach."""
+    """A configuration (nq,) with a stretched elbow, its flange pose (4, 4), and the direction (3,)
+    out of reach.
+    """
     arm = load_robot(robot)
     limits, elbow = arm.limits, 2 if arm.nq == 6 else 3
     rng = np.random.default_rng(seed)
@@ -54,7 +58,10 @@ def test_a_pose_that_is_hardly_out_of_reach_keeps_its_branches(robot: str, seed:
         moved[:3, 3] += beyond * outward
         found = [each.q for each in kinematics.solve(moved, windings=False)]
         assert nearest(found, q) < 1e-3
-        assert all(np.linalg.norm(chain.flange(each[None])[0, :3, 3] - moved[:3, 3]) < ALLOWED for each in found)
+        assert all(
+            np.linalg.norm(chain.flange(each[None])[0, :3, 3] - moved[:3, 3]) < ALLOWED
+            for each in found
+        )
         # one configuration at the edge, where two branches meet
         assert sum(nearest([each], q) < 1e-3 for each in found) == 1
 
@@ -73,7 +80,9 @@ def test_a_pose_that_is_clearly_out_of_reach_is_refused() -> None:
 
 
 def test_the_motion_to_a_stretched_pose_is_the_same_a_nanometre_out_of_reach() -> None:
-    """Without a tolerance, the branch was lost, and the answer went to another one for twice the energy."""
+    """Without a tolerance, the branch was lost, and the answer went to another one for twice the
+    energy.
+    """
     q, T, outward = stretched("ur5e", 1)
     start = q + np.array([0.4, 0.3, 0.5, -0.3, 0.2, 0.4])
     energies = []
@@ -92,7 +101,9 @@ def test_mechanical_work_is_optimal_only_below_its_stated_gap(seed: int) -> None
     start, goal = rng.uniform(-1.5, 1.5, (2, 6)) - np.array([0, 1.2, 0, 0, 0, 0])
     longest = float(shortest_duration(goal - start, ROBOT.limits)) * rng.uniform(1.1, 3)
     up_to = optimize(problem(start, goal, objective="mechanical", duration_max=longest))
-    fixed = optimize(problem(start, goal, objective="mechanical", duration_min=longest, duration_max=longest))
+    fixed = optimize(
+        problem(start, goal, objective="mechanical", duration_min=longest, duration_max=longest)
+    )
     for solution in (up_to, fixed):
         work = solution.energy.mechanical.total
         gap = 1 - solution.lower_bound / work

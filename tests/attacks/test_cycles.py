@@ -1,6 +1,8 @@
-"""Cycles in a given time need no more than any simpler cycle that is known, whatever the time, and wherever it ends.
+"""Cycles in a given time need no more than any simpler cycle that is known, whatever the time, and
+wherever it ends.
 
-The fastest move of `HARD` is not found by a search from nothing, so that its time could once not be shared at all.
+The fastest move of `HARD` is not found by a search from nothing, so that its time could once not be
+shared at all.
 """
 
 from __future__ import annotations
@@ -46,7 +48,10 @@ CONVERGED = 2e-3
 START = np.array([-1.477, -1.808, 1.483, 1.913, 0.829, -1.357])
 GOAL = np.array([-0.341, -2.823, 1.001, 1.472, 0.493, -2.509])
 HARD = Cycle(
-    arm=Arm(robot=ROBOT, collisions=False), start=START, stops=[Stop(name="there", target=GOAL)], deadline=AMPLE
+    arm=Arm(robot=ROBOT, collisions=False),
+    start=START,
+    stops=[Stop(name="there", target=GOAL)],
+    deadline=AMPLE,
 )
 # rad: joint positions all over the range, each near the one before
 WHOLE_RANGE, NEAR = 2.9, 1.5
@@ -68,7 +73,9 @@ def near_cycles(seed: int) -> Cycle:
     for k in range(int(rng.integers(2, 5))):
         q.append(np.clip(q[-1] + rng.uniform(-NEAR, NEAR, 6), -WHOLE_RANGE, WHOLE_RANGE))
         part = Payload(mass=float(rng.uniform(0.0, 5.0)), com=np.array([0.0, 0.0, 0.05]))
-        stops.append(Stop(name=str(k), target=q[-1], dwell=float(rng.choice([0.0, 0.4])), payload=part))
+        stops.append(
+            Stop(name=str(k), target=q[-1], dwell=float(rng.choice([0.0, 0.4])), payload=part)
+        )
     return replace(HARD, start=q[0], stops=stops, closed=bool(rng.integers(2)), windings=False)
 
 
@@ -87,7 +94,9 @@ def energy(found: CycleSolution) -> float:
 
 
 def assert_no_dearer_than_its_baselines(found: CycleSolution) -> None:
-    """Not than `controller_default`: its acceleration jumps where it begins, which no certificate confirms."""
+    """Not than `controller_default`: its acceleration jumps where it begins, which no certificate
+    confirms.
+    """
     assert all(move.solution.certificate.valid for move in found.moves)
     assert found.lower_bound <= energy(found) * (1 + ROUNDING)
     for each in found.baselines:
@@ -104,11 +113,15 @@ def test_a_cycle_whose_fastest_move_is_hard_to_find_has_its_time_shared(duration
     assert energy(found) <= energy(free()) + waiting_power(free()) * (duration - free().duration)
 
     def move(start: Array, goal: Array, length: float) -> float:
-        task = Problem(arm=HARD.arm, start=start, goal=goal, windings=False, deadline=AMPLE, **fixed(length))
+        task = Problem(
+            arm=HARD.arm, start=start, goal=goal, windings=False, deadline=AMPLE, **fixed(length)
+        )
         return optimize(task).energy.electrical.total
 
     lengths = [share * duration for share in (0.49, 0.505, 0.52)]
-    best = min(move(START, GOAL, length) + move(GOAL, START, duration - length) for length in lengths)
+    best = min(
+        move(START, GOAL, length) + move(GOAL, START, duration - length) for length in lengths
+    )
     assert energy(found) == pytest.approx(best, rel=CONVERGED)
     assert found.status == "optimal"
 
@@ -124,7 +137,9 @@ class Spied(CycleSearch):
 
 
 def cheapest_known(asked: Cycle) -> Iterator[float]:
-    """Energies [J] of the cycles that the last search held: the chains of its finished moves, and a wait."""
+    """Energies [J] of the cycles that the last search held: the chains of its finished moves, and a
+    wait.
+    """
     assert asked.duration_max is not None
     search = Spied.made[-1]
     if nodes := search.least_through(search.solutions):
@@ -135,8 +150,12 @@ def cheapest_known(asked: Cycle) -> Iterator[float]:
 
 
 @pytest.mark.parametrize("readings", long_but([700, 1500], range(100, 2300, 50)))
-def test_wherever_the_deadline_ends_it_what_is_in_hand_counts(readings: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The clock moves by a second at each reading, so that the deadline passes between two readings of the search."""
+def test_wherever_the_deadline_ends_it_what_is_in_hand_counts(
+    readings: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The clock moves by a second at each reading, so that the deadline passes between two readings
+    of the search.
+    """
     monkeypatch.setattr(ENTRY, "CycleSearch", Spied)
     asked = in_time(HARD, 2.5, deadline=float(readings))
     try:
@@ -167,20 +186,33 @@ def test_cycles_need_no_more_than_any_simpler_one_at_any_time(seed: int) -> None
 @pytest.mark.parametrize("seed", range(10))
 def test_more_time_does_no_more_mechanical_work(seed: int) -> None:
     """Rests do no work: a cycle may wait."""
-    asked = replace(near_cycles(seed), objective="mechanical", duration_max=0.2 + near_cycles(seed).dwelling)
+    asked = replace(
+        near_cycles(seed), objective="mechanical", duration_max=0.2 + near_cycles(seed).dwelling
+    )
     with pytest.raises(CycleTooShort) as refusal:
         plan_cycle(asked)
     shortest = refusal.value.shortest - asked.dwelling
-    cycles = [plan_cycle(replace(asked, duration_max=asked.dwelling + k * shortest)) for k in (1.1, 1.6, 3.0)]
+    cycles = [
+        plan_cycle(replace(asked, duration_max=asked.dwelling + k * shortest))
+        for k in (1.1, 1.6, 3.0)
+    ]
     for each in cycles:
-        named = [baseline for baseline in each.baselines if baseline.name in ("same_factor", "fastest_then_wait")]
-        assert all(each.energy.mechanical.total <= other.mechanical * (1 + ROUNDING) for other in named)
+        named = [
+            baseline
+            for baseline in each.baselines
+            if baseline.name in ("same_factor", "fastest_then_wait")
+        ]
+        assert all(
+            each.energy.mechanical.total <= other.mechanical * (1 + ROUNDING) for other in named
+        )
     for faster, slower in pairwise(cycles):
         assert slower.energy.mechanical.total <= faster.energy.mechanical.total * (1 + CONVERGED)
 
 
 def test_simple_cycles_that_are_not_confirmed_are_no_answer() -> None:
-    """Sped up by half, the moves in their own time break limits; as they are, with a wait, they do not."""
+    """Sped up by half, the moves in their own time break limits; as they are, with a wait, they do
+    not.
+    """
     for duration, confirmed in ((free().duration / 1.5, False), (free().duration * 1.5, True)):
         search = CycleSearch(in_time(HARD, duration), CountingClock(0.0))
         nodes = search.run()
@@ -190,7 +222,9 @@ def test_simple_cycles_that_are_not_confirmed_are_no_answer() -> None:
         assert len(cycles) == 1 + confirmed and alike.waited == 0
 
 
-def test_a_chain_that_is_finished_is_the_answer_once_the_time_is_up(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_chain_that_is_finished_is_the_answer_once_the_time_is_up(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """The search went on to another chain, and had no time left to finish that."""
     search = CycleSearch(HARD, CountingClock(0.0))
     explored = [CycleSearch(HARD, CountingClock(0.0)).run()]
@@ -206,16 +240,24 @@ def test_a_chain_that_is_finished_is_the_answer_once_the_time_is_up(monkeypatch:
     assert all(each in search.solutions for each in search.pairs(nodes))
 
 
-def test_the_given_order_is_the_answer_where_a_free_one_needs_more(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_given_order_is_the_answer_where_a_free_one_needs_more(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     asked = pick_and_place(2, 3, windings=False, closed=False)
     stops = [replace(stop, payload=None) for stop in asked.stops]
     asked = replace(asked, stops=stops, order=FreeOrder())
     best = plan_cycle(asked)
     by_name = {stop.name: stop for stop in asked.stops}
     given = replace(asked, stops=[by_name[name] for name in best.order])
-    worse = replace(asked, stops=[by_name[name] for name in (best.order[2], best.order[0], best.order[1])], order=None)
+    worse = replace(
+        asked,
+        stops=[by_name[name] for name in (best.order[2], best.order[0], best.order[1])],
+        order=None,
+    )
     monkeypatch.setattr(OrderSearch, "run", lambda self: worse)
     found = plan_cycle(given)
     assert found.order == best.order and found.status == "feasible"
-    assert energy(found) == pytest.approx(energy(best), rel=CONVERGED) and energy(found) < energy(plan_cycle(worse))
+    assert energy(found) == pytest.approx(energy(best), rel=CONVERGED) and energy(found) < energy(
+        plan_cycle(worse)
+    )
     assert_no_dearer_than_its_baselines(found)

@@ -1,4 +1,6 @@
-"""The fastest motion: what a refusal names is no slower than a motion in hand, and is answered when it is asked for."""
+"""The fastest motion: what a refusal names is no slower than a motion in hand, and is answered when
+it is asked for.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,17 @@ from joulepath.optimizer.problem.problem import LEAST_DURATION, MethodName, Prob
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.search.errors import DurationTooShort
 from tests.optimizer.clocks import CountingClock
-from tests.optimizer.moves import CEILING, GOAL, PAYLOAD, ROBOT, START, fixed, limits, problem, tcp_pose
+from tests.optimizer.moves import (
+    CEILING,
+    GOAL,
+    PAYLOAD,
+    ROBOT,
+    START,
+    fixed,
+    limits,
+    problem,
+    tcp_pose,
+)
 from tests.selection import long_but
 
 # a move whose minimum-time solve from one start ends at four times the fastest motion
@@ -61,8 +73,12 @@ def named(error: DurationTooShort) -> float:
     return error.shortest
 
 
-def assert_answered(asked: Problem, error: DurationTooShort, shares: tuple[float, ...] = (1.0, 1.02)) -> None:
-    """What the refusal names is answered, as a fixed duration and as the longest one, and a little more as well."""
+def assert_answered(
+    asked: Problem, error: DurationTooShort, shares: tuple[float, ...] = (1.0, 1.02)
+) -> None:
+    """What the refusal names is answered, as a fixed duration and as the longest one, and a little
+    more as well.
+    """
     assert error.shortest is not None
     for share in shares:
         answer = optimize(replace(asked, **fixed(share * error.shortest)))
@@ -77,7 +93,8 @@ def test_one_bad_local_optimum_is_not_the_shortest_duration() -> None:
     assert error.proven and not error.cut_short
     assert error.bound <= named(error) <= 0.7311
     assert_answered(asked, error)
-    # a motion that is faster by less than counts is answered, too: Ruckig's takes no more than the bound
+    # a motion that is faster by less than counts is answered, too: Ruckig's takes no more than the
+    # bound
     exact = optimize(replace(asked, **fixed(error.bound * (1 + 1e-6))))
     assert exact.certificate.valid
     # it stands as it was found, and is not sold as the optimum
@@ -123,10 +140,16 @@ def test_a_cycle_takes_any_time_from_the_fastest_one_on() -> None:
 
 @pytest.mark.parametrize("index", long_but([5], range(16)))
 def test_no_motion_in_hand_is_faster(index: int) -> None:
-    """Moves of ±1.5 rad, every other one with 4 kg: of 118 alike, 16 were refused for up to ten times too long."""
+    """Moves of ±1.5 rad, every other one with 4 kg: of 118 alike, 16 were refused for up to ten
+    times too long.
+    """
     rng = np.random.default_rng([11, index])
     start, goal = rng.uniform(-1.5, 1.5, (2, 6))
-    payload = Payload(4.0, rng.uniform([-0.05, -0.05, 0.0], [0.05, 0.05, 0.12])) if index % 2 else Payload()
+    payload = (
+        Payload(4.0, rng.uniform([-0.05, -0.05, 0.0], [0.05, 0.05, 0.12]))
+        if index % 2
+        else Payload()
+    )
     asked = problem(start, goal, payload=payload)
     free, error = optimize(asked), refused(asked)
     theirs = [each.duration for each in free.baselines if each.within_limits]
@@ -142,11 +165,16 @@ MOVES: dict[str, Problem] = {
     "polynomial_ga": problem(method="polynomial_ga", payload=PAYLOAD),
     "one joint": problem(goal=START + np.array([0.0, 0.0, 0.7, 0.0, 0.0, 0.0])),
     "hardly any torque": problem(
-        payload=Payload(5.0, np.array([0.05, -0.05, 0.12])), limits=limits(tau_max=[40, 105, 60, 14, 14, 14])
+        payload=Payload(5.0, np.array([0.05, -0.05, 0.12])),
+        limits=limits(tau_max=[40, 105, 60, 14, 14, 14]),
     ),
-    "on a wall": problem(gravity=np.array([9.81, 0.0, 0.0]), payload=Payload(4.0, np.array([0.0, 0.0, 0.1]))),
+    "on a wall": problem(
+        gravity=np.array([9.81, 0.0, 0.0]), payload=Payload(4.0, np.array([0.0, 0.0, 0.1]))
+    ),
     "on the ceiling": problem(gravity=CEILING, payload=PAYLOAD),
-    "between poses": problem(tcp_pose(START), tcp_pose(GOAL), payload=Payload(4.5, np.array([0.05, 0.05, 0.12]))),
+    "between poses": problem(
+        tcp_pose(START), tcp_pose(GOAL), payload=Payload(4.5, np.array([0.05, 0.05, 0.12]))
+    ),
     "storage on the bus": problem(bus=Bus(mode="storage")),
     "mechanical": problem(objective="mechanical", duration_max=3.0),
     "slow tool": problem(tcp_speed=0.25, elbow_speed=0.5),
@@ -159,13 +187,20 @@ def test_what_is_named_is_answered(name: str) -> None:
     assert_answered(MOVES[name], refused(MOVES[name]))
 
 
-@pytest.mark.parametrize("name", long_but(["panda"], ["panda", "ur20", "kr10_r1100", "xarm7", "ur3e", "fr3"]))
+@pytest.mark.parametrize(
+    "name", long_but(["panda"], ["panda", "ur20", "kr10_r1100", "xarm7", "ur3e", "fr3"])
+)
 def test_other_robots(name: str) -> None:
     robot = load_robot(name)
     rng = np.random.default_rng(5)
     start, goal = rng.uniform(*_ranges(robot), (2, robot.nq))
     payload = Payload(0.9 * robot.rated_payload, np.array([0.0, 0.0, 0.08]))
-    asked = Problem(arm=Arm(robot=robot, collisions=False, payload=payload), start=start, goal=goal, deadline=300.0)
+    asked = Problem(
+        arm=Arm(robot=robot, collisions=False, payload=payload),
+        start=start,
+        goal=goal,
+        deadline=300.0,
+    )
     error = refused(asked)
     # these moves are as fast as the joints alone, or hardly slower
     assert named(error) <= 1.003 * error.bound
@@ -173,9 +208,13 @@ def test_other_robots(name: str) -> None:
 
 
 def _ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
-    """Ranges of joint positions (nq,) [rad] within ±2.5 rad; where a joint's range has none of that, its own."""
+    """Ranges of joint positions (nq,) [rad] within ±2.5 rad; where a joint's range has none of
+    that, its own.
+    """
     lower, upper = np.maximum(robot.limits.q_min, -2.5), np.minimum(robot.limits.q_max, 2.5)
-    return np.where(lower < upper, lower, robot.limits.q_min), np.where(lower < upper, upper, robot.limits.q_max)
+    return np.where(lower < upper, lower, robot.limits.q_min), np.where(
+        lower < upper, upper, robot.limits.q_max
+    )
 
 
 def test_equal_ends_take_the_least_duration() -> None:
@@ -264,7 +303,9 @@ def test_requests_of_other_kinds(name: str) -> None:
 
 @pytest.mark.parametrize("tick", long_but([0.02], [0.002, 0.005, 0.02, 0.1, 0.5]))
 def test_a_search_that_is_cut_short_says_so(tick: float) -> None:
-    """On a clock that each reading moves on: the search ends somewhere between its first start and its last."""
+    """On a clock that each reading moves on: the search ends somewhere between its first start and
+    its last.
+    """
     tight = replace(MOVES["hardly any torque"], **fixed(TOO_SHORT))
     with pytest.raises(DurationTooShort) as caught:
         optimize(replace(tight, deadline=2.0), clock=CountingClock(tick))

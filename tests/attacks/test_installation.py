@@ -1,6 +1,7 @@
 """Installations as the documentation has them, and surroundings that are hostile to the service.
 
-The deployment page's steps are run from a clean clone, as far as they need no root, no systemd and no container.
+The deployment page's steps are run from a clean clone, as far as they need no root, no systemd and
+no container.
 """
 
 from __future__ import annotations
@@ -42,7 +43,9 @@ OF_ROOT = ("useradd ", "cp deploy/", "nginx -t")
 INSTALLED = 1500.0  # s; for a gigabyte of packages on a machine with much else to do
 BUILT = 600.0  # s; for a wheel, with its build requirements
 ANSWERED = 120.0  # s
-in_a_repository = pytest.mark.skipif(not (ROOT / ".git").exists(), reason="there is no repository to clone")
+in_a_repository = pytest.mark.skipif(
+    not (ROOT / ".git").exists(), reason="there is no repository to clone"
+)
 
 
 def free_port() -> int:
@@ -55,7 +58,9 @@ def free_port() -> int:
 def started(command: list[str], log: Path, environment: dict[str, str], port: int) -> Iterator[str]:
     """A service and its address, once it is ready."""
     with log.open("wb") as output:
-        service = subprocess.Popen(command, cwd=log.parent, env=environment, stdout=output, stderr=output)
+        service = subprocess.Popen(
+            command, cwd=log.parent, env=environment, stdout=output, stderr=output
+        )
     try:
         end = time.monotonic() + WARM_UP
         while True:
@@ -71,7 +76,9 @@ def started(command: list[str], log: Path, environment: dict[str, str], port: in
         service.wait()
 
 
-def post(url: str, path: str, body: object, head: dict[str, str] | None = None) -> dict[str, object]:
+def post(
+    url: str, path: str, body: object, head: dict[str, str] | None = None
+) -> dict[str, object]:
     """The answer of a service."""
     headers = {"Content-Type": "application/json"} | (head or {})
     request = urllib.request.Request(f"{url}{path}", json.dumps(body).encode(), headers)
@@ -82,7 +89,9 @@ def post(url: str, path: str, body: object, head: dict[str, str] | None = None) 
 def loaded_files(get: Callable[[str], str]) -> set[str]:
     """The paths of all files that the studio page loads; `get` gives the text of each, or fails."""
     page = get("studio")
-    names = json.loads(re.findall(r'<script type="importmap">(.*?)</script>', page, re.S)[0])["imports"]
+    names = json.loads(re.findall(r'<script type="importmap">(.*?)</script>', page, re.S)[0])[
+        "imports"
+    ]
     waiting = re.findall(r'(?:href|src)="(studio/[^"]+)"', page)
     found = set[str]()
     while waiting:
@@ -92,12 +101,21 @@ def loaded_files(get: Callable[[str], str]) -> set[str]:
         found.add(path)
         text = get(path)
         if path.endswith(".js"):
-            imports = re.findall(r"""^\s*(?:import|export)\s*(?:[\w$*{}\s,]+?\bfrom\s*)?['"]([^'"]+)['"]""", text, re.M)
+            imports = re.findall(
+                r"""^\s*(?:import|export)\s*(?:[\w$*{}\s,]+?\bfrom\s*)?['"]([^'"]+)['"]""",
+                text,
+                re.M,
+            )
             imports += re.findall(r"""\bimport\(\s*['"]([^'"]+)['"]\s*\)""", text)
             for name in imports:
-                known = next((key for key in sorted(names, key=len, reverse=True) if name.startswith(key)), None)
+                known = next(
+                    (key for key in sorted(names, key=len, reverse=True) if name.startswith(key)),
+                    None,
+                )
                 waiting.append(
-                    urljoin(path, name) if known is None else names[known].removeprefix("./") + name[len(known) :]
+                    urljoin(path, name)
+                    if known is None
+                    else names[known].removeprefix("./") + name[len(known) :]
                 )
     return found
 
@@ -131,9 +149,22 @@ def copy_of(clone: Path, folder: Path) -> Path:
 
 def build(source: Path, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
     """What `pip install .` does first: the wheel, by build requirements of its own."""
-    command = [sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "--no-deps", "--wheel-dir", folder]
+    command = [
+        sys.executable,
+        "-m",
+        "pip",
+        "--disable-pip-version-check",
+        "wheel",
+        "--no-deps",
+        "--wheel-dir",
+        folder,
+    ]
     return subprocess.run(
-        [*command, source], env=os.environ | environment, capture_output=True, text=True, timeout=BUILT
+        [*command, source],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        timeout=BUILT,
     )
 
 
@@ -152,14 +183,29 @@ def test_the_wheel_of_a_clean_clone_computes_and_shows_the_studio(
     assert done.returncode == 0, done.stderr
     (wheel,) = (tmp_path / "wheels").glob("*.whl")
     target = tmp_path / "target"
-    install = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", "--target", target, wheel]
+    install = [
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--no-deps",
+        "--no-index",
+        "--target",
+        target,
+        wheel,
+    ]
     subprocess.run(install, check=True)
     port = free_port()
     environment = os.environ | {
-        "PYTHONPATH": str(target), "PORT": str(port), "JOULEPATH_WORKERS": "1",
+        "PYTHONPATH": str(target),
+        "PORT": str(port),
+        "JOULEPATH_WORKERS": "1",
         "JOULEPATH_DATABASE_URL": f"sqlite:///{tmp_path}/joulepath.db",
-    }  # fmt: skip
-    with started([sys.executable, "-m", "joulepath.app"], tmp_path / "log", environment, port) as url:
+    }
+    with started(
+        [sys.executable, "-m", "joulepath.app"], tmp_path / "log", environment, port
+    ) as url:
         check_studio(url)
         assert post(url, "/optimize", move())["status"] == "optimal"
 
@@ -167,8 +213,14 @@ def test_the_wheel_of_a_clean_clone_computes_and_shows_the_studio(
 @pytest.mark.long
 @in_a_repository
 def test_the_source_archive_has_what_its_wheel_needs(clone: Path, tmp_path: Path) -> None:
-    """It is built where npm's registry is reached, its wheel anywhere. Machine code is in the wheel alone."""
-    archive = [sys.executable, "-c", f"import hatchling.build as b; print(b.build_sdist({str(tmp_path)!r}))"]
+    """It is built where npm's registry is reached, its wheel anywhere. Machine code is in the wheel
+    alone.
+    """
+    archive = [
+        sys.executable,
+        "-c",
+        f"import hatchling.build as b; print(b.build_sdist({str(tmp_path)!r}))",
+    ]
     name = subprocess.run(
         archive, cwd=copy_of(clone, tmp_path), check=True, capture_output=True, text=True
     ).stdout.split()[-1]
@@ -202,7 +254,9 @@ def deployment_steps() -> str:
 
 
 def test_what_the_deployment_page_copies_is_there() -> None:
-    """The steps that only root takes name files of the repository, and the unit runs what the others install."""
+    """The steps that only root takes name files of the repository, and the unit runs what the
+    others install.
+    """
     left_out = [line for line in deployment_steps().splitlines() if line.startswith(OF_ROOT)]
     assert [line.split()[0] for line in left_out] == ["useradd", "cp", "cp", "nginx"]
     named = [word for line in left_out for word in line.split() if word.startswith("deploy/")]
@@ -216,21 +270,36 @@ def test_what_the_deployment_page_copies_is_there() -> None:
 @pytest.mark.timeout(2 * INSTALLED)
 @in_a_repository
 def test_the_deployment_page_is_followed(tmp_path: Path) -> None:
-    """Its steps, in folders of the test's own, make a service that computes, replays and shows the studio."""
+    """Its steps, in folders of the test's own, make a service that computes, replays and shows the
+    studio.
+    """
 
     def here(text: str) -> str:
         for path in DEPLOYED:
             text = text.replace(path, f"{tmp_path}{path}")
         return text
 
-    steps = here(deployment_steps()).replace("git clone …", f"git clone --quiet {ROOT}").replace("-g joulepath ", "")
-    steps = "".join(line for line in steps.splitlines(keepends=True) if not line.startswith(OF_ROOT))
+    steps = (
+        here(deployment_steps())
+        .replace("git clone …", f"git clone --quiet {ROOT}")
+        .replace("-g joulepath ", "")
+    )
+    steps = "".join(
+        line for line in steps.splitlines(keepends=True) if not line.startswith(OF_ROOT)
+    )
     (tmp_path / "opt").mkdir()
     clean = {
-        name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV", "MAKEFLAGS")
+        name: value
+        for name, value in os.environ.items()
+        if name not in ("PYTHONPATH", "VIRTUAL_ENV", "MAKEFLAGS")
     }
     done = subprocess.run(
-        ["bash", "-eu", "-c", steps], cwd=tmp_path, env=clean, capture_output=True, text=True, timeout=INSTALLED
+        ["bash", "-eu", "-c", steps],
+        cwd=tmp_path,
+        env=clean,
+        capture_output=True,
+        text=True,
+        timeout=INSTALLED,
     )
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     key = done.stdout.split()[-1]
@@ -240,7 +309,9 @@ def test_the_deployment_page_is_followed(tmp_path: Path) -> None:
     (command,) = re.findall(r"^ExecStart=(.*)$", unit, re.M)
     settings = re.findall(r"^Environment=(\w+)=(.*)$", unit, re.M)
     (further,) = re.findall(r"^EnvironmentFile=-(.*)$", unit, re.M)
-    settings += [tuple(line.split("=", 1)) for line in Path(further).read_text(encoding="utf-8").splitlines()]
+    settings += [
+        tuple(line.split("=", 1)) for line in Path(further).read_text(encoding="utf-8").splitlines()
+    ]
     environment = clean | dict(settings) | {"PORT": str(port), "JOULEPATH_WORKERS": "1"}
     for folder in DEPLOYED[2:]:
         Path(here(folder)).mkdir(parents=True)
@@ -261,15 +332,22 @@ def test_a_busy_port_is_told_with_its_remedy(tmp_path: Path, host: str) -> None:
         other.bind(("127.0.0.1", 0))
         other.listen()
         settings = {
-            "JOULEPATH_HOST": host, "PORT": str(other.getsockname()[1]),
+            "JOULEPATH_HOST": host,
+            "PORT": str(other.getsockname()[1]),
             "JOULEPATH_DATABASE_URL": f"sqlite:///{tmp_path}/joulepath.db",
-        }  # fmt: skip
+        }
         done = subprocess.run(
             [sys.executable, "-m", "joulepath.app"],
-            cwd=ROOT, env=os.environ | settings, capture_output=True, text=True, timeout=WARM_UP,
-        )  # fmt: skip
+            cwd=ROOT,
+            env=os.environ | settings,
+            capture_output=True,
+            text=True,
+            timeout=WARM_UP,
+        )
     assert done.returncode == 1
-    assert "Address already in use" in done.stderr and "choose another port by --port" in done.stderr
+    assert (
+        "Address already in use" in done.stderr and "choose another port by --port" in done.stderr
+    )
     # it has not begun anything: no log, no database
     assert len(done.stderr.splitlines()) == 1 and not list(tmp_path.iterdir())
 
@@ -281,14 +359,23 @@ def test_a_request_under_a_locale_without_unicode(tmp_path: Path) -> None:
         "print(optimize(problem()).certificate.valid)\n"
     )
     environment = {
-        "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "JOULEPATH_CACHE_DIR": str(tmp_path),
-    }  # fmt: skip
+        "LC_ALL": "C",
+        "PYTHONUTF8": "0",
+        "PYTHONCOERCECLOCALE": "0",
+        "JOULEPATH_CACHE_DIR": str(tmp_path),
+    }
     done = subprocess.run(
         [sys.executable, "-X", "warn_default_encoding", "-c", code],
-        cwd=ROOT, env=os.environ | environment, capture_output=True, text=True, timeout=ANSWERED,
-    )  # fmt: skip
+        cwd=ROOT,
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        timeout=ANSWERED,
+    )
     assert (done.returncode, done.stdout.strip()) == (0, "True"), done.stderr
-    ours = [line for line in done.stderr.splitlines() if "EncodingWarning" in line and str(ROOT) in line]
+    ours = [
+        line for line in done.stderr.splitlines() if "EncodingWarning" in line and str(ROOT) in line
+    ]
     assert [line for line in ours if "/.venv/" not in line and "/tests/" not in line] == []
 
 
@@ -311,7 +398,9 @@ def test_a_command_gives_a_hung_compiler_up(
 ) -> None:
     """It says so each time, and waits for it once."""
     compiler = tmp_path / "cc"
-    compiler.write_text(f"#!/bin/sh\necho call >> {tmp_path}/calls\nexec sleep 1000\n", encoding="utf-8")
+    compiler.write_text(
+        f"#!/bin/sh\necho call >> {tmp_path}/calls\nexec sleep 1000\n", encoding="utf-8"
+    )
     compiler.chmod(0o755)
     monkeypatch.setenv("CC", str(compiler))
     monkeypatch.setenv("JOULEPATH_CACHE_DIR", str(tmp_path / "cache"))
@@ -326,12 +415,16 @@ def test_a_command_gives_a_hung_compiler_up(
 
 @pytest.mark.long
 def test_a_scheduler_without_the_package_fails_no_job(tmp_path: Path) -> None:
-    """200 requests wait, whatever machines there are, and are done once there is a scheduler that can read them."""
+    """200 requests wait, whatever machines there are, and are done once there is a scheduler that
+    can read them.
+    """
     requests = [evaluation() for _ in range(200)]
     with ExitStack() as stack:
         empty = stack.enter_context(ExitStack())
         _, address = empty.enter_context(scheduler_process(tmp_path))
-        stack.enter_context(process(tmp_path / "machine.log", "joulepath.app.cli", "cluster-worker", address))
+        stack.enter_context(
+            process(tmp_path / "machine.log", "joulepath.app.cli", "cluster-worker", address)
+        )
         database = f"sqlite:///{tmp_path}/joulepath.db"
         server = stack.enter_context(serving(database_url=database, cluster=address, workers=1))
         until(lambda: "cannot import this package" in server.log.read_text())
@@ -343,8 +436,14 @@ def test_a_scheduler_without_the_package_fails_no_job(tmp_path: Path) -> None:
         empty.close()
         port = address.rpartition(":")[2]
         where = ("--host", "127.0.0.1", "--port", port, "--no-dashboard")
-        stack.enter_context(process(tmp_path / "again.log", "distributed.cli.dask_scheduler", *where))
+        stack.enter_context(
+            process(tmp_path / "again.log", "distributed.cli.dask_scheduler", *where)
+        )
         until(lambda: len(machines(server)) == 1)
         assert ended(over(server), path)["counts"] == {
-            "done": len(requests), "waiting": 0, "running": 0, "failed": 0, "cancelled": 0,
-        }  # fmt: skip
+            "done": len(requests),
+            "waiting": 0,
+            "running": 0,
+            "failed": 0,
+            "cancelled": 0,
+        }

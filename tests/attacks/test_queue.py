@@ -38,10 +38,16 @@ def test_clients_that_leave_early_cost_no_worker(two: Server) -> None:
     assert two.post("/optimize", move()).status_code == 200
     until(two.is_idle)
     assert two.workers() == before
-    asked = [entry for entry in two.logged() if entry["message"] == "request" and entry["path"] == "/optimize"]
+    asked = [
+        entry
+        for entry in two.logged()
+        if entry["message"] == "request" and entry["path"] == "/optimize"
+    ]
     statuses = Counter(entry["status"] for entry in asked)
     assert statuses.keys() <= {200, 499}, statuses
-    assert not any("traceback" in entry or entry["message"] == "mended the queue" for entry in two.logged())
+    assert not any(
+        "traceback" in entry or entry["message"] == "mended the queue" for entry in two.logged()
+    )
 
 
 @pytest.mark.long
@@ -51,7 +57,10 @@ def test_deadlines_that_pass_in_the_queue_cost_no_worker(two: Server) -> None:
     def asks(seed: int) -> set[int]:
         rng = random.Random(seed)
         body = long_search(0.3) if seed % 2 else move(deadline=0.2)
-        return {two.post("/optimize", {**body, "deadline": rng.uniform(0.05, 0.4)}).status_code for _ in range(8)}
+        return {
+            two.post("/optimize", {**body, "deadline": rng.uniform(0.05, 0.4)}).status_code
+            for _ in range(8)
+        }
 
     with ThreadPoolExecutor(20) as threads:
         statuses = set[int]().union(*threads.map(asks, range(20)))

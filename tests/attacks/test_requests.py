@@ -1,4 +1,6 @@
-"""Requests as users send them, and what they may rely on in the answer: ends, warnings, ids, logs, payloads."""
+"""Requests as users send them, and what they may rely on in the answer: ends, warnings, ids, logs,
+payloads.
+"""
 
 from __future__ import annotations
 
@@ -33,14 +35,18 @@ def free_about(end: dict[str, Any], axis: list[float] | None) -> dict[str, Any]:
     """An end of the seam with its rotation about an axis of the tool free, or given."""
     orientation = end["pose"]["orientation"]
     if axis is None:
-        return {"pose": {"position": end["pose"]["position"], "quaternion": orientation["quaternion"]}}
+        return {
+            "pose": {"position": end["pose"]["position"], "quaternion": orientation["quaternion"]}
+        }
     return {"pose": {**end["pose"], "orientation": {**orientation, "free_about": axis}}}
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("free", [("start",), ("start", "goal"), ("goal",)], ids="+".join)
 def test_a_seam_with_free_ends_is_answered(client: TestClient, free: tuple[str, ...]) -> None:
-    """Where the tool is beside the last axis, a nozzle turned about it is another place for the wrist."""
+    """Where the tool is beside the last axis, a nozzle turned about it is another place for the
+    wrist.
+    """
     asked = example("optimize/seam_any_turn")
     given = asked | {end: free_about(asked[end], None) for end in ("start", "goal")}
     part = given | {end: asked[end] for end in free}
@@ -62,7 +68,9 @@ THROUGH: dict[str, Any] = {
     "scene": TABLE,
     **PATIENT,
 }
-"""A gripper and a part that end 80 mm below the surface of a table, if only the arm itself is kept clear of it."""
+"""A gripper and a part that end 80 mm below the surface of a table, if only the arm itself is kept
+clear of it.
+"""
 ABOVE = {"pose": {"position": [0.7, 0.3, 0.02], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
 DEPTH = 80
 BALL = 86
@@ -72,7 +80,9 @@ BALL = 86
 def depths(warnings: list[str]) -> dict[str, int]:
     """Depth in the table [mm] by what is said to have no shape."""
     said = "\n".join(warnings)
-    found = re.findall(r"The (tool|payload) has no shape.* would be (\d+) mm deep in table at \d\.\d{3} s", said)
+    found = re.findall(
+        r"The (tool|payload) has no shape.* would be (\d+) mm deep in table at \d\.\d{3} s", said
+    )
     return {what: int(depth) for what, depth in found}
 
 
@@ -80,11 +90,15 @@ def test_a_gripper_without_a_shape_is_said_to_be_in_the_table(client: TestClient
     answer = client.post("/optimize", json=THROUGH).json()
     found = depths(answer["warnings"])
     assert found["tool"] >= DEPTH and found["payload"] >= DEPTH + BALL
-    assert all("`tool.capsules`" in said or "`payload.shape`" in said for said in answer["warnings"])
+    assert all(
+        "`tool.capsules`" in said or "`payload.shape`" in said for said in answer["warnings"]
+    )
 
 
 def test_the_remedy_of_the_warning_works(client: TestClient) -> None:
-    """With shapes, the goal in the table is refused; above it, the motion keeps clear and nothing is said."""
+    """With shapes, the goal in the table is refused; above it, the motion keeps clear and nothing
+    is said.
+    """
     tool = {"capsules": [{"start": [0, 0, 0.06], "end": [0, 0, 0.13], "radius": 0.02}]}
     box = {"shape": "box", "size": [0.1, 0.1, 0.1], "pose": pose([0.0, 0.0, 0.15])}
     shaped = THROUGH | {"tool": tool, "payload": {**THROUGH["payload"], "shape": box}}
@@ -93,13 +107,18 @@ def test_the_remedy_of_the_warning_works(client: TestClient) -> None:
     above = {"pose": {"position": [0.7, 0.3, 0.06], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
     answer = client.post("/optimize", json=shaped | {"goal": above})
     assert answer.status_code == 200, answer.text
-    assert depths(answer.json()["warnings"]) == {} and answer.json()["certificate"]["clearance"]["min_clearance"] >= 0
+    assert (
+        depths(answer.json()["warnings"]) == {}
+        and answer.json()["certificate"]["clearance"]["min_clearance"] >= 0
+    )
 
 
 @pytest.mark.long
 def test_points_rows_and_recordings_say_it_too(client: TestClient) -> None:
     front = client.post("/pareto", json=THROUGH | {"points": 2}).json()
-    compared = client.post("/compare", json=THROUGH | {"methods": ["bspline"], "answers": True}).json()
+    compared = client.post(
+        "/compare", json=THROUGH | {"methods": ["bspline"], "answers": True}
+    ).json()
     stored = client.get(front["points"][-1]["answer"]).json()["answer"]
     motion = {"t": stored["trajectory"]["t"], "q": stored["trajectory"]["q"]}
     arm = {name: THROUGH[name] for name in ("robot", "tcp", "payload", "scene")}
@@ -110,7 +129,9 @@ def test_points_rows_and_recordings_say_it_too(client: TestClient) -> None:
 
 
 def test_each_move_of_a_cycle_has_its_own_payload(client: TestClient) -> None:
-    """The tool's end stays above the table: only the part on its way from pick to place reaches into it."""
+    """The tool's end stays above the table: only the part on its way from pick to place reaches
+    into it.
+    """
     target = {"pose": {"position": [0.7, -0.3, 0.02], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
     stops = [
         {"name": "pick", "target": target, "payload": {"mass": 4.0, "com": [0.0, 0.0, 0.15]}},
@@ -125,15 +146,22 @@ def test_each_move_of_a_cycle_has_its_own_payload(client: TestClient) -> None:
 
 def test_a_payload_without_mass_needs_no_centre(client: TestClient) -> None:
     asked = {"start": {"q": HOME}, "goal": {"q": NEAR}, **PATIENT}
-    nothing, empty = (client.post("/optimize", json=asked | {"payload": each}) for each in (None, {"mass": 0}))
+    nothing, empty = (
+        client.post("/optimize", json=asked | {"payload": each}) for each in (None, {"mass": 0})
+    )
     assert nothing.status_code == empty.status_code == 200, empty.text
     assert empty.json()["energy"] == nothing.json()["energy"]
     refused = client.post("/optimize", json=asked | {"payload": {"mass": 1e-9}})
     assert refused.json()["errors"][0]["loc"] == ["body", "payload", "com"]
     stop = {"target": {"q": NEAR}, "payload": {"mass": 0}}
-    assert client.post("/cycle", json={"start": {"q": HOME}, "stops": [stop], **PATIENT}).status_code == 200
+    assert (
+        client.post("/cycle", json={"start": {"q": HOME}, "stops": [stop], **PATIENT}).status_code
+        == 200
+    )
     arm = {"payload": {"mass": 0}}
-    changed = client.post("/whatif", json={"optimize": asked, "changes": [{"name": "empty", "arm": arm}], **PATIENT})
+    changed = client.post(
+        "/whatif", json={"optimize": asked, "changes": [{"name": "empty", "arm": arm}], **PATIENT}
+    )
     assert changed.status_code == 200, changed.text
 
 
@@ -142,10 +170,14 @@ def kept_answers(client: TestClient) -> list[dict[str, Any]]:
     asked = {"start": {"q": HOME}, "goal": {"q": NEAR}, **PATIENT}
     motion = {"configurations": [HOME, NEAR], "time_per_segment": 1.5, "sample_period": 0.02}
     optimized = client.post("/optimize", json=asked).json()
-    a_cycle = client.post("/cycle", json={"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], **PATIENT}).json()
+    a_cycle = client.post(
+        "/cycle", json={"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], **PATIENT}
+    ).json()
     front = client.post("/pareto", json=asked | {"points": 2}).json()
     empty = {"name": "empty", "arm": {"payload": None}}
-    changed = client.post("/whatif", json={"evaluate": motion, "changes": [empty], **PATIENT}).json()
+    changed = client.post(
+        "/whatif", json={"evaluate": motion, "changes": [empty], **PATIENT}
+    ).json()
     sent = client.post("/jobs", json={"requests": [{"optimize": asked}, {"evaluate": motion}]})
     job = ended(client, sent.headers["location"])
     study = client.post("/studies", json={"name": "ids", "threshold": 1.0}).headers["location"]
@@ -183,10 +215,19 @@ def test_an_id_of_the_caller_is_no_id_of_an_answer(client: TestClient) -> None:
 def test_an_answer_that_is_not_kept_has_no_id(client: TestClient, path: str) -> None:
     bodies: dict[str, dict[str, Any]] = {
         "evaluate": {"configurations": [HOME, NEAR], "time_per_segment": 1.5},
-        "compare": {"start": {"q": HOME}, "goal": {"q": NEAR}, "methods": ["bspline"], "answers": True, **PATIENT},
+        "compare": {
+            "start": {"q": HOME},
+            "goal": {"q": NEAR},
+            "methods": ["bspline"],
+            "answers": True,
+            **PATIENT,
+        },
         "ik": {"pose": {"position": [0.4, -0.2, 0.35], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
     }
     answer = client.post(f"/{path}", json=bodies[path], headers={"X-Request-ID": "mine"}).json()
     assert answer["request"] == "mine" and answer["id"] is None
     for row in answer.get("methods", []):
-        assert row["answer"]["request"] == "mine" and row["answer"]["id"] is row["answer"]["answer"] is None
+        assert (
+            row["answer"]["request"] == "mine"
+            and row["answer"]["id"] is row["answer"]["answer"] is None
+        )

@@ -1,4 +1,6 @@
-"""Shapes that claim no size: a collision check would never find them hit, and call a motion through them free."""
+"""Shapes that claim no size: a collision check would never find them hit, and call a motion through
+them free.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,10 @@ from tests.models.own_arm.arms import BLOCK, PLAIN, SHAPE, changed, meshed, obj
     ],
 )
 def test_a_shape_of_no_size_makes_no_robot(shape: str, words: str) -> None:
-    with pytest.raises(InvalidArm, match=f"A <collision> of link 'upper_arm' has a {words}" if "<" in words else words):
+    with pytest.raises(
+        InvalidArm,
+        match=f"A <collision> of link 'upper_arm' has a {words}" if "<" in words else words,
+    ):
         own_figures("mine", changed(urdf=URDF.replace(SHAPE, shape)))
 
 
@@ -56,21 +61,30 @@ def test_a_shape_of_no_size_makes_no_robot(shape: str, words: str) -> None:
     ],
 )
 def test_a_mesh_of_no_size_makes_no_robot(scale: str, points: Any, words: str) -> None:
-    with pytest.raises(InvalidArm, match=f"link 'upper_arm' .*{words}"), np.errstate(over="ignore", invalid="ignore"):
+    with (
+        pytest.raises(InvalidArm, match=f"link 'upper_arm' .*{words}"),
+        np.errstate(over="ignore", invalid="ignore"),
+    ):
         own_figures("mine", changed(urdf=meshed(scale), meshes={"link.obj": obj(points)}))
 
 
 def test_a_mirrored_mesh_and_a_flat_one_keep_their_size() -> None:
-    """A negative scale mirrors, as on left and right hands; a sheet of metal is a surface with an area."""
+    """A negative scale mirrors, as on left and right hands; a sheet of metal is a surface with an
+    area.
+    """
     for scale, points in (("0.001 -0.001 0.001", BLOCK), ("0.001 0.001 0.001", BLOCK * [1, 1, 0])):
         files = {"link.obj": obj(points)}
         figures, _ = own_figures("mine", changed(urdf=meshed(f'scale="{scale}"'), meshes=files))
         (row,) = figures["collision"]["upper_arm"]["value"]
         # in the frame of the figures, whose z axis is the joint's y axis
-        placed = (points * np.array([float(each) for each in scale.split()]) + [0, 0, 0.2]) @ turn_onto(np.eye(3)[1])
+        placed = (
+            points * np.array([float(each) for each in scale.split()]) + [0, 0, 0.2]
+        ) @ turn_onto(np.eye(3)[1])
         begin, along = np.array(row[:3]), np.array(row[3:6]) - row[:3]
         share = np.clip((placed - begin) @ along / max(along @ along, 1e-30), 0, 1)
-        assert np.linalg.norm(placed - begin - share[:, None] * along, axis=1).max() <= row[6] + 1e-9  # rounding
+        assert (
+            np.linalg.norm(placed - begin - share[:, None] * along, axis=1).max() <= row[6] + 1e-9
+        )  # rounding
 
 
 @pytest.mark.parametrize(
@@ -100,7 +114,9 @@ def test_an_arm_whose_joints_are_in_one_place_needs_a_radius() -> None:
 def test_a_stored_robot_with_a_shape_of_no_size_is_refused() -> None:
     figures, _ = own_figures("mine", PLAIN)
     figures["collision"]["upper_arm"]["value"][0][6] = -0.2
-    with pytest.raises(InvalidProblem, match=r"'upper_arm' must be between .* Add it again") as found:
+    with pytest.raises(
+        InvalidProblem, match=r"'upper_arm' must be between .* Add it again"
+    ) as found:
         own_robot_of("mine", figures)
     assert found.value.field == "robot"
 
@@ -109,12 +125,21 @@ def test_a_stored_robot_with_a_shape_of_no_size_is_refused() -> None:
     ("field", "shape"),
     [
         ("vertices", {"shape": "mesh", "vertices": (1e-6 * np.eye(4, 3)).tolist()}),
-        ("data", {"shape": "mesh_file", "format": "obj", "data": base64.b64encode(obj(np.eye(4, 3))).decode(),
-                  "scale": 1e-6}),
+        (
+            "data",
+            {
+                "shape": "mesh_file",
+                "format": "obj",
+                "data": base64.b64encode(obj(np.eye(4, 3))).decode(),
+                "scale": 1e-6,
+            },
+        ),
     ],
-)  # fmt: skip
+)
 def test_an_obstacle_of_no_size_is_refused(field: str, shape: dict[str, Any]) -> None:
-    request = ArmRequest.model_validate({"robot": "ur5e", "scene": {"obstacles": [{"name": "box", **shape}]}})
+    request = ArmRequest.model_validate(
+        {"robot": "ur5e", "scene": {"obstacles": [{"name": "box", **shape}]}}
+    )
     with pytest.raises(InvalidProblem, match=r"extend over 0\.0001 m or more") as found:
         to_arm(request)
     assert found.value.field == f"scene.obstacles.0.{field}"

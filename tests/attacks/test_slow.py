@@ -23,8 +23,9 @@ from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, fixed, limits, problem
 from tests.selection import long_but
 
-# a move of which joint 6 is limited to so many rad/s, and the least energies [J] that are known of it. These and those
-# below are from spaces of four times the answer's control points (`benchmarks.slow_moves.more_points`)
+# a move of which joint 6 is limited to so many rad/s, and the least energies [J] that are known of
+# it. These and those below are from spaces of four times the answer's control points
+# (`benchmarks.slow_moves.more_points`)
 SLOW_START = np.array([0.5, -0.3, 0.4, -1.2, -1.1, 0.0])
 SLOW_GOAL = np.array([-0.5, -0.3, -0.4, -1.2, -1.1, 2.0])
 LEAST_KNOWN = {0.3: 331.8, 0.1: 823.9, 0.05: 1562.8, 0.02: 3783.0}
@@ -34,7 +35,9 @@ RAMPS = 5e-3
 
 @pytest.fixture(scope="module", autouse=True)
 def _compiled() -> Iterator[None]:
-    """Many motions of the default robot take a while without it. The few of another one take less than its compiler."""
+    """Many motions of the default robot take a while without it. The few of another one take less
+    than its compiler.
+    """
     compile_kernel(load_robot("ur5e"))
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(kernel, "compiler", lambda: None)
@@ -91,9 +94,12 @@ def test_a_duration_next_to_the_shortest_is_kept(ratio: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("goal", "duration", "least"), [(GOAL, 60.0, 2260.1), (START, 20.0, 768.3), (START + 1e-3, 20.0, 768.4)]
+    ("goal", "duration", "least"),
+    [(GOAL, 60.0, 2260.1), (START, 20.0, 768.3), (START + 1e-3, 20.0, 768.4)],
 )
-def test_much_more_time_than_a_move_needs_is_used(goal: Array, duration: float, least: float) -> None:
+def test_much_more_time_than_a_move_needs_is_used(
+    goal: Array, duration: float, least: float
+) -> None:
     """It goes to where holding costs less, and on in time, even if it only comes back."""
     assert energy(optimize(problem(START, goal, **fixed(duration)))) < least * (1 + MOST_EXCESS)
 
@@ -103,7 +109,9 @@ def test_other_robots_ramp_as_fast_as_they_can(name: str) -> None:
     robot = load_robot(name)
     lower, upper = np.maximum(robot.limits.q_min, -2.0), np.minimum(robot.limits.q_max, 2.0)
     start, goal = np.random.default_rng(0).uniform(lower, upper, (2, robot.nq))
-    task = problem(start, goal, robot=robot, limits=replace(robot.limits, v_max=np.full(robot.nq, 0.25)))
+    task = problem(
+        start, goal, robot=robot, limits=replace(robot.limits, v_max=np.full(robot.nq, 0.25))
+    )
     found = optimize(task)
     assert found.status == "optimal"
     assert found.duration < shortest(task) * (1 + RAMPS)
@@ -114,9 +122,13 @@ def test_a_payload_is_moved_slowly() -> None:
     assert energy(found) < 449.3 * (1 + MOST_EXCESS)
 
 
-@pytest.mark.parametrize("bus", [Bus("isolated"), Bus("storage", efficiency=0.9, capacity=50.0, power=500.0)])
+@pytest.mark.parametrize(
+    "bus", [Bus("isolated"), Bus("storage", efficiency=0.9, capacity=50.0, power=500.0)]
+)
 def test_other_buses_ramp_as_fast(bus: Bus) -> None:
-    """On an isolated bus power has a corner of its own for each joint, and finer motions are solved one by one."""
+    """On an isolated bus power has a corner of its own for each joint, and finer motions are solved
+    one by one.
+    """
     task = slow(0.1, bus=bus)
     found = optimize(task)
     assert found.duration < shortest(task) * (1 + RAMPS)
@@ -136,13 +148,18 @@ def test_a_longest_duration_beyond_the_answers_changes_little(index: int) -> Non
     assert energy(again) == pytest.approx(energy(found), rel=MOST_EXCESS)
 
 
-@pytest.mark.parametrize(("index", "speed"), long_but([(2, 0.25)], [(2, 0.25), (4, 0.08), (5, 0.25)]))
+@pytest.mark.parametrize(
+    ("index", "speed"), long_but([(2, 0.25)], [(2, 0.25), (4, 0.08), (5, 0.25)])
+)
 def test_a_slow_tcp_is_within_its_limit_in_short_spans(index: int, speed: float) -> None:
-    """Evenly spaced path points missed short knot spans: no motion was confirmed, or one of half again the energy."""
+    """Evenly spaced path points missed short knot spans: no motion was confirmed, or one of half
+    again the energy.
+    """
     _, task = slow_problem(0, index)
     task = replace(task, arm=replace(task.arm, tcp_speed=speed))
     found = optimize(task)
     assert found.certificate.worst_ratio["tcp_speed"] <= 1 + 1e-6
-    # at a lower limit of speed there are no faster motions, so none that needs less time and less energy was missed
+    # at a lower limit of speed there are no faster motions, so none that needs less time and less
+    # energy was missed
     lower = optimize(replace(task, arm=replace(task.arm, tcp_speed=0.9 * speed)))
     assert energy(found) < energy(lower) * (1 + MOST_EXCESS)

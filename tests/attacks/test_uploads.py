@@ -44,35 +44,64 @@ from tests.optimizer.clocks import CountingClock
 
 CORNERS = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 LATE = 20.0
-"""Deadline [s] by a clock that moves by 1 s whenever it is read: it passes while a file of some pieces is read."""
+"""Deadline [s] by a clock that moves by 1 s whenever it is read: it passes while a file of some
+pieces is read.
+"""
 MORE_READINGS = 12
-"""Readings of the clock after the deadline: one that ends the reading, and those of whoever asks for the time left."""
+"""Readings of the clock after the deadline: one that ends the reading, and those of whoever asks
+for the time left.
+"""
 # a document, or a file, of a size that counts; what becomes of it
 DOCUMENTS: dict[str, tuple[Callable[[int], str], str]] = {
     "open comments": (lambda n: "<robot>" + "<!--" * n, "not XML"),
-    "comments": (lambda n: URDF.replace("</robot>", "<!---->" * n + "</robot>"), "more than 200000 elements"),
-    "attributes": (lambda n: URDF.replace("<robot", "<robot " + " ".join(f'a{k}=""' for k in range(n)), 1),
-                   "more than 200 attributes"),
-    "levels": (lambda n: URDF.replace("</robot>", "<a>" * n + "</a>" * n + "</robot>"), "more than 100 levels"),
+    "comments": (
+        lambda n: URDF.replace("</robot>", "<!---->" * n + "</robot>"),
+        "more than 200000 elements",
+    ),
+    "attributes": (
+        lambda n: URDF.replace("<robot", "<robot " + " ".join(f'a{k}=""' for k in range(n)), 1),
+        "more than 200 attributes",
+    ),
+    "levels": (
+        lambda n: URDF.replace("</robot>", "<a>" * n + "</a>" * n + "</robot>"),
+        "more than 100 levels",
+    ),
     "unclosed levels": (lambda n: URDF.replace("</robot>", "<a>" * n), "more than 100 levels"),
     "elements": (lambda n: URDF.replace("</robot>", "<a/>" * n + "</robot>"), "more than"),
-    "instructions": (lambda n: URDF.replace("</robot>", "<?a?>" * n + "</robot>"), "more than 200000 elements"),
-    "entities": (lambda n: "<!DOCTYPE r [<!ENTITY a '" + "a" * n + "'>]><robot>" + "&a;" * n + "</robot>",
-                 "document type"),
-    "shapes": (lambda n: URDF.replace(SHAPE, SHAPE + "</geometry></collision><collision><geometry>" + SHAPE, 1)
-               .replace('<link name="tool"/>', '<link name="tool">' + f"<collision><geometry>{SHAPE}</geometry>"
-                        "</collision>" * min(n, 2000) + "</link>"), "more than 1000 shapes"),
+    "instructions": (
+        lambda n: URDF.replace("</robot>", "<?a?>" * n + "</robot>"),
+        "more than 200000 elements",
+    ),
+    "entities": (
+        lambda n: "<!DOCTYPE r [<!ENTITY a '" + "a" * n + "'>]><robot>" + "&a;" * n + "</robot>",
+        "document type",
+    ),
+    "shapes": (
+        lambda n: URDF.replace(
+            SHAPE, SHAPE + "</geometry></collision><collision><geometry>" + SHAPE, 1
+        ).replace(
+            '<link name="tool"/>',
+            '<link name="tool">' + f"<collision><geometry>{SHAPE}</geometry>"
+            "</collision>" * min(n, 2000) + "</link>",
+        ),
+        "more than 1000 shapes",
+    ),
     "words": (lambda n: URDF.replace('"0 0 0.2"', '"' + "0 " * n + '"', 1), "not 3 finite numbers"),
     "names": (lambda n: URDF.replace('link="upper_arm"', f'link="{"a" * n}"'), "no <child> link"),
-    "spaces": (lambda n: URDF.replace("<robot", "<robot" + " " * LIMITS.xml_bytes), "more than 8 MiB"),
+    "spaces": (
+        lambda n: URDF.replace("<robot", "<robot" + " " * LIMITS.xml_bytes),
+        "more than 8 MiB",
+    ),
     "zeros": (lambda n: "\0" * n, "not XML"),
     "surrogates": (lambda n: "<robot>" + "\ud800" * n, "not XML"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", DOCUMENTS)
 def test_a_urdf_that_holds_too_much_is_refused_at_once(name: str) -> None:
-    """Each took seconds to minutes, or the worker, by the time that a request's body may hold as much."""
+    """Each took seconds to minutes, or the worker, by the time that a request's body may hold as
+    much.
+    """
     make, words = DOCUMENTS[name]
     with pytest.raises(InvalidArm, match=words) as found:
         own_figures("mine", changed(urdf=make(300_000)))
@@ -94,10 +123,14 @@ def test_what_is_below_the_limits_is_read() -> None:
         lambda text: '<?xml version="1.0" encoding="UTF-16"?>' + text,
         lambda text: text.replace("\n", "\r\n"),
         lambda text: text.replace("</robot>", '<!-- <xacro:a b="${c}"/> <!DOCTYPE d> --></robot>'),
-        lambda text: text.replace("<robot", '<robot xmlns="http://www.ros.org" xmlns:xacro="http://ros.org/xacro"', 1),
+        lambda text: text.replace(
+            "<robot", '<robot xmlns="http://www.ros.org" xmlns:xacro="http://ros.org/xacro"', 1
+        ),
         lambda text: text.replace("</robot>", '<gz:plugin gz:a="1"><b/></gz:plugin></robot>'),
         lambda text: text.replace("</robot>", "<gazebo><![CDATA[ a < b ]]></gazebo></robot>"),
-        lambda text: text.replace("</robot>", '<gazebo a="&lt;&#65;">&amp;&gt;</gazebo><?php a?></robot>'),
+        lambda text: text.replace(
+            "</robot>", '<gazebo a="&lt;&#65;">&amp;&gt;</gazebo><?php a?></robot>'
+        ),
     ],
 )
 def test_what_public_urdfs_contain_is_no_fault(made: Callable[[str], str]) -> None:
@@ -106,7 +139,10 @@ def test_what_public_urdfs_contain_is_no_fault(made: Callable[[str], str]) -> No
 
 def glb(document: dict[str, Any], data: bytes) -> bytes:
     head = json.dumps(document).encode()
-    parts = [(0x4E4F534A, head + b" " * (-len(head) % 4)), (0x004E4942, data + b"\0" * (-len(data) % 4))]
+    parts = [
+        (0x4E4F534A, head + b" " * (-len(head) % 4)),
+        (0x004E4942, data + b"\0" * (-len(data) % 4)),
+    ]
     content = b"".join(struct.pack("<II", len(part), kind) + part for kind, part in parts)
     return struct.pack("<4sII", b"glTF", 2, 12 + len(content)) + content
 
@@ -125,7 +161,9 @@ def one_triangle(primitives: int, nodes: list[dict[str, Any]]) -> bytes:
                 {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
                 {"bufferView": 1, "componentType": 5125, "count": 3, "type": "SCALAR"},
             ],
-            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}] * primitives}],
+            "meshes": [
+                {"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}] * primitives}
+            ],
             "nodes": nodes,
             "scenes": [{"nodes": [0]}],
             "scene": 0,
@@ -144,7 +182,8 @@ SOLIDS = b"solid\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendsolid\n" * 40_000
 
 @pytest.mark.parametrize(("kind", "content"), [("obj", GROUPS), ("stl", SOLIDS)])
 def test_groups_materials_and_solids_cost_nothing(kind: Any, content: bytes) -> None:
-    """All of their triangles count. It took time as the square of their number, minutes for these."""
+    """All of their triangles count. It took time as the square of their number, minutes for
+    these."""
     assert len(mesh(kind, content).corners) == 40_000
 
 
@@ -169,7 +208,9 @@ def test_a_plain_glb_is_read() -> None:
 
 def test_corners_that_count_back_are_those_above_the_face() -> None:
     """Of the whole file, the last three would be the second triangle's, twice."""
-    content = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 0 0 5\nv 1 0 5\nv 0 1 5\nf -3/1/1 -2//2 -1\n"
+    content = (
+        b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 0 0 5\nv 1 0 5\nv 0 1 5\nf -3/1/1 -2//2 -1\n"
+    )
     heights = mesh("obj", content).corners[:, :, 2]
     assert sorted(heights.max(axis=1)) == [0.0, 5.0] and sorted(heights.min(axis=1)) == [0.0, 5.0]
 
@@ -200,7 +241,9 @@ def test_an_obj_that_is_none_or_too_large_is_refused(content: bytes) -> None:
 def clock(monkeypatch: pytest.MonkeyPatch) -> CountingClock:
     """The clock of all deadlines, which moves by itself whenever it is read."""
     clock = CountingClock()
-    monkeypatch.setattr(Deadline, "after", lambda seconds, _=None: Deadline(clock() + seconds, clock))
+    monkeypatch.setattr(
+        Deadline, "after", lambda seconds, _=None: Deadline(clock() + seconds, clock)
+    )
     return clock
 
 
@@ -225,25 +268,42 @@ def late_tasks(log: bytes, folder: Path) -> Iterator[tuple[str, Any]]:
     many = CORNERS + b"v 0 0 1\n" + b"f 1 2 3\nf 2 3 4\n" * (30 * LIMITS.mesh_lines)
     remarks = base64.b64encode(b"#\n" * (30 * LIMITS.mesh_lines) + obj(np.eye(4, 3))).decode()
     scene = {"obstacles": [{"name": "bin", "shape": "mesh_file", "format": "obj", "data": remarks}]}
-    with_mesh = OwnArm.model_validate({**ARM, "urdf": meshed(""), "meshes": zipped({"link.obj": many})})
+    with_mesh = OwnArm.model_validate(
+        {**ARM, "urdf": meshed(""), "meshes": zipped({"link.obj": many})}
+    )
     yield "a mesh of a robot", OwnRobotTask("mine", with_mesh, "id")
-    text = OwnArm.model_validate({**ARM, "urdf": URDF.replace("</robot>", " " * (30 * LIMITS.xml_piece) + "</robot>")})
+    text = OwnArm.model_validate(
+        {**ARM, "urdf": URDF.replace("</robot>", " " * (30 * LIMITS.xml_piece) + "</robot>")}
+    )
     yield "a URDF", OwnRobotTask("mine", text, "id")
     yield "a log", ReadLogTask(str(path), LogSettings(robot="ur5e"), 1 << 30, "id")
     motion = folder / "motion.csv"
     motion.write_text("q1,q2,q3,q4,q5,q6\n" + "0,0,0,0,0,0\n" * 200)
-    yield "a motion", EvaluateTask(str(motion), "csv", {"time_per_segment": "1"}, "json", "id", LATE)
-    request = IdentifyRequest.model_validate({"logs": ["1" * 8 + "-" + "-".join(["1" * 4] * 3) + "-" + "1" * 12]})
+    yield (
+        "a motion",
+        EvaluateTask(str(motion), "csv", {"time_per_segment": "1"}, "json", "id", LATE),
+    )
+    request = IdentifyRequest.model_validate(
+        {"logs": ["1" * 8 + "-" + "-".join(["1" * 4] * 3) + "-" + "1" * 12]}
+    )
     settings = LogSettings(robot="ur5e").model_dump(mode="json")
-    yield "an identification", IdentifyTask(request, (GivenLog("log", settings, gzip.compress(log)),), "id")
+    yield (
+        "an identification",
+        IdentifyTask(request, (GivenLog("log", settings, gzip.compress(log)),), "id"),
+    )
     pose = {"position": [0.4, 0.1, 0.3], "rpy": [0, 0, 0]}
     yield "a scene of /ik", IKTask(IKRequest.model_validate({"pose": pose, "scene": scene}), "id")
     move = {"start": {"q": [0.0] * 6}, "goal": {"q": [1.0] * 6}, "scene": scene}
     asked = OptimizeRequest.model_validate(move)
-    yield "a scene", type("Task", (), {"run": staticmethod(lambda deadline: to_problem(asked, deadline))})
+    yield (
+        "a scene",
+        type("Task", (), {"run": staticmethod(lambda deadline: to_problem(asked, deadline))}),
+    )
 
 
-def test_what_is_read_ends_at_its_deadline(clock: CountingClock, log_file: bytes, tmp_path: Path) -> None:
+def test_what_is_read_ends_at_its_deadline(
+    clock: CountingClock, log_file: bytes, tmp_path: Path
+) -> None:
     """With the typed error, and at once; whatever ran it goes on."""
     for name, task in late_tasks(log_file, tmp_path):
         began = clock.now
@@ -252,7 +312,9 @@ def test_what_is_read_ends_at_its_deadline(clock: CountingClock, log_file: bytes
         assert clock.now - began < LATE + MORE_READINGS, name
 
 
-@pytest.mark.parametrize("content", [gzip.compress(b"") * 10_000, gzip.compress(b"t,q1\n" + b"#\n" * 100_000)])
+@pytest.mark.parametrize(
+    "content", [gzip.compress(b"") * 10_000, gzip.compress(b"t,q1\n" + b"#\n" * 100_000)]
+)
 def test_gzip_that_yields_nothing_ends_at_the_deadline(content: bytes) -> None:
     from joulepath.optimizer.identify.logs.reading import read_log
 
@@ -264,7 +326,11 @@ def test_gzip_that_yields_nothing_ends_at_the_deadline(content: bytes) -> None:
     "change",
     [
         {"urdf": "<robot>" + "<!--" * 500_000},
-        {"urdf": URDF.replace("<robot", "<robot " + " ".join(f'a{k}="1"' for k in range(100_000)), 1)},
+        {
+            "urdf": URDF.replace(
+                "<robot", "<robot " + " ".join(f'a{k}="1"' for k in range(100_000)), 1
+            )
+        },
         {"urdf": URDF.replace("</robot>", "<a>" * 400_000 + "</a>" * 400_000 + "</robot>")},
         {"urdf": URDF.replace(SHAPE, '<cylinder radius="-0.2" length="0.3"/>')},
         {"urdf": meshed('scale="1e-9 1e-9 1e-9"'), "meshes": zipped({"link.obj": obj(BLOCK)})},
@@ -275,23 +341,39 @@ def test_gzip_that_yields_nothing_ends_at_the_deadline(content: bytes) -> None:
 def test_the_worker_answers_and_lives_on(client: TestClient, change: dict[str, Any]) -> None:
     """The last but one has three corners only, in 40,000 groups."""
     workers = sorted(client.app.state.engine.worker_pids)  # type: ignore[attr-defined]
-    errors = refused(client.post("/robots", json={"name": "attack", **ARM, **change}), InvalidRequest)["errors"]
+    errors = refused(
+        client.post("/robots", json={"name": "attack", **ARM, **change}), InvalidRequest
+    )["errors"]
     assert errors[0]["loc"] in (["body", "urdf"], ["body", "meshes"])
     assert sorted(client.app.state.engine.worker_pids) == workers  # type: ignore[attr-defined]
 
 
 def test_a_scene_of_40000_groups_is_an_obstacle(client: TestClient) -> None:
     pose = {"position": [0.6, 0.6, 0.0], "rpy": [0, 0, 0]}
-    bin_ = {"name": "bin", "shape": "mesh_file", "format": "obj", "data": base64.b64encode(GROUPS).decode()}
-    move = {"start": {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]}, "goal": {"q": [1.0, -1.2, 1.8, -2.0, -1.3, 0.5]}}
-    answer = client.post("/optimize", json={**move, "scene": {"obstacles": [{**bin_, "pose": pose}]}})
-    assert answer.status_code == 200 and answer.json()["certificate"]["clearance"]["min_clearance"] > 0
+    bin_ = {
+        "name": "bin",
+        "shape": "mesh_file",
+        "format": "obj",
+        "data": base64.b64encode(GROUPS).decode(),
+    }
+    move = {
+        "start": {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]},
+        "goal": {"q": [1.0, -1.2, 1.8, -2.0, -1.3, 0.5]},
+    }
+    answer = client.post(
+        "/optimize", json={**move, "scene": {"obstacles": [{**bin_, "pose": pose}]}}
+    )
+    assert (
+        answer.status_code == 200 and answer.json()["certificate"]["clearance"]["min_clearance"] > 0
+    )
 
 
 def test_a_body_that_unpacks_to_more_than_the_limit_is_refused(client: TestClient) -> None:
     """Before and after unpacking: 70 kB of gzip make 70 MB of JSON."""
     content = b'{"urdf": "' + b" " * 70_000_000 + b'"}'
     headers = {"Content-Type": "application/json"}
-    packed = client.post("/robots", content=gzip.compress(content), headers={**headers, "Content-Encoding": "gzip"})
+    packed = client.post(
+        "/robots", content=gzip.compress(content), headers={**headers, "Content-Encoding": "gzip"}
+    )
     refused(packed, BodyTooLarge)
     refused(client.post("/robots", content=content, headers=headers), BodyTooLarge)

@@ -34,7 +34,9 @@ def task() -> RequestTask:
 @pytest.fixture(scope="module")
 def answered(task: RequestTask) -> Json:
     request = OptimizeRequest.model_validate(task.body)
-    content = OptimizeAnswer.of(request, "id", optimize(to_problem(request, 10.0)), arm_fields(request))
+    content = OptimizeAnswer.of(
+        request, "id", optimize(to_problem(request, 10.0)), arm_fields(request)
+    )
     answer: Json = orjson.loads(json_document(content))
     return answer
 
@@ -79,14 +81,28 @@ def miss_the_start(answer: Json) -> None:
 
 def be_beaten(answer: Json) -> None:
     baseline = answer["baselines"][1]
-    baseline |= {"within_limits": True, "electrical": 0.99 * answer["energy"]["electrical"]["total"]}
+    baseline |= {
+        "within_limits": True,
+        "electrical": 0.99 * answer["energy"]["electrical"]["total"],
+    }
 
 
 @pytest.mark.parametrize(
     "spoil",
-    [shift_goal, hurry, lose_energy, boast, break_a_limit, forget_a_limit, miss_the_start, be_beaten],
+    [
+        shift_goal,
+        hurry,
+        lose_energy,
+        boast,
+        break_a_limit,
+        forget_a_limit,
+        miss_the_start,
+        be_beaten,
+    ],
 )
-def test_what_is_wrong_is_found(task: RequestTask, answered: Json, spoil: Callable[[Json], None]) -> None:
+def test_what_is_wrong_is_found(
+    task: RequestTask, answered: Json, spoil: Callable[[Json], None]
+) -> None:
     answer = copy.deepcopy(answered)
     spoil(answer)
     assert found(task, answer)
@@ -113,9 +129,16 @@ def test_replay_agrees_with_the_certificate(task: RequestTask, answered: Json) -
     spline = answered["trajectory"]["spline"]
     points = np.array(spline["control_points"])
     problem = to_problem(OptimizeRequest.model_validate(task.body), 10.0)
-    motion = replay(problem, SplineMotion(np.array(spline["knots"]), points, spline["degree"]), points[0], points[-1])
+    motion = replay(
+        problem,
+        SplineMotion(np.array(spline["knots"]), points, spline["degree"]),
+        points[0],
+        points[-1],
+    )
     assert motion.end_error < ROUNDING
-    assert motion.energy.electrical.total == pytest.approx(answered["energy"]["electrical"]["total"], rel=ENERGY_ERROR)
+    assert motion.energy.electrical.total == pytest.approx(
+        answered["energy"]["electrical"]["total"], rel=ENERGY_ERROR
+    )
     for name, ratio in answered["certificate"]["worst_ratio"].items():
         assert motion.ratios[name] == pytest.approx(ratio, abs=RATIO_ERROR)
 

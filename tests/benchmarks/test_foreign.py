@@ -9,7 +9,12 @@ import pytest
 
 from benchmarks.foreign import KINDS, chosen, main, problems_of, run, summary
 
-POST = {"name": "base", "shape": "box", "size": [0.05, 0.05, 0.4], "pose": {"position": [0.5, 0.5, 0.2]}}
+POST = {
+    "name": "base",
+    "shape": "box",
+    "size": [0.05, 0.05, 0.4],
+    "pose": {"position": [0.5, 0.5, 0.2]},
+}
 CAPSULE = {"start": [0, 0, 0], "end": [0, 0, 0.1], "radius": 0.03}
 START = [-0.8, -1.4, 1.6, -1.7, -1.57, 0.0]
 AMPLE = 60.0  # s
@@ -23,10 +28,16 @@ def written(folder: Path, families: tuple[str, ...] = ("posts",)) -> Path:
         "goal_pose": {"position": [-0.4, -0.3, 0.4], "quaternion": [0.0, 1.0, 0.0, 0.0]},
         "obstacles": [{**POST, "pose": {**POST["pose"], "quaternion": [0.0, 0.0, 0.0, 1.0]}}],  # type: ignore[dict-item]
     }
-    problems = [{**problem, "name": f"{family}/{k}", "family": family} for family in families for k in range(3)]
+    problems = [
+        {**problem, "name": f"{family}/{k}", "family": family}
+        for family in families
+        for k in range(3)
+    ]
     tcp = {"position": [0, 0, 0.15], "quaternion": [0.0, 0.0, 0.0, 1.0]}
     file = folder / "problems.json"
-    file.write_bytes(orjson.dumps({"tool": {"capsules": [CAPSULE]}, "tcp": tcp, "problems": problems}))
+    file.write_bytes(
+        orjson.dumps({"tool": {"capsules": [CAPSULE]}, "tcp": tcp, "problems": problems})
+    )
     return file
 
 

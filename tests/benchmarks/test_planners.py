@@ -20,7 +20,8 @@ from tests.selection import long_but
 OPTIONAL = {"drake": "pydrake", "copp": "copp_py"}
 ENDS = 1e-6  # rad
 SLACK = 1e-3  # by which limits may be exceeded
-IDENTITY = 1e-3  # sum of energy's parts against the total: what makes a replay's speeds and torques fit together
+# sum of energy's parts against the total: what makes a replay's speeds and torques fit together
+IDENTITY = 1e-3
 # toppra knows no jerk; bounds on a grid are broken between its points
 HOLDING = [name for name in PLANNERS if name not in ("toppra", "opti-grid")]
 
@@ -35,7 +36,9 @@ def planned(name: str) -> Replay:
     return replay(problem_with(task.q_start, task.q_goal), motion, task.q_start, task.q_goal)
 
 
-@pytest.mark.parametrize("name", long_but([name for name in PLANNERS if name in ("joulepath", "toppra")], PLANNERS))
+@pytest.mark.parametrize(
+    "name", long_but([name for name in PLANNERS if name in ("joulepath", "toppra")], PLANNERS)
+)
 def test_planners_reach_start_and_goal(name: str) -> None:
     found = planned(name)
     electrical = found.energy.electrical
@@ -47,7 +50,9 @@ def test_planners_reach_start_and_goal(name: str) -> None:
 
 def test_gradient_of_the_energy_given_to_drake() -> None:
     pytest.importorskip("pydrake")
-    planner = import_module("benchmarks.planners.drake_trajectory").DrakeTrajectory(load_robot("ur5e"))
+    planner = import_module("benchmarks.planners.drake_trajectory").DrakeTrajectory(
+        load_robot("ur5e")
+    )
     rng = np.random.default_rng(0)
     x = np.append(rng.normal(size=planner.basis.n * 6), 2.0)
     _, gradient = planner.energy._evaluate(x)
@@ -55,7 +60,9 @@ def test_gradient_of_the_energy_given_to_drake() -> None:
     for k in rng.integers(len(x), size=10):
         change = np.zeros(len(x))
         change[k] = step
-        slope = (planner.energy._evaluate(x + change)[0] - planner.energy._evaluate(x - change)[0]) / (2 * step)
+        slope = (
+            planner.energy._evaluate(x + change)[0] - planner.energy._evaluate(x - change)[0]
+        ) / (2 * step)
         assert slope == pytest.approx(gradient[k], rel=1e-5, abs=1e-6)
 
 
@@ -64,16 +71,34 @@ def test_control_points_of_derivatives(order: int) -> None:
     knots, points = uniform(13).knots, np.random.default_rng(0).normal(size=(13, 2))
     derived = BSpline(knots[order:-order], derivative_points(knots, order) @ points, DEGREE - order)
     t = np.linspace(0, 1, 50)
-    assert np.allclose(derived(t), BSpline(knots, points, DEGREE)(t, order), rtol=0, atol=1e-9 * 13**order)
+    assert np.allclose(
+        derived(t), BSpline(knots, points, DEGREE)(t, order), rtol=0, atol=1e-9 * 13**order
+    )
 
 
 def test_the_best_is_the_least_energy_within_limits() -> None:
     def results(energy: float, worst: float | None) -> dict[str, object]:
         row = {"index": 0, "wall": 0.1, "energy": energy, "duration": 1.0, "worst": worst}
-        return {"title": "x", "versions": "y 1", "what": "z", "seed": 0, "rows": [row, {"index": 1, "wall": 0.2}]}
+        return {
+            "title": "x",
+            "versions": "y 1",
+            "what": "z",
+            "seed": 0,
+            "rows": [row, {"index": 1, "wall": 0.2}],
+        }
 
     # JSON has no infinity: an unbounded ratio comes back as null
-    found = {"a": results(110.0, 1.0), "b": results(90.0, 1.2), "c": results(80.0, None), "d": results(100.0, 1.0)}
+    found = {
+        "a": results(110.0, 1.0),
+        "b": results(90.0, 1.2),
+        "c": results(80.0, None),
+        "d": results(100.0, 1.0),
+    }
     planners = Comparison.of(found)
     assert planners.best[0] == 100.0
-    assert [round(float(planners.above(row)[0]), 3) for row in planners.rows] == [0.1, -0.1, -0.2, 0.0]
+    assert [round(float(planners.above(row)[0]), 3) for row in planners.rows] == [
+        0.1,
+        -0.1,
+        -0.2,
+        0.0,
+    ]

@@ -7,15 +7,33 @@ import pytest
 from benchmarks.energies import RELATIVE, differences
 from benchmarks.requirements import Requirement, requirements
 
-ROW = {"index": 3, "kind": "payload", "task": [0.1, 0.2], "outcome": "optimal", "energy": 50.0, "duration": 1.0}
+ROW = {
+    "index": 3,
+    "kind": "payload",
+    "task": [0.1, 0.2],
+    "outcome": "optimal",
+    "energy": 50.0,
+    "duration": 1.0,
+}
 
 
 @pytest.mark.parametrize(
     ("measured", "at_least", "satisfied"),
-    [(1.0, False, True), (1.0, True, True), (1.1, False, False), (0.9, True, False), (math.nan, False, False)],
+    [
+        (1.0, False, True),
+        (1.0, True, True),
+        (1.1, False, False),
+        (0.9, True, False),
+        (math.nan, False, False),
+    ],
 )
-def test_a_requirement_is_satisfied_up_to_its_bound(measured: float, at_least: bool, satisfied: bool) -> None:
-    assert Requirement("task", "quantity [1]", "maximum", measured, 1.0, at_least).satisfied is satisfied
+def test_a_requirement_is_satisfied_up_to_its_bound(
+    measured: float, at_least: bool, satisfied: bool
+) -> None:
+    assert (
+        Requirement("task", "quantity [1]", "maximum", measured, 1.0, at_least).satisfied
+        is satisfied
+    )
 
 
 def test_a_row_has_one_value_per_column() -> None:
@@ -48,6 +66,11 @@ def test_a_different_energy_outcome_or_task_is_named(change: dict[str, object]) 
 
 
 def test_rounding_is_no_difference() -> None:
-    assert differences([ROW | {"energy": 50.0 * (1 + 0.5 * RELATIVE), "task": [0.1 + 1e-12, 0.2]}], [ROW]) == []
+    assert (
+        differences(
+            [ROW | {"energy": 50.0 * (1 + 0.5 * RELATIVE), "task": [0.1 + 1e-12, 0.2]}], [ROW]
+        )
+        == []
+    )
     refused = ROW | {"energy": None, "outcome": "NoTrajectory"}
     assert differences([refused], [refused]) == []

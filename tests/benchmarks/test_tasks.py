@@ -22,14 +22,20 @@ def robot() -> Robot:
 
 def test_a_task_is_its_seed_and_index() -> None:
     again = list(moves(3, 4))[2]
-    assert np.array_equal(move(3, 2).q_start, again.q_start) and np.array_equal(move(3, 2).q_goal, again.q_goal)
+    assert np.array_equal(move(3, 2).q_start, again.q_start) and np.array_equal(
+        move(3, 2).q_goal, again.q_goal
+    )
     assert request_task(3, 2).body == list(request_tasks(3, 4))[2].body
     assert request_task(3, 2).body != request_task(3, 3).body != request_task(4, 3).body
 
 
 def test_moves_are_within_one_turn_and_the_limits(robot: Robot) -> None:
     q = np.array([end for task in moves(0, 200) for end in (task.q_start, task.q_goal)])
-    assert (q >= robot.limits.q_min).all() and (q <= robot.limits.q_max).all() and np.abs(q).max() <= np.pi
+    assert (
+        (q >= robot.limits.q_min).all()
+        and (q <= robot.limits.q_max).all()
+        and np.abs(q).max() <= np.pi
+    )
     # drawn evenly: both halves of every joint's range, and its outer tenths, are reached
     assert (q.min(axis=0) < -0.9 * np.pi).all() and (q.max(axis=0) > 0.9 * np.pi).all()
 

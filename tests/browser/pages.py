@@ -1,4 +1,6 @@
-"""The studio page in a browser, and what every test asks of it: no error in its console, no request to elsewhere."""
+"""The studio page in a browser, and what every test asks of it: no error in its console, no request
+to elsewhere.
+"""
 
 from __future__ import annotations
 
@@ -18,14 +20,23 @@ PATIENCE = 1000 * ANSWER  # [ms]
 expect.set_options(timeout=PATIENCE)
 SHOWN = "() => Boolean(window.studio?.state.answer && (window.studio.view?.frames ?? 1))"
 # what is drawn from figures has texture coordinates, the meshes have none
-MESHES = "() => Boolean(window.studio?.view?.arms) && !studio.view.arms[0].drawn[0].geometry.hasAttribute('uv')"
+MESHES = (
+    "() => Boolean(window.studio?.view?.arms) && "
+    "!studio.view.arms[0].drawn[0].geometry.hasAttribute('uv')"
+)
 
 
 def until(page: Page, condition: str, patience: float = ANSWER) -> None:
-    """Waits until a JavaScript function of the page returns true. The page's own policy forbids `wait_for_function`."""
+    """Waits until a JavaScript function of the page returns true. The page's own policy forbids
+    `wait_for_function`.
+    """
     end = time.monotonic() + patience
     while not page.evaluate(condition):
-        told = [page.locator(box).inner_text() for box in ("#problem", "#status")] if time.monotonic() > end else None
+        told = (
+            [page.locator(box).inner_text() for box in ("#problem", "#status")]
+            if time.monotonic() > end
+            else None
+        )
         assert told is None, (condition, *told)
         page.wait_for_timeout(20)
 
@@ -56,10 +67,17 @@ def opened(browser: Browser, url: str, **options: Any) -> Iterator[Page]:
     page = context.new_page()
     page.set_default_timeout(PATIENCE)
     faults: list[str] = []
-    page.on("console", lambda message: faults.append(message.text) if message.type in ("error", "warning") else None)
+    page.on(
+        "console",
+        lambda message: (
+            faults.append(message.text) if message.type in ("error", "warning") else None
+        ),
+    )
     page.on("pageerror", lambda error: faults.append(str(error)))
     own = (url.split("/studio")[0], "data:", "blob:")
-    page.on("request", lambda sent: faults.append(sent.url) if not sent.url.startswith(own) else None)
+    page.on(
+        "request", lambda sent: faults.append(sent.url) if not sent.url.startswith(own) else None
+    )
     page.goto(url)
     yield page
     context.close()

@@ -1,4 +1,6 @@
-"""The studio page in a real browser: how one asks, by form, by JSON and by hand, and what is said of errors."""
+"""The studio page in a real browser: how one asks, by form, by JSON and by hand, and what is said
+of errors.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,9 @@ CARRIED = """() => {
 
 def edit(page: Page, text: str) -> None:
     """Puts a text into the field of the request, whether it is seen or not."""
-    page.locator("#json").evaluate("(it, text) => { it.value = text; it.dispatchEvent(new Event('change')); }", text)
+    page.locator("#json").evaluate(
+        "(it, text) => { it.value = text; it.dispatchEvent(new Event('change')); }", text
+    )
 
 
 def test_a_wrong_request_is_explained(page: Page) -> None:
@@ -66,7 +70,11 @@ WRONG: list[dict[str, Any]] = [
     {"scene": {"obstacles": {}}},
     {"scene": {"obstacles": [3]}},
     {"scene": {"obstacles": [None]}},
-    {"scene": {"obstacles": [{"name": "x", "shape": "box", "size": 3, "pose": FIRST["start"]["pose"]}]}},
+    {
+        "scene": {
+            "obstacles": [{"name": "x", "shape": "box", "size": 3, "pose": FIRST["start"]["pose"]}]
+        }
+    },
     {"stops": 3},
     {"stops": [None]},
     {"logs": 3},
@@ -198,14 +206,23 @@ def test_a_cycle_is_played_as_one(browser: Browser, service: Server, page: Page)
     expect(page.locator("#timeline .leg").first).to_be_visible()
     legs = state(page, "cycle.legs")
     assert page.locator("#timeline .leg").count() == len(legs)
-    t, q = np.array(state(page, "answer.trajectory.t")), np.array(state(page, "answer.trajectory.q"))
-    assert t[0] == 0 and t[-1] == pytest.approx(state(page, "cycle.duration")) and (np.diff(t) > -ROUNDING).all()
+    t, q = (
+        np.array(state(page, "answer.trajectory.t")),
+        np.array(state(page, "answer.trajectory.q")),
+    )
+    assert (
+        t[0] == 0
+        and t[-1] == pytest.approx(state(page, "cycle.duration"))
+        and (np.diff(t) > -ROUNDING).all()
+    )
     assert np.abs(np.diff(q, axis=0)).max() < 0.1
     assert page.locator("#timeline tbody tr").count() == len(legs)
     for k, leg in enumerate(legs):
         page.locator("#timeline .leg").nth(k).click()
         assert state(page, "time") == pytest.approx(leg["t0"])
-        assert page.evaluate(CARRIED) == (1 if leg["payload_mass"] else 0), "what it carries on this leg is drawn"
+        assert page.evaluate(CARRIED) == (1 if leg["payload_mass"] else 0), (
+            "what it carries on this leg is drawn"
+        )
     expect(page.locator(".label.stop", has_text="finished")).to_be_visible()
     kept = state(page, "cycle.answer").removeprefix("/answers/")
     with opened(browser, f"{service.url}/studio#answer={kept}") as other:
@@ -220,7 +237,9 @@ def test_a_cycle_is_played_as_one(browser: Browser, service: Server, page: Page)
 def test_what_does_not_count_at_a_stop_is_faint(page: Page) -> None:
     """The part that is grasped: at its stop and on the lines in and out of it."""
     ask(page, json.loads((ROOT / "examples" / "cycle" / "out_of_a_tray.json").read_text()))
-    names = page.evaluate("() => studio.view.parts.obstacles.children.map(({ userData }) => userData.name)")
+    names = page.evaluate(
+        "() => studio.view.parts.obstacles.children.map(({ userData }) => userData.name)"
+    )
     part = f"studio.view.parts.obstacles.children[{names.index('part')}]"
     faint = []
     for k, leg in enumerate(legs := state(page, "cycle.legs")):
@@ -228,7 +247,9 @@ def test_what_does_not_count_at_a_stop_is_faint(page: Page) -> None:
         assert state(page, "time") == pytest.approx(leg["t0"])
         page.evaluate("() => studio.view.render()")
         faint.append(page.evaluate(f"() => {part}.userData.material.opacity < 0.5"))
-    assert faint == [leg["kind"] != "move" and leg["goal"]["stop"].startswith("pick") for leg in legs]
+    assert faint == [
+        leg["kind"] != "move" and leg["goal"]["stop"].startswith("pick") for leg in legs
+    ]
     assert any(faint)
 
 

@@ -1,4 +1,6 @@
-"""The documentation page in a browser: its Authorize button gives the key to the requests that it sends."""
+"""The documentation page in a browser: its Authorize button gives the key to the requests that it
+sends.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,12 @@ def test_authorize(guarded: tuple[Server, str], page: Page) -> None:
     sent: list[str] = []
     blocked: list[str] = []
     page.on("request", lambda request: sent.append(request.url))
-    page.on("console", lambda message: blocked.append(message.text) if "Content Security" in message.text else None)
+    page.on(
+        "console",
+        lambda message: (
+            blocked.append(message.text) if "Content Security" in message.text else None
+        ),
+    )
     page.goto(f"{server.url}/docs")
 
     operation = page.locator("#operations-studies-list_studies_studies_get")
@@ -60,12 +67,16 @@ def test_authorize(guarded: tuple[Server, str], page: Page) -> None:
     operation.locator(".execute").click()
     expect(status).to_contain_text("200", timeout=PATIENCE)
 
-    assert all(url.startswith((server.url, "data:")) for url in sent), "nothing comes from elsewhere"
+    assert all(url.startswith((server.url, "data:")) for url in sent), (
+        "nothing comes from elsewhere"
+    )
     assert not blocked
 
 
 def test_a_page_of_another_site_reaches_nothing(guarded: tuple[Server, str], page: Page) -> None:
-    """A real browser on a page of another port: neither a form nor a script gets through, with the key or without."""
+    """A real browser on a page of another port: neither a form nor a script gets through, with the
+    key or without.
+    """
     server, secret = guarded
     with serving(recorded=True) as other:
         page.goto(f"{other.url}/healthz")

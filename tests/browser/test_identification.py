@@ -1,4 +1,6 @@
-"""The studio page in a real browser: from a log to figures, their residuals, and a motion computed with them."""
+"""The studio page in a real browser: from a log to figures, their residuals, and a motion computed
+with them.
+"""
 
 from __future__ import annotations
 
@@ -52,14 +54,26 @@ def shown_rms(page: Page, name: str) -> float:
 
 
 def rms(moves: list[dict[str, Any]], joint: int) -> float:
-    pairs = [pair for move in moves for pair in zip(*(move["torque"][key][joint] for key in KEYS), strict=True)]
-    return float(np.sqrt(np.mean([(measured - modelled) ** 2 for measured, modelled in pairs if modelled is not None])))
+    pairs = [
+        pair
+        for move in moves
+        for pair in zip(*(move["torque"][key][joint] for key in KEYS), strict=True)
+    ]
+    return float(
+        np.sqrt(
+            np.mean(
+                [(measured - modelled) ** 2 for measured, modelled in pairs if modelled is not None]
+            )
+        )
+    )
 
 
 KEYS = ("measured", "modelled")
 
 
-def test_a_log_becomes_figures_that_the_next_motion_has(page: Page, service: Server, tmp_path: Path) -> None:
+def test_a_log_becomes_figures_that_the_next_motion_has(
+    page: Page, service: Server, tmp_path: Path
+) -> None:
     file = tmp_path / "monday.csv"
     file.write_bytes(csv_of(recorded(ROBOT, TRUTH, moves=6)))
     choose_log(page, file)
@@ -75,9 +89,15 @@ def test_a_log_becomes_figures_that_the_next_motion_has(page: Page, service: Ser
     assert shown_rms(page, "shoulder lift") == pytest.approx(rms(found["moves"], 1), rel=DIGITS)
     expect(box).to_contain_text("No payload is given")
     cells = box.locator("tr", has_text="torque, elbow").locator("td").all_inner_texts()
-    fitted, own = (found["result"]["validation"][whose]["torque"]["relative"][2] for whose in ("fitted", "own"))
+    fitted, own = (
+        found["result"]["validation"][whose]["torque"]["relative"][2] for whose in ("fitted", "own")
+    )
     assert [float(cell) for cell in cells[1:3]] == pytest.approx([fitted, own], rel=DIGITS)
-    coulomb = next(each for each in found["result"]["parameters"] if (each["figure"], each["joint"]) == ("coulomb", 1))
+    coulomb = next(
+        each
+        for each in found["result"]["parameters"]
+        if (each["figure"], each["joint"]) == ("coulomb", 1)
+    )
     cells = box.locator("tr", has_text="coulomb").nth(1).locator("td").all_inner_texts()
     assert cells[1] == "shoulder lift" and cells[5:] == ["B", "N·m"]
     told = [coulomb[name] for name in ("value", "sd", "previous")]
@@ -85,18 +105,25 @@ def test_a_log_becomes_figures_that_the_next_motion_has(page: Page, service: Ser
     assert not [found for found in page.evaluate(CONTRASTS) if found[1] < LEAST]
     page.get_by_role("button", name="Use these figures").click()
     assert state(page, "request.figures") == found["figures"] and not page.evaluate(OPENED)
-    # on a busy machine, the usual deadline may pass without an answer: these figures need a kernel of their own
+    # on a busy machine, the usual deadline may pass without an answer: these figures need a kernel
+    # of their own
     ask(page, state(page, "request") | {"deadline": ANSWER})
     assert state(page, "asked.figures") == found["figures"]
 
 
 def test_moves_are_chosen_and_those_held_out_are_named(browser: Browser, service: Server) -> None:
-    """On a phone, from the lists of what is kept, as a job and by itself; the log was deleted meanwhile."""
+    """On a phone, from the lists of what is kept, as a job and by itself; the log was deleted
+    meanwhile.
+    """
     with opened(browser, f"{service.url}/studio", viewport={"width": 390, "height": 844}) as page:
         until(page, SHOWN)
         body = csv_of(recorded(ROBOT, TRUTH, moves=4, seed=3), without="P")
-        log = CLIENT.post(f"{service.url}/logs", content=body, headers={"Content-Type": "text/csv"}).json()["id"]
-        made = service.post("/identifications", {"logs": [log], "validate": {"fraction": 0.5}}).json()
+        log = CLIENT.post(
+            f"{service.url}/logs", content=body, headers={"Content-Type": "text/csv"}
+        ).json()["id"]
+        made = service.post(
+            "/identifications", {"logs": [log], "validate": {"fraction": 0.5}}
+        ).json()
         show(page, "kept")
         page.locator("#pane-kept h2:text('Jobs') + ul button").first.click()
         page.locator("#pane-kept li button", has_text="1: identify").click()
@@ -109,7 +136,10 @@ def test_moves_are_chosen_and_those_held_out_are_named(browser: Browser, service
         assert found["id"] == made["id"]
         moves = sorted(found["moves"], key=lambda each: each["t"])
         options = page.get_by_label("Moves shown").locator("option")
-        assert ["held out" in text for text in options.all_inner_texts()] == [False, *(m["held_out"] for m in moves)]
+        assert ["held out" in text for text in options.all_inner_texts()] == [
+            False,
+            *(m["held_out"] for m in moves),
+        ]
         assert any(move["held_out"] for move in moves)
         for k in (0, 3):
             page.get_by_label("Moves shown").select_option(index=k + 1)
@@ -138,4 +168,6 @@ def test_what_a_log_does_not_tell_is_explained(page: Page, tmp_path: Path) -> No
     file.write_text("t,q1\n0,1\n")
     choose_log(page, file)
     send(page)
-    expect(page.locator("#problem a")).to_have_attribute("href", re.compile("problems/(validation|invalid-table)"))
+    expect(page.locator("#problem a")).to_have_attribute(
+        "href", re.compile("problems/(validation|invalid-table)")
+    )

@@ -1,4 +1,6 @@
-"""Whether the page can be read: contrast in light and dark, letters of twice the size, names of what is seen."""
+"""Whether the page can be read: contrast in light and dark, letters of twice the size, names of
+what is seen.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,8 @@ from tests.browsers import BROWSER, MISSING
 pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
 
 LEAST = 4.5  # contrast of text, WCAG 2.2, 1.4.3
-# texts that are shown, and their contrast with what is behind them: the nearest grounds, laid over each other
+# texts that are shown, and their contrast with what is behind them: the nearest grounds, laid over
+# each other
 CONTRASTS = """() => {
     const canvas = Object.assign(document.createElement("canvas"), { width: 1, height: 1 });
     const pen = canvas.getContext("2d", { willReadFrequently: true });
@@ -41,7 +44,8 @@ CONTRASTS = """() => {
     }
     return found;
 }"""
-# pairs of controls and headings of which one covers the other, and those that are cut at the edge of the page
+# pairs of controls and headings of which one covers the other, and those that are cut at the edge
+# of the page
 CROWDED = """() => {
     const all = [...document.querySelectorAll("h1, h2, button, .button, select, summary, label, #joules, #facts")]
         .filter((each) => each.checkVisibility({ visibilityProperty: true }) && each.getBoundingClientRect().width);
@@ -78,7 +82,8 @@ def test_letters_of_twice_the_size(browser: Browser, service: Server, width: int
     with opened(browser, f"{service.url}/studio", viewport={"width": width, "height": 900}) as page:
         until(page, SHOWN)
         page.evaluate(
-            "() => { document.documentElement.style.fontSize = '32px'; document.body.style.fontSize = '28px'; }"
+            "() => { document.documentElement.style.fontSize = '32px'; "
+            "document.body.style.fontSize = '28px'; }"
         )
         assert not page.evaluate(CROWDED)
         for control in ("#optimise", "#play", "#scrub", "#joules"):

@@ -48,7 +48,9 @@ PIXELS = """() => {
 
 def tcp(page: Page, time: float) -> np.ndarray:
     """The pose of the TCP (4, 4) as it is drawn at a time."""
-    page.locator("#scrub").evaluate("(it, time) => { it.value = time; it.dispatchEvent(new Event('input')); }", time)
+    page.locator("#scrub").evaluate(
+        "(it, time) => { it.value = time; it.dispatchEvent(new Event('input')); }", time
+    )
     return np.array(page.evaluate("() => studio.tcp()")).reshape(4, 4)
 
 
@@ -77,10 +79,14 @@ def test_the_picture_is_of_the_motion(page: Page) -> None:
 
 
 def test_the_picture_is_where_the_library_says(page: Page) -> None:
-    arm = Arm(robot=load_robot("ur5e"), T_flange_tcp=Pose.from_quaternion([0, 0, 0.16], [0, 0, 0, 1]).T)
+    arm = Arm(
+        robot=load_robot("ur5e"), T_flange_tcp=Pose.from_quaternion([0, 0, 0.16], [0, 0, 0, 1]).T
+    )
     trajectory = state(page, "answer.trajectory")
     for k in (10, 50, 90):
-        assert tcp(page, trajectory["t"][k]) == pytest.approx(tcp_pose(arm, np.array(trajectory["q"][k])), abs=ROUNDING)
+        assert tcp(page, trajectory["t"][k]) == pytest.approx(
+            tcp_pose(arm, np.array(trajectory["q"][k])), abs=ROUNDING
+        )
 
 
 def test_something_is_drawn_and_switches_change_it(page: Page) -> None:
@@ -101,22 +107,34 @@ def test_something_is_drawn_and_switches_change_it(page: Page) -> None:
 
 def test_the_nearest_points_are_those_of_the_certificate(page: Page) -> None:
     clearance = state(page, "answer.certificate.clearance")
-    drawn = page.evaluate("""() => [...studio.view.parts.nearest.children.at(-1).geometry.attributes.position.array]""")
+    drawn = page.evaluate(
+        """() => [...studio.view.parts.nearest.children.at(-1).geometry.attributes.position.array]"""
+    )
     assert np.array(drawn).reshape(2, 3) == pytest.approx(np.array(clearance["points"]), abs=DRAWN)
     expect(page.locator(".label.near")).to_contain_text(" – ".join(clearance["pair"]))
 
 
 def test_the_makers_meshes_are_drawn(browser: Browser, service: Server, page: Page) -> None:
-    """Where the service has them; else the arm is drawn from its figures, and the page says nothing."""
+    """Where the service has them; else the arm is drawn from its figures, and the page says
+    nothing.
+    """
     with_meshes = page.evaluate(PIXELS)
     with opened(browser, f"{service.url}/studio") as other:
-        other.route("**/meshes.glb", lambda route: route.fulfill(status=404, json={"title": "No meshes"}))
+        other.route(
+            "**/meshes.glb", lambda route: route.fulfill(status=404, json={"title": "No meshes"})
+        )
         other.reload()
         until(other, SHOWN)
-        until(other, "() => performance.getEntriesByType('resource').some(({ name }) => name.endsWith('/meshes.glb'))")
+        until(
+            other,
+            "() => performance.getEntriesByType('resource').some(({ name }) => "
+            "name.endsWith('/meshes.glb'))",
+        )
         without = other.evaluate(PIXELS)
         assert not other.evaluate(MESHES) and other.locator("#problem").is_hidden()
-        assert without[0] == pytest.approx(with_meshes[0], rel=0.05) and without[1] != with_meshes[1]
+        assert (
+            without[0] == pytest.approx(with_meshes[0], rel=0.05) and without[1] != with_meshes[1]
+        )
         other.unroute("**/meshes.glb")
         ask(other, move(robot="ur3e"))
         until(other, MESHES)
@@ -156,7 +174,9 @@ def test_figures_are_those_of_the_answer(page: Page) -> None:
     bound = page.locator("#waterfall li.bound .value").inner_text()
     assert float(bound) == pytest.approx(answer["energy"]["lower_bound"], rel=0.01)
     friction = page.locator("#breakdown li", has_text="friction").locator("b").inner_text()
-    assert float(friction.split()[0]) == pytest.approx(answer["energy"]["electrical"]["friction"], rel=0.01)
+    assert float(friction.split()[0]) == pytest.approx(
+        answer["energy"]["electrical"]["friction"], rel=0.01
+    )
     for name, unit in (("position", ""), ("torque", "N·m"), ("speed", "rad/s")):
         page.locator("#quantities button", has_text=name).click()
         page.locator("#shares").set_checked(not unit)
@@ -170,9 +190,13 @@ def test_downloads_are_what_the_service_reads(page: Page, service: Server) -> No
     rows = list(csv.DictReader(io.StringIO(Path(download.value.path()).read_text())))
     answer = state(page, "answer")
     assert len(rows) == len(answer["trajectory"]["t"])
-    columns = {name: [[float(row[f"{name}{j}"]) for j in range(1, 7)] for row in rows] for name in "qva"}
+    columns = {
+        name: [[float(row[f"{name}{j}"]) for j in range(1, 7)] for row in rows] for name in "qva"
+    }
     body = {"trajectory": {"t": [float(row["t"]) for row in rows], **columns}}
-    again = service.post("/evaluate", {**body, "tcp": FIRST["tcp"], "payload": FIRST["payload"]}).json()
+    again = service.post(
+        "/evaluate", {**body, "tcp": FIRST["tcp"], "payload": FIRST["payload"]}
+    ).json()
     ours = answer["energy"]["electrical"]["total"]
     assert again["total"]["energy"]["electrical"]["total"] == pytest.approx(ours, rel=RECORDED)
     with page.expect_download() as picture:
@@ -245,7 +269,11 @@ def test_behind_the_path_of_a_proxy(browser: Browser, service: Server) -> None:
     def forward(route: Route) -> None:
         path = route.request.url.removeprefix(front)
         assert path != route.request.url, f"outside of the proxy's path: {path}"
-        route.fulfill(response=route.fetch(url=service.url + path, headers={"content-type": "application/json"}))
+        route.fulfill(
+            response=route.fetch(
+                url=service.url + path, headers={"content-type": "application/json"}
+            )
+        )
 
     context = browser.new_context(reduced_motion="reduce")
     context.route("**/*", forward)
@@ -283,7 +311,9 @@ def test_the_keyboard_is_enough(browser: Browser, service: Server) -> None:
 
 
 def test_what_stands_before_the_arm_fades(page: Page) -> None:
-    """The side of the shelf, seen through it; what stands behind the arm, or is not to fade, does not."""
+    """The side of the shelf, seen through it; what stands behind the arm, or is not to fade, does
+    not.
+    """
     faint = """show => {
         const { view } = studio;
         const { position } = view.camera;
@@ -303,7 +333,9 @@ def test_what_stands_before_the_arm_fades(page: Page) -> None:
 
 
 def test_a_coarse_picture_has_no_shadows(page: Page) -> None:
-    """On a machine without a graphics card they take half the time of a moving picture. A still one has them again."""
+    """On a machine without a graphics card they take half the time of a moving picture. A still one
+    has them again.
+    """
     drawn = """fineness => {
         const { view } = studio;
         view.setFineness(fineness);

@@ -1,4 +1,6 @@
-"""`deploy/backup.sh`: a copy that is made under load has all that was acknowledged before, and a service runs on it."""
+"""`deploy/backup.sh`: a copy that is made under load has all that was acknowledged before, and a
+service runs on it.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ from tests.app.store.test_store import with_store
 
 SCRIPT = ROOT / "deploy" / "backup.sh"
 BEFORE, MEANWHILE = 30, 30
-MISSING = why_no_postgres() or (shutil.which("pg_dump") is None and "pg_dump is not installed") or None
+MISSING = (
+    why_no_postgres() or (shutil.which("pg_dump") is None and "pg_dump is not installed") or None
+)
 
 
 def begin(server: Server, name: str) -> str:
@@ -52,7 +56,9 @@ def back_up_under_load(server: Server, url: str, file: Path) -> list[str]:
     finally:
         stop.set()
         writer.join()
-    assert sorted(path.name for path in file.parent.iterdir()) == [file.name], "nothing else is left"
+    assert sorted(path.name for path in file.parent.iterdir()) == [file.name], (
+        "nothing else is left"
+    )
     return before
 
 
@@ -98,6 +104,8 @@ def test_postgresql_under_load(tmp_path: Path) -> None:
         with serving(recorded=True, database_url=database.url) as server:
             ids = back_up_under_load(server, database.url, file)
         empty = database.url.rpartition("/")[0] + "/restored"
-        subprocess.run(["psql", database.url, "--quiet", "--command", "CREATE DATABASE restored"], check=True)
+        subprocess.run(
+            ["psql", database.url, "--quiet", "--command", "CREATE DATABASE restored"], check=True
+        )
         subprocess.run(["pg_restore", "--dbname", empty, "--no-owner", file], check=True)
         assert_all_there(empty, ids)

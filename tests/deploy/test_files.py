@@ -1,4 +1,6 @@
-"""The files of `deploy/`: well-formed, true to the settings, and checked by the programs that read them."""
+"""The files of `deploy/`: well-formed, true to the settings, and checked by the programs that read
+them.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,10 @@ from joulepath.app.settings import Settings
 from tests.app.live import ROOT
 
 DEPLOY = ROOT / "deploy"
-KNOWN = {f"JOULEPATH_{name.upper()}" for name in Settings.model_fields} | {"JOULEPATH_CACHE_DIR", "MPLCONFIGDIR"}
+KNOWN = {f"JOULEPATH_{name.upper()}" for name in Settings.model_fields} | {
+    "JOULEPATH_CACHE_DIR",
+    "MPLCONFIGDIR",
+}
 UNITS = {"s": 1, "m": 60, "h": 3600}
 
 
@@ -56,7 +61,10 @@ def test_nginx_waits_as_long_as_the_service_works(tls: list[dict[str, Any]]) -> 
 
 def test_nginx_replaces_what_a_client_says_of_itself(tls: list[dict[str, Any]]) -> None:
     headers = dict(inside(tls, "proxy_set_header"))
-    assert headers.items() >= {"X-Forwarded-For": "$remote_addr", "Forwarded": "", "Host": "$http_host"}.items()
+    assert (
+        headers.items()
+        >= {"X-Forwarded-For": "$remote_addr", "Forwarded": "", "Host": "$http_host"}.items()
+    )
     # a location with one such directive would lose all of these
     locations = [each["block"] for each in tls if each["directive"] == "location"]
     assert locations and not any(inside(block, "proxy_set_header") for block in locations)
@@ -72,11 +80,15 @@ def test_compose_names_what_there_is(compose: dict[str, Any]) -> None:
     for service in compose["services"].values():
         assert service["networks"] if "network_mode" not in service else True
         assert set(service.get("networks", ())) <= compose["networks"].keys()
-        assert {name for name in service.get("environment", ()) if name.startswith("JOULEPATH_")} <= KNOWN
+        assert {
+            name for name in service.get("environment", ()) if name.startswith("JOULEPATH_")
+        } <= KNOWN
         for volume in service.get("volumes", ()):
             source = volume.split(":")[0]
             made_by_operator = source in ("./keys", "./tls")
-            assert made_by_operator or source in compose["volumes"] or (DEPLOY / source).exists(), source
+            assert made_by_operator or source in compose["volumes"] or (DEPLOY / source).exists(), (
+                source
+            )
     (upstream,) = nginx("upstream-compose.conf")
     servers = {server.partition(":")[0] for (server,) in inside(upstream["block"], "server")}
     assert servers == {name for name in compose["services"] if name.startswith("joulepath")}
@@ -97,29 +109,55 @@ def test_compose_is_not_open(compose: dict[str, Any]) -> None:
 def test_compose_keeps_the_cluster_apart(compose: dict[str, Any]) -> None:
     """Whoever reaches it can run any code there."""
     assert compose["networks"]["cluster"] == {"internal": True}
-    members = {name: each for name, each in compose["services"].items() if "cluster" in each.get("networks", ())}
+    members = {
+        name: each
+        for name, each in compose["services"].items()
+        if "cluster" in each.get("networks", ())
+    }
     assert set(members) == {"joulepath-1", "joulepath-2", "scheduler", "machine-1", "machine-2"}
     for name, member in members.items():
         if name.startswith("machine"):
-            assert member["command"][:4] == ["python", "-m", "joulepath.app.cli", cluster_worker.name]
-            assert member["command"][4] == members["joulepath-1"]["environment"]["JOULEPATH_CLUSTER"]
+            assert member["command"][:4] == [
+                "python",
+                "-m",
+                "joulepath.app.cli",
+                cluster_worker.name,
+            ]
+            assert (
+                member["command"][4] == members["joulepath-1"]["environment"]["JOULEPATH_CLUSTER"]
+            )
             assert member["networks"] == ["cluster"]
         assert (ROOT / member["build"]["args"]["LOCK"]).exists()
 
 
 def test_the_image_is_made_of_what_its_context_has(compose: dict[str, Any]) -> None:
     """What `.dockerignore` leaves out cannot be copied."""
-    sent = {line[1:] for line in (ROOT / ".dockerignore").read_text().splitlines() if line.startswith("!")}
+    sent = {
+        line[1:]
+        for line in (ROOT / ".dockerignore").read_text().splitlines()
+        if line.startswith("!")
+    }
     lines = re.findall(r"^COPY (?!--from)(.*) \S+$", (ROOT / "Dockerfile").read_text(), re.M)
     locks = {
         "requirements.lock",
-        *(each["build"]["args"]["LOCK"] for each in compose["services"].values() if "build" in each),
+        *(
+            each["build"]["args"]["LOCK"]
+            for each in compose["services"].values()
+            if "build" in each
+        ),
     }
-    sources = {lock if name == "${LOCK}" else name for line in lines for name in line.split() for lock in locks}
+    sources = {
+        lock if name == "${LOCK}" else name
+        for line in lines
+        for name in line.split()
+        for lock in locks
+    }
     assert len(sources) > 8
     for name in sources:
         assert (ROOT / name).exists(), name
-        assert any(name == each or name.startswith(f"{each}/") for each in sent), f"{name} is left out of the context"
+        assert any(name == each or name.startswith(f"{each}/") for each in sent), (
+            f"{name} is left out of the context"
+        )
 
 
 @pytest.mark.long
@@ -141,7 +179,11 @@ def test_the_unit_sets_what_there_is() -> None:
 def test_systemd_takes_the_unit(tmp_path: Path) -> None:
     unit = tmp_path / "joulepath.service"
     # the program is not installed here
-    unit.write_text(re.sub(r"^ExecStart=.*$", "ExecStart=/bin/true", (DEPLOY / unit.name).read_text(), flags=re.M))
+    unit.write_text(
+        re.sub(
+            r"^ExecStart=.*$", "ExecStart=/bin/true", (DEPLOY / unit.name).read_text(), flags=re.M
+        )
+    )
     verified = subprocess.run(["systemd-analyze", "verify", unit], capture_output=True, text=True)
     assert (verified.returncode, verified.stderr) == (0, "")
 

@@ -1,4 +1,6 @@
-"""What `deploy/compose.yaml` describes, from plain processes: nginx with TLS, two services, one PostgreSQL."""
+"""What `deploy/compose.yaml` describes, from plain processes: nginx with TLS, two services, one
+PostgreSQL.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,9 @@ from tests.app.routes.test_problems import refused
 NAME = "robots.example"
 START = 30.0
 """Until nginx takes connections, at most [s]."""
-MISSING = why_no_postgres() or ", ".join(f"no {it}" for it in ("nginx", "openssl") if shutil.which(it) is None)
+MISSING = why_no_postgres() or ", ".join(
+    f"no {it}" for it in ("nginx", "openssl") if shutil.which(it) is None
+)
 
 pytestmark = [pytest.mark.long, pytest.mark.skipif(bool(MISSING), reason=MISSING)]
 
@@ -46,7 +50,9 @@ class Whole:
 
     def send(self, method: str, path: str, body: object = None, **headers: str) -> httpx2.Response:
         host = f"{NAME}:{self.url.rpartition(':')[2]}"
-        return self.client.request(method, self.url + path, json=body, headers={"Host": host, **headers})
+        return self.client.request(
+            method, self.url + path, json=body, headers={"Host": host, **headers}
+        )
 
 
 def free_port() -> int:
@@ -57,7 +63,15 @@ def free_port() -> int:
 
 def certificate(folder: Path) -> None:
     subject = ["-subj", f"/CN={NAME}", "-addext", f"subjectAltName=DNS:{NAME},IP:127.0.0.1"]
-    key = ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-keyout", folder / "key.pem"]
+    key = [
+        "-newkey",
+        "ec",
+        "-pkeyopt",
+        "ec_paramgen_curve:P-256",
+        "-nodes",
+        "-keyout",
+        folder / "key.pem",
+    ]
     subprocess.run(
         ["openssl", "req", "-x509", *key, *subject, "-days", "2", "-out", folder / "fullchain.pem"],
         check=True,
@@ -66,20 +80,26 @@ def certificate(folder: Path) -> None:
 
 
 def configuration(folder: Path, port: int, services: list[str]) -> Path:
-    """The files of `deploy/nginx` with other ports, addresses and paths, in a main file as Debian has it."""
+    """The files of `deploy/nginx` with other ports, addresses and paths, in a main file as Debian
+    has it.
+    """
     site = (ROOT / "deploy" / "nginx" / "joulepath.conf").read_text()
     site = re.sub(r"^ *listen \[::\].*\n", "", site, flags=re.M)
     site = site.replace("listen 80;", f"listen 127.0.0.1:{free_port()};")
-    site = site.replace("listen 443 ssl;", f"listen 127.0.0.1:{port} ssl;").replace("/etc/ssl/joulepath", str(folder))
+    site = site.replace("listen 443 ssl;", f"listen 127.0.0.1:{port} ssl;").replace(
+        "/etc/ssl/joulepath", str(folder)
+    )
     upstream = (ROOT / "deploy" / "nginx" / "upstream-compose.conf").read_text()
     for k, service in enumerate(services, start=1):
         upstream = upstream.replace(f"joulepath-{k}:8000", service)
     folders = "".join(
-        f"{kind}_temp_path {folder}/{kind};" for kind in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
+        f"{kind}_temp_path {folder}/{kind};"
+        for kind in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
     )
     main = folder / "nginx.conf"
     main.write_text(
-        f"user root; daemon off; worker_processes 1; pid {folder}/pid; error_log {folder}/error.log;\n"
+        f"user root; daemon off; worker_processes 1; pid {folder}/pid; error_log "
+        f"{folder}/error.log;\n"
         f"events {{}}\nhttp {{ access_log off; {folders}\n{upstream}\n{site}\n}}\n"
     )
     return main
@@ -87,7 +107,9 @@ def configuration(folder: Path, port: int, services: list[str]) -> Path:
 
 @contextmanager
 def nginx(folder: Path, services: list[str]) -> Iterator[tuple[str, httpx2.Client]]:
-    """nginx with the certificate in `folder`, in front of two services: its URL, and a client that trusts it."""
+    """nginx with the certificate in `folder`, in front of two services: its URL, and a client that
+    trusts it.
+    """
     port = free_port()
     main = configuration(folder, port, services)
     subprocess.run(["nginx", "-t", "-c", main], check=True, capture_output=True)
@@ -95,7 +117,9 @@ def nginx(folder: Path, services: list[str]) -> Iterator[tuple[str, httpx2.Clien
     try:
         end = time.monotonic() + START
         while True:
-            assert time.monotonic() < end and process.poll() is None, (folder / "error.log").read_text()
+            assert time.monotonic() < end and process.poll() is None, (
+                folder / "error.log"
+            ).read_text()
             try:
                 socket.create_connection(("127.0.0.1", port)).close()
                 break
@@ -147,13 +171,23 @@ def test_both_services_have_one_database(whole: Whole, key: dict[str, str]) -> N
         assert answer.status_code == 200 and answer.json()["owner"] == "press"
 
 
-def test_the_log_has_the_clients_address_and_not_what_it_says(whole: Whole, key: dict[str, str]) -> None:
-    spoofed = {"X-Forwarded-For": "192.0.2.66", "Forwarded": "for=192.0.2.66", "X-Request-ID": "spoofed"}
+def test_the_log_has_the_clients_address_and_not_what_it_says(
+    whole: Whole, key: dict[str, str]
+) -> None:
+    spoofed = {
+        "X-Forwarded-For": "192.0.2.66",
+        "Forwarded": "for=192.0.2.66",
+        "X-Request-ID": "spoofed",
+    }
     whole.send("GET", "/robots/ur5e", **key, **spoofed)
 
     def entries() -> list[dict[str, Any]]:
         logged = (entry for service in whole.services for entry in service.logged())
-        return [each for each in logged if each["message"] == "request" and each["path"] == "/robots/ur5e"]
+        return [
+            each
+            for each in logged
+            if each["message"] == "request" and each["path"] == "/robots/ur5e"
+        ]
 
     until(lambda: bool(entries()))
     assert [(each["client"], each["key"]) for each in entries()] == [("127.0.0.1", "press")]
@@ -197,7 +231,10 @@ def test_events_come_one_by_one(path: str, says_so: bool, tmp_path: Path) -> Non
     certificate(tmp_path)
     address = f"127.0.0.1:{upstream.server_port}"
     try:
-        with nginx(tmp_path, [address, address]) as (url, client), client.stream("GET", url + path) as answer:
+        with (
+            nginx(tmp_path, [address, address]) as (url, client),
+            client.stream("GET", url + path) as answer,
+        ):
             events = answer.iter_lines()
             assert next(events) == "data: 1"
             received.set()

@@ -1,4 +1,5 @@
-"""Requests that are generated from the OpenAPI document, to every operation of a running service."""
+"""Requests that are generated from the OpenAPI document, to every operation of a running
+service."""
 
 from __future__ import annotations
 
@@ -37,10 +38,13 @@ def fuzzed() -> Iterator[Server]:
     suppress_health_check=list(HealthCheck),
 )
 def test_holds_for_generated_requests(case: Any, fuzzed: Server) -> None:
-    # what the schema allows may still be out of reach (422), and a deadline may pass (504): both are documented
+    # what the schema allows may still be out of reach (422), and a deadline may pass (504): both
+    # are documented
     checks = [positive_data_acceptance, not_a_server_error]
     answer = case.call(base_url=fuzzed.url, timeout=30)
     # schemathesis does not count a body or a head that is too large to be read as a rejection
     too_large = [negative_data_rejection] if answer.status_code in (413, 431) else []
     case.validate_response(answer, excluded_checks=checks + too_large)
-    assert answer.status_code != 500, [entry for entry in fuzzed.logged() if entry["level"] == "error"]
+    assert answer.status_code != 500, [
+        entry for entry in fuzzed.logged() if entry["level"] == "error"
+    ]

@@ -17,7 +17,9 @@ def test_an_array_is_a_read_only_copy() -> None:
         array[0] = 1.0
 
 
-@pytest.mark.parametrize(("shape", "values"), [((-1, 3), np.ones((7, 3))), ((-1, -1), [[1, 2]]), ((), 3), ((0,), [])])
+@pytest.mark.parametrize(
+    ("shape", "values"), [((-1, 3), np.ones((7, 3))), ((-1, -1), [[1, 2]]), ((), 3), ((0,), [])]
+)
 def test_any_length(shape: tuple[int, ...], values: object) -> None:
     assert read_only(values, shape, "vertices").tolist() == np.array(values).tolist()
 

@@ -1,4 +1,6 @@
-"""What capsules hold: the proof over whole triangles against points of surfaces, and robots against their meshes."""
+"""What capsules hold: the proof over whole triangles against points of surfaces, and robots against
+their meshes.
+"""
 
 from __future__ import annotations
 
@@ -86,12 +88,17 @@ def test_a_triangle_over_several_capsules_is_held() -> None:
 
 def test_a_gap_below_the_resolution_is_found() -> None:
     """Two balls that miss each other by less than SMALLEST: a piece over the gap is never held."""
-    balls = [capsule([s * (0.1 + SMALLEST / 4), 0, 0], [s * (0.1 + SMALLEST / 4), 0, 0], 0.1) for s in (-1, 1)]
+    balls = [
+        capsule([s * (0.1 + SMALLEST / 4), 0, 0], [s * (0.1 + SMALLEST / 4), 0, 0], 0.1)
+        for s in (-1, 1)
+    ]
     assert len(not_held(triangles([[-0.05, 0, 0], [0.05, 0, 0], [0.05, 1e-9, 0]]), balls))
 
 
 def test_what_is_held_has_no_point_outside() -> None:
-    """Random capsules and triangles: the proof and dense samples agree; what is not held is outside or on the rim."""
+    """Random capsules and triangles: the proof and dense samples agree; what is not held is outside
+    or on the rim.
+    """
     rng = np.random.default_rng(8)
     held = 0
     for _ in range(200):

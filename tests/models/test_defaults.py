@@ -1,4 +1,6 @@
-"""Figures without a source follow the rules that their notes state, and tensors are those of arms that can be built."""
+"""Figures without a source follow the rules that their notes state, and tensors are those of arms
+that can be built.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +22,12 @@ LARGEST = ("ur15", "ur20", "ur30")
 
 
 def robots(section: str, part: str) -> list[str]:
-    """Names of the robots of one maker of which a figure has no source: the rules are from that maker's joints."""
-    return [name for name in OF_ONE_MAKER if load_robot(name).figures[section][part]["trust"] == "E"]
+    """Names of the robots of one maker of which a figure has no source: the rules are from that
+    maker's joints.
+    """
+    return [
+        name for name in OF_ONE_MAKER if load_robot(name).figures[section][part]["trust"] == "E"
+    ]
 
 
 @pytest.mark.parametrize("name", robots("drives", "copper"))
@@ -34,7 +40,9 @@ def test_copper_loss_is_that_of_the_rule(name: str) -> None:
 @pytest.mark.parametrize("name", LARGEST)
 def test_rotors_and_friction_are_those_of_the_rules(name: str) -> None:
     robot = load_robot(name)
-    assert robot.drives.rotor_inertia == pytest.approx(ROTOR * robot.limits.tau_max**1.243, rel=DIGITS)
+    assert robot.drives.rotor_inertia == pytest.approx(
+        ROTOR * robot.limits.tau_max**1.243, rel=DIGITS
+    )
     assert robot.friction.coulomb == pytest.approx(COULOMB * robot.limits.tau_max, rel=DIGITS)
     assert robot.friction.viscous == pytest.approx(VISCOUS * robot.limits.tau_max, rel=DIGITS)
 
@@ -46,16 +54,23 @@ def test_the_rules_are_the_robots_without_drives_of_their_own() -> None:
 
 @pytest.mark.parametrize("name", OF_ONE_MAKER)
 def test_a_long_link_has_at_least_the_inertia_of_a_rod(name: str) -> None:
-    """Joints at both ends, so more mass is outside than a uniform rod has: the tensor of a lighter arm would show."""
+    """Joints at both ends, so more mass is outside than a uniform rod has: the tensor of a lighter
+    arm would show.
+    """
     robot = load_robot(name)
     for link in (2, 3):
-        body, length = robot.model.inertias[link], np.linalg.norm(robot.model.jointPlacements[link + 1].translation[:2])
+        body, length = (
+            robot.model.inertias[link],
+            np.linalg.norm(robot.model.jointPlacements[link + 1].translation[:2]),
+        )
         assert body.inertia[2, 2] > body.mass * length**2 / 12
 
 
 @pytest.mark.parametrize("name", robot_names())
 def test_every_tensor_is_that_of_a_body(name: str) -> None:
-    """Principal moments are positive, and none exceeds the sum of the others, but for rounding and one known fault."""
+    """Principal moments are positive, and none exceeds the sum of the others, but for rounding and
+    one known fault.
+    """
     figures = load_robot(name).figures["inertials"]
     for body in load_robot(name).model.inertias[1:]:
         moments = np.linalg.eigvalsh(body.inertia)
@@ -66,7 +81,9 @@ def test_every_tensor_is_that_of_a_body(name: str) -> None:
 
 
 def rings(robot: Robot, joint: int) -> tuple[int, Array]:
-    """The link before a joint whose axis meets the one before, and circles around both axes where they meet [m]."""
+    """The link before a joint whose axis meets the one before, and circles around both axes where
+    they meet [m].
+    """
     radii = RADIUS * (robot.limits.tau_max[joint - 1 : joint + 1] / 9) ** 0.241
     angle = np.linspace(0, 2 * np.pi, 72)
     circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
@@ -88,7 +105,9 @@ def test_capsules_without_meshes_hold_joints_of_the_size_of_the_rule(name: str, 
 
 @pytest.mark.parametrize("name", FOUND)
 def test_the_rule_of_radii_fits_the_arms_that_it_is_from(name: str) -> None:
-    """Half the width of shoulder and wrist 2 across the axes of both of their joints, by the maker's meshes."""
+    """Half the width of shoulder and wrist 2 across the axes of both of their joints, by the
+    maker's meshes.
+    """
     limits = load_robot(name).limits
     for link, joint in ((1, 0), (5, 5)):
         half = np.abs(link_surfaces(meshes(name), name, link)["visual"][..., 0]).max()

@@ -1,4 +1,6 @@
-"""The form in which arms are drawn: at the joints, about their axes, where the collision capsules are."""
+"""The form in which arms are drawn: at the joints, about their axes, where the collision capsules
+are.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,8 @@ from joulepath.models.robot import Array
 
 # m; sums of some ten products in double precision
 ROUNDING = 1e-9
-# of the radius: how far the middle of a body may be outside of the capsules; one of the xArm is by 0.33
+# of the radius: how far the middle of a body may be outside of the capsules; one of the xArm is by
+# 0.33
 OUTSIDE = 0.35
 
 
@@ -43,9 +46,14 @@ def test_what_is_drawn_is_where_collision_checks_see_the_arm(name: str) -> None:
     robot = load_robot(name)
     names = ["base", *robot.figures["kinematics"]["link_names"]["value"]]
     for link, own in zip(names, link_bodies(robot.figures), strict=True):
-        capsules = np.array(robot.figures["collision"].get(link, {}).get("value", [])).reshape(-1, 7)
+        capsules = np.array(robot.figures["collision"].get(link, {}).get("value", [])).reshape(
+            -1, 7
+        )
         for body in own:
             assert body.radius > 0
             if len(capsules) and body.kind in ("housing", "tube"):
                 middle = (np.array(body.start) + body.end) / 2
-                assert min(distance(middle, each) for each in capsules) <= OUTSIDE * body.radius, (link, body)
+                assert min(distance(middle, each) for each in capsules) <= OUTSIDE * body.radius, (
+                    link,
+                    body,
+                )

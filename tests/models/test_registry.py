@@ -1,4 +1,6 @@
-"""Every robot against its own figures, and against the DH table by an independent product of matrices."""
+"""Every robot against its own figures, and against the DH table by an independent product of
+matrices.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,8 @@ from tests.mesh_folders import meshes as arm_folder
 
 # double precision over a product of seven matrices of entries about 1
 ROUNDING = 1e-14
-# the same over angles that are rounded to nine digits, and lengths of about 1 m; and of limits written as 3.14
+# the same over angles that are rounded to nine digits, and lengths of about 1 m; and of limits
+# written as 3.14
 NINE_DIGITS, THREE_DIGITS = 1e-8, 1e-3
 # the same relative to torques of up to 150 N·m
 TORQUE_ROUNDING = 1e-11
@@ -31,7 +34,13 @@ TORQUE_ROUNDING = 1e-11
 MASSES = {
     "gen3": 1.3773 + 1.1636 + 1.1636 + 0.9302 + 0.6781 + 0.6781 + 0.364,
     "xarm7": 2.382 + 1.869 + 1.6383 + 1.7269 + 1.3203 + 1.325 + 0.17,
-    "fr3": 2.9274653454 + 2.9355370338 + 2.2449013699 + 2.6155955791 + 2.3271207594 + 1.8170376524 + 0.6271432862,
+    "fr3": 2.9274653454
+    + 2.9355370338
+    + 2.2449013699
+    + 2.6155955791
+    + 2.3271207594
+    + 1.8170376524
+    + 0.6271432862,
     "iiwa14": 5.76 + 6.35 + 3 * 3.5 + 1.8 + 1.2,
     "panda": 2.7907 + 2.542 + 2.2513 + 2.2037 + 2.2855 + 1.353 + 0.35973,
     "kr10_r1100": 8.416 + 17.8369 + 6.075 + 5.16238 + 1.6128 + 0.734,
@@ -62,7 +71,10 @@ def flange_by_origins(q: Array, kinematics: dict[str, Any]) -> Array:
         about_y = np.array([[np.cos(p), 0, np.sin(p)], [0, 1, 0], [-np.sin(p), 0, np.cos(p)]])
         about_z = np.array([[np.cos(y), -np.sin(y), 0], [np.sin(y), np.cos(y), 0], [0, 0, 1]])
         step = np.eye(4)
-        step[:3, 3], step[:3, :3] = origin[:3], about_z @ about_y @ about_x @ [[c, -s, 0], [s, c, 0], [0, 0, 1]]
+        step[:3, 3], step[:3, :3] = (
+            origin[:3],
+            about_z @ about_y @ about_x @ [[c, -s, 0], [s, c, 0], [0, 0, 1]],
+        )
         T = T @ step
     return T
 
@@ -70,10 +82,14 @@ def flange_by_origins(q: Array, kinematics: dict[str, Any]) -> Array:
 def dh_flange(q: Array, table: dict[str, Any]) -> Array:
     """T_base_flange by the standard Denavit-Hartenberg table, shape (4, 4)."""
     T = np.eye(4)
-    rows = zip(q, table["dh_d"]["value"], table["dh_a"]["value"], table["dh_alpha"]["value"], strict=True)
+    rows = zip(
+        q, table["dh_d"]["value"], table["dh_a"]["value"], table["dh_alpha"]["value"], strict=True
+    )
     for theta, d, a, alpha in rows:
         c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
-        T = T @ np.array([[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]])
+        T = T @ np.array(
+            [[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]]
+        )
     return T
 
 
@@ -88,12 +104,21 @@ def leaves(figures: Any, path: str = "") -> Iterator[tuple[str, dict[str, Any]]]
 
 
 def craig_flange(q: Array, figures: dict[str, Any]) -> Array:
-    """T_base_flange by the Denavit-Hartenberg table as Craig has it, with the flange along the last z axis, (4, 4)."""
+    """T_base_flange by the Denavit-Hartenberg table as Craig has it, with the flange along the last
+    z axis, (4, 4).
+    """
     T = np.eye(4)
     table = (figures[f"modified_dh_{part}"]["value"] for part in ("d", "a", "alpha"))
     for theta, d, a, alpha in zip(q, *table, strict=True):
         c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
-        T = T @ np.array([[c, -s, 0, a], [s * ca, c * ca, -sa, -sa * d], [s * sa, c * sa, ca, ca * d], [0, 0, 0, 1]])
+        T = T @ np.array(
+            [
+                [c, -s, 0, a],
+                [s * ca, c * ca, -sa, -sa * d],
+                [s * sa, c * sa, ca, ca * d],
+                [0, 0, 0, 1],
+            ]
+        )
     T[:3, 3] += figures["flange_origin"]["value"][2] * T[:3, 2]
     return T
 
@@ -110,9 +135,9 @@ def configurations(nq: int, count: int = 200) -> Array:
 
 
 def test_names_load_and_others_do_not() -> None:
-    assert {"kr10_r1100", "panda", "ur3e", "ur5e"} <= set(robot_names()) and list(robot_names()) == sorted(
+    assert {"kr10_r1100", "panda", "ur3e", "ur5e"} <= set(robot_names()) and list(
         robot_names()
-    )
+    ) == sorted(robot_names())
     assert load_robot("ur5e") is load_robot("ur5e")
     with pytest.raises(LookupError, match="ur5e"):
         load_robot("../ur5e")
@@ -139,7 +164,8 @@ TABLES = {"dh_a": dh_flange, "modified_dh_a": craig_flange}
 
 
 def test_forward_kinematics_is_that_of_the_figures(robot: Robot) -> None:
-    """By the origins of the joints, and by the Denavit-Hartenberg table where the maker gives one."""
+    """By the origins of the joints, and by the Denavit-Hartenberg table where the maker gives
+    one."""
     kinematics = robot.figures["kinematics"]
     ways = [flange_by_origins, *(way for key, way in TABLES.items() if key in kinematics)]
     for q in configurations(robot.nq):
@@ -186,7 +212,9 @@ def test_payload_torque_is_that_of_the_body_added_by_hand(robot: Robot) -> None:
     loaded = robot.loaded_model(mass, com, inertia, gravity)
     by_hand = robot.model.copy()
     T_last_body = pin.SE3(robot.T_last_flange) * pin.SE3(np.eye(3), com)
-    by_hand.appendBodyToJoint(by_hand.njoints - 1, pin.Inertia(mass, np.zeros(3), inertia), T_last_body)
+    by_hand.appendBodyToJoint(
+        by_hand.njoints - 1, pin.Inertia(mass, np.zeros(3), inertia), T_last_body
+    )
     rng = np.random.default_rng(2)
     data, plain = loaded.createData(), robot.model.createData()
     for q in configurations(robot.nq, 20):
@@ -194,7 +222,9 @@ def test_payload_torque_is_that_of_the_body_added_by_hand(robot: Robot) -> None:
         expected = pin.rnea(by_hand, by_hand.createData(), q, v, a)
         assert pin.rnea(loaded, data, q, v, a) == pytest.approx(expected, abs=TORQUE_ROUNDING)
         height = (flange_by_origins(q, robot.figures["kinematics"]) @ np.append(com, 1.0))[2]
-        work = pin.computePotentialEnergy(loaded, data, q) - pin.computePotentialEnergy(robot.model, plain, q)
+        work = pin.computePotentialEnergy(loaded, data, q) - pin.computePotentialEnergy(
+            robot.model, plain, q
+        )
         assert work == pytest.approx(mass * 9.81 * height, abs=TORQUE_ROUNDING)
 
 
@@ -211,7 +241,9 @@ def test_shared_arrays_are_read_only(robot: Robot) -> None:
 
 @pytest.mark.parametrize("name", ["ur3e", "ur5e"])
 def test_the_elbow_is_a_figure(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The capsule about the third axis, at the far end of the upper arm; a robot without the figure has no elbow."""
+    """The capsule about the third axis, at the far end of the upper arm; a robot without the figure
+    has no elbow.
+    """
     robot = load_robot(name)
     assert robot.elbow is not None
     assert robot.elbow.link == robot.figures["collision"]["elbow"]["value"] == 2
@@ -239,7 +271,10 @@ def test_kinematics_and_limits_are_those_of_a_urdf_of_others(name: str) -> None:
     assert model.lowerPositionLimit == pytest.approx(robot.limits.q_min, rel=THREE_DIGITS)
     assert model.upperPositionLimit == pytest.approx(robot.limits.q_max, rel=THREE_DIGITS)
     assert model.upperVelocityLimit == pytest.approx(robot.limits.v_max, rel=THREE_DIGITS)
-    data, (base, tool) = model.createData(), (model.getFrameId(frame) for frame in ("base", "tool0"))
+    data, (base, tool) = (
+        model.createData(),
+        (model.getFrameId(frame) for frame in ("base", "tool0")),
+    )
     for q in configurations(robot.nq):
         pin.framesForwardKinematics(model, data, q)
         T = data.oMf[base].actInv(data.oMf[tool]).homogeneous
@@ -264,24 +299,34 @@ def test_the_sentence_on_energies_says_what_each_robot_rests_on(robot: Robot) ->
     # inertias, friction, and rotor inertias: who has them from where
     together = re.search(r"\(link masses, centres of mass, link inertias", told) is not None
     assert together == (robot.name != "ur30")
-    groups = {part: group for group, parts in re.findall(r"([^(),]+) \(([^)]+)\)", told) for part in parts.split(", ")}
+    groups = {
+        part: group
+        for group, parts in re.findall(r"([^(),]+) \(([^)]+)\)", told)
+        for part in parts.split(", ")
+    }
     source = dict.fromkeys(("ur3e", "ur5e", "ur10e"), "measured")
     source |= {"panda": "sister robot", "fr3": "second-hand"}
     source |= dict.fromkeys(("ur7e", "ur12e", "ur16e"), "sister robot")
     assert source.get(robot.name, "without a source") in groups["rotor inertias"]
     without = robot.name in ("fr3", "panda")
-    assert ("without a source" if without else source.get(robot.name, "without a source")) in groups["friction"]
+    assert (
+        "without a source" if without else source.get(robot.name, "without a source")
+    ) in groups["friction"]
 
 
 def test_the_sentence_on_energies_is_made_from_the_letters() -> None:
     figures = load_figures("ur5e")
     told = energy_trust(figures)
-    assert "transferred from a sister robot (copper loss, idle power" in told and told.count(".") == 1
+    assert (
+        "transferred from a sister robot (copper loss, idle power" in told and told.count(".") == 1
+    )
     figures["drives"]["copper"]["trust"] = "A"
     assert "torque constants, copper loss)" in energy_trust(figures)
     for _, figure in leaves(figures):
         figure["trust"] = "E"
-    assert energy_trust(figures).startswith("Energies rest on engineering defaults without a source (link masses")
+    assert energy_trust(figures).startswith(
+        "Energies rest on engineering defaults without a source (link masses"
+    )
 
 
 @pytest.mark.parametrize(
@@ -289,7 +334,10 @@ def test_the_sentence_on_energies_is_made_from_the_letters() -> None:
     [
         ("inertials", "center_of_mass", "centres of mass"),
         ("inertials", "inertia_frame_rpy", "link inertias"),
-        *(("drives", f"inverter_{part}", "inverter loss") for part in ("constant", "linear", "quadratic")),
+        *(
+            ("drives", f"inverter_{part}", "inverter loss")
+            for part in ("constant", "linear", "quadratic")
+        ),
         ("limits", "jerk", "jerk limits"),
     ],
 )
@@ -304,7 +352,10 @@ def test_the_worst_of_several_letters_counts(section: str, name: str, words: str
 def test_every_link_has_capsules(robot: Robot) -> None:
     assert robot.link_names == ("base", *robot.figures["kinematics"]["link_names"]["value"])
     assert {capsule.link for capsule in robot.capsules} == set(range(robot.nq + 1))
-    assert all(0.01 < capsule.radius < 0.15 and not capsule.axis.flags.writeable for capsule in robot.capsules)
+    assert all(
+        0.01 < capsule.radius < 0.15 and not capsule.axis.flags.writeable
+        for capsule in robot.capsules
+    )
     assert all(first + 1 < second for first, second in robot.never_in_collision)
 
 
@@ -314,7 +365,9 @@ def test_a_robot_may_have_no_default_motion() -> None:
 
 
 def test_the_kuka_stands_on_its_base_with_its_first_axis_down() -> None:
-    """As its maker counts: from above, a positive turn is clockwise. At zero it reaches forward, at its full length."""
+    """As its maker counts: from above, a positive turn is clockwise. At zero it reaches forward, at
+    its full length.
+    """
     robot = load_robot("kr10_r1100")
     assert robot.model.jointPlacements[1].rotation[:, 2] == pytest.approx([0, 0, -1], abs=ROUNDING)
     q = np.zeros(6)
@@ -323,4 +376,6 @@ def test_the_kuka_stands_on_its_base_with_its_first_axis_down() -> None:
     assert at_zero[:3, 3] == pytest.approx([1.19, 0.0, 0.425], abs=ROUNDING)
     assert at_zero[:3, 2] == pytest.approx([1, 0, 0], abs=ROUNDING)
     q[0] = 0.5
-    assert flange_by_origins(q, robot.figures["kinematics"])[1, 3] == pytest.approx(-1.19 * np.sin(0.5), abs=ROUNDING)
+    assert flange_by_origins(q, robot.figures["kinematics"])[1, 3] == pytest.approx(
+        -1.19 * np.sin(0.5), abs=ROUNDING
+    )

@@ -29,10 +29,16 @@ def columns(name: str) -> dict[str, Any]:
 
 
 def test_the_table_has_the_worst_letters_of_every_robot() -> None:
-    rows = [line.strip("| ").split(" | ") for line in PAGE.read_text(encoding="utf-8").splitlines() if "|" in line]
+    rows = [
+        line.strip("| ").split(" | ")
+        for line in PAGE.read_text(encoding="utf-8").splitlines()
+        if "|" in line
+    ]
     head, _, *body = rows
     assert sorted(row[0].strip("`") for row in body) == sorted(robot_names())
     for name, payload, *letters in body:
         figures = columns(name.strip("`"))
         assert float(payload) == load_robot(name.strip("`")).rated_payload
-        assert dict(zip(head[2:], letters, strict=True)) == {column: worst_letter(of) for column, of in figures.items()}
+        assert dict(zip(head[2:], letters, strict=True)) == {
+            column: worst_letter(of) for column, of in figures.items()
+        }

@@ -30,11 +30,13 @@ ROUNDING = 1e-9
 # relative; what a solver that stops where a step promises 5e-5 of the cost may leave behind, twice
 CONVERGED = 1e-3
 BALANCE = 1e-3  # of the total: the identity of energy that is promised
-# relative; the two energies are sums over panels of their own, with corners of |x| inside (see QUADRATURE in
-# test_baselines); a motion that is its own baseline differs by 1e-5 from itself
+# relative; the two energies are sums over panels of their own, with corners of |x| inside (see
+# QUADRATURE in test_baselines); a motion that is its own baseline differs by 1e-5 from itself
 NOT_BEATEN = 5e-5
 ONE_PERCENT = 0.01  # by which a B-spline may exceed the time-scaled motion in the same duration
-SYMMETRY = 2e-3  # relative; two runs whose optima are mirror images, reached along ways that are not
+SYMMETRY = (
+    2e-3  # relative; two runs whose optima are mirror images, reached along ways that are not
+)
 
 
 def total(solution: Solution, task: Problem) -> float:
@@ -53,7 +55,9 @@ def assert_true(solution: Solution, task: Problem) -> None:
     assert electrical.parts_sum == pytest.approx(electrical.total, rel=BALANCE)
     assert solution.lower_bound <= own
     assert solution.lower_bound == min(each.lower_bound for each in solution.candidates)
-    assert min(each.energy for each in solution.candidates if each.energy is not None) == pytest.approx(own)
+    assert min(
+        each.energy for each in solution.candidates if each.energy is not None
+    ) == pytest.approx(own)
     least, most = task.duration_min or 0.0, task.duration_max or math.inf
     assert least <= solution.duration <= most
     for each in solution.baselines:
@@ -85,6 +89,10 @@ CONDITIONS: dict[str, dict[str, Any]] = {
     "slow": {"limits": limits(v_max=0.6, a_max=2.0, j_max=10.0)},
     "smooth": {"limits": limits(j_max=15.0)},
     "weak": {"limits": limits(tau_max=[60, 100, 60, 14, 14, 14]), "payload": Payload(mass=1.0)},
-    "half recovered": {"robot": replace(ROBOT, electronics=replace(ROBOT.electronics, regeneration=0.5))},
-    "idles cheaply": {"robot": replace(ROBOT, electronics=replace(ROBOT.electronics, idle_power=4.0))},
+    "half recovered": {
+        "robot": replace(ROBOT, electronics=replace(ROBOT.electronics, regeneration=0.5))
+    },
+    "idles cheaply": {
+        "robot": replace(ROBOT, electronics=replace(ROBOT.electronics, idle_power=4.0))
+    },
 }

@@ -1,4 +1,6 @@
-"""Arms in a cell, for tests of collisions: every shape around the arm, a tool, and a load of any shape."""
+"""Arms in a cell, for tests of collisions: every shape around the arm, a tool, and a load of any
+shape.
+"""
 
 from __future__ import annotations
 
@@ -48,9 +50,12 @@ def cell(seed: int = 1) -> Scene:
         Mesh(rng.normal(size=(30, 3)) * 0.1),
     ]
     around = [
-        Obstacle(f"thing {k}", s, at(rng.uniform(-0.9, 0.9, 3), rng.normal(size=3))) for k, s in enumerate(shapes)
+        Obstacle(f"thing {k}", s, at(rng.uniform(-0.9, 0.9, 3), rng.normal(size=3)))
+        for k, s in enumerate(shapes)
     ]
-    near = Obstacle("kept away from", Box(np.array([0.2, 0.2, 0.2])), at(rng.uniform(-0.9, 0.9, 3)), margin=0.03)
+    near = Obstacle(
+        "kept away from", Box(np.array([0.2, 0.2, 0.2])), at(rng.uniform(-0.9, 0.9, 3)), margin=0.03
+    )
     return Scene([Obstacle("floor", HalfSpace(), at([0, 0, -0.4])), *around, near])
 
 

@@ -21,7 +21,9 @@ LENGTH, RADIUS, MASS = 0.22, 0.03, 1.6
 
 
 def serial_chain(nq: int, capsules: bool = True) -> Robot:
-    """A chain whose axes stand at right angles in turn, or nearly so, with the strongest joints at its base."""
+    """A chain whose axes stand at right angles in turn, or nearly so, with the strongest joints at
+    its base.
+    """
     rng = np.random.default_rng(nq)
     model = pin.Model()
     model.name = f"chain_{nq}"
@@ -29,7 +31,9 @@ def serial_chain(nq: int, capsules: bool = True) -> Robot:
     along = np.array([0.0, 0.0, LENGTH])
     for k in range(1, nq + 1):
         # alternately a roll about the chain's direction and a pitch across it, off by some degrees
-        axis = pin.rpy.rpyToMatrix(*(np.array([np.pi / 2 if k % 2 else -np.pi / 2, 0, 0]) + rng.normal(0, 0.05, 3)))
+        axis = pin.rpy.rpyToMatrix(
+            *(np.array([np.pi / 2 if k % 2 else -np.pi / 2, 0, 0]) + rng.normal(0, 0.05, 3))
+        )
         placement = pin.SE3(np.eye(3) if k == 1 else axis, along if k == 1 else axis @ along)
         joint = model.addJoint(k - 1, pin.JointModelRZ(), placement, f"joint_{k}")
         lever = rng.uniform(-0.3, 0.3, 3) * LENGTH
@@ -48,10 +52,14 @@ def serial_chain(nq: int, capsules: bool = True) -> Robot:
         model=model,
         limits=Limits(-3.0 * ones, 3.0 * ones, 2.5 * ones, 8.0 * ones, 150.0 * ones, strength),
         rated_payload=2.0,
-        drives=Drives(100 * ones, 9.0 * ones, rotor_inertia, 0.5 * ones, 0.2 * ones, 0.05 * ones, zeros),
+        drives=Drives(
+            100 * ones, 9.0 * ones, rotor_inertia, 0.5 * ones, 0.2 * ones, 0.05 * ones, zeros
+        ),
         electronics=Electronics(idle_power=25.0, controller_power=5.0, regeneration=0.3),
         friction_laws={
-            "coulomb_viscous": FrictionLaw("coulomb_viscous", 0.02 * strength, zeros, ones, 0.05 * strength)
+            "coulomb_viscous": FrictionLaw(
+                "coulomb_viscous", 0.02 * strength, zeros, ones, 0.05 * strength
+            )
         },
         default_motion=DefaultMotion(1.0, 1.5),
         capsules=_capsules(model) if capsules else (),
@@ -65,7 +73,9 @@ def _capsules(model: pin.Model) -> tuple[LinkCapsule, ...]:
     flange = model.frames[model.getFrameId("flange")].placement.translation
     ends = [placement.translation for placement in list(model.jointPlacements)[1:]] + [flange]
     # short of the joints at both ends, so that links next but one do not touch at every position
-    return tuple(LinkCapsule(k, np.array([0.2 * end, 0.8 * end]), RADIUS) for k, end in enumerate(ends))
+    return tuple(
+        LinkCapsule(k, np.array([0.2 * end, 0.8 * end]), RADIUS) for k, end in enumerate(ends)
+    )
 
 
 def move(nq: int) -> tuple[Array, Array]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-# readings of the clock that a search needs at most to end once its deadline has passed: every stage looks at it once,
-# and a front does so in each of its searches
+# readings of the clock that a search needs at most to end once its deadline has passed: every stage
+# looks at it once, and a front does so in each of its searches
 LAST_READINGS = 40
 
 

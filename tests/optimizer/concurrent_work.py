@@ -1,4 +1,5 @@
-"""Fifty pieces of work of every kind that the library does, and fingerprints of their results, bit for bit.
+"""Fifty pieces of work of every kind that the library does, and fingerprints of their results, bit
+for bit.
 
 The clock stands still: no deadline passes, however busy the machine is.
 """
@@ -46,7 +47,18 @@ from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.problem.tool_cone import ToolCone
 from joulepath.optimizer.what_if import what_if
 from tests.optimizer.cells import arm_in_cell, at, wander
-from tests.optimizer.moves import CEILING, GOAL, PAYLOAD, ROBOT, START, TILTED, fixed, problem, random_moves, tcp_pose
+from tests.optimizer.moves import (
+    CEILING,
+    GOAL,
+    PAYLOAD,
+    ROBOT,
+    START,
+    TILTED,
+    fixed,
+    problem,
+    random_moves,
+    tcp_pose,
+)
 
 # the only figure of an answer that is measured, not computed
 MEASURED = {"wall_time"}
@@ -77,7 +89,11 @@ def fingerprint(value: Any) -> object:
     if isinstance(value, pin.Model) or value is ROBOT:
         return "robot"
     if is_dataclass(value) and not isinstance(value, type):
-        parts = ((part.name, getattr(value, part.name)) for part in fields(value) if part.name not in MEASURED)
+        parts = (
+            (part.name, getattr(value, part.name))
+            for part in fields(value)
+            if part.name not in MEASURED
+        )
         return type(value).__name__, *((name, fingerprint(part)) for name, part in parts)
     if isinstance(value, JoulepathError):
         return type(value).__name__, str(value)
@@ -106,20 +122,35 @@ def behind_a_post(height: float = 0.5) -> Problem:
     arm = Arm(robot=ROBOT, scene=scene, tool=(HOLDER,), T_flange_tcp=at([0, 0, 0.15]))
     ends = []
     for side in (-0.3, 0.3):
-        found = inverse_kinematics_for(ROBOT).solve(at([0.5, side, 0.15], DOWN), arm.T_flange_tcp, windings=False)
-        ends.append([each.q for each in found if collision_model(arm).signed_distances(each.q[None])[0].min() > 0])
-    start, goal = min(((a, b) for a in ends[0] for b in ends[1]), key=lambda both: float(np.ptp(both[1] - both[0])))
+        found = inverse_kinematics_for(ROBOT).solve(
+            at([0.5, side, 0.15], DOWN), arm.T_flange_tcp, windings=False
+        )
+        ends.append(
+            [
+                each.q
+                for each in found
+                if collision_model(arm).signed_distances(each.q[None])[0].min() > 0
+            ]
+        )
+    start, goal = min(
+        ((a, b) for a in ends[0] for b in ends[1]),
+        key=lambda both: float(np.ptp(both[1] - both[0])),
+    )
     return Problem(arm=arm, start=start, goal=goal)
 
 
 def replayed(interpolation: Any, arm: Arm) -> object:
     points = np.array([START, START + np.array([-0.4, 0.3, 0.5, -0.6, 0.8, 0.2]), GOAL])
-    return evaluate(arm, Waypoints(points, np.array([1.1, 1.7]), interpolation), sample_period=0.004)
+    return evaluate(
+        arm, Waypoints(points, np.array([1.1, 1.7]), interpolation), sample_period=0.004
+    )
 
 
 def replayed_log(arm: Arm) -> object:
     t = np.arange(1500) * 0.008
-    return evaluate(arm, Recording.of(t, START + 0.3 * np.sin(t[:, None] * np.linspace(0.2, 0.7, 6))))
+    return evaluate(
+        arm, Recording.of(t, START + 0.3 * np.sin(t[:, None] * np.linspace(0.2, 0.7, 6)))
+    )
 
 
 def inverse(seed: int) -> object:
@@ -127,18 +158,24 @@ def inverse(seed: int) -> object:
     arm, found = arm_in_cell(), []
     for q in np.random.default_rng(seed).uniform(-np.pi, np.pi, (10, 6)):
         solutions = inverse_kinematics_for(ROBOT).solve(tcp_pose(q).T)
-        found.append((solutions, collision_model(arm).closest_pairs([each.q for each in solutions])))
+        found.append(
+            (solutions, collision_model(arm).closest_pairs([each.q for each in solutions]))
+        )
     return found
 
 
 def followed() -> object:
     centre = tcp_pose(START).T[:3, 3]
-    circle = np.array([[0.0, 0.08 * np.sin(x), 0.08 * (np.cos(x) - 1)] for x in np.linspace(0, 2 * np.pi, 40)])
+    circle = np.array(
+        [[0.0, 0.08 * np.sin(x), 0.08 * (np.cos(x) - 1)] for x in np.linspace(0, 2 * np.pi, 40)]
+    )
     return follow(Arm(robot=ROBOT), centre + circle, START)
 
 
 def certified(seed: int) -> object:
-    """A motion through a cell, some seconds long: quadrature over thousands of samples, distances, the proof."""
+    """A motion through a cell, some seconds long: quadrature over thousands of samples, distances,
+    the proof.
+    """
     arm = arm_in_cell()
     spline = wander(seed, duration=6.0)
     ends: tuple[Array, Array] = spline.control_points[0], spline.control_points[-1]
@@ -156,7 +193,9 @@ def changed_arm(asked: Problem, changed: Problem) -> object:
 
 
 def moves() -> list[Work]:
-    """Joints to joints: every method, several arms with the same robot, payloads, mountings and buses."""
+    """Joints to joints: every method, several arms with the same robot, payloads, mountings and
+    buses.
+    """
     arms: list[dict[str, Any]] = [
         {},
         {"payload": PAYLOAD},
@@ -185,11 +224,15 @@ def targets() -> list[Work]:
         "pose": problem(goal=pose),
         "pose to pose": problem(start=tcp_pose(START), goal=pose, windings=False),
         "loaded pose": problem(goal=pose, payload=PAYLOAD, gravity=TILTED),
-        "mechanical pose": problem(goal=pose, objective="mechanical", branch=near, windings=False, **fixed(2.0)),
+        "mechanical pose": problem(
+            goal=pose, objective="mechanical", branch=near, windings=False, **fixed(2.0)
+        ),
         "uniformly scaled pose": problem(goal=pose, method="uniform_scaling"),
         "time scaled pose": problem(goal=other, method="time_scaling"),
         "one of two poses": problem(goal=AnyOf((pose, other)), windings=False),
-        "any turn about the tool": problem(goal=ConeOrientedPose.about(pose, np.array([0.0, 0.0, 1.0]))),
+        "any turn about the tool": problem(
+            goal=ConeOrientedPose.about(pose, np.array([0.0, 0.0, 1.0]))
+        ),
         "cone": problem(goal=cone),
         "out of reach": problem(goal=unreachable),
         "too short": problem(**fixed(0.05)),
@@ -207,17 +250,22 @@ def surroundings() -> list[Work]:
         "post": behind_a_post(),
         "lower post": behind_a_post(0.45),
         "wall": problem(START, GOAL, collisions=True, scene=wall),
-        "carried cup": problem(START, near, collisions=True, scene=wall, payload=cup, tool=(HOLDER,)),
+        "carried cup": problem(
+            START, near, collisions=True, scene=wall, payload=cup, tool=(HOLDER,)
+        ),
         "upright": problem(START, near, tool_cone=upright),
         "slow": problem(START, GOAL, tcp_speed=0.4, elbow_speed=0.3),
         "dwell": problem(START, GOAL, dwell=Dwell(4.0)),
-        "storage": problem(START, GOAL, bus=Bus("storage", efficiency=0.9, capacity=20.0, power=200.0)),
+        "storage": problem(
+            START, GOAL, bus=Bus("storage", efficiency=0.9, capacity=20.0, power=200.0)
+        ),
     }
     return [Work(name, partial(solved, each)) for name, each in asked.items()]
 
 
 def other_work() -> list[Work]:
-    """Fronts, changed arms, replays, inverse kinematics, certificates, and the genetic algorithm."""
+    """Fronts, changed arms, replays, inverse kinematics, certificates, and the genetic
+    algorithm."""
     arm, stored = Arm(robot=ROBOT, payload=PAYLOAD), Bus("storage", efficiency=0.9, capacity=5.0)
     genetic = problem(START, GOAL, method="polynomial_ga")
     heavier = problem(START, GOAL, payload=PAYLOAD)
@@ -225,7 +273,10 @@ def other_work() -> list[Work]:
         Work("genetic algorithm", partial(solved, genetic)),
         Work("front", partial(front, problem(duration_max=3.0), 4)),
         Work("lighter load", partial(changed_arm, heavier, problem())),
-        *(Work(f"replay {way}", partial(replayed, way, arm)) for way in ("linear", "quintic", "spline")),
+        *(
+            Work(f"replay {way}", partial(replayed, way, arm))
+            for way in ("linear", "quintic", "spline")
+        ),
         Work("replay with storage", partial(replayed, "quintic", replace(arm, bus=stored))),
         Work("replayed log", partial(replayed_log, arm)),
         *(Work(f"inverse kinematics {seed}", partial(inverse, seed)) for seed in (1, 2)),

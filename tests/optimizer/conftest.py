@@ -1,4 +1,6 @@
-"""What all tests of the library share: one thread for linear algebra, and no kernel but that of the default robot."""
+"""What all tests of the library share: one thread for linear algebra, and no kernel but that of the
+default robot.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ def _one_thread() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def _compiled() -> Iterator[None]:
-    """Many motions of the default robot take a while without it. The few of another one take less than its compiler."""
+    """Many motions of the default robot take a while without it. The few of another one take less
+    than its compiler.
+    """
     compile_kernel(load_robot("ur5e"))
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(kernel, "compiler", lambda: None)

@@ -1,4 +1,6 @@
-"""What the tests of the optimiser share: an arm, moves of it, and limits and targets made to measure."""
+"""What the tests of the optimiser share: an arm, moves of it, and limits and targets made to
+measure.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,9 @@ GOAL = START + np.array([0.9, 0.5, -0.7, 0.3, 0.2, -1.0])
 # of the UR5e paper; tests/reference/README.md tells what is known of its joint convention
 HOME = np.radians([0, -90, 90, -90, 180, 0])
 PAPER = Path(__file__).parents[1] / "reference" / "paper_table1_poses.csv"
-PAYLOAD = Payload(mass=2.0, com=np.array([0.02, -0.03, 0.1]), inertia=np.diag([0.004, 0.005, 0.003]))
+PAYLOAD = Payload(
+    mass=2.0, com=np.array([0.02, -0.03, 0.1]), inertia=np.diag([0.004, 0.005, 0.003])
+)
 TILTED = np.array([2.0, -4.0, -8.7])
 CEILING = np.array([0.0, 0.0, 9.81])
 # a deadline [s] that no search comes near, however busy the machine
@@ -39,7 +43,9 @@ def problem_with(start: Any, goal: Any, **given: Any) -> Problem:
     """A problem of the UR5e, or of `robot`; `given` are fields of its arm and its own."""
     own = {name: value for name, value in given.items() if name in Problem.__dataclass_fields__}
     arm = {name: value for name, value in given.items() if name not in own}
-    return Problem(arm=Arm(**{"robot": ROBOT} | arm), start=start, goal=goal, **{"deadline": AMPLE} | own)
+    return Problem(
+        arm=Arm(**{"robot": ROBOT} | arm), start=start, goal=goal, **{"deadline": AMPLE} | own
+    )
 
 
 def changed(asked: Problem, **given: Any) -> Problem:
@@ -56,7 +62,10 @@ def fixed(duration: float) -> dict[str, Any]:
 
 def limits(**given: Any) -> Limits:
     """The robot's limits with some replaced: one number for all joints, or one each."""
-    return replace(ROBOT.limits, **{name: np.broadcast_to(value, 6).astype(float) for name, value in given.items()})
+    return replace(
+        ROBOT.limits,
+        **{name: np.broadcast_to(value, 6).astype(float) for name, value in given.items()},
+    )
 
 
 def tcp_pose(q: Array, T_flange_tcp: Array | None = None) -> Pose:
@@ -76,9 +85,13 @@ def random_moves(seed: int, count: int) -> Iterator[tuple[Array, Array]]:
 
 
 def torques(task: Problem, q: Array, v: Array, a: Array) -> Array:
-    """Rigid body and rotor torques (k, nq) by Pinocchio, payload, gravity and scaled links included."""
+    """Rigid body and rotor torques (k, nq) by Pinocchio, payload, gravity and scaled links
+    included.
+    """
     arm, load = task.arm, task.arm.payload
-    model = arm.robot.loaded_model(load.mass, load.com, load.inertia, arm.gravity, arm.link_mass_scale)
+    model = arm.robot.loaded_model(
+        load.mass, load.com, load.inertia, arm.gravity, arm.link_mass_scale
+    )
     data = model.createData()
     return np.array([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)])
 
@@ -96,4 +109,4 @@ def paper_poses() -> list[Pose]:
         rows = [[float(value) for value in row.values()] for row in csv.DictReader(file)]
     return [
         Pose(pin.SE3(pin.rpy.rpyToMatrix(*row[3:]), np.array(row[:3])).homogeneous) for row in rows
-    ]  # fmt: skip
+    ]

@@ -21,19 +21,24 @@ from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.trajectories.spline import Spline
 from tests.optimizer.moves import problem_with
 
-ROUNDING = 1e-9  # relative; values met exactly on the grid, up to double precision through a few thousand operations
-# relative; a peak h/2 from the nearest of the grid's samples is missed by (h/2)² · |x''| / 2|x|: for the quintic's
-# acceleration 18 (h / 2T)², 4.5e-6 at 1 ms in 1 s
+# relative; values met exactly on the grid, up to double precision through a few thousand operations
+ROUNDING = 1e-9
+# relative; a peak h/2 from the nearest of the grid's samples is missed by (h/2)² · |x''| / 2|x|:
+# for the quintic's acceleration 18 (h / 2T)², 4.5e-6 at 1 ms in 1 s
 GRID_MISS = 5e-6
-# relative; the torque between two samples, by which the certificate's bound may be above the greatest sample
+# relative; the torque between two samples, by which the certificate's bound may be above the
+# greatest sample
 BETWEEN = 5e-5
-QUADRATURE = 1e-5  # relative; Simpson on 1 ms against Gauss on other panels, both with corners of |x| inside intervals
+# relative; Simpson on 1 ms against Gauss on other panels, both with corners of |x| inside intervals
+QUADRATURE = 1e-5
 
 ROBOT = load_robot("ur5e")
 START = np.array([0.3, -1.4, 1.6, -0.9, -1.2, 0.5])
 GOAL = START + np.array([0.9, 0.5, -0.7, 0.3, 0.2, -1.0])
 TRAVEL = np.abs(GOAL - START)
-PAYLOAD = Payload(mass=2.0, com=np.array([0.02, -0.03, 0.1]), inertia=np.diag([0.004, 0.005, 0.003]))
+PAYLOAD = Payload(
+    mass=2.0, com=np.array([0.02, -0.03, 0.1]), inertia=np.diag([0.004, 0.005, 0.003])
+)
 GRAVITY = np.array([2.0, -4.0, -8.7])
 
 
@@ -44,7 +49,9 @@ def quintic(start: Array = START, goal: Array = GOAL, duration: float = 1.0) -> 
 
 
 def problem(**given: object) -> Problem:
-    return problem_with(**{"start": START, "goal": GOAL, "payload": PAYLOAD, "gravity": GRAVITY} | given)
+    return problem_with(
+        **{"start": START, "goal": GOAL, "payload": PAYLOAD, "gravity": GRAVITY} | given
+    )
 
 
 def samples(start: Array, goal: Array, t: Array, duration: float) -> tuple[Array, Array, Array]:
@@ -58,7 +65,9 @@ def samples(start: Array, goal: Array, t: Array, duration: float) -> tuple[Array
 
 
 def by_crba(task: Problem, q: Array, v: Array, a: Array) -> Array:
-    """Torques (k, nq) = M(q) a + h(q, v): composite rigid bodies and nonlinear effects instead of Newton-Euler."""
+    """Torques (k, nq) = M(q) a + h(q, v): composite rigid bodies and nonlinear effects instead of
+    Newton-Euler.
+    """
     load = task.arm.payload
     model = task.arm.robot.loaded_model(load.mass, load.com, load.inertia, task.arm.gravity)
     data = model.createData()
@@ -70,7 +79,9 @@ def by_crba(task: Problem, q: Array, v: Array, a: Array) -> Array:
     return tau
 
 
-def honest(task: Problem, start: Array = START, goal: Array = GOAL, duration: float = 1.0) -> Energy:
+def honest(
+    task: Problem, start: Array = START, goal: Array = GOAL, duration: float = 1.0
+) -> Energy:
     """The quintic's energy by Gauss-Legendre on 400 panels and torques of their own route."""
     x, w = np.polynomial.legendre.leggauss(4)
     panel = duration / 400
@@ -79,7 +90,9 @@ def honest(task: Problem, start: Array = START, goal: Array = GOAL, duration: fl
     load = task.arm.payload
     model = task.arm.robot.loaded_model(load.mass, load.com, load.inertia, task.arm.gravity)
     data = model.createData()
-    change = pin.computePotentialEnergy(model, data, goal) - pin.computePotentialEnergy(model, data, start)
+    change = pin.computePotentialEnergy(model, data, goal) - pin.computePotentialEnergy(
+        model, data, start
+    )
     tau = by_crba(task, q, v, a)
     weights = np.tile(w / 2 * panel, 400)
     return breakdown(weights, v, a, tau, change, task.arm)
@@ -97,7 +110,9 @@ def test_confirms_an_honest_answer(energy: Energy) -> None:
     limits, most = ROBOT.limits, TRAVEL.max()
     ratios = certificate.worst_ratio
     assert ratios["velocity"] == pytest.approx(15 / 8 * most / limits.v_max[0], rel=ROUNDING)
-    assert ratios["acceleration"] == pytest.approx(10 / math.sqrt(3) * most / limits.a_max[0], rel=GRID_MISS)
+    assert ratios["acceleration"] == pytest.approx(
+        10 / math.sqrt(3) * most / limits.a_max[0], rel=GRID_MISS
+    )
     assert ratios["jerk"] == pytest.approx(60 * most / limits.j_max[0], rel=ROUNDING)
     assert max(certificate.start_error + certificate.goal_error) < ROUNDING
     assert certificate.rest_error < ROUNDING
@@ -108,7 +123,8 @@ def test_confirms_an_honest_answer(energy: Energy) -> None:
 
 @pytest.mark.parametrize("friction", list(ROBOT.friction_laws))
 def test_torques_agree_with_another_route(friction: str) -> None:
-    """M a + h with the payload, tilted gravity and rotor inertia, plus friction, over the same millisecond grid.
+    """M a + h with the payload, tilted gravity and rotor inertia, plus friction, over the same
+    millisecond grid.
 
     In half a second, so that the peak is in motion, where friction counts.
     """
@@ -131,7 +147,9 @@ def test_torques_agree_with_another_route(friction: str) -> None:
         ("torque", "tau_max", BETWEEN),
     ],
 )
-def test_a_broken_limit_shows_its_ratio(energy: Energy, name: str, field: str, tolerance: float) -> None:
+def test_a_broken_limit_shows_its_ratio(
+    energy: Energy, name: str, field: str, tolerance: float
+) -> None:
     """With the last joint's limit at its peak over 1.25 that limit, and no other, reads 1.25."""
     q, v, a = samples(START, GOAL, np.linspace(0.0, 1.0, 1001), 1.0)
     tau_motor = by_crba(problem(), q, v, a) + ROBOT.friction.torque(v)
@@ -143,7 +161,9 @@ def test_a_broken_limit_shows_its_ratio(energy: Energy, name: str, field: str, t
     }[field]
     tight = getattr(ROBOT.limits, field).copy()
     tight[-1] = peak / 1.25
-    certificate = certify(problem(limits=replace(ROBOT.limits, **{field: tight})), quintic(), START, GOAL, energy)
+    certificate = certify(
+        problem(limits=replace(ROBOT.limits, **{field: tight})), quintic(), START, GOAL, energy
+    )
     assert certificate.worst_ratio[name] == pytest.approx(1.25, rel=tolerance)
     assert all(ratio < 1 for other, ratio in certificate.worst_ratio.items() if other != name)
     assert not certificate.valid
@@ -162,7 +182,9 @@ def test_an_end_on_an_uneven_position_limit_reads_one(energy: Energy) -> None:
 def test_a_motion_beyond_a_position_limit_is_refused(energy: Energy) -> None:
     """There and back: both ends are inside, the turning point at half time is 0.1 rad outside."""
     limits = ROBOT.limits
-    knots = np.concatenate([np.zeros(6), np.full(6, 0.5), np.full(6, 1.0)])  # two quintics, one after the other
+    knots = np.concatenate(
+        [np.zeros(6), np.full(6, 0.5), np.full(6, 1.0)]
+    )  # two quintics, one after the other
     bulge = np.zeros(6)
     bulge[1] = 0.5
     top = START + bulge
@@ -177,14 +199,18 @@ def test_a_motion_beyond_a_position_limit_is_refused(energy: Energy) -> None:
 
 
 def test_a_missed_goal_shows(energy: Energy) -> None:
-    """The base joint off by δ: the TCP turns by δ and moves by the chord of its circle about the base's axis."""
+    """The base joint off by δ: the TCP turns by δ and moves by the chord of its circle about the
+    base's axis.
+    """
     delta = 1e-3
     spline = quintic(goal=GOAL + np.array([delta, 0, 0, 0, 0, 0]))
     data = ROBOT.model.createData()
     pin.framesForwardKinematics(ROBOT.model, data, GOAL)
     radius = float(np.hypot(*data.oMf[ROBOT.model.getFrameId("flange")].translation[:2]))
     certificate = certify(problem(), spline, START, GOAL, energy)
-    assert certificate.goal_error == pytest.approx((2 * radius * math.sin(delta / 2), delta), rel=1e-6)  # of 1e-3
+    assert certificate.goal_error == pytest.approx(
+        (2 * radius * math.sin(delta / 2), delta), rel=1e-6
+    )  # of 1e-3
     assert max(certificate.start_error) < ROUNDING
     assert not certificate.valid
     backwards = certify(replace(problem(), goal=START, start=GOAL), spline, GOAL, START, energy)
@@ -202,7 +228,9 @@ def test_a_full_turn_is_not_the_same_goal(energy: Energy) -> None:
 
 
 def test_pose_targets_are_of_the_tcp(energy: Energy) -> None:
-    """A goal pose moved by 2 mm and turned by 3 mrad about the TCP's own z reads just so, tool included."""
+    """A goal pose moved by 2 mm and turned by 3 mrad about the TCP's own z reads just so, tool
+    included.
+    """
     data = ROBOT.model.createData()
     pin.framesForwardKinematics(ROBOT.model, data, GOAL)
     tool = pin.SE3(pin.rpy.rpyToMatrix(0.4, -0.2, 1.0), np.array([0.05, 0.0, 0.15]))
@@ -213,12 +241,16 @@ def test_pose_targets_are_of_the_tcp(energy: Energy) -> None:
     assert max(certificate.goal_error) < ROUNDING
     assert certificate.valid
     missed = certify(replace(exact, goal=Pose(moved.homogeneous)), quintic(), START, GOAL, energy)
-    assert missed.goal_error == pytest.approx((2e-3, 3e-3), rel=1e-6)  # log3 of a small angle loses a few digits
+    assert missed.goal_error == pytest.approx(
+        (2e-3, 3e-3), rel=1e-6
+    )  # log3 of a small angle loses a few digits
     assert not missed.valid
 
 
 def test_ends_that_are_not_at_rest_show(energy: Energy) -> None:
-    """Two coinciding control points leave an acceleration of 20 Δc / T² at the end, one leaves speed as well."""
+    """Two coinciding control points leave an acceleration of 20 Δc / T² at the end, one leaves
+    speed as well.
+    """
     spline = quintic()
     points = spline.control_points.copy()
     points[3, 0] -= 0.01
@@ -250,23 +282,32 @@ def test_the_way_back_costs_something_else(energy: Energy) -> None:
 
 def test_parts_that_do_not_add_up_show(energy: Energy) -> None:
     electrical = energy.electrical
-    wrong = replace(energy, electrical=replace(electrical, friction=electrical.friction + 0.02 * electrical.total))
+    wrong = replace(
+        energy,
+        electrical=replace(electrical, friction=electrical.friction + 0.02 * electrical.total),
+    )
     certificate = certify(problem(), quintic(), START, GOAL, wrong)
     assert certificate.balance_error == pytest.approx(0.02, abs=QUADRATURE)
     assert not certificate.valid
 
 
 def test_short_motions_get_a_fine_grid(energy: Energy) -> None:
-    """20 ms: on a millisecond grid the peak of acceleration would be missed by 2e-3, on a hundredth part by 3e-5."""
+    """20 ms: on a millisecond grid the peak of acceleration would be missed by 2e-3, on a hundredth
+    part by 3e-5.
+    """
     spline = quintic(goal=START + 1e-4, duration=0.02)
     certificate = certify(problem(goal=START + 1e-4), spline, START, START + 1e-4, energy)
     peak = 10 / math.sqrt(3) * 1e-4 / 0.02**2
-    assert certificate.worst_ratio["acceleration"] == pytest.approx(peak / ROBOT.limits.a_max[0], rel=1e-4)
+    assert certificate.worst_ratio["acceleration"] == pytest.approx(
+        peak / ROBOT.limits.a_max[0], rel=1e-4
+    )
 
 
 @pytest.mark.parametrize("broken", ["control_points", "knots"])
 def test_nothing_undefined_passes(energy: Energy, broken: str) -> None:
-    """NaN in a control point, or a spline that does not begin at zero, compares false with every tolerance."""
+    """NaN in a control point, or a spline that does not begin at zero, compares false with every
+    tolerance.
+    """
     spline = quintic()
     if broken == "control_points":
         points = spline.control_points.copy()
@@ -281,7 +322,9 @@ def test_nothing_undefined_passes(energy: Energy, broken: str) -> None:
 def test_a_certificate_with_nan_is_not_valid(name: str) -> None:
     ratios = dict.fromkeys(["position", "velocity", "acceleration", "jerk", "torque"], 0.5)
     clearance = Clearance(0.01, 0.01, ("base", "tool"), 0.0)
-    good = Certificate(ratios, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0, 0.0, clearance, close_pass=None)
+    good = Certificate(
+        ratios, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0, 0.0, clearance, close_pass=None
+    )
     assert good.valid
     assert not replace(good, worst_ratio=ratios | {name: math.nan}).valid
     assert not replace(good, goal_error=(0.0, math.nan)).valid

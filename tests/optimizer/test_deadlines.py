@@ -1,4 +1,6 @@
-"""Deadlines hold wherever the time goes: by a clock that moves with the work that is done, not with the machine."""
+"""Deadlines hold wherever the time goes: by a clock that moves with the work that is done, not with
+the machine.
+"""
 
 from __future__ import annotations
 
@@ -39,8 +41,8 @@ from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.moves import GOAL, ROBOT, START, problem, tcp_pose
 from tests.selection import long_but
 
-# what the work of a call takes on one core [s]: per node of the kernel, instant of Pinocchio's recursion, forward
-# kinematics, distance by Coal, row of a quadratic program
+# what the work of a call takes on one core [s]: per node of the kernel, instant of Pinocchio's
+# recursion, forward kinematics, distance by Coal, row of a quadratic program
 NODE, INSTANT, PLACEMENT, DISTANCE, ROW = 1.2e-6, 1.5e-6, 3e-6, 6e-6, 2e-5
 # relative; the same sums in the same order
 ROUNDING = 1e-12
@@ -90,7 +92,12 @@ def crowded() -> Scene:
         direction = rng.normal(size=3)
         where = direction / np.linalg.norm(direction) * rng.uniform(0.6, 1.1)
         thing = Obstacle(f"thing {len(things)}", Mesh(rng.normal(size=(24, 3)) * 0.03), at(where))
-        if CollisionModel(Arm(robot=ROBOT, scene=Scene([thing]))).least_distance(np.array([START, GOAL]), 0.02) > 0.01:
+        if (
+            CollisionModel(Arm(robot=ROBOT, scene=Scene([thing]))).least_distance(
+                np.array([START, GOAL]), 0.02
+            )
+            > 0.01
+        ):
             things.append(thing)
     return Scene(things)
 
@@ -100,7 +107,9 @@ HARD: dict[str, Problem] = {
     "slow joints": problem(limits=ROBOT.limits.tightened(v_max=np.full(6, 0.02))),
     "ten minutes": problem(duration_min=600.0, duration_max=600.0, sample_period=0.01),
     "crowded": problem(goal=tcp_pose(GOAL), scene=crowded(), collisions=True),
-    "mechanical": problem(tcp_pose(START), tcp_pose(GOAL), objective="mechanical", duration_max=1.5, windings=False),
+    "mechanical": problem(
+        tcp_pose(START), tcp_pose(GOAL), objective="mechanical", duration_max=1.5, windings=False
+    ),
 }
 
 
@@ -136,7 +145,9 @@ def test_a_front_does_not_overrun(clock: WorkClock, kind: str) -> None:
 
 
 def test_a_change_does_not_overrun(clock: WorkClock) -> None:
-    """Two minutes of motion, certified on the changed arm and optimised for it, in a second of work."""
+    """Two minutes of motion, certified on the changed arm and optimised for it, in a second of
+    work.
+    """
     base = optimize(due(HARD["slow joints"], 60.0), clock)
     began = clock.now
     with suppress(DeadlineExceeded):
@@ -156,7 +167,9 @@ def test_what_was_verified_by_then_is_answered(clock: WorkClock) -> None:
 
 
 def test_what_the_deadline_left_coarse_is_not_optimal() -> None:
-    """The motion with few control points is found and proven best of all branches, but its refinement is cut short."""
+    """The motion with few control points is found and proven best of all branches, but its
+    refinement is cut short.
+    """
     asked = problem(START, GOAL)
     least, found = optimize(asked, still).energy.electrical.total, []
     for readings in range(20, 110, 6):
@@ -168,7 +181,9 @@ def test_what_the_deadline_left_coarse_is_not_optimal() -> None:
 
 
 def test_the_request_that_was_killed_is_answered(clock: WorkClock) -> None:
-    """A TCP at 1 mm/s: three minutes of motion, certified at 180,000 instants, within two seconds of work."""
+    """A TCP at 1 mm/s: three minutes of motion, certified at 180,000 instants, within two seconds
+    of work.
+    """
     asked = problem(
         start=np.array([0, -1.57, 1.57, -1.57, -1.57, 0]),
         goal=np.array([0.3, -1.4, 1.4, -1.5, -1.57, 0.2]),
@@ -181,7 +196,9 @@ def test_the_request_that_was_killed_is_answered(clock: WorkClock) -> None:
     assert clock.now < 2.0 + OVERRUN
 
 
-def test_a_quadratic_program_gets_no_more_than_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_quadratic_program_gets_no_more_than_the_time_left(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     given: list[float] = []
     solve = daqp.solve
 

@@ -41,7 +41,9 @@ from tests.selection import long_but
     ),
 )
 def test_fixed_durations_are_kept_exactly(objective: str, duration: float, method: str) -> None:
-    assert solved(problem(objective=objective, method=method, **fixed(duration))).duration == duration
+    assert (
+        solved(problem(objective=objective, method=method, **fixed(duration))).duration == duration
+    )
 
 
 @pytest.mark.parametrize("method", ["bspline", "time_scaling"])
@@ -59,7 +61,9 @@ def test_duration_bounds_are_kept(method: str) -> None:
 
 
 def test_the_shortest_duration_is_nearly_the_seven_segments() -> None:
-    """Where torque is ample, the arm can be told to be as fast as its slowest joint, or hardly slower."""
+    """Where torque is ample, the arm can be told to be as fast as its slowest joint, or hardly
+    slower.
+    """
     for start, goal in random_moves(43, 4):
         least = shortest(start, goal)
         with pytest.raises(DurationTooShort) as refusal:
@@ -70,8 +74,13 @@ def test_the_shortest_duration_is_nearly_the_seven_segments() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize(("less", "more"), [(0.8, 2.0), (0.8, 1.2), (1.2, 2.0)])
 def test_more_time_is_never_dearer_without_a_price_of_time(less: float, more: float) -> None:
-    """The mechanical objective, which a longer duration can only help: up to 2 s is no worse than up to 1 s."""
-    fast, slow = (solved(problem(objective="mechanical", duration_max=T)).energy.mechanical.total for T in (less, more))
+    """The mechanical objective, which a longer duration can only help: up to 2 s is no worse than
+    up to 1 s.
+    """
+    fast, slow = (
+        solved(problem(objective="mechanical", duration_max=T)).energy.mechanical.total
+        for T in (less, more)
+    )
     assert slow <= fast * (1 + CONVERGED)
 
 
@@ -84,25 +93,35 @@ def test_no_time_at_all_is_a_deadline_exceeded() -> None:
 
 
 def test_little_time_gives_the_best_found_so_far() -> None:
-    """A search that would take many seconds, cut off: certified, feasible, told which candidates it did not reach."""
-    task = problem(start=tcp_pose(START), goal=tcp_pose(GOAL), objective="mechanical", duration_max=2.5)
+    """A search that would take many seconds, cut off: certified, feasible, told which candidates it
+    did not reach.
+    """
+    task = problem(
+        start=tcp_pose(START), goal=tcp_pose(GOAL), objective="mechanical", duration_max=2.5
+    )
     readings = 300
     solution = optimize(replace(task, deadline=float(readings)), CountingClock())
     assert_true(solution, task)
     assert readings - RESERVE < solution.solver.wall_time < readings + LAST_READINGS
     assert solution.status == "feasible"
-    assert any(each.status == "unvisited" and "deadline" in each.reason for each in solution.candidates)
+    assert any(
+        each.status == "unvisited" and "deadline" in each.reason for each in solution.candidates
+    )
 
 
 def test_a_load_that_cannot_be_held_is_told() -> None:
     """The shoulder, what it needs to hold the arm stretched out, and what it has."""
     stretched = np.array([0.0, 0.0, 0.0, 0.0, -1.57, 0.0])
-    needed = np.abs(torques(problem(payload=Payload(5.0)), stretched[None], np.zeros((1, 6)), np.zeros((1, 6))))[0, 1]
+    needed = np.abs(
+        torques(problem(payload=Payload(5.0)), stretched[None], np.zeros((1, 6)), np.zeros((1, 6)))
+    )[0, 1]
     own = limits(tau_max=[150, 0.9 * needed, 150, 28, 28, 28])
     with pytest.raises(TorqueInfeasible) as refusal:
         optimize(problem(START, stretched, payload=Payload(5.0), limits=own))
     error = refusal.value
-    assert (error.joint, error.needed, error.available) == pytest.approx((ROBOT.joint_names[1], needed, 0.9 * needed))
+    assert (error.joint, error.needed, error.available) == pytest.approx(
+        (ROBOT.joint_names[1], needed, 0.9 * needed)
+    )
 
 
 def test_a_payload_beyond_the_rating_is_refused() -> None:
@@ -114,7 +133,9 @@ def test_a_payload_beyond_the_rating_is_refused() -> None:
 
 @pytest.mark.parametrize("refused", ["all", "the first"])
 def test_nothing_uncertified_is_returned(monkeypatch: pytest.MonkeyPatch, refused: str) -> None:
-    """A motion that its certificate does not confirm is not the answer; what it had ruled out may be."""
+    """A motion that its certificate does not confirm is not the answer; what it had ruled out may
+    be.
+    """
     judged = []
 
     def judge(*given: Any) -> Certificate:

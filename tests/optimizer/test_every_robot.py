@@ -1,4 +1,6 @@
-"""What holds for one robot holds for every robot that comes with the library: poses, dynamics, answers, proofs."""
+"""What holds for one robot holds for every robot that comes with the library: poses, dynamics,
+answers, proofs.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,8 @@ ACCURACY, FOUND = 1e-9, 1e-6
 TORQUE = 1e-9
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0
-# share of configurations, drawn at random, in which capsules of links meet: more would mean that they are too large
+# share of configurations, drawn at random, in which capsules of links meet: more would mean that
+# they are too large
 OFTEN = 0.6
 # folded over the table as an arm is put to work, stretched out, and upright
 EVERYDAY: dict[int | str, tuple[list[float], ...]] = {
@@ -29,7 +32,8 @@ EVERYDAY: dict[int | str, tuple[list[float], ...]] = {
     "xarm7": ([0.0, -0.5, 0.0, 1.0, 0.0, 1.5, 0.0], [0.0] * 7, [0.0, 0.5, 0.0, 1.2, 0.0, 0.8, 0.0]),
     7: ([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785], [0.0, 0.5, 0.0, -1.2, 0.0, 0.8, 0.0]),
 }
-# robots that every run tries: their kernels take ten seconds each to compile; one has no figures of drives of its own
+# robots that every run tries: their kernels take ten seconds each to compile; one has no figures of
+# drives of its own
 QUICK = ("ur3e", "ur5e", "ur20")
 
 
@@ -51,9 +55,15 @@ def test_every_configuration_is_among_those_of_its_pose(robot: Robot) -> None:
         T = flange(robot, q)
         solutions = inverse.solve(T, np.eye(4), robot.limits, True, "goal")
         # of a curve, solutions are samples: the member nearest to q stands for it
-        curves = {id(each.self_motion): each.self_motion for each in solutions if each.self_motion is not None}
+        curves = {
+            id(each.self_motion): each.self_motion
+            for each in solutions
+            if each.self_motion is not None
+        }
         members = [curve.at(np.array([curve.parameter(q)]))[0] for curve in curves.values()]
-        found = np.array([each.q for each in solutions] + [nearest_turn(member, q) for member in members])
+        found = np.array(
+            [each.q for each in solutions] + [nearest_turn(member, q) for member in members]
+        )
         assert np.abs(found - q).max(axis=1).min() < FOUND
         reached = [each.q for each in solutions] + members
         assert max(np.abs(flange(robot, each) - T).max() for each in reached) < ACCURACY
@@ -67,13 +77,19 @@ def test_dynamics_are_pinocchios(robot: Robot, count: int) -> None:
     q = rng.uniform(limits.q_min, limits.q_max, (count, robot.nq))
     v, a = (rng.uniform(-most, most, q.shape) for most in (limits.v_max, limits.a_max))
     data = robot.model.createData()
-    expected = np.array([pin.rnea(robot.model, data, *state) for state in zip(q, v, a, strict=True)])
+    expected = np.array(
+        [pin.rnea(robot.model, data, *state) for state in zip(q, v, a, strict=True)]
+    )
     assert np.abs(plant.torques(q, v, a) - expected).max() < TORQUE
 
 
 def test_links_meet_in_some_configurations_only(robot: Robot) -> None:
     model, rng = collision_model(Arm(robot=robot)), np.random.default_rng(33)
-    q = rng.uniform(np.maximum(robot.limits.q_min, -np.pi), np.minimum(robot.limits.q_max, np.pi), (400, robot.nq))
+    q = rng.uniform(
+        np.maximum(robot.limits.q_min, -np.pi),
+        np.minimum(robot.limits.q_max, np.pi),
+        (400, robot.nq),
+    )
     assert 0 < np.mean(model.signed_distances(q)[0].min(axis=1) < 0) < OFTEN
 
 
@@ -101,10 +117,15 @@ def test_poses_are_answered_with_a_proof(robot: Robot, count: int) -> None:
         start, goal = ends
         pose = Pose(flange(robot, goal))
         answer = optimize(Problem(arm=Arm(robot=robot), start=start, goal=pose, deadline=AMPLE))
-        # of a pose that is held on curves, samples are solved: whether other members are better is not proven
-        assert answer.status == ("optimal" if robot.nq == 6 else "feasible") and answer.certificate.valid
+        # of a pose that is held on curves, samples are solved: whether other members are better is
+        # not proven
+        assert (
+            answer.status == ("optimal" if robot.nq == 6 else "feasible")
+            and answer.certificate.valid
+        )
         energy = answer.energy.electrical
         assert 0 <= answer.lower_bound <= energy.total
-        # zero is all that is known where the weight of a coming down arm may pay for the motion, and nowhere else
+        # zero is all that is known where the weight of a coming down arm may pay for the motion,
+        # and nowhere else
         assert answer.lower_bound > 0 or energy.potential < 0
         assert np.abs(flange(robot, answer.goal.q) - pose.T).max() < ACCURACY

@@ -1,4 +1,6 @@
-"""A fixed speed of the TCP on its path: held between the ramps, never exceeded on them, and certified."""
+"""A fixed speed of the TCP on its path: held between the ramps, never exceeded on them, and
+certified.
+"""
 
 from __future__ import annotations
 
@@ -27,13 +29,22 @@ DIFFERENCE = 1e-4
 RAMP = 0.03
 LINE = along(moved([0.0, 0.3, 0.0]), path=ToolPath(fixed_speed=0.1, ramp=RAMP))
 CORNER = along(
-    moved([0.0, 0.2, -0.15]), path=ToolPath(via=[moved([0.0, 0.2, 0.0])], blend=0.04, fixed_speed=0.2, ramp=RAMP)
+    moved([0.0, 0.2, -0.15]),
+    path=ToolPath(via=[moved([0.0, 0.2, 0.0])], blend=0.04, fixed_speed=0.2, ramp=RAMP),
 )
 CURVE = along(
     moved([0.1, 0.3, 0.0]),
-    path=ToolPath(shape="curve", via=[moved([0.05, 0.1, 0.03]), moved([0.0, 0.2, -0.03])], fixed_speed=0.15, ramp=RAMP),
+    path=ToolPath(
+        shape="curve",
+        via=[moved([0.05, 0.1, 0.03]), moved([0.0, 0.2, -0.03])],
+        fixed_speed=0.15,
+        ramp=RAMP,
+    ),
 )
-ARC = along(moved([0.2, 0.2, 0.0]), path=ToolPath(shape="arc", via=[moved([0.03, 0.12, 0.0])], fixed_speed=0.1))
+ARC = along(
+    moved([0.2, 0.2, 0.0]),
+    path=ToolPath(shape="arc", via=[moved([0.03, 0.12, 0.0])], fixed_speed=0.1),
+)
 TASKS = {"line": LINE, "corner": CORNER, "curve": CURVE, "arc": ARC}
 
 
@@ -49,7 +60,9 @@ def speed_of(task: Problem) -> float:
 
 
 def deviations(task: Problem, found: Solution, count: int = 4000) -> tuple[float, float]:
-    """Largest deviation from the speed between the ramps, and above it on them, as shares of it; by the positions."""
+    """Largest deviation from the speed between the ramps, and above it on them, as shares of it; by
+    the positions.
+    """
     steps = np.linalg.norm(np.diff(poses_of(found, count)[:, :3, 3], axis=0), axis=1)
     off = steps * (count - 1) / found.trajectory.spline.duration / speed_of(task) - 1
     gone = np.cumsum(steps)
@@ -62,7 +75,11 @@ def test_the_speed_is_held(name: str) -> None:
     task = TASKS[name]
     found = optimize(task)
     between, above = deviations(task, found)
-    assert found.certificate.valid and between < SPEED_TOLERANCE + DIFFERENCE and above < SPEED_TOLERANCE + DIFFERENCE
+    assert (
+        found.certificate.valid
+        and between < SPEED_TOLERANCE + DIFFERENCE
+        and above < SPEED_TOLERANCE + DIFFERENCE
+    )
     told = found.certificate.worst_ratio["path_speed"] * SPEED_TOLERANCE
     assert between - DIFFERENCE <= told <= SPEED_TOLERANCE
 
@@ -71,10 +88,16 @@ def test_the_certificate_finds_a_speed_that_is_not_held() -> None:
     """Too slow, too fast, and one that is right on average."""
     found = optimize(LINE)
     spline, ends = found.trajectory.spline, (found.start.q, found.goal.q)
-    for factor, valid in ((1.0, True), (1 + 2 * SPEED_TOLERANCE, False), (1 - 2 * SPEED_TOLERANCE, False)):
+    for factor, valid in (
+        (1.0, True),
+        (1 + 2 * SPEED_TOLERANCE, False),
+        (1 - 2 * SPEED_TOLERANCE, False),
+    ):
         other = replace(LINE, tool_path=replace(path_of(LINE), fixed_speed=0.1 * factor))
         assert certify(other, spline, *ends, found.energy).valid == valid
-    uneven = optimize(replace(LINE, tool_path=replace(path_of(LINE), fixed_speed=None, least_speed=0.095)))
+    uneven = optimize(
+        replace(LINE, tool_path=replace(path_of(LINE), fixed_speed=None, least_speed=0.095))
+    )
     assert uneven.certificate.valid
     assert not certify(LINE, uneven.trajectory.spline, *ends, uneven.energy).valid
 
@@ -106,7 +129,10 @@ def test_a_cycle_holds_it_in_a_given_time() -> None:
     assert found.duration == pytest.approx(time)
     for round_ in (own, found):
         (path,) = (move for move in round_.moves if move.planned.kind == "path")
-        assert path.solution.certificate.valid and path.solution.certificate.worst_ratio["path_speed"] <= 1
+        assert (
+            path.solution.certificate.valid
+            and path.solution.certificate.worst_ratio["path_speed"] <= 1
+        )
 
 
 @pytest.mark.parametrize(

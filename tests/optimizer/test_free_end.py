@@ -1,4 +1,6 @@
-"""Paths whose goal leaves the rotation about the tool's free axis open: what it gains, its bound, and its refusals."""
+"""Paths whose goal leaves the rotation about the tool's free axis open: what it gains, its bound,
+and its refusals.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +44,9 @@ def turned_as_little_as_may_be(goal: Pose, before: Pose) -> Pose:
 
 def outwards(goal: Any) -> Problem:
     """A line away from the base, with a nozzle that points back at it in the beginning."""
-    return over_the_base(start=down(0.45, -0.12, 0.25), goal=goal, branch=BranchFilter("right", "up", "flip"))
+    return over_the_base(
+        start=down(0.45, -0.12, 0.25), goal=goal, branch=BranchFilter("right", "up", "flip")
+    )
 
 
 @pytest.fixture(scope="module")
@@ -54,10 +58,16 @@ def stretched() -> Solution:
 def test_a_goal_out_of_reach_is_reached_with_a_turn(stretched: Solution) -> None:
     with pytest.raises(PathInfeasible):
         optimize(outwards(down(0.8, -0.12, 0.25)))
-    assert stretched.certificate.valid and stretched.lower_bound <= stretched.energy.electrical.total
+    assert (
+        stretched.certificate.valid and stretched.lower_bound <= stretched.energy.electrical.total
+    )
     T = pose_of(ARM, stretched.goal.q[None])[0]
-    assert np.abs(T[:3, 3] - [0.8, -0.12, 0.25]).max() < 1e-6 and T[2, 2] == pytest.approx(-1.0, abs=1e-9)
-    assert abs(Rotation.from_matrix(down(0, 0, 0).T[:3, :3].T @ T[:3, :3]).magnitude()) > 0.2, "the tool has turned"
+    assert np.abs(T[:3, 3] - [0.8, -0.12, 0.25]).max() < 1e-6 and T[2, 2] == pytest.approx(
+        -1.0, abs=1e-9
+    )
+    assert abs(Rotation.from_matrix(down(0, 0, 0).T[:3, :3].T @ T[:3, :3]).magnitude()) > 0.2, (
+        "the tool has turned"
+    )
     assert np.array_equal(stretched.goal.q, stretched.trajectory.spline.control_points[-1])
 
 
@@ -88,7 +98,9 @@ def test_a_free_end_never_needs_more_than_the_one_without_a_turn(seed: int) -> N
 
 @pytest.mark.long
 def test_past_a_corner_the_free_end_is_no_worse_than_a_given_one() -> None:
-    """Angles are compared by motions of the same fineness: once, a coarse one at a better angle lost to a fine one."""
+    """Angles are compared by motions of the same fineness: once, a coarse one at a better angle
+    lost to a fine one.
+    """
     rng = np.random.default_rng(1)
     turn = Rotation.from_rotvec(rng.uniform(-0.3, 0.3, 3))
     goal, via = moved(rng.uniform(-0.2, 0.2, 3), turn), moved(rng.uniform(-0.2, 0.2, 3))
@@ -131,7 +143,9 @@ def test_a_turning_to_a_free_end_is_the_shortest_on_its_sheet() -> None:
     best, pinned = sheet.least(shortest, free_end=True), sheet.least(shortest)
     assert best is not None and pinned is not None and best[0] == middle
     steps = np.array(list(np.ndindex(7, 7, 7))) - 3
-    all_turnings = middle + np.concatenate([np.zeros((len(steps), 1), dtype=int), steps.cumsum(axis=1)], axis=1)
+    all_turnings = middle + np.concatenate(
+        [np.zeros((len(steps), 1), dtype=int), steps.cumsum(axis=1)], axis=1
+    )
     least = min(total(each) for each in all_turnings)
     assert total(best) == pytest.approx(least, rel=1e-12) and total(best) <= total(pinned)
 
@@ -172,7 +186,9 @@ WRONG: list[tuple[Any, ToolPath]] = [
     (free(down(0.4, 0.1, 0.2)), ToolPath(about=(1.0, 0.0, 0.0))),
     (ConeOrientedPose(np.array([0.4, 0.1, 0.2])), ToolPath(about=Z)),
     (
-        ConeOrientedPose(np.array([0.4, 0.1, 0.2]), direction=np.array([0.0, 0.0, -1.0]), half_angle=0.1),
+        ConeOrientedPose(
+            np.array([0.4, 0.1, 0.2]), direction=np.array([0.0, 0.0, -1.0]), half_angle=0.1
+        ),
         ToolPath(about=Z),
     ),
 ]
@@ -186,5 +202,7 @@ def test_any_other_freedom_of_the_goal_is_refused(goal: Any, path: ToolPath) -> 
 
 
 def test_the_opposite_axis_is_the_same_freedom() -> None:
-    goal = ConeOrientedPose(down(0.4, 0.1, 0.2).T[:3, 3], -np.array(Z), np.array([0.0, 0.0, 1.0]), 0.0)
+    goal = ConeOrientedPose(
+        down(0.4, 0.1, 0.2).T[:3, 3], -np.array(Z), np.array([0.0, 0.0, 1.0]), 0.0
+    )
     Problem(arm=Arm(robot=ROBOT), start=HOME, goal=goal, tool_path=ToolPath(about=Z))

@@ -1,4 +1,6 @@
-"""Paths whose start leaves the rotation about the tool's free axis open: what it gains, its bound, and its refusals."""
+"""Paths whose start leaves the rotation about the tool's free axis open: what it gains, its bound,
+and its refusals.
+"""
 
 from __future__ import annotations
 
@@ -50,10 +52,17 @@ def retracted() -> Solution:
 def test_a_start_out_of_reach_is_left_with_a_turn(retracted: Solution) -> None:
     with pytest.raises(UnreachablePose):
         optimize(inwards(FAR_AWAY))
-    assert retracted.certificate.valid and 0 < retracted.lower_bound <= retracted.energy.electrical.total
+    assert (
+        retracted.certificate.valid
+        and 0 < retracted.lower_bound <= retracted.energy.electrical.total
+    )
     first, last = pose_of(ARM, np.array([retracted.start.q, retracted.goal.q]))
-    assert np.abs(first[:3, 3] - FAR_AWAY.T[:3, 3]).max() < 1e-6 and first[2, 2] == pytest.approx(-1.0, abs=1e-9)
-    assert abs(Rotation.from_matrix(FAR_AWAY.T[:3, :3].T @ first[:3, :3]).magnitude()) > 0.2, "the tool is turned"
+    assert np.abs(first[:3, 3] - FAR_AWAY.T[:3, 3]).max() < 1e-6 and first[2, 2] == pytest.approx(
+        -1.0, abs=1e-9
+    )
+    assert abs(Rotation.from_matrix(FAR_AWAY.T[:3, :3].T @ first[:3, :3]).magnitude()) > 0.2, (
+        "the tool is turned"
+    )
     assert np.abs(last - down(0.45, -0.12, 0.25).T).max() < 1e-6, "and turned back at the end"
     assert np.array_equal(retracted.start.q, retracted.trajectory.spline.control_points[0])
 
@@ -63,7 +72,9 @@ def test_a_known_motion_from_a_free_start_is_certified_as_it_is(retracted: Solut
     """Another run has not followed the path from the very start that the first one chose."""
     again = Run(inwards(free(FAR_AWAY))).as_it_is(retracted.trajectory.spline)
     assert again.certificate.valid
-    assert again.energy.electrical.total == pytest.approx(retracted.energy.electrical.total, rel=1e-12)
+    assert again.energy.electrical.total == pytest.approx(
+        retracted.energy.electrical.total, rel=1e-12
+    )
     assert {each.name for each in again.baselines} == {each.name for each in retracted.baselines}
 
 
@@ -119,7 +130,9 @@ def test_the_bound_between_free_ends_is_that_of_the_best_pair_but_for_little(see
     start, goal = ends_turned(seed)
     asked = PreparedProblem.of(along(free(goal), start=HOME, tool_path=None))
     proven = bound_between(asked, free(start), free(goal), NEVER, np.inf)
-    known = pairs(asked, ends_of(asked, "goal", free(start), 72)[0], ends_of(asked, "goal", free(goal), 72)[0])
+    known = pairs(
+        asked, ends_of(asked, "goal", free(start), 72)[0], ends_of(asked, "goal", free(goal), 72)[0]
+    )
     bound(asked, known)
     least = min(each.lower_bound for each in known)
     assert 0.9 * least < proven <= least
@@ -127,7 +140,9 @@ def test_the_bound_between_free_ends_is_that_of_the_best_pair_but_for_little(see
 
 def test_a_path_is_followed_from_angles_all_around() -> None:
     start, goal = ends_turned(0)
-    found = path_candidates(PreparedProblem.of(along(goal, start=free(start), path=ToolPath(about=Z))))
+    found = path_candidates(
+        PreparedProblem.of(along(goal, start=free(start), path=ToolPath(about=Z)))
+    )
     labels = {each.start.label for each in found}
     assert len(found) >= 8 * len(labels) and all(each.deferred for each in found)
 

@@ -14,22 +14,30 @@ from tests.optimizer.moves import problem_with
 from tests.selection import long_but
 
 ROBOT = load_robot("ur5e")
-# of a baseline's energy against ours where it is the answer itself: both are quadratures, and where switches of two
-# joints fall within microseconds, the spline that stands for the motion is slower by that hair
+# of a baseline's energy against ours where it is the answer itself: both are quadratures, and where
+# switches of two joints fall within microseconds, the spline that stands for the motion is slower
+# by that hair
 HAIR = 3e-4
 
 
 def pose(q: np.ndarray) -> Pose:
     data = ROBOT.model.createData()
     pin.forwardKinematics(ROBOT.model, data, q)
-    return Pose(pin.updateFramePlacement(ROBOT.model, data, ROBOT.model.getFrameId("flange")).homogeneous)
+    return Pose(
+        pin.updateFramePlacement(ROBOT.model, data, ROBOT.model.getFrameId("flange")).homogeneous
+    )
 
 
 def varied(seed: int, index: int) -> Problem:
-    """A random request with random options: payload, mount, limits, duration, method, friction law, windings."""
+    """A random request with random options: payload, mount, limits, duration, method, friction law,
+    windings.
+    """
     rng = np.random.default_rng([seed, index])
     limits = ROBOT.limits
-    q_start, q_goal = rng.uniform(limits.q_min, limits.q_max), rng.uniform(limits.q_min, limits.q_max)
+    q_start, q_goal = (
+        rng.uniform(limits.q_min, limits.q_max),
+        rng.uniform(limits.q_min, limits.q_max),
+    )
     options: dict[str, object] = {}
     if rng.random() < 0.4:
         mass = rng.uniform(0, 5)
@@ -73,7 +81,9 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize(("seed", "index"), long_but(list(CASES.values())[2:], CASES.values()), ids=CASES.keys())
+@pytest.mark.parametrize(
+    ("seed", "index"), long_but(list(CASES.values())[2:], CASES.values()), ids=CASES.keys()
+)
 def test_requests_that_once_failed(seed: int, index: int) -> None:
     problem = varied(seed, index)
     solution = optimize(problem)
@@ -95,7 +105,12 @@ def test_requests_that_once_failed(seed: int, index: int) -> None:
 def test_very_slow_motions(jerk: float, duration: float, displacement: float) -> None:
     limits = replace(ROBOT.limits, j_max=np.full(6, jerk))
     start = np.full(6, -displacement / 2)
-    fixed = {"duration_min": duration, "duration_max": duration, "deadline": 60.0, "collisions": False}
+    fixed = {
+        "duration_min": duration,
+        "duration_max": duration,
+        "deadline": 60.0,
+        "collisions": False,
+    }
     solution = optimize(problem_with(start, start + displacement, limits=limits, **fixed))  # type: ignore[arg-type]
     assert solution.certificate.valid
     assert solution.duration == duration

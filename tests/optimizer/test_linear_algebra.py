@@ -1,4 +1,6 @@
-"""The limit of one BLAS thread: in force in every thread that asks for it, lifted when the last one leaves."""
+"""The limit of one BLAS thread: in force in every thread that asks for it, lifted when the last one
+leaves.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ def _several_blas_threads() -> Iterator[None]:
 
 def counts() -> set[int]:
     """The numbers of threads of the BLAS libraries."""
-    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+    return {
+        library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"
+    }
 
 
 class Neighbour:

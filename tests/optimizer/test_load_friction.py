@@ -1,4 +1,6 @@
-"""Friction that grows with the torque that a joint carries: one law in every place that looks at it."""
+"""Friction that grows with the torque that a joint carries: one law in every place that looks at
+it.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,9 @@ def loaded(robot: Robot = ROBOT, load: Any = LOAD, **given: Any) -> Robot:
     """The robot with laws whose friction grows with the load."""
     share = np.broadcast_to(np.asarray(load, dtype=float), robot.nq)
     return replace(
-        robot, friction_laws={n: replace(law, load=share) for n, law in robot.friction_laws.items()}, **given
+        robot,
+        friction_laws={n: replace(law, load=share) for n, law in robot.friction_laws.items()},
+        **given,
     )
 
 
@@ -50,7 +54,9 @@ def by_hand(task: Any, q: Array, v: Array, a: Array) -> Array:
     data = model.createData()
     carried = np.abs([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)])
     step = v / np.sqrt(v**2 + law.knee**2)
-    return np.asarray((law.coulomb + law.load * carried) * step + law.unloaded.torque(v) - law.coulomb * step)
+    return np.asarray(
+        (law.coulomb + law.load * carried) * step + law.unloaded.torque(v) - law.coulomb * step
+    )
 
 
 def test_the_law_takes_what_the_links_ask_for() -> None:
@@ -62,7 +68,10 @@ def test_the_law_takes_what_the_links_ask_for() -> None:
     flow = power_flow(tau, v, a, task.arm.drives, task.arm.friction_law)
     assert flow.tau_motor - tau == pytest.approx(by_hand(task, q, v, a), abs=TORQUE)
     assert limited_torque(task.arm, tau, v, a) == pytest.approx(flow.tau_motor, abs=TORQUE)
-    assert (flow.friction >= power_flow(tau, v, a, task.arm.drives, task.arm.friction_law.unloaded).friction).all()
+    assert (
+        flow.friction
+        >= power_flow(tau, v, a, task.arm.drives, task.arm.friction_law.unloaded).friction
+    ).all()
 
 
 def test_a_load_of_zero_is_no_load() -> None:
@@ -71,7 +80,10 @@ def test_a_load_of_zero_is_no_load() -> None:
     zero = problem(payload=PAYLOAD, robot=loaded(load=0.0))
     q, v, a = y[:, :6], y[:, 6:12], y[:, 12:]
     tau = torques(none, q, v, a)
-    flows = [power_flow(tau, v, a, each.arm.drives, each.arm.friction_law).joints for each in (none, zero)]
+    flows = [
+        power_flow(tau, v, a, each.arm.drives, each.arm.friction_law).joints
+        for each in (none, zero)
+    ]
     assert (flows[0] == flows[1]).all()
     kernels = [Kernel(each.arm.robot, Interpreted(build(each.arm.robot))) for each in (none, zero)]
     p = PreparedProblem.of(none).parameters(electrical=1.0)
@@ -81,8 +93,12 @@ def test_a_load_of_zero_is_no_load() -> None:
 
 @pytest.mark.parametrize("side", ["motor", "link"])
 def test_the_kernels_cost_and_its_derivatives(side: Any) -> None:
-    """With corners as good as sharp the cost is the reported power; smoothed, derivatives are the slopes."""
-    robot = loaded(drives=LOSSY, torque_side=side, electronics=replace(ROBOT.electronics, regeneration=0.3))
+    """With corners as good as sharp the cost is the reported power; smoothed, derivatives are the
+    slopes.
+    """
+    robot = loaded(
+        drives=LOSSY, torque_side=side, electronics=replace(ROBOT.electronics, regeneration=0.3)
+    )
     prepared = PreparedProblem.of(problem(robot=robot, payload=PAYLOAD, gravity=TILTED))
     kernel, y, arm = Kernel(robot, Interpreted(build(robot))), states(23, 12), prepared.arm
     p = prepared.parameters(electrical=1.0)
@@ -96,10 +112,15 @@ def test_the_kernels_cost_and_its_derivatives(side: Any) -> None:
     assert cost == pytest.approx(drawn_power(net, 0.3), rel=FORMULA, abs=1e-7)
     assert limited == pytest.approx(limited_torque(arm, tau, v, a), abs=TORQUE)
 
-    multiplier, weight = np.random.default_rng(3).normal(size=(len(y), 6)), np.linspace(0.5, 1.5, len(y))
+    multiplier, weight = (
+        np.random.default_rng(3).normal(size=(len(y), 6)),
+        np.linspace(0.5, 1.5, len(y)),
+    )
     _, _, gradient, jacobian, hessian = (x.copy() for x in kernel.node(y, multiplier, weight, p))
     rigid = tau - arm.drives.rotor_inertia * a
-    dry = arm.friction_law.coulomb + arm.friction_law.load * np.sqrt(rigid**2 + p[places("bend")] ** 2)
+    dry = arm.friction_law.coulomb + arm.friction_law.load * np.sqrt(
+        rigid**2 + p[places("bend")] ** 2
+    )
     hessian += left_out(kernel, y, weight, p, dry)
     for i in range(18):
         up, down = (y + sign * STEP * np.eye(18)[i] for sign in (1, -1))
@@ -107,15 +128,21 @@ def test_the_kernels_cost_and_its_derivatives(side: Any) -> None:
         slope, tau_slope = ((high - low) / (2 * STEP) for high, low in zip(*values, strict=True))
         assert np.abs(gradient[:, i] - slope).max() < DIFFERENCE * np.abs(gradient).max()
         assert np.abs(jacobian[:, :, i] - tau_slope).max() < DIFFERENCE * np.abs(jacobian).max()
-        sides = [[x.copy() for x in kernel.node(each, 0 * multiplier, weight, p)] for each in (up, down)]
-        pull = [weight[:, None] * g + np.einsum("nj,njk->nk", multiplier, rows) for _, _, g, rows, _ in sides]
+        sides = [
+            [x.copy() for x in kernel.node(each, 0 * multiplier, weight, p)] for each in (up, down)
+        ]
+        pull = [
+            weight[:, None] * g + np.einsum("nj,njk->nk", multiplier, rows)
+            for _, _, g, rows, _ in sides
+        ]
         row = (pull[0] - pull[1]) / (2 * STEP)
         assert np.abs(hessian[:, i] - row).max() < DIFFERENCE * np.abs(hessian).max()
 
 
 @pytest.mark.parametrize("method", ["bspline", "time_scaling", "lagrange"])
 def test_an_answer_holds_whoever_looks_at_it(method: Any) -> None:
-    """Certificate and replay agree with the energy, its parts add up, and the bounds lie below it."""
+    """Certificate and replay agree with the energy, its parts add up, and the bounds lie below
+    it."""
     task = problem(robot=loaded(), payload=HEAVY, method=method, bound="tight")
     found = optimize(task)
     assert found.certificate.valid
@@ -123,13 +150,20 @@ def test_an_answer_holds_whoever_looks_at_it(method: Any) -> None:
     assert electrical.parts_sum == pytest.approx(electrical.total, rel=1e-5)
     assert 0 < found.lower_bound <= electrical.total
     path = found.trajectory
-    assert path.tau_motor - path.tau == pytest.approx(by_hand(task, path.q, path.v, path.a), abs=1e-6)
-    replayed = evaluate(task.arm, Recording([RecordedRows(path.t, path.q, path.v, path.a)])).total.energy
+    assert path.tau_motor - path.tau == pytest.approx(
+        by_hand(task, path.q, path.v, path.a), abs=1e-6
+    )
+    replayed = evaluate(
+        task.arm, Recording([RecordedRows(path.t, path.q, path.v, path.a)])
+    ).total.energy
     assert replayed.electrical.total == pytest.approx(electrical.total, rel=2e-3)  # of samples
-    # the same motion of an arm without that friction needs less, and the certificate tells the two apart
+    # the same motion of an arm without that friction needs less, and the certificate tells the two
+    # apart
     dry = problem(payload=HEAVY, method=method)
     assert path.spline is not None
-    assert PreparedProblem.of(dry).energy(path.spline).electrical.friction < 0.98 * electrical.friction
+    assert (
+        PreparedProblem.of(dry).energy(path.spline).electrical.friction < 0.98 * electrical.friction
+    )
     assert not certify(dry, path.spline, found.start.q, found.goal.q, found.energy).valid
 
 
@@ -143,12 +177,17 @@ def test_friction_that_is_known_saves() -> None:
 
 
 def test_no_torque_within_the_limits_is_beyond_the_relaxed_one() -> None:
-    """Friction helps to hold a load back: states whose motor torque is within the limit, at any share below one."""
+    """Friction helps to hold a load back: states whose motor torque is within the limit, at any
+    share below one.
+    """
     rng = np.random.default_rng(5)
     for load in (0.0, 0.05, 0.2, 0.9):
         arm = problem(robot=loaded(load=load), payload=PAYLOAD).arm
         limits = arm.active_limits
-        v, a = rng.uniform(-1, 1, (4000, 6)) * limits.v_max, rng.uniform(-1, 1, (4000, 6)) * limits.a_max
+        v, a = (
+            rng.uniform(-1, 1, (4000, 6)) * limits.v_max,
+            rng.uniform(-1, 1, (4000, 6)) * limits.a_max,
+        )
         tau = rng.uniform(-12, 12, (4000, 6)) * limits.tau_max
         inside = np.abs(limited_torque(arm, tau, v, a)) <= limits.tau_max
         assert inside.any(axis=0).all()
@@ -159,7 +198,9 @@ def test_no_torque_within_the_limits_is_beyond_the_relaxed_one() -> None:
 def test_a_share_that_no_gear_has_is_refused(share: float) -> None:
     figures = load_figures("ur5e")
     law = dict(figures["friction_laws"]["curved"]) | {"load": {"value": [share] + 5 * [0.1]}}
-    with pytest.raises(ValueError, match=r"friction_laws\.curved\.load must be at least 0 and below 1"):
+    with pytest.raises(
+        ValueError, match=r"friction_laws\.curved\.load must be at least 0 and below 1"
+    ):
         robot_of("ur5e", figures | {"friction_laws": {"curved": law}})
 
 

@@ -1,4 +1,6 @@
-"""The one door: whatever comes out of it is certified, true to its own figures, and no worse than what others do."""
+"""The one door: whatever comes out of it is certified, true to its own figures, and no worse than
+what others do.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,15 @@ from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search.errors import DurationTooShort, TorqueInfeasible
-from tests.optimizer.answers import CONDITIONS, CONVERGED, ONE_PERCENT, ROUNDING, shortest, solved, total
+from tests.optimizer.answers import (
+    CONDITIONS,
+    CONVERGED,
+    ONE_PERCENT,
+    ROUNDING,
+    shortest,
+    solved,
+    total,
+)
 from tests.optimizer.moves import (
     GOAL,
     HOME,
@@ -45,7 +55,8 @@ from tests.selection import long_but
     ),
 )
 def test_answers_are_true(name: str, method: str) -> None:
-    """Electrical energy with free duration, over conditions, of three moves of which one is short."""
+    """Electrical energy with free duration, over conditions, of three moves of which one is
+    short."""
     for k, (start, goal) in enumerate(random_moves(41, 4)):
         if method == "bspline" or k != 1:
             task = problem(start, goal, method=method, **CONDITIONS[name])
@@ -81,15 +92,21 @@ SHORT: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("name", long_but(("electrical",), SHORT))
 def test_short_moves_are_not_beaten(name: str) -> None:
-    """Of a milliradian to some hundredths: so slow that friction's reversal, which is smoothed, is all of the way."""
+    """Of a milliradian to some hundredths: so slow that friction's reversal, which is smoothed, is
+    all of the way.
+    """
     rng = np.random.default_rng(44)
     for size in (1e-3, 3e-3, 1e-2, 3e-2):
         start = rng.uniform(-np.pi, np.pi, 6)
-        solved(problem(start, np.clip(start + size * rng.normal(size=6), -np.pi, np.pi), **SHORT[name]))
+        solved(
+            problem(start, np.clip(start + size * rng.normal(size=6), -np.pi, np.pi), **SHORT[name])
+        )
 
 
 def pairs(objective: str) -> Iterator[tuple[Problem, Problem]]:
-    """Problems that differ in the method only, the second in the first's duration and between the same joints."""
+    """Problems that differ in the method only, the second in the first's duration and between the
+    same joints.
+    """
     for k, (start, goal) in enumerate(random_moves(42, 6)):
         given = list(CONDITIONS.values())[k]
         longest = None if objective == "electrical" else 1.6 * shortest(start, goal, **given)
@@ -113,12 +130,17 @@ def test_a_bspline_spends_no_more_than_a_time_scaled_motion(objective: str) -> N
 
 
 def test_the_trajectory_is_that_of_the_spline() -> None:
-    """Samples from SciPy's spline, torques from Pinocchio, power from the definition; Σ P Δt is the energy."""
+    """Samples from SciPy's spline, torques from Pinocchio, power from the definition; Σ P Δt is the
+    energy.
+    """
     task = problem(payload=PAYLOAD, gravity=TILTED, sample_period=0.004)
     solution = solved(task)
     path, spline = solution.trajectory, solution.trajectory.spline
     curve = BSpline(spline.knots, spline.control_points, spline.degree)
-    assert np.diff(path.t)[:-1] == pytest.approx(0.004) and 0 < path.t[-1] - path.t[-2] <= 0.004 + ROUNDING
+    assert (
+        np.diff(path.t)[:-1] == pytest.approx(0.004)
+        and 0 < path.t[-1] - path.t[-2] <= 0.004 + ROUNDING
+    )
     for d, samples in enumerate((path.q, path.v, path.a)):
         assert samples == pytest.approx(curve(path.t, d), abs=1e-7)
     tau = torques(task, path.q, path.v, path.a)
@@ -129,29 +151,50 @@ def test_the_trajectory_is_that_of_the_spline() -> None:
     joints = tau_motor * path.v + drives.copper * (tau_motor / drives.torque_constant) ** 2
     assert path.power == pytest.approx(np.maximum(36.7 + joints.sum(axis=1), 0.0), abs=1e-6)
     electrical = solution.energy.electrical
-    assert np.trapezoid(path.power, path.t) == pytest.approx(electrical.total, rel=5e-3)  # samples 4 ms apart
+    assert np.trapezoid(path.power, path.t) == pytest.approx(
+        electrical.total, rel=5e-3
+    )  # samples 4 ms apart
     assert electrical.idle == pytest.approx(36.7 * solution.duration, rel=ROUNDING)
-    assert electrical.potential == pytest.approx(potential(task, GOAL) - potential(task, START), abs=1e-8)
+    assert electrical.potential == pytest.approx(
+        potential(task, GOAL) - potential(task, START), abs=1e-8
+    )
     assert electrical.recovered == 0
     assert solution.energy.peak_power >= path.power.max() * (1 - 1e-3)
-    assert solution.energy.mean_power == pytest.approx(electrical.total / solution.duration, rel=ROUNDING)
+    assert solution.energy.mean_power == pytest.approx(
+        electrical.total / solution.duration, rel=ROUNDING
+    )
 
 
 def test_regeneration_gives_energy_back() -> None:
-    """A load let down by a metre: what is recovered is negative and lowers the total; more of it lowers it more."""
-    high, low = np.array([0.0, -1.9, 0.9, -1.0, -1.57, 0.0]), np.array([0.0, -0.6, 0.9, -1.0, -1.57, 0.0])
+    """A load let down by a metre: what is recovered is negative and lowers the total; more of it
+    lowers it more.
+    """
+    high, low = (
+        np.array([0.0, -1.9, 0.9, -1.0, -1.57, 0.0]),
+        np.array([0.0, -0.6, 0.9, -1.0, -1.57, 0.0]),
+    )
     totals = []
     for regeneration in (0.0, 0.4, 1.0):
-        robot = replace(ROBOT, electronics=replace(ROBOT.electronics, idle_power=4.0, regeneration=regeneration))
-        electrical = solved(problem(high, low, robot=robot, payload=Payload(mass=5.0))).energy.electrical
-        assert electrical.recovered == pytest.approx(-regeneration * electrical.braking, rel=ROUNDING, abs=0)
+        robot = replace(
+            ROBOT, electronics=replace(ROBOT.electronics, idle_power=4.0, regeneration=regeneration)
+        )
+        electrical = solved(
+            problem(high, low, robot=robot, payload=Payload(mass=5.0))
+        ).energy.electrical
+        assert electrical.recovered == pytest.approx(
+            -regeneration * electrical.braking, rel=ROUNDING, abs=0
+        )
         totals.append(electrical.total)
     assert totals[0] > totals[1] > totals[2]
 
 
-@pytest.mark.parametrize("given", [{}, fixed(2.0), {"method": "time_scaling"}, {"goal": tcp_pose(START)}], ids=str)
+@pytest.mark.parametrize(
+    "given", [{}, fixed(2.0), {"method": "time_scaling"}, {"goal": tcp_pose(START)}], ids=str
+)
 def test_going_nowhere(given: dict[str, Any]) -> None:
-    """Start and goal are the same: a motion that idles, holds itself up, and costs no more than staying put does."""
+    """Start and goal are the same: a motion that idles, holds itself up, and costs no more than
+    staying put does.
+    """
     task = problem(**{"goal": START} | given)
     solution = solved(task)
     tau = torques(task, START[None], np.zeros((1, 6)), np.zeros((1, 6)))[0]
@@ -165,7 +208,9 @@ def test_going_nowhere(given: dict[str, Any]) -> None:
 def test_full_turns_are_made_where_only_they_lead_there() -> None:
     """A goal a full turn of the last joint away is not where the arm already is."""
     solution = solved(problem(goal=START - 2 * math.pi * np.eye(6)[5]))
-    assert np.abs(solution.trajectory.q[:, 5] - START[5]).max() == pytest.approx(2 * math.pi, rel=1e-6)
+    assert np.abs(solution.trajectory.q[:, 5] - START[5]).max() == pytest.approx(
+        2 * math.pi, rel=1e-6
+    )
     assert solution.energy.electrical.total > 36.7 * 2.0  # two seconds at 3.14 rad/s
 
 
@@ -187,26 +232,36 @@ def test_the_branch_asked_for_is_taken() -> None:
     ):
         solution = solved(problem(start=tcp_pose(START), goal=tcp_pose(GOAL), branch=wanted))
         for label in (solution.start.label, solution.goal.label):
-            parts = zip(label.split("/"), (wanted.shoulder, wanted.elbow, wanted.wrist), strict=True)
+            parts = zip(
+                label.split("/"), (wanted.shoulder, wanted.elbow, wanted.wrist), strict=True
+            )
             assert all(asked in (None, part) for part, asked in parts)
         assert solution.energy.electrical.total >= best.energy.electrical.total * (1 - CONVERGED)
 
 
 def test_pose_and_joints_agree() -> None:
-    """A pose's answer is that of the joints it chose; joints that were given are never beaten by fewer choices."""
+    """A pose's answer is that of the joints it chose; joints that were given are never beaten by
+    fewer choices.
+    """
     by_pose = solved(problem(goal=tcp_pose(GOAL), payload=PAYLOAD))
     by_joints = solved(problem(goal=by_pose.goal.q, payload=PAYLOAD))
-    assert by_pose.energy.electrical.total == pytest.approx(by_joints.energy.electrical.total, rel=CONVERGED)
+    assert by_pose.energy.electrical.total == pytest.approx(
+        by_joints.energy.electrical.total, rel=CONVERGED
+    )
     direct = solved(problem(payload=PAYLOAD))
     assert by_pose.energy.electrical.total <= direct.energy.electrical.total * (1 + CONVERGED)
 
 
 def test_a_tool_moves_the_goal_but_not_the_motion() -> None:
-    """A pose of the tool's tip, tool told, is the same request as the flange's pose without a tool."""
+    """A pose of the tool's tip, tool told, is the same request as the flange's pose without a
+    tool."""
     tool = pin.SE3(pin.rpy.rpyToMatrix(0.4, -0.2, 1.0), np.array([0.05, 0.0, 0.15])).homogeneous
     bare = solved(problem(goal=tcp_pose(GOAL)))
     tipped = solved(problem(goal=tcp_pose(GOAL, tool), T_flange_tcp=tool))
-    assert tipped.goal.q == pytest.approx(bare.goal.q, abs=1e-7) and tipped.goal.label == bare.goal.label
+    assert (
+        tipped.goal.q == pytest.approx(bare.goal.q, abs=1e-7)
+        and tipped.goal.label == bare.goal.label
+    )
     assert tipped.energy.electrical.total == pytest.approx(bare.energy.electrical.total, rel=1e-6)
     turned = pin.SE3(pin.rpy.rpyToMatrix(0.1, 0.2, 0.3), np.zeros(3)).homogeneous
     elsewhere = solved(problem(goal=tcp_pose(GOAL), T_flange_tcp=turned))
@@ -215,7 +270,9 @@ def test_a_tool_moves_the_goal_but_not_the_motion() -> None:
 
 @pytest.mark.parametrize("number", range(1, 16))
 def test_the_papers_poses_are_answered(number: int) -> None:
-    """From its home to each pose of its Table 1: all are within reach, and each answer reaches the pose."""
+    """From its home to each pose of its Table 1: all are within reach, and each answer reaches the
+    pose.
+    """
     task = problem(HOME, paper_poses()[number - 1])
     try:
         solution = solved(task)

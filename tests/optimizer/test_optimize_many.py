@@ -23,7 +23,9 @@ def test_processes_give_what_one_call_gives() -> None:
     assert sorted(found) == [0, 1, 2, 3]
     for index, move in enumerate(MOVES):
         own = optimize(move)
-        assert found[index].result().energy.electrical.total == own.energy.electrical.total, "to the last bit"
+        assert found[index].result().energy.electrical.total == own.energy.electrical.total, (
+            "to the last bit"
+        )
     with pytest.raises(DurationTooShort) as refusal:
         found[3].result()
     assert refusal.value.shortest > 0.01, "the error keeps its data"

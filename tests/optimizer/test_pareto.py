@@ -1,4 +1,6 @@
-"""The front of energy over duration: not beaten by fresh answers, by itself, or by what lies between its points."""
+"""The front of energy over duration: not beaten by fresh answers, by itself, or by what lies
+between its points.
+"""
 
 from __future__ import annotations
 
@@ -30,13 +32,16 @@ from tests.selection import long_but
 
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 
-# both are local optima, found from several guesses: of neighbouring durations' answers, about 2e-4 is scatter
+# both are local optima, found from several guesses: of neighbouring durations' answers, about 2e-4
+# is scatter
 LOCAL = 1e-3
-# of the least duration: two runs stop at the same motion or at one that differs by the solver's tolerance
+# of the least duration: two runs stop at the same motion or at one that differs by the solver's
+# tolerance
 SAME = 1e-6
 # of the same search, run twice
 ROUNDING = 1e-12
-# of the energy: what a jump lowers it to at most; of the duration: how near it is looked at from below
+# of the energy: what a jump lowers it to at most; of the duration: how near it is looked at from
+# below
 JUMP, NEAR = 0.9, 2e-3
 POINTS = 6
 
@@ -51,7 +56,9 @@ def straight_line() -> Problem:
 
 
 def jumping() -> Problem:
-    """Pose 1 of the founding paper: the fastest candidate needs half as much again as a slightly slower one."""
+    """Pose 1 of the founding paper: the fastest candidate needs half as much again as a slightly
+    slower one.
+    """
     T = np.eye(4)
     T[:3, :3] = Rotation.from_euler("xyz", [-3.14, 0.001432, -1.5704]).as_matrix()
     T[:3, 3] = [-0.7, -0.0124, 0.1]
@@ -90,11 +97,16 @@ def test_dropped_ones_are_beaten_or_not_found(asked_and_found: tuple[Problem, Fr
     for each in front.dropped:
         assert each.reason
         if "same least energy" in each.reason:
-            # what `optimize` answers is the last point, also where another duration's solve stops a little below
+            # what `optimize` answers is the last point, also where another duration's solve stops a
+            # little below
             least = objective(asked, front.points[-1])
             assert each.energy is not None and least * (1 - CONVERGED) <= each.energy <= least
         elif each.energy is not None:
-            better = [p for p in front.points if p.duration <= each.duration and objective(asked, p) <= each.energy]
+            better = [
+                p
+                for p in front.points
+                if p.duration <= each.duration and objective(asked, p) <= each.energy
+            ]
             assert better
 
 
@@ -105,7 +117,9 @@ def test_every_point_is_certified(asked_and_found: tuple[Problem, Front]) -> Non
         assert 0 < point.lower_bound <= objective(asked, point)
 
 
-def test_every_point_is_at_least_as_good_as_a_fresh_answer(asked_and_found: tuple[Problem, Front]) -> None:
+def test_every_point_is_at_least_as_good_as_a_fresh_answer(
+    asked_and_found: tuple[Problem, Front],
+) -> None:
     asked, front = asked_and_found
     for point in front.points:
         try:
@@ -115,7 +129,9 @@ def test_every_point_is_at_least_as_good_as_a_fresh_answer(asked_and_found: tupl
         assert objective(asked, point) <= objective(asked, fresh) * (1 + LOCAL)
 
 
-def test_begins_with_the_shortest_and_ends_with_the_cheapest(asked_and_found: tuple[Problem, Front]) -> None:
+def test_begins_with_the_shortest_and_ends_with_the_cheapest(
+    asked_and_found: tuple[Problem, Front],
+) -> None:
     asked, front = asked_and_found
     assert front.points[0].duration == pytest.approx(front.shortest, rel=SAME)
     with pytest.raises(DurationTooShort) as refused:
@@ -124,7 +140,9 @@ def test_begins_with_the_shortest_and_ends_with_the_cheapest(asked_and_found: tu
     assert objective(asked, front.points[-1]) <= objective(asked, optimize(asked)) * (1 + LOCAL)
 
 
-def test_what_lies_between_passes_within_the_rectangles(asked_and_found: tuple[Problem, Front]) -> None:
+def test_what_lies_between_passes_within_the_rectangles(
+    asked_and_found: tuple[Problem, Front],
+) -> None:
     """The premise of the spacing, asked of motions that the front does not know."""
     asked, front = asked_and_found
     for left, right in list(pairwise(front.points))[:3]:
@@ -136,9 +154,13 @@ def test_ends_at_the_longest_duration_where_that_costs_least() -> None:
     """Mechanical work has no idle power: the smoothed cost must not end it early."""
     asked = replace(mechanical(), method="time_scaling")
     longest = optimize(replace(asked, **fixed(3.0)))
-    assert objective(asked, longest) < 0.97 * objective(asked, optimize(replace(asked, **fixed(1.65))))
+    assert objective(asked, longest) < 0.97 * objective(
+        asked, optimize(replace(asked, **fixed(1.65)))
+    )
     assert objective(asked, optimize(asked)) <= objective(asked, longest) * (1 + LOCAL)
-    assert objective(asked, pareto(asked, 3, still).points[-1]) <= objective(asked, longest) * (1 + LOCAL)
+    assert objective(asked, pareto(asked, 3, still).points[-1]) <= objective(asked, longest) * (
+        1 + LOCAL
+    )
 
 
 @pytest.mark.long
@@ -167,19 +189,24 @@ def test_no_front_where_every_motion_takes_longer() -> None:
 
 
 # between these the minimum-time solve finds no motion, though there are some
-HARD = problem(np.array([0, -1.57, 1.57, -1.57, -1.57, 0]), np.array([1.2, -0.9, 1.3, -1.9, -1.57, 0.4]))
+HARD = problem(
+    np.array([0, -1.57, 1.57, -1.57, -1.57, 0]), np.array([1.2, -0.9, 1.3, -1.9, -1.57, 0.4])
+)
 
 
 @pytest.mark.parametrize(
     "given",
     [
         {"limits": limits(tau_max=[45, 45, 45, 20, 20, 20])},
-        pytest.param({"payload": Payload(mass=5.0, com=np.array([0.0, 0.0, 2.8]))}, marks=pytest.mark.long),
+        pytest.param(
+            {"payload": Payload(mass=5.0, com=np.array([0.0, 0.0, 2.8]))}, marks=pytest.mark.long
+        ),
     ],
     ids=["weak", "far"],
 )
 def test_a_front_where_the_fastest_motion_is_not_found_at_once(given: dict[str, Any]) -> None:
-    """Where there is an answer there is a front, and it ends with a motion as good as the answer."""
+    """Where there is an answer there is a front, and it ends with a motion as good as the
+    answer."""
     asked = changed(HARD, **given)
     front = pareto(asked, 2, still)
     assert all(point.certificate.valid for point in front.points)
@@ -205,7 +232,9 @@ def seeded(seed: int) -> dict[str, Problem]:
     rng = np.random.default_rng(seed)
     q_start, q_goal = HOME + rng.uniform(-0.8, 0.8, (2, 6))
     weak = limits(tau_max=[60.0, 60.0, 60.0, 20.0, 20.0, 20.0])
-    free = ConeOrientedPose(tcp_pose(q_goal).T[:3, 3], np.array([0.0, 0, 1]), np.array([0.0, 0, -1]), np.pi)
+    free = ConeOrientedPose(
+        tcp_pose(q_goal).T[:3, 3], np.array([0.0, 0, 1]), np.array([0.0, 0, -1]), np.pi
+    )
     return {
         "joints": problem(q_start, q_goal),
         "pose": problem(q_start, tcp_pose(q_goal)),
@@ -231,7 +260,9 @@ SEEDED = [
 
 @pytest.mark.parametrize(("seed", "kind"), SEEDED)
 def test_the_front_ends_where_optimize_ends(seed: int, kind: str) -> None:
-    """Neither is better than the other: the last point is what `optimize` answers, and no other point needs less."""
+    """Neither is better than the other: the last point is what `optimize` answers, and no other
+    point needs less.
+    """
     asked = seeded(seed)[kind]
     alone, front = optimize(asked, still), pareto(asked, 4, still)
     least = front.points[-1]
@@ -258,11 +289,21 @@ def test_moves_that_had_no_front_or_a_better_one(extra: dict[str, Any]) -> None:
 
 
 def test_a_front_whose_deadline_ended_a_search_is_not_optimal() -> None:
-    """Also where the answer that this search still found is dominated by another one, which was solved to its end."""
-    asked = problem(HOME, HOME + np.array([0.3, 0.17, -0.17, 0.07, 0.0, 0.2]), objective="mechanical", duration_max=9.0)
+    """Also where the answer that this search still found is dominated by another one, which was
+    solved to its end.
+    """
+    asked = problem(
+        HOME,
+        HOME + np.array([0.3, 0.17, -0.17, 0.07, 0.0, 0.2]),
+        objective="mechanical",
+        duration_max=9.0,
+    )
     for readings in range(130, 180, 5):
         with suppress(DeadlineExceeded):
-            assert pareto(replace(asked, deadline=float(readings)), 100, CountingClock()).status == "feasible"
+            assert (
+                pareto(replace(asked, deadline=float(readings)), 100, CountingClock()).status
+                == "feasible"
+            )
 
 
 @pytest.mark.long
@@ -278,7 +319,9 @@ def test_a_front_whose_fastest_motion_was_cut_short_is_not_optimal() -> None:
 
 @pytest.mark.parametrize("readings", [3, 10, 100, 400])
 def test_a_deadline_gives_what_was_found(readings: int) -> None:
-    """By a clock that moves on with each reading: the front comes a few readings after the deadline, or none at all."""
+    """By a clock that moves on with each reading: the front comes a few readings after the
+    deadline, or none at all.
+    """
     clock = CountingClock()
     try:
         front = pareto(replace(mechanical(), deadline=float(readings)), 50, clock)
@@ -291,7 +334,9 @@ def test_a_deadline_gives_what_was_found(readings: int) -> None:
     assert front.solver.wall_time < readings + LAST_READINGS
 
 
-def test_a_front_without_its_end_of_least_energy_is_not_optimal(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_front_without_its_end_of_least_energy_is_not_optimal(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """That search ends at its share of the deadline while the front has time left."""
     solution = Run.solution
 

@@ -1,4 +1,6 @@
-"""A tool within a cone, and speeds of TCP and elbow: held by the real optimiser, dearer as they tighten."""
+"""A tool within a cone, and speeds of TCP and elbow: held by the real optimiser, dearer as they
+tighten.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,10 @@ from tests.optimizer.moves import problem_with
 from tests.selection import long_but
 
 # the tool points straight down at both ends, 12 cm from the flange
-START, GOAL = np.array([-0.77, -1.52, 1.82, -1.87, -1.57, -2.34]), np.array([0.66, -1.4, 0.75, -0.92, -1.57, -0.91])
+START, GOAL = (
+    np.array([-0.77, -1.52, 1.82, -1.87, -1.57, -2.34]),
+    np.array([0.66, -1.4, 0.75, -0.92, -1.57, -0.91]),
+)
 T_FLANGE_TCP = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.12])).homogeneous
 # of a share of a limit, between samples a tenth of the certificate's own
 TOLERANCE = 1e-6
@@ -39,7 +44,8 @@ def electrical(solution: Solution) -> float:
 
 
 def replayed(solution: Solution) -> tuple[Array, Array, Array]:
-    """Tilt of the tool [rad], speed of the TCP and of the elbow's housing [m/s] on a 0.1 ms grid."""
+    """Tilt of the tool [rad], speed of the TCP and of the elbow's housing [m/s] on a 0.1 ms
+    grid."""
     spline = solution.trajectory.spline
     q, v, _ = sample(spline, np.linspace(0, spline.duration, int(spline.duration * 1e4) + 1))
     problem = problem_with(start=START, goal=GOAL)
@@ -50,12 +56,20 @@ def replayed(solution: Solution) -> tuple[Array, Array, Array]:
     for q_k, v_k in zip(q, v, strict=True):
         pin.forwardKinematics(model, data, q_k, v_k)
         T = pin.updateFramePlacement(model, data, flange)
-        tilt.append(np.arctan2(np.linalg.norm(np.cross(T.rotation[:, 2], DOWN)), T.rotation[:, 2] @ DOWN))
+        tilt.append(
+            np.arctan2(np.linalg.norm(np.cross(T.rotation[:, 2], DOWN)), T.rotation[:, 2] @ DOWN)
+        )
         at_flange = pin.getFrameVelocity(model, data, flange, pin.LOCAL_WORLD_ALIGNED)
-        tcp.append(np.linalg.norm(at_flange.linear + np.cross(at_flange.angular, T.rotation @ T_FLANGE_TCP[:3, 3])))
+        tcp.append(
+            np.linalg.norm(
+                at_flange.linear + np.cross(at_flange.angular, T.rotation @ T_FLANGE_TCP[:3, 3])
+            )
+        )
         # the upper arm's own velocity, in its own axes
         motion = data.v[elbow.link]
-        housing.append(np.linalg.norm(motion.linear + np.cross(motion.angular, elbow.axis), axis=1).max())
+        housing.append(
+            np.linalg.norm(motion.linear + np.cross(motion.angular, elbow.axis), axis=1).max()
+        )
     return np.array(tilt), np.array(tcp), np.array(housing)
 
 
@@ -64,7 +78,9 @@ def test_the_tool_stays_within_the_cone(half_angle: float) -> None:
     solution = solved(half_angle)
     tilt, _, _ = replayed(solution)
     assert tilt.max() <= half_angle * (1 + TOLERANCE)
-    assert solution.certificate.worst_ratio["tool_cone"] == pytest.approx(tilt.max() / half_angle, rel=1e-4)
+    assert solution.certificate.worst_ratio["tool_cone"] == pytest.approx(
+        tilt.max() / half_angle, rel=1e-4
+    )
     assert tilt.max() > 0.98 * half_angle, "the limit is made use of"
 
 
@@ -85,10 +101,17 @@ def test_tighter_limits_cost_more() -> None:
     cones = [electrical(solved(half_angle)) for half_angle in (0.1, 0.02, 0.005)]
     speeds = [electrical(solved(tcp_speed=limit)) for limit in (1.0, 0.5, 0.25)]
     for energies in (cones, speeds):
-        assert all(later >= earlier * (1 - SOLVER) for earlier, later in zip([free, *energies], energies, strict=False))
+        assert all(
+            later >= earlier * (1 - SOLVER)
+            for earlier, later in zip([free, *energies], energies, strict=False)
+        )
     assert speeds[-1] > 1.2 * free
 
 
 def test_loose_limits_cost_nothing() -> None:
-    assert electrical(solved(3.0, tcp_speed=20.0, elbow_speed=20.0)) == pytest.approx(electrical(solved()), rel=SOLVER)
-    assert solved().certificate.worst_ratio.keys() & {"tool_cone", "tcp_speed", "elbow_speed"} == set()
+    assert electrical(solved(3.0, tcp_speed=20.0, elbow_speed=20.0)) == pytest.approx(
+        electrical(solved()), rel=SOLVER
+    )
+    assert (
+        solved().certificate.worst_ratio.keys() & {"tool_cone", "tcp_speed", "elbow_speed"} == set()
+    )

@@ -1,4 +1,6 @@
-"""What a search tells while it runs: it changes nothing, goes forward only, and ends with the answer."""
+"""What a search tells while it runs: it changes nothing, goes forward only, and ends with the
+answer.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,14 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.pareto import pareto
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Event, Improved, forward, nobody
+from joulepath.optimizer.progress import (
+    CandidatesFound,
+    CandidateTried,
+    Event,
+    Improved,
+    forward,
+    nobody,
+)
 from joulepath.optimizer.search.candidates import Reason
 from tests.optimizer.cycle.cycles import pick_and_place
 from tests.optimizer.moves import GOAL, HOME, problem, tcp_pose
@@ -37,7 +46,9 @@ def goes_forward(events: list[Event]) -> list[Improved]:
         bounds = [-np.inf if each.bound is None else each.bound for each in (before, after)]
         assert after.energy <= before.energy and bounds[0] <= bounds[1]
         assert after.energy < before.energy or bounds[0] < bounds[1]
-    assert all(pickle.loads(pickle.dumps(each)) is not None for each in events), "they go through a pipe"
+    assert all(pickle.loads(pickle.dumps(each)) is not None for each in events), (
+        "they go through a pipe"
+    )
     return best
 
 
@@ -46,20 +57,26 @@ def test_a_search_ends_with_its_answer(bound: str) -> None:
     events: list[Event] = []
     answer = optimize(asked(bound), tell=events.append)
     unheard = optimize(asked(bound))
-    assert (answer.trajectory.q == unheard.trajectory.q).all() and answer.lower_bound == unheard.lower_bound
+    assert (
+        answer.trajectory.q == unheard.trajectory.q
+    ).all() and answer.lower_bound == unheard.lower_bound
     last = goes_forward(events)[-1]
     assert (last.energy, last.duration) == (answer.energy.electrical.total, answer.duration)
     assert last.bound == answer.lower_bound
     assert last.q_goal is not None and (last.q_goal == answer.goal.q).all()
     assert events[0] == CandidatesFound(len(answer.candidates))
     told = {each.index: each for each in events if isinstance(each, CandidateTried)}
-    assert set(told) == {k for k, each in enumerate(answer.candidates) if each.reason != Reason.BOUND.value}
+    assert set(told) == {
+        k for k, each in enumerate(answer.candidates) if each.reason != Reason.BOUND.value
+    }
     for index, each in told.items():
         assert each.status == answer.candidates[index].status.value
 
 
 def test_no_bound_is_told_that_is_not_proven() -> None:
-    """Of an orientation that is free about an axis, only samples are solved: the bound comes at the end."""
+    """Of an orientation that is free about an axis, only samples are solved: the bound comes at the
+    end.
+    """
     events: list[Event] = []
     start, goal = np.radians([0, -80, 90, -90, -85, 0]), np.radians([30, -70, 80, -90, -85, 10])
     answer = optimize(problem(start, tcp_pose(goal), method="time_scaling"), tell=events.append)
@@ -72,7 +89,9 @@ def test_a_cycle_ends_with_its_answer() -> None:
     found = plan_cycle(pick_and_place(1, 2, method="time_scaling"), tell=events.append)
     last = goes_forward(events)[-1]
     assert last.energy == pytest.approx(sum(each.energy for each in found.moves), rel=SAME)
-    assert last.duration == pytest.approx(found.duration, rel=SAME) and last.bound == found.lower_bound
+    assert (
+        last.duration == pytest.approx(found.duration, rel=SAME) and last.bound == found.lower_bound
+    )
 
 
 def test_a_cycle_of_another_time_tells_none_of_its_own() -> None:
@@ -81,7 +100,9 @@ def test_a_cycle_of_another_time_tells_none_of_its_own() -> None:
     events: list[Event] = []
     asked = pick_and_place(1, 2, method="time_scaling", duration_min=longer, duration_max=longer)
     found = plan_cycle(asked, tell=events.append)
-    assert [each.energy for each in goes_forward(events)] == [pytest.approx(sum(each.energy for each in found.moves))]
+    assert [each.energy for each in goes_forward(events)] == [
+        pytest.approx(sum(each.energy for each in found.moves))
+    ]
 
 
 def test_a_front_tells_its_durations() -> None:
@@ -109,7 +130,9 @@ def test_what_is_no_news_is_not_passed_on() -> None:
     assert list(map(repr, events)) == list(map(repr, news))
     tell(Improved(8.5, bound=3.0))
     assert isinstance(events[-1], Improved)
-    assert (events[-1].energy, events[-1].bound) == (8.0, 3.0), "a bound on a worse motion holds for the best one"
+    assert (events[-1].energy, events[-1].bound) == (8.0, 3.0), (
+        "a bound on a worse motion holds for the best one"
+    )
     tell(Improved(7.0))
     assert isinstance(events[-1], Improved)
     assert (events[-1].energy, events[-1].bound) == (7.0, 3.0)

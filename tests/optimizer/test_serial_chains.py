@@ -1,4 +1,6 @@
-"""Targets in joint positions, of serial chains of any number of revolute joints, by no inverse kinematics."""
+"""Targets in joint positions, of serial chains of any number of revolute joints, by no inverse
+kinematics.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,8 @@ from tests.selection import long_but
 
 JOINTS = (2, 3, 5, 8)
 OBJECTIVES: dict[str, dict[str, Any]] = {"electrical": {}, "mechanical": {"duration_max": 1.5}}
-# relative, of the energy: a sum over this many equal steps, of powers that have corners where they change sign
+# relative, of the energy: a sum over this many equal steps, of powers that have corners where they
+# change sign
 STEPS, SUMMED = 20001, 1e-3
 # relative, of a limit: the certificate's own tolerance
 HELD = 1e-6
@@ -41,7 +44,9 @@ HELD = 1e-6
 
 @pytest.fixture(scope="module", autouse=True)
 def _no_compiler() -> Iterator[None]:
-    """Compiling the kernels would take minutes, and the virtual machine solves each of these in a second."""
+    """Compiling the kernels would take minutes, and the virtual machine solves each of these in a
+    second.
+    """
     with pytest.MonkeyPatch.context() as patched:
         patched.setenv("PATH", "")
         yield
@@ -54,28 +59,44 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 
 def problem(robot: Robot, objective: str = "electrical", **given: Any) -> Problem:
     start, goal = move(robot.nq)
-    asked = {"start": start, "goal": goal, "deadline": 120.0, "objective": objective} | OBJECTIVES[objective] | given
+    asked = (
+        {"start": start, "goal": goal, "deadline": 120.0, "objective": objective}
+        | OBJECTIVES[objective]
+        | given
+    )
     return Problem(arm=Arm(robot=robot, payload=Payload(mass=0.5)), **asked)
 
 
 def replayed(asked: Problem, solution: Solution) -> tuple[float, dict[str, Array]]:
-    """The objective's energy [J] and the peaks of speed, acceleration and torque, by Pinocchio and SciPy alone."""
+    """The objective's energy [J] and the peaks of speed, acceleration and torque, by Pinocchio and
+    SciPy alone.
+    """
     arm, spline = asked.arm, solution.trajectory.spline
-    model = arm.robot.loaded_model(arm.payload.mass, arm.payload.com, arm.payload.inertia, arm.gravity)
+    model = arm.robot.loaded_model(
+        arm.payload.mass, arm.payload.com, arm.payload.inertia, arm.gravity
+    )
     data = model.createData()
     t = np.linspace(0.0, spline.duration, STEPS)
     curve = BSpline(spline.knots, spline.control_points, spline.degree)
     q, v, a = curve(t), curve(t, 1), curve(t, 2)
     tau = np.array([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)])
     tau_motor = tau + arm.friction_law.torque(v)
-    peaks = {"v_max": np.abs(v).max(axis=0), "a_max": np.abs(a).max(axis=0), "tau_max": np.abs(tau_motor).max(axis=0)}
+    peaks = {
+        "v_max": np.abs(v).max(axis=0),
+        "a_max": np.abs(a).max(axis=0),
+        "tau_max": np.abs(tau_motor).max(axis=0),
+    }
     if asked.objective == "mechanical":
         return float(np.trapezoid(np.abs(tau * v).sum(axis=1), t)), peaks
     drives, electronics = arm.drives, arm.robot.electronics
     i = np.abs(tau_motor / drives.torque_constant)
-    joints = tau_motor * v + drives.copper * i**2 + drives.inverter_constant + drives.inverter_linear * i
+    joints = (
+        tau_motor * v + drives.copper * i**2 + drives.inverter_constant + drives.inverter_linear * i
+    )
     net = electronics.idle_power + electronics.controller_power + joints.sum(axis=1)
-    return float(np.trapezoid(np.maximum(net, 0) - electronics.regeneration * np.maximum(-net, 0), t)), peaks
+    return float(
+        np.trapezoid(np.maximum(net, 0) - electronics.regeneration * np.maximum(-net, 0), t)
+    ), peaks
 
 
 @pytest.mark.parametrize("objective", long_but(["electrical"], OBJECTIVES))
@@ -119,7 +140,8 @@ def test_without_capsules_there_is_nothing_to_collide() -> None:
 
 def test_links_keep_clear_of_each_other(robot: Robot) -> None:
     clearance = optimize(problem(robot)).certificate.clearance
-    # links next to each other are not compared: of two joints, only the base and the last link are left
+    # links next to each other are not compared: of two joints, only the base and the last link are
+    # left
     assert clearance is not None and clearance.min_clearance >= 0
 
 
@@ -128,13 +150,17 @@ POSE, FREE = Pose(np.eye(4)), ConeOrientedPose([0.3, 0.1, 0.4])
 
 @pytest.mark.parametrize(("end", "target"), [("start", POSE), ("goal", POSE), ("goal", FREE)])
 @pytest.mark.parametrize("several", [False, True])
-def test_a_pose_needs_inverse_kinematics(robot: Robot, end: str, target: Any, several: bool) -> None:
+def test_a_pose_needs_inverse_kinematics(
+    robot: Robot, end: str, target: Any, several: bool
+) -> None:
     with pytest.raises(InvalidProblem, match="give joint positions") as refusal:
         optimize(problem(robot, **{end: AnyOf((move(robot.nq)[0], target)) if several else target}))
     assert refusal.value.field == end
 
 
-@pytest.mark.parametrize("method", long_but([each for each in METHODS if each != "polynomial_ga"], METHODS))
+@pytest.mark.parametrize(
+    "method", long_but([each for each in METHODS if each != "polynomial_ga"], METHODS)
+)
 def test_every_method(method: MethodName) -> None:
     solution = optimize(problem(serial_chain(3), method=method))
     assert solution.certificate.valid and solution.lower_bound <= solution.energy.electrical.total

@@ -1,4 +1,6 @@
-"""Surroundings: clearance of motions, constrained pairs and planned paths of an arm among obstacles."""
+"""Surroundings: clearance of motions, constrained pairs and planned paths of an arm among
+obstacles.
+"""
 
 from __future__ import annotations
 
@@ -60,7 +62,8 @@ def test_a_motion_that_passes_closely_needs_its_proof() -> None:
     assert proof is not None and 0 < proof.min_clearance < proof.sampled
     assert near.worst_violation(MOTION) is None
     (post,) = near.arm.scene.obstacles
-    # the proof ends when its bound is at most GAP below the least sample: here that leaves it below zero
+    # the proof ends when its bound is at most GAP below the least sample: here that leaves it below
+    # zero
     margin = post.margin + proof.sampled - GAP / 4
     closer = Surroundings(replace(near.arm, scene=Scene([replace(post, margin=margin)])))
     assert closer.is_collision_free(sample(MOTION, np.linspace(0, 1, 500))[0])
@@ -83,7 +86,11 @@ def test_active_pairs_are_those_that_come_near() -> None:
     q = sample(MOTION, np.linspace(0, 1, 500))[0]
     least = surroundings.model.signed_distances(q)[0].min(axis=0)
     # between two of the samples a joint at 1.9 rad/s moves a point 1 m away by less than 2 cm
-    assert set(np.flatnonzero(least < ACTIVE - 0.02)) <= set(active.tolist()) <= set(np.flatnonzero(least < ACTIVE))
+    assert (
+        set(np.flatnonzero(least < ACTIVE - 0.02))
+        <= set(active.tolist())
+        <= set(np.flatnonzero(least < ACTIVE))
+    )
     constraints = surroundings.with_clearance(active)
     assert len(constraints.names) == len(active)
 
@@ -117,7 +124,9 @@ def test_paths_are_planned_once() -> None:
 
 def test_a_planning_that_the_deadline_ended_is_not_kept() -> None:
     surroundings = behind_a_wall()
-    assert surroundings.planned_paths(START, GOAL, Deadline.after(-1.0)).end is PlanningEnd.CUT_SHORT
+    assert (
+        surroundings.planned_paths(START, GOAL, Deadline.after(-1.0)).end is PlanningEnd.CUT_SHORT
+    )
     assert surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE)).paths
 
 
@@ -125,18 +134,24 @@ def test_a_planning_that_ran_out_of_states_is_kept_until_more_are_allowed() -> N
     surroundings, few = behind_a_wall(), 1
     first = surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE), effort=Effort(few))
     assert first.end is PlanningEnd.EXHAUSTED and not first.paths
-    assert surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE), effort=Effort(few)) is first
+    assert (
+        surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE), effort=Effort(few)) is first
+    )
     assert surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE)).paths
 
 
 def test_a_path_to_another_goal_is_kept_for_that_goal() -> None:
     """The first goal is within the wall."""
     surroundings = behind_a_wall()
-    within = next(q for q in np.linspace(START, GOAL, 50) if not surroundings.is_collision_free(q[None]))
+    within = next(
+        q for q in np.linspace(START, GOAL, 50) if not surroundings.is_collision_free(q[None])
+    )
     planned = surroundings.planned_paths(START, within, Deadline.after(AMPLE), [GOAL])
     assert planned.paths and not planned.leading_to(within)
     assert all((path[-1] == GOAL).all() for path in planned.paths)
-    assert surroundings.has_planned_paths(START, GOAL) and not surroundings.has_planned_paths(START, within)
+    assert surroundings.has_planned_paths(START, GOAL) and not surroundings.has_planned_paths(
+        START, within
+    )
 
 
 def test_a_planning_stands_for_all_goals_that_differ_by_full_turns() -> None:
@@ -144,10 +159,17 @@ def test_a_planning_stands_for_all_goals_that_differ_by_full_turns() -> None:
     surroundings, few = behind_a_wall(), 1
     turned = GOAL + 2 * np.pi * np.eye(6)[4]
     first = surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE), effort=Effort(few))
-    assert surroundings.seems_enclosed(START, turned) and not surroundings.has_planned_paths(START, turned)
-    assert surroundings.planned_paths(START, turned, Deadline.after(AMPLE), effort=Effort(few)) is first
+    assert surroundings.seems_enclosed(START, turned) and not surroundings.has_planned_paths(
+        START, turned
+    )
+    assert (
+        surroundings.planned_paths(START, turned, Deadline.after(AMPLE), effort=Effort(few))
+        is first
+    )
     found = surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE))
     assert found.paths and not surroundings.seems_enclosed(START, turned)
     (path,) = surroundings.planned_paths(START, turned, Deadline.after(AMPLE)).paths
     np.testing.assert_array_equal(path[[0, -1]], [START, turned])
-    assert surroundings.has_planned_paths(START, turned) and not surroundings.seems_enclosed(GOAL, START)
+    assert surroundings.has_planned_paths(START, turned) and not surroundings.seems_enclosed(
+        GOAL, START
+    )

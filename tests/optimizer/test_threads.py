@@ -1,4 +1,5 @@
-"""Any number of threads of one process: every result is, bit for bit, what one thread alone gives."""
+"""Any number of threads of one process: every result is, bit for bit, what one thread alone
+gives."""
 
 from __future__ import annotations
 
@@ -43,13 +44,17 @@ PATIENCE = 1200.0
 
 @pytest.fixture(autouse=True)
 def _several_blas_threads() -> Iterator[None]:
-    """As in a program that leaves linear algebra as it is: results must not depend on its threads either."""
+    """As in a program that leaves linear algebra as it is: results must not depend on its threads
+    either.
+    """
     with threadpool_limits(limits=4, user_api="blas"):
         yield
 
 
 def in_threads(shares: Sequence[Sequence[Work]]) -> list[dict[str, object]]:
-    """The fingerprint of every result by the work's name, for threads that each do their share at the same time."""
+    """The fingerprint of every result by the work's name, for threads that each do their share at
+    the same time.
+    """
     found: list[dict[str, object]] = [{} for _ in shares]
     errors: list[BaseException] = []
     ready = threading.Barrier(len(shares))
@@ -62,7 +67,10 @@ def in_threads(shares: Sequence[Sequence[Work]]) -> list[dict[str, object]]:
         except BaseException as error:
             errors.append(error)
 
-    threads = [threading.Thread(target=work, args=each, daemon=True) for each in zip(found, shares, strict=True)]
+    threads = [
+        threading.Thread(target=work, args=each, daemon=True)
+        for each in zip(found, shares, strict=True)
+    ]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -87,7 +95,9 @@ def shuffled(works: Sequence[Work], seed: int) -> list[Work]:
 
 @pytest.mark.timeout(2 * PATIENCE)
 def test_eight_threads_give_what_one_gives(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every thread does the same quick work; the rest goes round. Two threads plan paths at the same time."""
+    """Every thread does the same quick work; the rest goes round. Two threads plan paths at the
+    same time.
+    """
     monkeypatch.setattr(polynomial_ga, "GENERATIONS", FEW_GENERATIONS)
     works = {each.name: each for each in all_work()}
     quick = [works[name] for name in QUICK]
@@ -122,8 +132,11 @@ def test_robots_are_loaded_once_by_threads_that_come_at_once() -> None:
         "from joulepath.models.registry import load_robot\n"
         "together = threading.Barrier(8)\n"
         "with ThreadPoolExecutor(8) as executor:\n"
-        "    loaded = list(executor.map(lambda _: together.wait() < 8 and load_robot('ur5e'), range(8)))\n"
+        "    loaded = list(executor.map(lambda _: together.wait() < 8 and load_robot('ur5e'), "
+        "range(8)))\n"
         "print(len({id(robot) for robot in loaded}))\n"
     )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE)
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE
+    )
     assert (run.returncode, run.stdout.strip(), run.stderr) == (0, "1", "")

@@ -51,14 +51,21 @@ def test_the_tool_is_on_the_line(name: str) -> None:
     found = optimize(along(goal))
     assert found.certificate.valid and found.lower_bound <= found.energy.electrical.total
     T, (T_start, T_goal) = poses_of(found), (tcp_pose(HOME).T, goal.T)
-    shift, turn = T_goal[:3, 3] - T_start[:3, 3], Rotation.from_matrix(T_goal[:3, :3] @ T_start[:3, :3].T).as_rotvec()
+    shift, turn = (
+        T_goal[:3, 3] - T_start[:3, 3],
+        Rotation.from_matrix(T_goal[:3, :3] @ T_start[:3, :3].T).as_rotvec(),
+    )
     share = (T[:, :3, 3] - T_start[:3, 3]) @ shift / (shift @ shift) if shift.any() else None
-    angles = (Rotation.from_matrix(T[:, :3, :3]) * Rotation.from_matrix(T_start[:3, :3]).inv()).as_rotvec()
+    angles = (
+        Rotation.from_matrix(T[:, :3, :3]) * Rotation.from_matrix(T_start[:3, :3]).inv()
+    ).as_rotvec()
     if share is None:
         share = angles @ turn / (turn @ turn)
     off = np.linalg.norm(T[:, :3, 3] - T_start[:3, 3] - share[:, None] * shift, axis=1)
     assert off.max() < ToolPath().position_tolerance
-    assert np.linalg.norm(angles - share[:, None] * turn, axis=1).max() < ToolPath().rotation_tolerance
+    assert (
+        np.linalg.norm(angles - share[:, None] * turn, axis=1).max() < ToolPath().rotation_tolerance
+    )
     assert share[0] == pytest.approx(0.0, abs=1e-6) and share[-1] == pytest.approx(1.0, abs=1e-6)
     assert (np.diff(share) > -1e-6).all()
 
@@ -79,7 +86,10 @@ def test_a_corner_is_rounded_within_its_blend() -> None:
 def test_an_arc_is_part_of_a_circle() -> None:
     """Three quarters of a circle of 80 mm, upright; the tool keeps its orientation."""
     radius, centre = 0.08, tcp_pose(HOME).T[:3, 3] + [0.0, 0.08, 0.0]
-    via, goal = moved([0.0, radius * (1 + np.sqrt(0.5)), radius * np.sqrt(0.5)]), moved([0.0, radius, -radius])
+    via, goal = (
+        moved([0.0, radius * (1 + np.sqrt(0.5)), radius * np.sqrt(0.5)]),
+        moved([0.0, radius, -radius]),
+    )
     found = optimize(along(goal, path=ToolPath(shape="arc", via=[via])))
     assert found.certificate.valid
     T = poses_of(found)
@@ -87,17 +97,26 @@ def test_an_arc_is_part_of_a_circle() -> None:
     assert np.abs(np.linalg.norm(away, axis=1) - radius).max() < ToolPath().position_tolerance
     assert np.abs(away[:, 0]).max() < ToolPath().position_tolerance, "in its plane"
     angle = np.unwrap(np.arctan2(away[:, 2], -away[:, 1]))
-    assert angle[-1] - angle[0] == pytest.approx(1.5 * np.pi, abs=1e-3), "the long way, over the pose between"
+    assert angle[-1] - angle[0] == pytest.approx(1.5 * np.pi, abs=1e-3), (
+        "the long way, over the pose between"
+    )
     assert (np.diff(angle) > -1e-6).all()
 
 
 @pytest.mark.long
 def test_a_recorded_curve_goes_through_every_pose() -> None:
-    """A spiral of one and a half turns that narrows, given by 100 poses, while the tool turns by 0.6 rad."""
+    """A spiral of one and a half turns that narrows, given by 100 poses, while the tool turns by
+    0.6 rad.
+    """
     share = np.linspace(0.0, 1.0, 102)[1:]
     angle, radius = 3 * np.pi * share, 0.1 - 0.05 * share
-    position = np.stack([-0.1 * share, radius * np.sin(angle), 0.1 - radius * np.cos(angle)], axis=1)
-    poses = [moved(x, Rotation.from_rotvec([0.0, 0.0, 0.6 * u])) for x, u in zip(position, share, strict=True)]
+    position = np.stack(
+        [-0.1 * share, radius * np.sin(angle), 0.1 - radius * np.cos(angle)], axis=1
+    )
+    poses = [
+        moved(x, Rotation.from_rotvec([0.0, 0.0, 0.6 * u]))
+        for x, u in zip(position, share, strict=True)
+    ]
     found = optimize(along(poses[-1], path=ToolPath(shape="curve", via=poses[:-1])))
     assert found.certificate.valid
     T = poses_of(found, 20000)
@@ -119,7 +138,9 @@ def test_three_poses_on_a_line_are_no_arc() -> None:
 @pytest.mark.parametrize("corners", long_but([5], [5, 10]))
 def test_many_tight_corners_are_followed(corners: int) -> None:
     """A zigzag of lines of 0.1 m and more, with corners of 5 mm."""
-    turns = [moved([-0.1 * (1 - k % 2), 0.4 * (k + 1) / (corners + 1), 0.0]) for k in range(corners + 1)]
+    turns = [
+        moved([-0.1 * (1 - k % 2), 0.4 * (k + 1) / (corners + 1), 0.0]) for k in range(corners + 1)
+    ]
     found = optimize(along(turns[-1], path=ToolPath(via=turns[:-1], blend=0.005)))
     assert found.certificate.valid and found.certificate.worst_ratio["path_position"] <= 1
     for corner in turns[:-1]:
@@ -146,11 +167,15 @@ CORNERED = ToolPath(via=[moved([0.0, 0.2, 0.0])], blend=0.04, least_speed=0.19, 
 
 def cornered(**given: Any) -> Problem:
     """A line, a rounded corner and a line, on which the TCP is nearly even."""
-    return along(moved([0.0, 0.2, -0.15]), **{"arm": ARM.no_faster_than(0.2), "path": CORNERED} | given)
+    return along(
+        moved([0.0, 0.2, -0.15]), **{"arm": ARM.no_faster_than(0.2), "path": CORNERED} | given
+    )
 
 
 def speeds_of(found: Solution, count: int = 4000) -> tuple[float, float, float]:
-    """Greatest speed [m/s] of the TCP, the least one between the ramps, and that at the start, by its positions."""
+    """Greatest speed [m/s] of the TCP, the least one between the ramps, and that at the start, by
+    its positions.
+    """
     steps = np.linalg.norm(np.diff(poses_of(found, count)[:, :3, 3], axis=0), axis=1)
     speed, gone = steps * (count - 1) / found.trajectory.spline.duration, np.cumsum(steps)
     between = (gone > CORNERED.ramp) & (gone < gone[-1] - CORNERED.ramp)
@@ -160,7 +185,11 @@ def speeds_of(found: Solution, count: int = 4000) -> tuple[float, float, float]:
 def test_the_tool_is_no_slower_than_asked_between_the_ramps() -> None:
     found = optimize(cornered())
     most, least, first = speeds_of(found)
-    assert found.certificate.valid and 0.19 * (1 - 1e-6) < least < most < 0.2 * (1 + 1e-6) and first < 0.02
+    assert (
+        found.certificate.valid
+        and 0.19 * (1 - 1e-6) < least < most < 0.2 * (1 + 1e-6)
+        and first < 0.02
+    )
     (even,) = found.baselines
     assert not even.within_limits and even.reason is not None and "path speed" in even.reason
 
@@ -171,7 +200,9 @@ def test_the_certificate_finds_a_motion_that_is_too_slow() -> None:
     slowest = speeds_of(found)[1]
     for share in (0.9, 1.1):
         asked = replace(free, tool_path=replace(CORNERED, least_speed=share * slowest))
-        certificate = certify(asked, found.trajectory.spline, found.start.q, found.goal.q, found.energy)
+        certificate = certify(
+            asked, found.trajectory.spline, found.start.q, found.goal.q, found.energy
+        )
         assert certificate.worst_ratio["path_speed"] == pytest.approx(share, rel=2e-2)
         assert certificate.valid == (share < 1)
 
@@ -188,12 +219,18 @@ def test_the_gradient_of_the_least_speed_is_that_of_its_slack() -> None:
     prepared = PreparedProblem.of(cornered())
     path = prepared.joint_path(HOME)
     assert path is not None
-    retiming = PathRetiming(prepared, path, duration_intervals(prepared, path.control_points[-1])[0])
+    retiming = PathRetiming(
+        prepared, path, duration_intervals(prepared, path.control_points[-1])[0]
+    )
     x = retiming.variables(np.linspace(0.0, 1.0, 50) ** 1.5, np.linspace(0.0, 2.0, 50))
     program = RetimingProgram(retiming, prepared.arm.active_limits, np.ones(1), x)
     state, step = program.state(x), 1e-6
     differences = np.stack(
-        [(program.state(x + d).slack - program.state(x - d).slack) / (2 * step) for d in step * np.eye(len(x))], axis=1
+        [
+            (program.state(x + d).slack - program.state(x - d).slack) / (2 * step)
+            for d in step * np.eye(len(x))
+        ],
+        axis=1,
     )
     assert np.abs(differences - state.slopes).max() < 1e-5 * np.abs(state.slopes).max()
 
@@ -208,7 +245,9 @@ def test_seven_joints_follow_a_line() -> None:
     start = np.array([0.0, -0.3, 0.1, -2.0, 0.0, 1.8, 0.7])
     goal = pose_of(arm, start).copy()
     goal[:3, 3] += [0.0, 0.2, -0.1]
-    found = optimize(Problem(arm=arm, start=start, goal=Pose(goal), tool_path=ToolPath(), deadline=AMPLE))
+    found = optimize(
+        Problem(arm=arm, start=start, goal=Pose(goal), tool_path=ToolPath(), deadline=AMPLE)
+    )
     assert found.certificate.valid and found.certificate.worst_ratio["path_position"] < 1
 
 
@@ -221,7 +260,9 @@ def test_what_is_out_of_reach_says_how_far_each_branch_gets() -> None:
     assert followed == sorted(followed, reverse=True)
     assert error.length == pytest.approx(1.0)
     # a little less is followed
-    assert optimize(along(moved([0.0, 0.02 - followed[0], 0.0]), moved([0.0, 0.0, 0.0]))).certificate.valid
+    assert optimize(
+        along(moved([0.0, 0.02 - followed[0], 0.0]), moved([0.0, 0.0, 0.0]))
+    ).certificate.valid
 
 
 def test_a_joint_range_in_the_way_is_named() -> None:
@@ -250,7 +291,14 @@ def test_an_obstacle_on_the_line_is_hit() -> None:
         ({"path": ToolPath(least_speed=0.1), "arm": ARM.no_faster_than(0.101)}, "path.speed.min"),
         ({"start": AnyOf((HOME,))}, "start"),
     ],
-    ids=["no way", "a pose twice", "too near for the blend", "all ramps", "no freedom", "several targets"],
+    ids=[
+        "no way",
+        "a pose twice",
+        "too near for the blend",
+        "all ramps",
+        "no freedom",
+        "several targets",
+    ],
 )
 def test_a_path_that_is_none_names_its_field(given: dict[str, Any], field: str) -> None:
     goal = tcp_pose(HOME) if field == "path" else moved([0.0, 0.2, 0.1])
@@ -295,18 +343,25 @@ def test_random_lines_are_followed_or_refused(seed: int) -> None:
     except PathInfeasible:
         return
     assert found.certificate.valid
-    assert found.certificate.worst_ratio["path_position"] <= 1 and found.certificate.worst_ratio["path_rotation"] <= 1
+    assert (
+        found.certificate.worst_ratio["path_position"] <= 1
+        and found.certificate.worst_ratio["path_rotation"] <= 1
+    )
 
 
 def test_work_without_friction_takes_the_longest_time() -> None:
     given = {"objective": "mechanical", "duration_max": 2.0}
-    assert optimize(along(moved([0.0, 0.3, -0.1]), **given)).trajectory.spline.duration == pytest.approx(2.0)
+    assert optimize(
+        along(moved([0.0, 0.3, -0.1]), **given)
+    ).trajectory.spline.duration == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("duration", long_but([60.0], [20.0, 60.0, 300.0]))
 def test_a_slow_motion_keeps_to_the_path(duration: float) -> None:
     """Where time costs next to nothing else, the optimal timing is uneven."""
-    found = optimize(along(moved([0.0, 0.3, -0.1]), duration_min=duration, duration_max=1.2 * duration))
+    found = optimize(
+        along(moved([0.0, 0.3, -0.1]), duration_min=duration, duration_max=1.2 * duration)
+    )
     assert found.certificate.valid and found.certificate.worst_ratio["path_position"] <= 1
 
 

@@ -1,4 +1,6 @@
-"""Paths on which the tool may turn about an axis: what it gains, and what the certificate makes of it."""
+"""Paths on which the tool may turn about an axis: what it gains, and what the certificate makes of
+it.
+"""
 
 from __future__ import annotations
 
@@ -42,8 +44,15 @@ def down(x: float, y: float, z: float) -> Pose:
 def over_the_base(**given: Any) -> Problem:
     """A line over the first axis, where a wrist above the TCP cannot be."""
     path = given.pop("path", ToolPath(about=Z))
-    task = {"arm": ARM, "start": down(0.45, -0.12, 0.25), "goal": down(-0.45, 0.12, 0.25), "tool_path": path}
-    return Problem(**{**task, "branch": BranchFilter("left", "down", "flip"), "deadline": AMPLE} | given)
+    task = {
+        "arm": ARM,
+        "start": down(0.45, -0.12, 0.25),
+        "goal": down(-0.45, 0.12, 0.25),
+        "tool_path": path,
+    }
+    return Problem(
+        **{**task, "branch": BranchFilter("left", "down", "flip"), "deadline": AMPLE} | given
+    )
 
 
 @pytest.fixture(scope="module")
@@ -64,8 +73,14 @@ def test_a_tool_that_may_turn_follows_what_no_other_can(crossed: Solution) -> No
     axis, position = axes_and_positions(crossed, ARM)
     start, way = np.array([0.45, -0.12, 0.25]), np.array([-0.9, 0.24, 0.0])
     share = (position - start) @ way / (way @ way)
-    assert np.linalg.norm(position - start - share[:, None] * way, axis=1).max() < ToolPath().position_tolerance
-    assert np.linalg.norm(axis[:, :2], axis=1).max() < ToolPath().rotation_tolerance and (np.diff(share) > -1e-6).all()
+    assert (
+        np.linalg.norm(position - start - share[:, None] * way, axis=1).max()
+        < ToolPath().position_tolerance
+    )
+    assert (
+        np.linalg.norm(axis[:, :2], axis=1).max() < ToolPath().rotation_tolerance
+        and (np.diff(share) > -1e-6).all()
+    )
     for error in (crossed.certificate.start_error, crossed.certificate.goal_error):
         assert max(error) < 1e-6, "at its ends the tool has its full pose"
 
@@ -75,7 +90,9 @@ def test_the_certificate_allows_turns_about_this_axis_alone(crossed: Solution) -
     for about in (None, Z, (1.0, 0.0, 0.0), (0.02, 0.0, 1.0)):
         asked = over_the_base(path=ToolPath(about=about))
         ends = crossed.start.q, crossed.goal.q
-        ratios[about] = certify(asked, crossed.trajectory.spline, *ends, crossed.energy).worst_ratio["path_rotation"]
+        ratios[about] = certify(
+            asked, crossed.trajectory.spline, *ends, crossed.energy
+        ).worst_ratio["path_rotation"]
     assert ratios.pop(Z) <= 1
     assert all(ratio > 10 for ratio in ratios.values())
 
@@ -123,7 +140,10 @@ def test_a_turning_is_the_shortest_of_all_on_its_sheet() -> None:
     best = sheet.least(cost)
     assert best is not None and best[0] == best[-1] == middle
     turnings = (middle + np.array([0, a - 3, b - 3, c - 3, 0]) for a, b, c in np.ndindex(7, 7, 7))
-    assert total(best) <= min(total(each) for each in turnings if np.abs(np.diff(each)).max() <= 3) + 1e-12
+    assert (
+        total(best)
+        <= min(total(each) for each in turnings if np.abs(np.diff(each)).max() <= 3) + 1e-12
+    )
 
 
 def test_what_no_turning_reaches_says_how_far_it_gets() -> None:

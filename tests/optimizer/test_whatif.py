@@ -42,7 +42,9 @@ def test_what_is_not_changed_is_as_it_was(asked: Problem, base: Solution) -> Non
     assert found.same_motion.electrical == base.energy.electrical
     assert found.reoptimised is not None
     assert found.reoptimised.energy.electrical == base.energy.electrical
-    assert np.array_equal(found.reoptimised.trajectory.spline.control_points, base.trajectory.spline.control_points)
+    assert np.array_equal(
+        found.reoptimised.trajectory.spline.control_points, base.trajectory.spline.control_points
+    )
 
 
 def test_same_motion_is_what_pinocchio_says(asked: Problem, base: Solution) -> None:
@@ -52,17 +54,26 @@ def test_same_motion_is_what_pinocchio_says(asked: Problem, base: Solution) -> N
     assert found.certificate.energy_error < QUADRATURE
     spline = base.trajectory.spline
     # the base's own energy is not that of the loaded arm, and the certificate would say so
-    assert certify(loaded, spline, base.start.q, base.goal.q, base.energy).energy_error > 10 * QUADRATURE
+    assert (
+        certify(loaded, spline, base.start.q, base.goal.q, base.energy).energy_error
+        > 10 * QUADRATURE
+    )
 
 
 @pytest.mark.parametrize("method", ["time_scaling", "uniform_scaling"])
 def test_optimising_anew_never_costs_more(asked: Problem, base: Solution, method: str) -> None:
-    """Also where what is found from the ground up does: these methods' own motions are worse than the base's."""
+    """Also where what is found from the ground up does: these methods' own motions are worse than
+    the base's.
+    """
     worse = replace(asked, method=method)  # type: ignore[arg-type]
     same = PreparedProblem.of(worse).energy(base.trajectory.spline).electrical.total
     assert optimize(worse).energy.electrical.total > same
     found = what_if(base, worse)
-    assert found.certificate.valid and found.reoptimised is not None and found.reoptimised.certificate.valid
+    assert (
+        found.certificate.valid
+        and found.reoptimised is not None
+        and found.reoptimised.certificate.valid
+    )
     assert found.reoptimised.energy.electrical.total <= same
 
 
@@ -95,11 +106,17 @@ def test_no_time_leaves_the_same_motion(asked: Problem, base: Solution) -> None:
 def test_wherever_the_deadline_ends_it_the_same_motion_is_in_hand(
     asked: Problem, base: Solution, readings: int
 ) -> None:
-    """On an arm with a part, the base motion needs less than what time is left for, or there is nothing else."""
-    worse = replace(changed(asked, payload=PAYLOAD), method="uniform_scaling", deadline=float(readings))
+    """On an arm with a part, the base motion needs less than what time is left for, or there is
+    nothing else.
+    """
+    worse = replace(
+        changed(asked, payload=PAYLOAD), method="uniform_scaling", deadline=float(readings)
+    )
     found = what_if(base, worse, CountingClock())
     assert found.certificate.valid
     if found.reoptimised is None:
         assert isinstance(found.error, DeadlineExceeded)
     else:
-        assert found.reoptimised.energy.electrical.total <= found.same_motion.electrical.total * (1 + ROUNDING)
+        assert found.reoptimised.energy.electrical.total <= found.same_motion.electrical.total * (
+            1 + ROUNDING
+        )

@@ -30,7 +30,9 @@ def moved(shift: list[float] | Array, turn: Rotation | None = None) -> Pose:
 
 def along(goal: Pose, start: Any = HOME, **given: Any) -> Problem:
     path = given.pop("path", ToolPath())
-    return Problem(**{"arm": ARM, "start": start, "goal": goal, "tool_path": path, "deadline": AMPLE} | given)
+    return Problem(
+        **{"arm": ARM, "start": start, "goal": goal, "tool_path": path, "deadline": AMPLE} | given
+    )
 
 
 def poses_of(found: Solution, count: int = 3000) -> Array:

@@ -14,9 +14,13 @@ class KeptAnswer(Response):
     """An answer that is kept, without its document."""
 
     id: str = described("Id of the answer.", None, ANSWER_ID)
-    kind: str = described("Endpoint of the answer, for example `optimize` or `cycle`.", None, "optimize")
+    kind: str = described(
+        "Endpoint of the answer, for example `optimize` or `cycle`.", None, "optimize"
+    )
     created: datetime = described("Time at which it was computed, in UTC.", None, CREATED)
-    owner: str | None = described("Name of the API key that asked for it; null without one.", None, "press_shop")
+    owner: str | None = described(
+        "Name of the API key that asked for it; null without one.", None, "press_shop"
+    )
 
 
 class AnswerSummary(KeptAnswer):
@@ -24,9 +28,14 @@ class AnswerSummary(KeptAnswer):
 
     robot: str | None = described("Name of the robot.", None, "ur5e")
     energy: float | None = described(
-        "Energy of the motion or cycle, of its objective (electrical for `evaluate`). Null for other kinds.", "J", 57.5
+        "Energy of the motion or cycle, of its objective (electrical for `evaluate`). Null for "
+        "other kinds.",
+        "J",
+        57.5,
     )
-    duration: float | None = described("Duration of that motion or cycle; null as `energy`.", "s", 1.33)
+    duration: float | None = described(
+        "Duration of that motion or cycle; null as `energy`.", "s", 1.33
+    )
     status: str | None = described("`status` of the answer; null if it has none.", None, "optimal")
 
 

@@ -31,8 +31,8 @@ AnswerId = Annotated[str, Path(description="The answer's id.", examples=[ANSWER_
     responses=problem_responses(InvalidRequest, StoreUnavailable),
 )
 async def list_answers(page: Annotated[AnswerPage, Query()], store: ServiceStore) -> AnswerList:
-    """All answers that are kept, newest first, page by page: also the motions of fronts and rounds, and the answers of
-    studies and jobs."""
+    """All answers that are kept, newest first, page by page: also the motions of fronts and rounds,
+    and the answers of studies and jobs."""
     found, following = await store.read(partial(answers.page, limit=page.limit, after=page.after))
     names = AnswerSummary.model_fields
     listed = [AnswerSummary(**{name: getattr(answer, name) for name in names}) for answer in found]

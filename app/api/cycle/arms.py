@@ -1,4 +1,6 @@
-"""The arms of the moves of a cycle, for their answers: each has a payload, limits and surroundings of its own."""
+"""The arms of the moves of a cycle, for their answers: each has a payload, limits and surroundings
+of its own.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,8 @@ def _arm(request: CycleRequest, arm: Arm, carried: Payload | None) -> dict[str, 
             given[public] = value.tolist()
     # a storage on the bus begins each move with the charge that the last one left
     stored = request.bus.mode == "storage" and {
-        "bus": request.bus.model_dump(mode="json", exclude_unset=True) | {"initial": arm.bus.initial}
+        "bus": request.bus.model_dump(mode="json", exclude_unset=True)
+        | {"initial": arm.bus.initial}
     }
     given |= {"tcp_speed": arm.tcp_speed, "elbow_speed": arm.elbow_speed}
     counted = [each for each in request.scene.obstacles if each.name in arm.scene.names]

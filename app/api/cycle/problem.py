@@ -57,7 +57,9 @@ def to_cycle(request: CycleRequest, deadline: float) -> Cycle:
 def _to_order(request: CycleRequest) -> FreeOrder | None:
     if request.order == "given":
         return None
-    return FreeOrder(before=[(first, second) for first, second in request.before], together=request.together)
+    return FreeOrder(
+        before=[(first, second) for first, second in request.before], together=request.together
+    )
 
 
 def _to_stop(k: int, stop: StopRequest, robot: Robot) -> Stop:
@@ -109,6 +111,11 @@ def _to_line(field: str, line: LineRequest | None, robot: Robot) -> Line | None:
     if line.frame != "tcp":
         direction = to_base(line.frame, robot)[:3, :3] @ direction
     try:
-        return Line(direction=direction, distance=line.distance, frame="tcp" if at_stop else "base", speed=line.speed)
+        return Line(
+            direction=direction,
+            distance=line.distance,
+            frame="tcp" if at_stop else "base",
+            speed=line.speed,
+        )
     except InvalidProblem as error:
         raise InvalidProblem(f"{field}.{error.field}", str(error)) from None

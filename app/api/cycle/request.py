@@ -25,7 +25,8 @@ from joulepath.optimizer.problem.free_order import MOST_FREE_STOPS
 from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.result.energy import Objective
 
-# of a cycle with more stops, the default deadline is longer, and samples are no closer: answers stay as large as before
+# of a cycle with more stops, the default deadline is longer, and samples are no closer: answers
+# stay as large as before
 _MANY_STOPS, _LONG_DEADLINE, _LEAST_PERIOD = 100, 120.0, 1e-3
 
 LongTime = Annotated[float, Field(gt=0, le=LONGEST_ROUND)]
@@ -38,14 +39,17 @@ class TimeRange(DurationRange):
     max: LongTime | None = described("Largest duration. Null: no bound.", "s", 12.0, default=None)
 
 
-CycleTime = Annotated[Annotated[LongTime, Tag("seconds")] | Annotated[TimeRange, Tag("range")], SECONDS_OR_RANGE]
+CycleTime = Annotated[
+    Annotated[LongTime, Tag("seconds")] | Annotated[TimeRange, Tag("range")], SECONDS_OR_RANGE
+]
 
 
 class CycleRequest(ArmRequest):
     """A cycle of stops. `payload` is what the arm carries to the first stop that changes it."""
 
     start: Target = described(
-        "Where the arm rests before the first move: joint positions, a pose of the TCP, or one of several targets.",
+        "Where the arm rests before the first move: joint positions, a pose of the TCP, or one of "
+        "several targets.",
         None,
         {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]},
     )
@@ -55,56 +59,67 @@ class CycleRequest(ArmRequest):
         [
             {
                 "name": "pick",
-                "target": {"pose": {"position": [0.4, -0.2, 0.1], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
+                "target": {
+                    "pose": {"position": [0.4, -0.2, 0.1], "quaternion": [0.0, 1.0, 0.0, 0.0]}
+                },
                 "payload": {"mass": 2.0, "com": [0.0, 0.0, 0.1]},
             },
             {
                 "name": "place",
-                "target": {"pose": {"position": [0.1, 0.5, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
+                "target": {
+                    "pose": {"position": [0.1, 0.5, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]}
+                },
                 "payload": None,
             },
         ],
     )
     order: Literal["given", "free"] = described(
-        "`given`: the stops are visited in the order of `stops`. `free`: in the order that needs the least energy, for "
-        f"at most {MOST_FREE_STOPS} stops. The arm then carries the same between groups of stops as at the start.",
+        "`given`: the stops are visited in the order of `stops`. `free`: in the order that needs "
+        "the least energy, for "
+        f"at most {MOST_FREE_STOPS} stops. The arm then carries the same between groups of stops "
+        "as at the start.",
         None,
         "given",
         default="given",
     )
-    before: Annotated[list[Annotated[list[PlainName], Field(min_length=2, max_length=2)]], Field(max_length=132)] = (
-        described(
-            "With a free order: pairs of stops, of which the first is visited earlier than the second.",
-            None,
-            [["pick", "inspect"]],
-            default=[],
-        )
+    before: Annotated[
+        list[Annotated[list[PlainName], Field(min_length=2, max_length=2)]], Field(max_length=132)
+    ] = described(
+        "With a free order: pairs of stops, of which the first is visited earlier than the second.",
+        None,
+        [["pick", "inspect"]],
+        default=[],
     )
     together: Annotated[
         list[Annotated[list[PlainName], Field(min_length=2, max_length=MOST_FREE_STOPS)]],
         Field(max_length=MOST_FREE_STOPS),
     ] = described(
-        "With a free order: lists of stops that are visited one directly after the other, as they are listed, like the "
+        "With a free order: lists of stops that are visited one directly after the other, as they "
+        "are listed, like the "
         "one where a part is taken up and the one where it is put down.",
         None,
         [["pick", "place"]],
         default=[],
     )
     closed: bool = described(
-        "Whether the arm returns to the start after the last stop: to the same joint positions, full turns included.",
+        "Whether the arm returns to the start after the last stop: to the same joint positions, "
+        "full turns included.",
         None,
         True,
         default=True,
     )
     time: CycleTime | None = described(
-        "Duration of the cycle, dwells and waiting included, or bounds on it. Time is shared among the moves so that "
-        "the energy is least; what is left over is waited out where that costs least. Null: the optimiser chooses.",
+        "Duration of the cycle, dwells and waiting included, or bounds on it. Time is shared among "
+        "the moves so that "
+        "the energy is least; what is left over is waited out where that costs least. Null: the "
+        "optimiser chooses.",
         "s",
         12.0,
         default=None,
     )
     objective: Objective = described(
-        "`electrical`: the energy drawn by the whole cycle. `mechanical`: the work of its moves, ∫ Σ |tau_j v_j| dt; "
+        "`electrical`: the energy drawn by the whole cycle. `mechanical`: the work of its moves, ∫ "
+        "Σ |tau_j v_j| dt; "
         "rests need none, and slower moves less, so it needs a `time` or a `time.max`.",
         None,
         "electrical",
@@ -117,7 +132,8 @@ class CycleRequest(ArmRequest):
         default=Holding(),
     )
     wait: PlainName | None = described(
-        "Where time that is left over is waited out: `start`, or the name of a stop. Null: where that costs least.",
+        "Where time that is left over is waited out: `start`, or the name of a stop. Null: where "
+        "that costs least.",
         None,
         "start",
         default=None,
@@ -132,7 +148,8 @@ class CycleRequest(ArmRequest):
         "How the moves are parametrised: see `POST /optimize`.", None, "bspline", default="bspline"
     )
     windings: bool = described(
-        "Whether full-turn alternatives q + 2πk within the joint range count at every stop. If not, each configuration "
+        "Whether full-turn alternatives q + 2πk within the joint range count at every stop. If "
+        "not, each configuration "
         "has the joint positions nearest to the middle of the joint range.",
         None,
         True,
@@ -140,7 +157,8 @@ class CycleRequest(ArmRequest):
     )
     candidates: WhichCandidates = which_candidates()
     sample_period: float = described(
-        f"Time between the samples of the answers of the moves. With more than {_MANY_STOPS} stops, at least "
+        f"Time between the samples of the answers of the moves. With more than {_MANY_STOPS} "
+        "stops, at least "
         f"{_LEAST_PERIOD:g} s.",
         "s",
         0.008,
@@ -149,8 +167,10 @@ class CycleRequest(ArmRequest):
         le=1,
     )
     deadline: float = described(
-        "Wall time from the arrival of the request, including the wait for a worker. When it nears, the service "
-        f"returns the best certified cycle found so far. With more than {_MANY_STOPS} stops, the default is "
+        "Wall time from the arrival of the request, including the wait for a worker. When it "
+        "nears, the service "
+        f"returns the best certified cycle found so far. With more than {_MANY_STOPS} stops, the "
+        "default is "
         f"{_LONG_DEADLINE:g} s.",
         "s",
         60.0,

@@ -52,10 +52,11 @@ async def cycle(
     reply: ServiceReply,
     cache: ServiceCache,
 ) -> Response:
-    """Finds the arm configuration at every stop of a cycle, and the motions between them, that need the least
-    electrical energy together. The configuration at one stop decides what the moves from there cost, so that all are
-    chosen at once. Each move refers to its complete answer. `Accept: text/csv` returns the samples of the cycle,
-    `Accept: text/event-stream` events while the search runs, and then the answer."""
+    """Finds the arm configuration at every stop of a cycle, and the motions between them, that need
+    the least electrical energy together. The configuration at one stop decides what the moves from
+    there cost, so that all are chosen at once. Each move refers to its complete answer. `Accept:
+    text/csv` returns the samples of the cycle, `Accept: text/event-stream` events while the search
+    runs, and then the answer."""
     if later.wanted:
         return await later.respond("cycle", body)
     # a body above 64 KiB is not looked into here

@@ -14,13 +14,16 @@ Row = list[float | str]
 def to_cycle_csv(found: CycleSolution) -> str:
     """CSV with the columns t, leg, kind, then q, v, a, tau_motor of every joint, and power.
 
-    Units as in the JSON answer. A rest has its mean power, and no torques: motors or brakes may hold the arm.
+    Units as in the JSON answer. A rest has its mean power, and no torques: motors or brakes may
+    hold the arm.
     """
     joints = range(1, found.moves[0].planned.arm.robot.nq + 1)
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
     names = ("q", "v", "a", "tau_motor")
-    writer.writerow(["t", "leg", "kind", *(f"{name}{joint}" for name in names for joint in joints), "power"])
+    writer.writerow(
+        ["t", "leg", "kind", *(f"{name}{joint}" for name in names for joint in joints), "power"]
+    )
     legs = ((move, leg) for move in found.moves for leg in move.legs(found.objective))
     for number, (move, leg) in enumerate(legs):
         rests = leg.kind in ("dwell", "wait")

@@ -82,7 +82,9 @@ class CycleAnswer(Answer):
     """Path of this answer: `GET` returns it again. Null if it could not be kept."""
 
     @classmethod
-    def of(cls, request: CycleRequest, request_id: str, found: CycleSolution, legs: list[CycleLeg]) -> Self:
+    def of(
+        cls, request: CycleRequest, request_id: str, found: CycleSolution, legs: list[CycleLeg]
+    ) -> Self:
         """The answer to a request, not kept yet; `legs` name the answers of their moves."""
         return cls(
             request=request_id,
@@ -154,7 +156,13 @@ def _warnings(found: CycleSolution) -> list[str]:
 
 
 def _divided(found: CycleSolution) -> list[tuple[str, float]]:
-    """Where paths are divided: the stop at which a part ends, and the share of the path until there."""
+    """Where paths are divided: the stop at which a part ends, and the share of the path until
+    there.
+    """
     paths = [(move.planned.goal, move.planned.tool_path) for move in found.moves]
-    parts = [(name, path.section) for name, path in paths if path is not None and path.section is not None]
+    parts = [
+        (name, path.section)
+        for name, path in paths
+        if path is not None and path.section is not None
+    ]
     return [(name, section.last) for name, section in parts if section.last < 1]

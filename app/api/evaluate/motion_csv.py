@@ -24,13 +24,14 @@ _NUMBER = re.compile(r'"?[-+]?[0-9.]')
 
 @dataclass(frozen=True)
 class MotionCsv:
-    """A CSV file after its header: columns t, q1 … qn, then v1 … vn, then a1 … an; or q1 … qn alone.
+    """A CSV file after its header: columns t, q1 … qn, then v1 … vn, then a1 … an; or q1 … qn
+    alone.
 
-    The header tells what separates the columns: a comma, a semicolon or a tab. With the latter two, numbers may have a
-    decimal comma.
+    The header tells what separates the columns: a comma, a semicolon or a tab. With the latter two,
+    numbers may have a decimal comma.
 
-    `rows` are the lines that are not read yet, in blocks (k, columns) in the units of the file. `scale` converts joint
-    columns to rad, rad/s, rad/s².
+    `rows` are the lines that are not read yet, in blocks (k, columns) in the units of the file.
+    `scale` converts joint columns to rad, rad/s, rad/s².
     """
 
     nq: int
@@ -45,10 +46,14 @@ class MotionCsv:
 
     @staticmethod
     def of(file: BufferedReader, nq: int, units: Literal["rad", "deg"]) -> MotionCsv:
-        """Reads the header of a file for an arm with nq joints. Raises InvalidTable, now or when rows are read."""
+        """Reads the header of a file for an arm with nq joints. Raises InvalidTable, now or when
+        rows are read.
+        """
         columns, separator = header_of(file, LONGEST_LINE)
         _check_header(columns, nq)
-        return MotionCsv(nq, columns, pi / 180 if units == "deg" else 1.0, _blocks(file, columns, separator))
+        return MotionCsv(
+            nq, columns, pi / 180 if units == "deg" else 1.0, _blocks(file, columns, separator)
+        )
 
     def log(self) -> Iterator[RecordedRows]:
         """The rows of a log, in s, rad, rad/s, rad/s²."""
@@ -73,18 +78,34 @@ def _check_header(columns: list[str], nq: int) -> None:
     q, v, a = groups["q"], groups["v"], groups["a"]
     if columns in (q, ["t", *q], ["t", *q, *v], ["t", *q, *v, *a]):
         return
-    wanted = f"t,q1,…,q{nq}, then v1,…,v{nq} and a1,…,a{nq} if they were logged, or q1,…,q{nq} alone"
-    wanted += ", or those of a log as POST /logs takes it. Separate columns by commas, semicolons or tabs."
+    wanted = (
+        f"t,q1,…,q{nq}, then v1,…,v{nq} and a1,…,a{nq} if they were logged, or q1,…,q{nq} alone"
+    )
+    wanted += (
+        ", or those of a log as POST /logs takes it. Separate columns by commas, semicolons "
+        "or tabs."
+    )
     if all(_NUMBER.match(name) for name in columns):
-        raise InvalidTable(f"The first line has numbers: put a header with the names of the columns first, {wanted}", 1)
+        raise InvalidTable(
+            "The first line has numbers: put a header with the names of the columns first, "
+            f"{wanted}",
+            1,
+        )
     if not any(_COLUMN.fullmatch(name) for name in columns):
-        raise InvalidTable(f"The first line is no header: begin the file with the names of the columns, {wanted}", 1)
+        raise InvalidTable(
+            f"The first line is no header: begin the file with the names of the columns, {wanted}",
+            1,
+        )
     expected = q if columns[0] in q else ["t", *q, *v, *a]
     for k, (name, right) in enumerate(zip(columns, expected, strict=False), 1):
         if name != right:
-            raise InvalidTable(f"Column {k} of the header is not `{right}`: its columns must be {wanted}", 1, right)
+            raise InvalidTable(
+                f"Column {k} of the header is not `{right}`: its columns must be {wanted}", 1, right
+            )
     last = columns[-1]
-    raise InvalidTable(f"The header has {len(columns)} columns, up to `{last}`: they must be {wanted}", 1, last)
+    raise InvalidTable(
+        f"The header has {len(columns)} columns, up to `{last}`: they must be {wanted}", 1, last
+    )
 
 
 def _blocks(file: BufferedReader, columns: list[str], separator: str) -> Iterator[Array]:
@@ -92,7 +113,9 @@ def _blocks(file: BufferedReader, columns: list[str], separator: str) -> Iterato
     while lines := [*islice(_lines(file, row), BLOCK)]:
         if separator != ",":
             lines = [*with_points(lines, row)]
-        yield numbers_of(lines, range(row, row + len(lines)), columns, separator, range(len(columns)))
+        yield numbers_of(
+            lines, range(row, row + len(lines)), columns, separator, range(len(columns))
+        )
         row += len(lines)
         if len(lines) < BLOCK:
             return

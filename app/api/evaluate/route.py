@@ -40,13 +40,17 @@ _REF = "#/components/schemas/{model}"
 
 
 def _openapi() -> dict[str, Any]:
-    """The bodies, and the settings of a CSV. FastAPI does not know them, because the body goes to a file unread."""
+    """The bodies, and the settings of a CSV. FastAPI does not know them, because the body goes to a
+    file unread.
+    """
     return {
         "parameters": query_parameters(EvaluateCsvSettings, "With a CSV body only. "),
         "requestBody": {
             "required": True,
             "content": {
-                "application/json": {"schema": {"$ref": _REF.format(model=EvaluateRequest.__name__)}},
+                "application/json": {
+                    "schema": {"$ref": _REF.format(model=EvaluateRequest.__name__)}
+                },
                 "text/csv": {"schema": {"type": "string"}},
             },
         },
@@ -86,10 +90,11 @@ async def evaluate(
     engine: ServiceArmEngine,
     later: ServiceLater,
 ) -> Response:
-    """The energy of a given motion, per segment and in total, and the limits that it violates. The motion is a list of
-    configurations with the times between them, a trajectory, or a log of the arm, whose measured energies stand beside
-    the model's. It is sent as JSON, or as CSV with the settings as query parameters: any file that `POST /logs` reads.
-    `Accept: text/csv` returns the table of energies as CSV."""
+    """The energy of a given motion, per segment and in total, and the limits that it violates. The
+    motion is a list of configurations with the times between them, a trajectory, or a log of the
+    arm, whose measured energies stand beside the model's. It is sent as JSON, or as CSV with the
+    settings as query parameters: any file that `POST /logs` reads. `Accept: text/csv` returns the
+    table of energies as CSV."""
     declared = media_type(request.headers)
     kind = _KINDS.get(declared)
     if kind is None and declared not in UNDECLARED:
@@ -102,7 +107,11 @@ async def evaluate(
         if kind == "json" and request.query_params:
             raise InvalidRequest([{"loc": ["query"], "msg": "Put the settings into the JSON body"}])
         if later.wanted and kind == "json":
-            body = JobBodyTask(path, deadlines(settings), request.state.id, is_fresh(request), evaluate=True)
+            body = JobBodyTask(
+                path, deadlines(settings), request.state.id, is_fresh(request), evaluate=True
+            )
             return await later.respond_with(await later.validated(body))
-        task = EvaluateTask(path, kind, dict(request.query_params), wanted, request.state.id, longest)
+        task = EvaluateTask(
+            path, kind, dict(request.query_params), wanted, request.state.id, longest
+        )
         return result_response(await unless_disconnected(request, engine.run(task, longest)))

@@ -1,4 +1,5 @@
-"""What `POST /evaluate` answers, and its work in a worker: reads the motion from the received body."""
+"""What `POST /evaluate` answers, and its work in a worker: reads the motion from the received
+body."""
 
 from __future__ import annotations
 
@@ -100,8 +101,8 @@ class EvaluateAnswer(MotionAnswer):
     segment_count: Count
     """Number of segments."""
     speed_jumps: Count
-    """Number of velocity steps inside the motion. A step contributes no energy, because its power is
-    not defined."""
+    """Number of velocity steps inside the motion. A step contributes no energy, because its power
+    is not defined."""
     within_limits: bool
     """Whether the motion is within every limit; collisions are in `collides`."""
     limits: list[LimitReport]
@@ -111,10 +112,10 @@ class EvaluateAnswer(MotionAnswer):
     nearest: LeastClearance | None
     """Smallest clearance at sample points; null if `collisions` is false."""
     warnings: list[str]
-    """Remarks on the motion, in words; empty if there are none. If two bodies come closer than 2 mm,
-    one names them, their distance without margins, and the time. Others say that arm configurations
-    may have been missed, that a baseline is left out, or what a tool or payload without a shape would
-    touch. Of a log, also what `POST /logs` says of it."""
+    """Remarks on the motion, in words; empty if there are none. If two bodies come closer than 2
+    mm, one names them, their distance without margins, and the time. Others say that arm
+    configurations may have been missed, that a baseline is left out, or what a tool or payload
+    without a shape would touch. Of a log, also what `POST /logs` says of it."""
     samples: Samples | None
     """Samples of the motion; null without `sample_period`."""
 
@@ -147,9 +148,11 @@ class EvaluateAnswer(MotionAnswer):
 
 @dataclass(frozen=True)
 class EvaluateTask:
-    """A received body in `file`, of the media type `kind`, and the query's parameters; the answer's is `wanted`.
+    """A received body in `file`, of the media type `kind`, and the query's parameters; the answer's
+    is `wanted`.
 
-    `longest`: most that the body may ask for as its deadline, and what it gets if it asks for none [s].
+    `longest`: most that the body may ask for as its deadline, and what it gets if it asks for none
+    [s].
     """
 
     file: str
@@ -160,7 +163,8 @@ class EvaluateTask:
     longest: float
 
     def run(self, deadline: float) -> TaskResult:
-        """The answer of `POST /evaluate`, within about `deadline` seconds. Raises InvalidRequest."""
+        """The answer of `POST /evaluate`, within about `deadline` seconds. Raises
+        InvalidRequest."""
         # when the request began to wait for a worker
         began = Deadline.after(deadline - self.longest)
         found = self._evaluate_csv(began) if self.kind == "csv" else self._evaluate_json(began)
@@ -184,8 +188,12 @@ class EvaluateTask:
         except InvalidProblem as error:
             raise InvalidRequest([{"loc": location(error, "query"), "msg": str(error)}]) from None
 
-    def _evaluate_log(self, settings: EvaluateCsvSettings, end: Deadline, error: InvalidTable) -> Evaluated:
-        """The evaluation of a file whose header is that of a log, and not that of a motion, as `error` says."""
+    def _evaluate_log(
+        self, settings: EvaluateCsvSettings, end: Deadline, error: InvalidTable
+    ) -> Evaluated:
+        """The evaluation of a file whose header is that of a log, and not that of a motion, as
+        `error` says.
+        """
         reading = read_csv(Path(self.file), settings, error)
         if settings.model_fields_set & {"time_per_segment", "interpolation"}:
             raise own_times()
@@ -198,9 +206,14 @@ class EvaluateTask:
         return evaluated(request, self._end(request, began, "body"))
 
     def _end(self, asked: EvaluateSettings, began: Deadline, where: str) -> Deadline:
-        """Raises InvalidRequest, with the part `where` of the request, if it asks for more than it may."""
+        """Raises InvalidRequest, with the part `where` of the request, if it asks for more than it
+        may.
+        """
         if asked.deadline is not None and asked.deadline > self.longest:
-            msg = f"deadline must be at most {self.longest:g} s: the operator of the service has set this."
+            msg = (
+                f"deadline must be at most {self.longest:g} s: the operator of the service has "
+                "set this."
+            )
             raise InvalidRequest([{"loc": [where, "deadline"], "msg": msg}])
         return began.earlier_by(-(asked.deadline or self.longest))
 
@@ -256,7 +269,9 @@ def _csv_table(found: Evaluated) -> str:
     for name, interval in [*rows, ("total", found.total)]:
         row = {"segment": name, **dict(_flat("", interval))}
         # only the whole motion has one
-        row = {key: value for key, value in row.items() if not key.startswith("electrical.interval")}
+        row = {
+            key: value for key, value in row.items() if not key.startswith("electrical.interval")
+        }
         if writer is None:
             writer = csv.DictWriter(text, row.keys(), lineterminator="\n")
             writer.writeheader()
@@ -270,7 +285,10 @@ def _flat(name: str, value: Any) -> list[tuple[str, Any]]:
         value = as_json(value)
     if isinstance(value, dict):
         # almost all fields are in `energy`: it would only make the names longer
-        parts = [(key if not name or name == "energy" else f"{name}.{key}", part) for key, part in value.items()]
+        parts = [
+            (key if not name or name == "energy" else f"{name}.{key}", part)
+            for key, part in value.items()
+        ]
     elif isinstance(value, np.ndarray):
         parts = [(f"{name}.{j}", part) for j, part in enumerate(value.tolist(), 1)]
     else:

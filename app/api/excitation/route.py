@@ -31,10 +31,17 @@ _CSV = "t,q1,…,q6,v1,…,v6,a1,…,a6\n0.0,0.0,-1.57,…\n0.008,0.0001,-1.5699
     },
 )
 async def excitation(
-    request: Request, body: ExcitationRequest, wanted: WantedFormat, settings: ServiceSettings, engine: ServiceArmEngine
+    request: Request,
+    body: ExcitationRequest,
+    wanted: WantedFormat,
+    settings: ServiceSettings,
+    engine: ServiceArmEngine,
 ) -> Response:
-    """A periodic motion from rest to rest whose log tells friction, rotor inertias and base parameters apart, within
-    all limits and clear of everything. `Accept: text/csv` returns its samples as a table, which `/evaluate` takes."""
+    """A periodic motion from rest to rest whose log tells friction, rotor inertias and base
+    parameters apart, within all limits and clear of everything. `Accept: text/csv` returns its
+    samples as a table, which `/evaluate` takes."""
     task = ExcitationTask(body, wanted, request.state.id)
-    result = await unless_disconnected(request, engine.run(task, deadline_of(body, settings.max_deadline)))
+    result = await unless_disconnected(
+        request, engine.run(task, deadline_of(body, settings.max_deadline))
+    )
     return result_response(result)

@@ -19,19 +19,31 @@ from joulepath.app.schemas.arm import ArmRequest
 from joulepath.app.schemas.common import described
 from joulepath.app.schemas.examples.values import HOME
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.excitation.excitation_problem import LEAST_DEADLINE, Criterion, ExcitationProblem, Part
+from joulepath.optimizer.excitation.excitation_problem import (
+    LEAST_DEADLINE,
+    Criterion,
+    ExcitationProblem,
+    Part,
+)
 from joulepath.optimizer.excitation.excite import Excitation, excite
 
 _ALL: list[Part] = ["inertials", "rotor", "friction"]
-_Angles = Annotated[list[Annotated[float, Field(ge=-1e3, le=1e3)]], Field(min_length=1, max_length=16)]
-_Noise = Annotated[list[Annotated[float, Field(ge=1e-6, le=1e3)]], Field(min_length=1, max_length=16)]
+_Angles = Annotated[
+    list[Annotated[float, Field(ge=-1e3, le=1e3)]], Field(min_length=1, max_length=16)
+]
+_Noise = Annotated[
+    list[Annotated[float, Field(ge=1e-6, le=1e3)]], Field(min_length=1, max_length=16)
+]
 
 
 class ExcitationRequest(ArmRequest):
-    """A periodic motion that tells the parameters of an arm apart. It keeps clear of the arm itself and the scene."""
+    """A periodic motion that tells the parameters of an arm apart. It keeps clear of the arm itself
+    and the scene.
+    """
 
     parameters: Annotated[list[Part], Field(min_length=1, max_length=3)] = described(
-        "Parameters that the motion is to tell apart: `inertials` (base parameters of the links), `rotor` (rotor "
+        "Parameters that the motion is to tell apart: `inertials` (base parameters of the links), "
+        "`rotor` (rotor "
         "inertias), `friction` (Coulomb, viscous, offset, and load where a joint carries enough).",
         None,
         ["rotor", "friction"],
@@ -40,21 +52,35 @@ class ExcitationRequest(ArmRequest):
     period: float = described("Period of the Fourier series.", "s", 6.0, default=10.0, ge=1, le=60)
     harmonics: int = described("Number of harmonics.", "1", 3, default=5, ge=2, le=10)
     criterion: Criterion = described(
-        "`d`: the determinant of the information is maximised. `condition`: the condition of the columns, scaled to "
+        "`d`: the determinant of the information is maximised. `condition`: the condition of the "
+        "columns, scaled to "
         "one length, is lowered.",
         None,
         "d",
         default="d",
     )
-    speed_fraction: float = described("Greatest joint speed over its limit.", "1", 0.6, default=0.6, ge=0.01, le=1)
+    speed_fraction: float = described(
+        "Greatest joint speed over its limit.", "1", 0.6, default=0.6, ge=0.01, le=1
+    )
     clearance: float = described(
-        "Least distance of two bodies, the margins of obstacles subtracted.", "m", 0.02, default=0.02, ge=0, le=0.5
+        "Least distance of two bodies, the margins of obstacles subtracted.",
+        "m",
+        0.02,
+        default=0.02,
+        ge=0,
+        le=0.5,
     )
     mounting_plane: bool = described(
-        "Whether the arm stands on an obstacle that fills everything below z = 0 of its base.", None, True, default=True
+        "Whether the arm stands on an obstacle that fills everything below z = 0 of its base.",
+        None,
+        True,
+        default=True,
     )
     centre: _Angles | None = described(
-        "Joint positions about which the arm moves. Null: they are chosen.", "rad", HOME, default=None
+        "Joint positions about which the arm moves. Null: they are chosen.",
+        "rad",
+        HOME,
+        default=None,
     )
     noise: _Noise | None = described(
         "Standard deviation of the torque of every joint. Null: 1 % of its limit.",
@@ -62,12 +88,20 @@ class ExcitationRequest(ArmRequest):
         [1.5, 1.5, 1.5, 0.3, 0.3, 0.3],
         default=None,
     )
-    starts: int = described("Random starts that are tried at most.", "1", 3, default=3, ge=1, le=100)
+    starts: int = described(
+        "Random starts that are tried at most.", "1", 3, default=3, ge=1, le=100
+    )
     sample_period: float = described(
-        "Time between the returned samples; at most 20,000.", "s", 0.008, default=0.008, ge=1e-4, le=1
+        "Time between the returned samples; at most 20,000.",
+        "s",
+        0.008,
+        default=0.008,
+        ge=1e-4,
+        le=1,
     )
     deadline: float = described(
-        "Wall time from the arrival of the request, including the wait for a worker. When it passes, the service "
+        "Wall time from the arrival of the request, including the wait for a worker. When it "
+        "passes, the service "
         "returns the best certified motion found so far.",
         "s",
         5.0,
@@ -110,7 +144,15 @@ def _problem(request: ExcitationRequest, deadline: float) -> ExcitationProblem:
     end = Deadline.after(max(deadline, LEAST_DEADLINE))
     with until(end):
         arm = to_arm(request)
-    same = ("period", "harmonics", "criterion", "speed_fraction", "clearance", "mounting_plane", "starts")
+    same = (
+        "period",
+        "harmonics",
+        "criterion",
+        "speed_fraction",
+        "clearance",
+        "mounting_plane",
+        "starts",
+    )
     return ExcitationProblem(
         arm=arm,
         parts=tuple(request.parameters),

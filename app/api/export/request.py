@@ -30,17 +30,24 @@ class UrscriptOptions(Request):
         "Rate of the controller: 500 for e-series and later, 125 for CB3.", "Hz", 125, default=500
     )
     form: Literal["polynomials", "points"] = described(
-        "`polynomials`: the controller evaluates the spline. `points`: the program has every set point.",
+        "`polynomials`: the controller evaluates the spline. `points`: the program has every set "
+        "point.",
         None,
         "points",
         default="polynomials",
     )
     lookahead_time: float = described(
-        "servoj's `lookahead_time`: larger is smoother and later.", "s", 0.05, default=0.1, ge=0.03, le=0.2
+        "servoj's `lookahead_time`: larger is smoother and later.",
+        "s",
+        0.05,
+        default=0.1,
+        ge=0.03,
+        le=0.2,
     )
     gain: float = described("servoj's `gain`.", "1", 500.0, default=300.0, ge=100, le=2000)
     digital_output: int | None = described(
-        "Standard digital output that is on from each grasp to the release. Null: none is switched.",
+        "Standard digital output that is on from each grasp to the release. Null: none is "
+        "switched.",
         None,
         0,
         default=None,
@@ -59,7 +66,8 @@ class Ros2Options(MoveitOptions):
     """Options of `ros2`. As JSON, it is the whole operation for rosbridge."""
 
     message: Literal["goal", "trajectory"] = described(
-        "`goal`: of control_msgs/action/FollowJointTrajectory. `trajectory`: trajectory_msgs/msg/JointTrajectory.",
+        "`goal`: of control_msgs/action/FollowJointTrajectory. `trajectory`: "
+        "trajectory_msgs/msg/JointTrajectory.",
         None,
         "trajectory",
         default="goal",
@@ -79,7 +87,10 @@ class FrankaOptions(Request):
     """Options of `franka`."""
 
     form: Literal["csv", "cpp"] = described(
-        "`csv`: a table with t, q and v. `cpp`: a C++ header with a motion generator.", None, "cpp", default="csv"
+        "`csv`: a table with t, q and v. `cpp`: a C++ header with a motion generator.",
+        None,
+        "cpp",
+        default="csv",
     )
 
 
@@ -87,7 +98,8 @@ class PointsOptions(Request):
     """Options that `rapid` and `krl` share."""
 
     tolerance: float = described(
-        "Deviation from the spline that the number of points is chosen for. The file says what is reached.",
+        "Deviation from the spline that the number of points is chosen for. The file says what is "
+        "reached.",
         "rad",
         0.002,
         default=0.005,
@@ -95,18 +107,23 @@ class PointsOptions(Request):
         le=0.1,
     )
     signs: Annotated[list[Literal[1, -1]], Field(min_length=1, max_length=16)] | None = described(
-        "Sense of the controller's axes against the joints of the robot's model, one per joint. Null: the same.",
+        "Sense of the controller's axes against the joints of the robot's model, one per joint. "
+        "Null: the same.",
         None,
         [1, -1, 1, 1, 1, 1],
         default=None,
     )
-    offsets: Annotated[list[Annotated[float, Field(ge=-360, le=360)]], Field(min_length=1, max_length=16)] | None = (
-        described(
-            "Position of the controller's axes where the model's joints are at zero, one per joint. Null: zero.",
-            "deg",
-            [0.0, -90.0, 90.0, 0.0, 0.0, 0.0],
-            default=None,
-        )
+    offsets: (
+        Annotated[
+            list[Annotated[float, Field(ge=-360, le=360)]], Field(min_length=1, max_length=16)
+        ]
+        | None
+    ) = described(
+        "Position of the controller's axes where the model's joints are at zero, one per joint. "
+        "Null: zero.",
+        "deg",
+        [0.0, -90.0, 90.0, 0.0, 0.0, 0.0],
+        default=None,
     )
 
 
@@ -114,7 +131,8 @@ class RapidOptions(PointsOptions):
     """Options of `rapid`."""
 
     digital_output: str | None = described(
-        "Name of the output signal that is on from each grasp to the release. Null: none is switched.",
+        "Name of the output signal that is on from each grasp to the release. Null: none is "
+        "switched.",
         None,
         "doGripper",
         default=None,
@@ -136,39 +154,62 @@ class KrlOptions(PointsOptions):
 
 
 class ExportRequest(AnswerRequest):
-    """An answer, and how to export it. Options of other formats than the one in the path are refused."""
+    """An answer, and how to export it. Options of other formats than the one in the path are
+    refused.
+    """
 
     speed_scale: float = described(
-        "Fraction of the speed: every move is slowed down uniformly and certified again. Rests stay as they are.",
+        "Fraction of the speed: every move is slowed down uniformly and certified again. Rests "
+        "stay as they are.",
         "1",
         0.1,
         default=1.0,
         ge=0.01,
         le=1.0,
     )
-    table: TableOptions | None = described("Options of `csv` and `npz`.", None, {"period": 0.004}, default=None)
-    urscript: UrscriptOptions | None = described("Options of `urscript`.", None, {"digital_output": 0}, default=None)
-    ros2: Ros2Options | None = described("Options of `ros2`.", None, {"message": "trajectory"}, default=None)
-    moveit: MoveitOptions | None = described("Options of `moveit`.", None, {"encoding": "json"}, default=None)
-    franka: FrankaOptions | None = described("Options of `franka`.", None, {"form": "cpp"}, default=None)
-    rapid: RapidOptions | None = described("Options of `rapid`.", None, {"tolerance": 0.002}, default=None)
-    krl: KrlOptions | None = described("Options of `krl`.", None, {"tolerance": 0.002}, default=None)
+    table: TableOptions | None = described(
+        "Options of `csv` and `npz`.", None, {"period": 0.004}, default=None
+    )
+    urscript: UrscriptOptions | None = described(
+        "Options of `urscript`.", None, {"digital_output": 0}, default=None
+    )
+    ros2: Ros2Options | None = described(
+        "Options of `ros2`.", None, {"message": "trajectory"}, default=None
+    )
+    moveit: MoveitOptions | None = described(
+        "Options of `moveit`.", None, {"encoding": "json"}, default=None
+    )
+    franka: FrankaOptions | None = described(
+        "Options of `franka`.", None, {"form": "cpp"}, default=None
+    )
+    rapid: RapidOptions | None = described(
+        "Options of `rapid`.", None, {"tolerance": 0.002}, default=None
+    )
+    krl: KrlOptions | None = described(
+        "Options of `krl`.", None, {"tolerance": 0.002}, default=None
+    )
 
 
 def option_field(format: FormatName) -> str | None:
-    """Field of the request with the options of a format, named after their class; None if it has none."""
+    """Field of the request with the options of a format, named after their class; None if it has
+    none.
+    """
     kind = FORMATS[format].options
     return None if kind is None else kind.__name__.removesuffix("Options").lower()
 
 
-def to_options(request: ExportRequest, format: FormatName, preferred: Encoding) -> ExportOptions | None:
+def to_options(
+    request: ExportRequest, format: FormatName, preferred: Encoding
+) -> ExportOptions | None:
     """The options of the library for a format.
 
     Messages have the `preferred` encoding unless the request names one. Raises
     InvalidRequest for options of another format.
     """
     own = option_field(format)
-    for name in sorted({other for each in FORMATS if (other := option_field(each)) is not None} - {own}):
+    for name in sorted(
+        {other for each in FORMATS if (other := option_field(each)) is not None} - {own}
+    ):
         if getattr(request, name) is not None:
             msg = f"{name} is not for the format {format}: leave it out"
             raise InvalidRequest([{"loc": ["body", name], "msg": msg}])
@@ -178,5 +219,7 @@ def to_options(request: ExportRequest, format: FormatName, preferred: Encoding) 
     given: dict[str, Any] = dict(getattr(request, own) or {})
     if "encoding" in kind.__dataclass_fields__:
         given["encoding"] = given.get("encoding") or preferred
-    values: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
+    values: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in given.items()
+    }
     return kind(**values)

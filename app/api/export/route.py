@@ -25,24 +25,39 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
 _NOT_IN_A_NAME = re.compile(r"[^A-Za-z0-9._-]")
 _FORMAT = Path(
-    description="The format. " + " ".join(f"`{name}`: {each.meaning}" for name, each in FORMATS.items()),
+    description="The format. "
+    + " ".join(f"`{name}`: {each.meaning}" for name, each in FORMATS.items()),
     examples=["urscript"],
-    json_schema_extra={"x-enum-descriptions": {name: each.meaning for name, each in FORMATS.items()}},
+    json_schema_extra={
+        "x-enum-descriptions": {name: each.meaning for name, each in FORMATS.items()}
+    },
 )
-_MEDIA_TYPES = ("text/plain", "application/yaml", "application/json", "text/csv", "application/octet-stream")
+_MEDIA_TYPES = (
+    "text/plain",
+    "application/yaml",
+    "application/json",
+    "text/csv",
+    "application/octet-stream",
+)
 _HEADERS = {
     "Content-Disposition": "`attachment`, with a name for the file.",
     "Joulepath-Speed-Scale": "Fraction of the speed: `speed_scale` of the request.",
-    "Joulepath-Worst-Ratio": "Largest value / limit of the exported motion, by its certificate, computed anew.",
-    "Joulepath-Notes": "Sentences on the file, separated by `; `: how far it deviates, and what it leaves out.",
+    "Joulepath-Worst-Ratio": "Largest value / limit of the exported motion, by its certificate, "
+    "computed anew.",
+    "Joulepath-Notes": "Sentences on the file, separated by `; `: how far it deviates, and what it "
+    "leaves out.",
 }
 _FILE: dict[int | str, dict[str, Any]] = {
     200: {
         "description": "The file.",
         "content": {
-            media: {"schema": {} if media == "application/json" else {"type": "string"}} for media in _MEDIA_TYPES
+            media: {"schema": {} if media == "application/json" else {"type": "string"}}
+            for media in _MEDIA_TYPES
         },
-        "headers": {name: {"description": text, "schema": {"type": "string"}} for name, text in _HEADERS.items()},
+        "headers": {
+            name: {"description": text, "schema": {"type": "string"}}
+            for name, text in _HEADERS.items()
+        },
     }
 }
 
@@ -69,8 +84,9 @@ async def export(
     settings: ServiceSettings,
     engine: ServiceArmEngine,
 ) -> Response:
-    """Writes the motion of an answer as a file for a robot controller. The certificate of the motion is computed again,
-    for the speed asked for: what fails it is not exported. No format was run on hardware."""
+    """Writes the motion of an answer as a file for a robot controller. The certificate of the
+    motion is computed again, for the speed asked for: what fails it is not exported. No format was
+    run on hardware."""
     as_json = is_wanted(request, JSON)
     task = ExportTask(body, format, as_json, request.state.id)
     work = engine.run(task, settings.max_deadline)
@@ -87,4 +103,8 @@ def _response(result: ExportResult) -> Response:
         f"{result.worst_ratio:.6f}",
         "; ".join(result.notes),
     )
-    return Response(result.document, headers=dict(zip(_HEADERS, values, strict=True)), media_type=result.media_type)
+    return Response(
+        result.document,
+        headers=dict(zip(_HEADERS, values, strict=True)),
+        media_type=result.media_type,
+    )

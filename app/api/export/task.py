@@ -1,4 +1,5 @@
-"""POST /export/{format} in a worker: reads the answer, certifies its motion again, writes the file."""
+"""POST /export/{format} in a worker: reads the answer, certifies its motion again, writes the
+file."""
 
 from __future__ import annotations
 
@@ -20,7 +21,9 @@ from joulepath.optimizer.export.program import Program
 
 @dataclass(frozen=True)
 class ExportResult(TaskResult):
-    """A file, its name, and what its response's headers say: largest ratio to a limit, speed scale, notes."""
+    """A file, its name, and what its response's headers say: largest ratio to a limit, speed scale,
+    notes.
+    """
 
     name: str = field(kw_only=True)
     speed_scale: float = field(kw_only=True)
@@ -41,7 +44,9 @@ class ExportTask:
     request_id: str
 
     def run(self, deadline: float) -> ExportResult:
-        """The file. Raises PartsNeeded with the answers that must be kept at hand first, and what its parts raise."""
+        """The file. Raises PartsNeeded with the answers that must be kept at hand first, and what
+        its parts raise.
+        """
         end = Deadline.after(deadline)
         options = to_options(self.asked, self.format, "json" if self.as_json else "yaml")
         try:

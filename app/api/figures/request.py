@@ -20,9 +20,13 @@ NAMES = (
 class Covariance(Request):
     """Covariance of the identified parameters."""
 
-    names: Annotated[list[str], Field(min_length=1, max_length=200)] = described(NAMES, None, COVARIANCE["names"])
+    names: Annotated[list[str], Field(min_length=1, max_length=200)] = described(
+        NAMES, None, COVARIANCE["names"]
+    )
     matrix: Annotated[list[list[float]], Field(min_length=1, max_length=200)] = described(
-        "Symmetric and positive semidefinite, in the units of the parameters.", "unit · unit", COVARIANCE["matrix"]
+        "Symmetric and positive semidefinite, in the units of the parameters.",
+        "unit · unit",
+        COVARIANCE["matrix"],
     )
 
 
@@ -31,33 +35,46 @@ def _section(what: str, example: Section) -> Any:
 
 
 class FiguresDocument(Request):
-    """Figures of a robot, some of them identified on one arm, in the form of its `figures.yaml`. Each figure has
-    `value`, `unit`, `source`, `trust`, and `sd` if it was identified. Only friction laws, drives, electronics and
-    inertials may differ from the robot's own."""
+    """Figures of a robot, some of them identified on one arm, in the form of its `figures.yaml`.
+    Each figure has `value`, `unit`, `source`, `trust`, and `sd` if it was identified. Only friction
+    laws, drives, electronics and inertials may differ from the robot's own."""
 
     robot: RobotName = described("Name of the robot.", None, "ur5e")
-    friction_laws: Section | None = _section("Friction laws by name; the first one is the default", FRICTION)
+    friction_laws: Section | None = _section(
+        "Friction laws by name; the first one is the default", FRICTION
+    )
     drives: Section | None = _section("Motors, gears and inverters", DRIVES)
     electronics: Section | None = _section("Electronics", {})
     inertials: Section | None = _section("Masses, centres of mass and inertias of the links", {})
     covariance: Covariance | None = described(
-        "Covariance of the identified parameters. Null: none was identified.", None, COVARIANCE, default=None
+        "Covariance of the identified parameters. Null: none was identified.",
+        None,
+        COVARIANCE,
+        default=None,
     )
     session_sd: Annotated[float, Field(ge=0, le=1)] | None = described(
         "Relative standard deviation of friction from one day to another.", "1", 0.03, default=None
     )
     move_sd: Annotated[float, Field(ge=0, le=1e5)] | None = described(
-        "Standard deviation of what the model cannot express of a motion, as a mean power.", "W", 1.5, default=None
+        "Standard deviation of what the model cannot express of a motion, as a mean power.",
+        "W",
+        1.5,
+        default=None,
     )
     title: str | None = described(
-        "Manufacturer and model. Null: the robot's own.", None, "Universal Robots UR5e", default=None
+        "Manufacturer and model. Null: the robot's own.",
+        None,
+        "Universal Robots UR5e",
+        default=None,
     )
     kinematics: Section | None = _section("As the robot's own", {})
     limits: Section | None = _section("As the robot's own", {})
     collision: Section | None = _section("As the robot's own", {})
     default_motion: Section | None = _section("As the robot's own", {})
     friction_table: Section | None = _section("As the robot's own", {})
-    id: str | None = described("Has no effect: the id follows from the content.", None, FIGURES_ID, default=None)
+    id: str | None = described(
+        "Has no effect: the id follows from the content.", None, FIGURES_ID, default=None
+    )
     created: str | None = described("Has no effect.", None, CREATED, default=None)
     owner: str | None = described("Has no effect.", None, "press_shop", default=None)
     parameters: int | None = described("Has no effect.", "1", 2, default=None)

@@ -13,12 +13,22 @@ from fastapi.concurrency import run_in_threadpool
 from joulepath.app.api.figures.models import FiguresDetail, FiguresList, FiguresSummary
 from joulepath.app.api.figures.request import FiguresDocument
 from joulepath.app.api.figures.task import FiguresTask
-from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from joulepath.app.api.shared.dependencies import (
+    ServiceArmEngine,
+    ServiceClient,
+    ServiceSettings,
+    ServiceStore,
+)
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.parameters import LOCATION_HEADER, set_location
 from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
 from joulepath.app.exceptions.access import NotOwner
-from joulepath.app.exceptions.stored import FiguresInUse, StoreUnavailable, TooManyFigures, UnknownFigures
+from joulepath.app.exceptions.stored import (
+    FiguresInUse,
+    StoreUnavailable,
+    TooManyFigures,
+    UnknownFigures,
+)
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.http.weights import is_wanted
@@ -54,8 +64,9 @@ async def put(
     store: ServiceStore,
     client: ServiceClient,
 ) -> FiguresDetail:
-    """Stores figures of a robot that were identified on one arm, as `GET /figures/{id}` of this or another server gives
-    them. The id follows from the content: the same figures are stored once. Their first owner keeps them."""
+    """Stores figures of a robot that were identified on one arm, as `GET /figures/{id}` of this or
+    another server gives them. The id follows from the content: the same figures are stored once.
+    Their first owner keeps them."""
     task = FiguresTask(body, request.state.id)
     result = await unless_disconnected(request, engine.run(task, settings.max_deadline))
     new = figures.new_figures(body.robot, orjson.loads(result.document), client.owner)
@@ -74,7 +85,9 @@ async def put(
 )
 async def list_figures(store: ServiceStore) -> FiguresList:
     """Ids, robots and owners of all identified figures."""
-    return FiguresList(figures=[FiguresSummary(**_summary(row)) for row in await store.read(figures.all_of)])
+    return FiguresList(
+        figures=[FiguresSummary(**_summary(row)) for row in await store.read(figures.all_of)]
+    )
 
 
 @router.get(
@@ -82,17 +95,27 @@ async def list_figures(store: ServiceStore) -> FiguresList:
     summary="Identified figures",
     response_model=FiguresDetail,
     responses={
-        200: {"content": {YAML: {"schema": {"type": "string"}, "example": yaml.safe_dump(FIGURES, sort_keys=False)}}},
+        200: {
+            "content": {
+                YAML: {
+                    "schema": {"type": "string"},
+                    "example": yaml.safe_dump(FIGURES, sort_keys=False),
+                }
+            }
+        },
         **problem_responses(UnknownFigures, UnknownRobot, StoreUnavailable),
     },
 )
 async def show(request: Request, id: FiguresIdPath, store: ServiceStore) -> Any:
-    """The robot's `figures.yaml` with the identified figures in the place of its own, their covariance and `sd`.
-    `Accept: application/yaml` returns a file for `load_robot(name, figures=…)` of the library."""
+    """The robot's `figures.yaml` with the identified figures in the place of its own, their
+    covariance and `sd`. `Accept: application/yaml` returns a file for `load_robot(name, figures=…)`
+    of the library."""
     detail = await _detail(store, await store.read(partial(figures.get, id=id)))
     if not is_wanted(request, YAML):
         return detail
-    content = detail.model_dump(mode="json", exclude={"id", "created", "owner", "parameters"}, exclude_none=True)
+    content = detail.model_dump(
+        mode="json", exclude={"id", "created", "owner", "parameters"}, exclude_none=True
+    )
     return Response(await run_in_threadpool(_yaml, content), media_type=YAML)
 
 
@@ -109,18 +132,28 @@ async def delete(id: FiguresIdPath, store: ServiceStore, client: ServiceClient) 
 
 def _summary(row: Figures) -> dict[str, Any]:
     names = row.content.get("covariance", {}).get("names", [])
-    return {"id": row.id, "robot": row.robot, "created": row.created, "owner": row.owner, "parameters": len(names)}
+    return {
+        "id": row.id,
+        "robot": row.robot,
+        "created": row.created,
+        "owner": row.owner,
+        "parameters": len(names),
+    }
 
 
 async def _detail(store: Store, row: Figures) -> FiguresDetail:
     """The whole document of a row. Raises UnknownRobot if its robot was deleted."""
     whole = merged((await robot_in(store, row.robot)).figures, row.content)
     sections: dict[str, Any] = {
-        name: whole.get(name) for name in FiguresDetail.model_fields if name not in FiguresSummary.model_fields
+        name: whole.get(name)
+        for name in FiguresDetail.model_fields
+        if name not in FiguresSummary.model_fields
     }
     return FiguresDetail(**_summary(row), **sections)
 
 
 def _yaml(content: dict[str, Any]) -> str:
-    text: str = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
+    text: str = yaml.safe_dump(
+        content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120
+    )
     return text

@@ -21,7 +21,8 @@ class FiguresTask:
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """What takes the place of the robot's own figures, as JSON. `deadline` is not watched: it takes milliseconds.
+        """What takes the place of the robot's own figures, as JSON. `deadline` is not watched: it
+        takes milliseconds.
 
         Raises UnknownRobot, or InvalidProblem, which names the place.
         """
@@ -29,7 +30,9 @@ class FiguresTask:
 
 
 def replacing(name: str, document: dict[str, Any]) -> dict[str, Any]:
-    """What of a document takes the place of a robot's own figures. Raises UnknownRobot, or InvalidProblem."""
+    """What of a document takes the place of a robot's own figures. Raises UnknownRobot, or
+    InvalidProblem.
+    """
     robot = robot_named(name)
     try:
         content = replaced_in(robot.name, robot.figures, document)

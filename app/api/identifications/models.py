@@ -17,7 +17,9 @@ class IdentifiedParameter(Response):
     """A figure of a joint or of the whole arm."""
 
     figure: str = described(
-        "Its name, as in `GET /robots/{name}`, or the expression of a base parameter.", None, "coulomb"
+        "Its name, as in `GET /robots/{name}`, or the expression of a base parameter.",
+        None,
+        "coulomb",
     )
     joint: int | None = described("Number of the joint, from 0; null: of the whole arm.", "1", 1)
     value: float = described("The value that is used.", "SI", 7.1)
@@ -28,13 +30,21 @@ class IdentifiedParameter(Response):
 
 
 class TorqueErrors(Response):
-    """Errors of predicted torques on held-out moves. Arrays are over joints; null where nothing moved."""
+    """Errors of predicted torques on held-out moves. Arrays are over joints; null where nothing
+    moved.
+    """
 
-    rmse: list[float] = described("Root mean square while the joint moves.", "N·m", [0.7, 0.8, 0.4, 0.2, 0.2, 0.1])
-    relative: list[float | None] = described(
-        "Size of the error over that of the torque, while the joint moves.", "%", [6.7, 1.4, 1.5, 2.9, 5.7, 5.6]
+    rmse: list[float] = described(
+        "Root mean square while the joint moves.", "N·m", [0.7, 0.8, 0.4, 0.2, 0.2, 0.1]
     )
-    relative_all: list[float | None] = described("The same over all rows.", "%", [8.0, 2.0, 1.9, 4.0, 25.0, 49.0])
+    relative: list[float | None] = described(
+        "Size of the error over that of the torque, while the joint moves.",
+        "%",
+        [6.7, 1.4, 1.5, 2.9, 5.7, 5.6],
+    )
+    relative_all: list[float | None] = described(
+        "The same over all rows.", "%", [8.0, 2.0, 1.9, 4.0, 25.0, 49.0]
+    )
     shaft_energy: float | None = described("Error of the energy at the shafts.", "%", 2.7)
     copper_energy: float | None = described("Error of the energy lost in copper.", "%", 1.1)
 
@@ -73,27 +83,38 @@ class Structure(Response):
     base: int = described("Number of their combinations that matter.", "1", 40)
     base_expressions: list[str] = described("These combinations.", None, ["Izz1 +1·Ia1"])
     condition: float | None = described(
-        "Condition number of their columns in these logs, each scaled to length 1; null without a refit.", "1", 33.0
+        "Condition number of their columns in these logs, each scaled to length 1; null without a "
+        "refit.",
+        "1",
+        33.0,
     )
-    excited: int | None = described("How many of them the logs excite; null without a refit.", "1", 40)
+    excited: int | None = described(
+        "How many of them the logs excite; null without a refit.", "1", 40
+    )
 
 
 class Physical(Response):
     """Whether refitted links are real bodies."""
 
     consistent: bool = described("Whether all of them are.", None, True)
-    min_eigenvalue: list[float] = described("Least eigenvalue of each link's pseudo-inertia.", "SI", [0.01, 0.002])
+    min_eigenvalue: list[float] = described(
+        "Least eigenvalue of each link's pseudo-inertia.", "SI", [0.01, 0.002]
+    )
 
 
 class Residuals(Response):
     """What the fit leaves over."""
 
     torque_lag_one: list[float | None] = described(
-        "Correlation of neighbouring residuals of each joint's torque.", "1", [0.8, 0.9, 0.9, 0.7, 0.7, 0.6]
+        "Correlation of neighbouring residuals of each joint's torque.",
+        "1",
+        [0.8, 0.9, 0.9, 0.7, 0.7, 0.6],
     )
     power_lag_one: float | None = described("The same of the power; null without power.", "1", 0.1)
     white: bool = described("Whether all of them are below 0.3.", None, False)
-    sessions: list[float] = described("Size of each log's friction relative to the fit's.", "1", [0.98, 1.02])
+    sessions: list[float] = described(
+        "Size of each log's friction relative to the fit's.", "1", [0.98, 1.02]
+    )
 
 
 class MeasuredNoise(Response):
@@ -103,25 +124,43 @@ class MeasuredNoise(Response):
     deviation: list[float] = described(
         "Standard deviation of each joint's torque.", "N·m", [0.6, 0.7, 0.4, 0.1, 0.1, 0.1]
     )
-    excess: float = described("Mean square of the residuals over that of the noise: 1 if the model is right.", "1", 1.1)
+    excess: float = described(
+        "Mean square of the residuals over that of the noise: 1 if the model is right.", "1", 1.1
+    )
 
 
 class Temperatures(Response):
-    """Friction over temperature: friction(T) = friction(T0)·exp(-k (T - T0)). Arrays are over joints."""
+    """Friction over temperature: friction(T) = friction(T0)·exp(-k (T - T0)). Arrays are over
+    joints.
+    """
 
-    reference: list[float | None] = described("T0, the mean of the logs; null if not logged.", "°C", [34.4, 35.7])
-    span: list[float | None] = described("Greatest less least temperature of the logs.", "K", [0.1, 0.1])
-    k: list[float | None] = described("k; null where the logs span less than 8 K.", "1/K", [None, 0.011])
+    reference: list[float | None] = described(
+        "T0, the mean of the logs; null if not logged.", "°C", [34.4, 35.7]
+    )
+    span: list[float | None] = described(
+        "Greatest less least temperature of the logs.", "K", [0.1, 0.1]
+    )
+    k: list[float | None] = described(
+        "k; null where the logs span less than 8 K.", "1/K", [None, 0.011]
+    )
     sd: list[float | None] = described("Its standard deviation.", "1/K", [None, 0.001])
 
 
 class Advice(Response):
     """What would help most."""
 
-    figure: str = described("The figure that, if known, would take most of the energy's variance away.", None, "copper")
+    figure: str = described(
+        "The figure that, if known, would take most of the energy's variance away.", None, "copper"
+    )
     joint: int | None = described("Its joint, from 0; null: of the whole arm.", "1", 1)
-    share: float = described("The share of the variance that it would take away, at most 1.", "1", 0.4)
-    do: str = described("What to log. Four times as many such moves halve its standard deviation.", None, "Log rests.")
+    share: float = described(
+        "The share of the variance that it would take away, at most 1.", "1", 0.4
+    )
+    do: str = described(
+        "What to log. Four times as many such moves halve its standard deviation.",
+        None,
+        "Log rests.",
+    )
 
 
 class IdentificationSummary(Response):
@@ -130,9 +169,12 @@ class IdentificationSummary(Response):
     id: str = described("Its id.", None, IDENTIFICATION_ID)
     state: State = described("Its state.", None, "done")
     created: datetime = described("Time at which it was sent, in UTC.", None, CREATED)
-    owner: str | None = described("Name of the API key that sent it; null without one.", None, "press_shop")
+    owner: str | None = described(
+        "Name of the API key that sent it; null without one.", None, "press_shop"
+    )
     figures: str | None = described(
-        "Id of the figures that were found: every request about a motion takes it as `figures`. Null before the end, "
+        "Id of the figures that were found: every request about a motion takes it as `figures`. "
+        "Null before the end, "
         "where the service has no room for more figures, and after they were deleted.",
         None,
         FIGURES_ID,
@@ -163,7 +205,9 @@ class Identification(IdentificationSummary):
     """An identification: its state and, once it is done, what was found."""
 
     problem: dict[str, Any] | None = described(
-        "Why it failed (RFC 9457); null otherwise.", None, {"type": "/problems/not-excited", "status": 422}
+        "Why it failed (RFC 9457); null otherwise.",
+        None,
+        {"type": "/problems/not-excited", "status": 422},
     )
     result: IdentificationResult | None = part("What was found; null before it is done.")
 
@@ -172,10 +216,13 @@ class TorqueCurves(Response):
     """Torques of the motors, one list for each joint."""
 
     measured: list[list[float | None]] = described(
-        "As measured, or from the currents; null where not logged.", "N·m", [[12.4, 12.6], [-3.1, -3.0]]
+        "As measured, or from the currents; null where not logged.",
+        "N·m",
+        [[12.4, 12.6], [-3.1, -3.0]],
     )
     modelled: list[list[float | None]] = described(
-        "By the figures; null where the joint is slower than `velocity_threshold`: friction at rest is not known.",
+        "By the figures; null where the joint is slower than `velocity_threshold`: friction at "
+        "rest is not known.",
         "N·m",
         [[12.3, 12.7], [None, -3.1]],
     )
@@ -184,16 +231,21 @@ class TorqueCurves(Response):
 class PowerCurves(Response):
     """Power on the arm's bus."""
 
-    measured: list[float | None] = described("As measured; null where not logged.", "W", [96.2, 101.5])
+    measured: list[float | None] = described(
+        "As measured; null where not logged.", "W", [96.2, 101.5]
+    )
     modelled: list[float | None] = described("By the figures.", "W", [95.8, 102.0])
 
 
 class ResidualMove(Response):
-    """A move of a log: what was measured, and what figures make of it. The residual is the difference."""
+    """A move of a log: what was measured, and what figures make of it. The residual is the
+    difference.
+    """
 
     log: str = described("Id of the log.", None, LOG_ID)
     held_out: bool = described(
-        "Whether the fit that predicts it has not seen it. All others are predicted by the figures that were found.",
+        "Whether the fit that predicts it has not seen it. All others are predicted by the figures "
+        "that were found.",
         None,
         True,
     )
@@ -207,7 +259,8 @@ class ResidualCurves(Response):
 
     id: str = described("Id of the identification.", None, IDENTIFICATION_ID)
     moves: list[ResidualMove] | None = part(
-        "All moves, those that are held out last: some 3000 instants in all, evenly among the rows. Null before it is "
+        "All moves, those that are held out last: some 3000 instants in all, evenly among the "
+        "rows. Null before it is "
         "done, and for identifications of an earlier version."
     )
 
@@ -219,7 +272,9 @@ class FoundPayload(Response):
     mass: float = described("Its mass; 0 if the logs do not tell it.", "kg", 2.8)
     mass_sd: float = described("Standard deviation of the mass.", "kg", 0.01)
     com: list[float] = described("Its centre of mass in the flange frame.", "m", [0.0, 0.0, 0.06])
-    com_sd: list[float] = described("Standard deviation of the centre of mass.", "m", [0.001, 0.001, 0.002])
+    com_sd: list[float] = described(
+        "Standard deviation of the centre of mass.", "m", [0.001, 0.001, 0.002]
+    )
     why: str = described("Why the logs do not tell it; empty if they do.", None, "")
 
 
@@ -228,21 +283,26 @@ class IdentificationResult(Response):
 
     robot: str = described("Name of the robot.", None, "ur5e")
     document: dict[str, Any] = described(
-        "The identified figures, which `PUT /figures` of another server takes, too: in the form of the robot's own, "
+        "The identified figures, which `PUT /figures` of another server takes, too: in the form of "
+        "the robot's own, "
         "with value, unit, source, trust and `sd`; `covariance`, "
-        "`session_sd` (relative, of friction from day to day) and `move_sd` (W, of the mean power of a move).",
+        "`session_sd` (relative, of friction from day to day) and `move_sd` (W, of the mean power "
+        "of a move).",
         None,
         {"robot": "ur5e", "electronics": {"idle_power": {"value": 36.4, "unit": "W", "sd": 0.3}}},
     )
     parameters: list[IdentifiedParameter] = part("Every figure that was sought.")
     structure: Structure = part("Base parameters of the links and rotors.")
-    physical: Physical | None = part("Whether refitted links are real bodies; null if they are kept.")
+    physical: Physical | None = part(
+        "Whether refitted links are real bodies; null if they are kept."
+    )
     validation: HeldOutErrors = part("Errors on moves that the fit has not seen.")
     residuals: Residuals = part("What the fit leaves over of the moves.")
     temperatures: Temperatures = part("Friction over temperature.")
     noise: MeasuredNoise | None = part("Noise of a periodic motion; null with other methods.")
     thresholds: list[float] | None = described(
-        "Speeds below which no sample of a joint was used; null but for the method `threshold_velocity`.",
+        "Speeds below which no sample of a joint was used; null but for the method "
+        "`threshold_velocity`.",
         "rad/s",
         [0.05, 0.04, 0.03, 0.02, 0.02, 0.02],
     )

@@ -19,7 +19,12 @@ class Fraction(Request):
     """The part of the moves that is held out."""
 
     fraction: float = described(
-        "Fraction of the moving time; whole motions are held out.", "1", 0.3, default=0.3, ge=0.05, le=0.8
+        "Fraction of the moving time; whole motions are held out.",
+        "1",
+        0.3,
+        default=0.3,
+        ge=0.05,
+        le=0.8,
     )
 
 
@@ -27,7 +32,8 @@ class FrictionTerms(Request):
     """The friction law that is fitted."""
 
     terms: Annotated[list[Term], Field(min_length=1, max_length=5)] = described(
-        "Terms of the law. `curved` is the concave rise of strain-wave gears, at the speed that fits best.",
+        "Terms of the law. `curved` is the concave rise of strain-wave gears, at the speed that "
+        "fits best.",
         None,
         list(DEFAULT_TERMS),
         default=list(DEFAULT_TERMS),
@@ -47,7 +53,8 @@ class IdentifyRequest(Request):
 
     logs: LogIds = described("Ids of logs, all of one robot.", None, [LOG_ID])
     validate_: LogIds | Fraction | Literal["moves"] = described(
-        "What the figures are validated on, which no fit sees: other logs, a fraction of the moves, or `moves`: each "
+        "What the figures are validated on, which no fit sees: other logs, a fraction of the "
+        "moves, or `moves`: each "
         "motion in its turn. Moves along the same motion stay together.",
         None,
         {"fraction": 0.3},
@@ -55,41 +62,68 @@ class IdentifyRequest(Request):
         alias="validate",
     )
     fit: Annotated[list[Target], Field(min_length=1, max_length=5)] = described(
-        "What is found. Power is added by itself where the logs have it; asking for it refuses logs without. "
-        "`payload`: mass and centre of mass of what the last of `logs` carried and the others did not; friction and "
+        "What is found. Power is added by itself where the logs have it; asking for it refuses "
+        "logs without. "
+        "`payload`: mass and centre of mass of what the last of `logs` carried and the others did "
+        "not; friction and "
         "rotors are found with it.",
         None,
         ["friction", "rotor"],
         default=["friction", "rotor"],
     )
     method: Method = described(
-        "How it is found. `automatic`: friction and rotors with the robot's own links where the logs "
+        "How it is found. `automatic`: friction and rotors with the robot's own links where the "
+        "logs "
         "have currents or torques, and power where they have it. The others are methods of the "
-        "literature, each for its own kind of log: one that does not fit is `method-not-applicable`.",
+        "literature, each for its own kind of log: one that does not fit is "
+        "`method-not-applicable`.",
         None,
         "automatic",
         default="automatic",
     )
     period: float | None = described(
-        "Period of the motion; only for the method `periodic`.", "s", 10.0, default=None, ge=0.1, le=1e4
+        "Period of the motion; only for the method `periodic`.",
+        "s",
+        10.0,
+        default=None,
+        ge=0.1,
+        le=1e4,
     )
     inertials: Literal["keep", "refit"] = described(
-        "`keep`: the robot's own. `refit`: they are found, too, as those of real bodies near the robot's own.",
+        "`keep`: the robot's own. `refit`: they are found, too, as those of real bodies near the "
+        "robot's own.",
         None,
         "keep",
         default="keep",
     )
-    friction: FrictionTerms = Field(description="Terms of the friction law.", default=FrictionTerms())
+    friction: FrictionTerms = Field(
+        description="Terms of the friction law.", default=FrictionTerms()
+    )
     estimator: Estimator = described(
-        "Weighted, reweighted (outliers count less) or ordinary least squares.", None, "wls", default="wls"
+        "Weighted, reweighted (outliers count less) or ordinary least squares.",
+        None,
+        "wls",
+        default="wls",
     )
     velocity_threshold: float = described(
-        "Slower samples of a joint do not count for its friction.", "rad/s", 0.02, default=0.02, ge=0.0, le=10.0
+        "Slower samples of a joint do not count for its friction.",
+        "rad/s",
+        0.02,
+        default=0.02,
+        ge=0.0,
+        le=10.0,
     )
     prior_weight: float = described(
-        "Weight of the robot's own inertials where they are refitted.", "1", 1.0, default=1.0, ge=1e-6, le=1e6
+        "Weight of the robot's own inertials where they are refitted.",
+        "1",
+        1.0,
+        default=1.0,
+        ge=1e-6,
+        le=1e6,
     )
-    deadline: float = described("Longest time of the fit.", "s", DEADLINE, default=DEADLINE, gt=0, le=3600)
+    deadline: float = described(
+        "Longest time of the fit.", "s", DEADLINE, default=DEADLINE, gt=0, le=3600
+    )
 
     @property
     def all_logs(self) -> list[str]:

@@ -24,7 +24,13 @@ from joulepath.app.convert.packed import unpacked
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.queue import Busy
-from joulepath.app.exceptions.stored import KeyReused, StoreUnavailable, UnknownIdentification, UnknownJob, UnknownLog
+from joulepath.app.exceptions.stored import (
+    KeyReused,
+    StoreUnavailable,
+    UnknownIdentification,
+    UnknownJob,
+    UnknownLog,
+)
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.examples.values import IDENTIFICATION_ID
@@ -37,7 +43,9 @@ from joulepath.app.tasks.job_request import IDENTIFY, RESIDUALS
 
 router = APIRouter(prefix="/identifications", tags=["logs"])
 
-IdentificationId = Annotated[str, Path(description="The identification's id.", examples=[IDENTIFICATION_ID])]
+IdentificationId = Annotated[
+    str, Path(description="The identification's id.", examples=[IDENTIFICATION_ID])
+]
 _STATES = {"waiting": "queued"}
 
 
@@ -66,8 +74,9 @@ async def add(
     client: ServiceClient,
     key: Key = None,
 ) -> Identification:
-    """Finds friction, rotor inertia and power of one arm from its logs, and says how well they predict moves that no
-    fit has seen. The work is a job, whose id is the identification's: `GET /jobs/{id}` knows it, too."""
+    """Finds friction, rotor inertia and power of one arm from its logs, and says how well they
+    predict moves that no fit has seen. The work is a job, whose id is the identification's: `GET
+    /jobs/{id}` knows it, too."""
     robots = set()
     for each in body.all_logs:
         robots.add((await store.read(partial(stored_logs.about, log_id=each))).robot)
@@ -85,7 +94,9 @@ async def add(
     response_model=IdentificationList,
     responses=problem_responses(InvalidRequest, StoreUnavailable),
 )
-async def list_identifications(page: Annotated[IdentificationPage, Query()], store: ServiceStore) -> IdentificationList:
+async def list_identifications(
+    page: Annotated[IdentificationPage, Query()], store: ServiceStore
+) -> IdentificationList:
     """All identifications, newest first, page by page. They are deleted with their jobs."""
     found, following = await store.read(partial(_page, limit=page.limit, after=page.after))
     return IdentificationList(identifications=found, next=following)
@@ -109,10 +120,12 @@ async def show(id: IdentificationId, store: ServiceStore) -> Identification:
     responses=problem_responses(UnknownIdentification, StoreUnavailable),
 )
 async def residuals(id: IdentificationId, store: ServiceStore) -> Response:
-    """Measured and modelled torques and power over time, move by move. Moves that were held out are predicted by a fit
-    that has not seen them."""
+    """Measured and modelled torques and power over time, move by move. Moves that were held out are
+    predicted by a fit that has not seen them."""
     body = await store.read(partial(_curves, job_id=id))
-    content = {"id": id, "moves": None} if body is None else {"id": id, **orjson.loads(unpacked(body))}
+    content = (
+        {"id": id, "moves": None} if body is None else {"id": id, **orjson.loads(unpacked(body))}
+    )
     return result_response(TaskResult.of_json(content))
 
 
@@ -134,14 +147,21 @@ def _curves(session: Session, job_id: str) -> bytes | None:
     return answers.of_job(session, job.id, RESIDUALS)
 
 
-def _page(session: Session, limit: int, after: str | None) -> tuple[list[ListedIdentification], str | None]:
+def _page(
+    session: Session, limit: int, after: str | None
+) -> tuple[list[ListedIdentification], str | None]:
     found, following = stored_jobs.page_of_kind(session, IDENTIFY, limit, after)
-    listed = [ListedIdentification(**_summary(session, job, request), robot=robot) for job, request, robot in found]
+    listed = [
+        ListedIdentification(**_summary(session, job, request), robot=robot)
+        for job, request, robot in found
+    ]
     return listed, following
 
 
 def _found(session: Session, job_id: str) -> tuple[Job, JobRequest, bytes | None]:
-    """The job of an identification, its request and the compressed answer. Raises UnknownIdentification."""
+    """The job of an identification, its request and the compressed answer. Raises
+    UnknownIdentification.
+    """
     try:
         job = stored_jobs.view(session, job_id).job
         request, body = stored_jobs.outcome(session, job_id, 0)

@@ -32,14 +32,17 @@ _DECIMALS = 4
 
 @dataclass(frozen=True)
 class IdentifyTask:
-    """A validated request, and the logs that it names: those of the fit, then those of the validation."""
+    """A validated request, and the logs that it names: those of the fit, then those of the
+    validation.
+    """
 
     request: IdentifyRequest
     logs: tuple[GivenLog, ...]
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """What was found, within about `deadline` seconds; the curves of its residuals are stored beside it.
+        """What was found, within about `deadline` seconds; the curves of its residuals are stored
+        beside it.
 
         Raises UnknownRobot, EffortNotUsable, MethodNotApplicable, NotExcited, NothingHeldOut,
         NoPowerChannel, PayloadUnknown, InvalidRequest or DeadlineExceeded.
@@ -57,7 +60,9 @@ class IdentifyTask:
             raise InvalidRequest([{"loc": location(error, "body"), "msg": str(error)}]) from None
         assert others is not None
         moves = _residual_fields(found, others, self.request.all_logs)
-        curves = StoredAnswer(str(uuid.uuid4()), json_document({"moves": moves}), AnswerFigures(robot.name))
+        curves = StoredAnswer(
+            str(uuid.uuid4()), json_document({"moves": moves}), AnswerFigures(robot.name)
+        )
         return TaskResult.of_json(_identification_fields(found, others), (curves,))
 
 
@@ -87,7 +92,9 @@ def _identification_fields(found: Identification, validation: Validation) -> dic
         "parameters": [asdict(each) for each in found.parameters],
         "structure": asdict(found.structure),
         "physical": None if found.physical is None else asdict(found.physical),
-        "validation": {name: value for name, value in asdict(validation).items() if name != "curves"},
+        "validation": {
+            name: value for name, value in asdict(validation).items() if name != "curves"
+        },
         "residuals": asdict(found.residuals),
         "temperatures": asdict(found.temperatures),
         "noise": None if found.noise is None else asdict(found.noise),
@@ -97,8 +104,12 @@ def _identification_fields(found: Identification, validation: Validation) -> dic
     }
 
 
-def _residual_fields(found: Identification, validation: Validation, logs: Sequence[str]) -> list[dict[str, Any]]:
-    """The moves of logs with these ids: those of the fit, and from the next number on those that validate it alone."""
+def _residual_fields(
+    found: Identification, validation: Validation, logs: Sequence[str]
+) -> list[dict[str, Any]]:
+    """The moves of logs with these ids: those of the fit, and from the next number on those that
+    validate it alone.
+    """
     own = len(found.logs)
     others = own if len(logs) > own else 0
     return [*_moves(found.curves, logs, False), *_moves(validation.curves, logs[others:], True)]
@@ -134,5 +145,10 @@ def _rounded(values: Array) -> Array:
 
 def _payload_fields(carried: Carried) -> dict[str, Any]:
     mass_sd, *com_sd = np.sqrt(np.diag(carried.covariance)).tolist()
-    told = {"log": carried.log, "mass": carried.mass, "com": carried.com.tolist(), "why": carried.why}
+    told = {
+        "log": carried.log,
+        "mass": carried.mass,
+        "com": carried.com.tolist(),
+        "why": carried.why,
+    }
     return told | {"mass_sd": mass_sd, "com_sd": com_sd}

@@ -1,4 +1,5 @@
-"""What `POST /ik` takes and answers, and its work in a worker, because its meshes may take seconds."""
+"""What `POST /ik` takes and answers, and its work in a worker, because its meshes may take
+seconds."""
 
 from __future__ import annotations
 
@@ -58,8 +59,8 @@ class IKAnswer(Answer):
     solutions: tuple[IKSolution, ...]
     """One entry per configuration."""
     complete: bool
-    """Whether every branch is among them. False for an arm whose inverse kinematics is not proven to
-    find all: some may be missing."""
+    """Whether every branch is among them. False for an arm whose inverse kinematics is not proven
+    to find all: some may be missing."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +93,8 @@ def to_ik_arm(request: IKRequest, robot: Robot) -> Arm:
         robot=robot,
         T_flange_tcp=to_matrix(request.tcp),
         tool=to_tool(request.tool),
-        payload=Payload(shape=None if carried is None else to_attachment(carried.shape, carried.touches)),
+        payload=Payload(
+            shape=None if carried is None else to_attachment(carried.shape, carried.touches)
+        ),
         scene=to_scene(request.scene, robot),
     )

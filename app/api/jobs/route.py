@@ -16,12 +16,23 @@ from joulepath.app.api.shared.dependencies import (
     ServiceStore,
 )
 from joulepath.app.api.shared.later import deadlines
-from joulepath.app.api.shared.parameters import CREATED_HEADERS, Key, WantedFormat, is_fresh, set_location
+from joulepath.app.api.shared.parameters import (
+    CREATED_HEADERS,
+    Key,
+    WantedFormat,
+    is_fresh,
+    set_location,
+)
 from joulepath.app.api.shared.uploads import upload
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.queue import Busy, ShuttingDown, WorkerLost
-from joulepath.app.exceptions.stored import JobNotCancellable, KeyReused, StoreUnavailable, UnknownJob
+from joulepath.app.exceptions.stored import (
+    JobNotCancellable,
+    KeyReused,
+    StoreUnavailable,
+    UnknownJob,
+)
 from joulepath.app.exceptions.transport import BodyTooLarge, RequestTimeout, UnsupportedMediaType
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.event_stream import EVENT_SCHEMA, EVENT_STREAM, EVENT_STREAM_HEADERS
@@ -44,7 +55,8 @@ LastEventId = Annotated[
     str | None,
     Header(
         alias="Last-Event-ID",
-        description="Number of the last event that was received. A text that is no number has no effect.",
+        description="Number of the last event that was received. A text that is no number has no "
+        "effect.",
         examples=["17"],
     ),
 ]
@@ -74,7 +86,9 @@ _OF_ONE = (UnknownJob, StoreUnavailable)
     openapi_extra={
         "requestBody": {
             "required": True,
-            "content": {"application/json": {"schema": {"$ref": f"#/components/schemas/{NewJob.__name__}"}}},
+            "content": {
+                "application/json": {"schema": {"$ref": f"#/components/schemas/{NewJob.__name__}"}}
+            },
         }
     },
 )
@@ -87,9 +101,9 @@ async def create(
     client: ServiceClient,
     key: Key = None,
 ) -> Job:
-    """Takes up to 10,000 requests, and computes them while the client does not wait. Every request is validated now: a
-    malformed one refuses the whole job. The job survives a restart of the service. Requests that somebody waits for
-    come first."""
+    """Takes up to 10,000 requests, and computes them while the client does not wait. Every request
+    is validated now: a malformed one refuses the whole job. The job survives a restart of the
+    service. Requests that somebody waits for come first."""
     if media_type(request.headers) not in (JSON, *UNDECLARED):
         raise UnsupportedMediaType
     with upload() as (file, path):
@@ -122,15 +136,22 @@ async def list_jobs(page: Annotated[JobPage, Query()], store: ServiceStore) -> J
     response_model=JobDetail,
     responses=problem_responses(InvalidRequest, *_OF_ONE),
 )
-async def show(id: JobId, page: Annotated[RequestPage, Query()], jobs: ServiceJobs, store: ServiceStore) -> JobDetail:
-    """The job with its progress and a page of its requests. Each request that is done refers to its answer, which is
-    kept as long as the job; each that failed has its problem."""
+async def show(
+    id: JobId, page: Annotated[RequestPage, Query()], jobs: ServiceJobs, store: ServiceStore
+) -> JobDetail:
+    """The job with its progress and a page of its requests. Each request that is done refers to its
+    answer, which is kept as long as the job; each that failed has its problem."""
     view = await jobs.view(id)
     read = partial(stored_jobs.requests, job_id=id, limit=page.limit + 1, after=page.after)
     return JobDetail(**detail(view, await store.read(read), page.limit))
 
 
-@router.delete("/{id}", summary="Delete a job", status_code=204, responses=problem_responses(*_OF_ONE, NotOwner))
+@router.delete(
+    "/{id}",
+    summary="Delete a job",
+    status_code=204,
+    responses=problem_responses(*_OF_ONE, NotOwner),
+)
 async def delete(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> None:
     """Deletes the job with its answers. What runs is stopped."""
     await jobs.delete(id, client)
@@ -144,8 +165,8 @@ async def delete(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> None:
     responses=problem_responses(*_OF_ONE, NotOwner, JobNotCancellable),
 )
 async def cancel(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> Job:
-    """Cancels what waits, and stops what runs within a second. Answers that are there stay. A job that is cancelled
-    already stays as it is."""
+    """Cancels what waits, and stops what runs within a second. Answers that are there stay. A job
+    that is cancelled already stays as it is."""
     await jobs.cancel(id, client)
     return Job(**summary(await jobs.view(id)))
 
@@ -158,7 +179,9 @@ async def cancel(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> Job:
     responses=problem_responses(*_OF_ONE, NotOwner, Busy),
 )
 async def retry(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> Job:
-    """Lets the requests wait again that failed or were cancelled. Those that are done stay as they are."""
+    """Lets the requests wait again that failed or were cancelled. Those that are done stay as they
+    are.
+    """
     await jobs.retry(id, client)
     return Job(**summary(await jobs.view(id)))
 
@@ -176,12 +199,17 @@ KnownJob = Annotated[str, Depends(_known)]
     "/{id}/events",
     summary="Events of a job",
     response_class=StreamingResponse,
-    responses={200: {"content": {EVENT_STREAM: {"itemSchema": EVENT_SCHEMA}}}, **problem_responses(*_OF_ONE)},
+    responses={
+        200: {"content": {EVENT_STREAM: {"itemSchema": EVENT_SCHEMA}}},
+        **problem_responses(*_OF_ONE),
+    },
 )
-async def events(job_id: KnownJob, jobs: ServiceJobs, store: ServiceStore, last: LastEventId = None) -> Response:
-    """Server-sent events: `state` (of the job), `request` (one has ended), `progress` (at most two in a second) and
-    `end`. They are numbered in the job from 1. `Last-Event-ID` continues after a number, also after a restart of the
-    service. The stream closes when the job has ended."""
+async def events(
+    job_id: KnownJob, jobs: ServiceJobs, store: ServiceStore, last: LastEventId = None
+) -> Response:
+    """Server-sent events: `state` (of the job), `request` (one has ended), `progress` (at most two
+    in a second) and `end`. They are numbered in the job from 1. `Last-Event-ID` continues after a
+    number, also after a restart of the service. The stream closes when the job has ended."""
     number = int(last) if last is not None and last.isdecimal() and len(last) < 10 else 0
     # in batches, and not event by event as FastAPI has it: hundreds may follow one job
     found = events_after(store, jobs.dispatcher, job_id, number)
@@ -203,8 +231,9 @@ async def events(job_id: KnownJob, jobs: ServiceJobs, store: ServiceStore, last:
     },
 )
 async def results(job_id: KnownJob, store: ServiceStore, wanted: WantedFormat) -> Response:
-    """The requests that have ended, in order of their index: a line of JSON each, with the complete answer under
-    `result`. `Accept: text/csv` returns a table of their figures without the answers."""
+    """The requests that have ended, in order of their index: a line of JSON each, with the complete
+    answer under `result`. `Accept: text/csv` returns a table of their figures without the answers.
+    """
     if wanted == "csv":
         return StreamingResponse(as_csv(store, job_id), media_type="text/csv")
     return StreamingResponse(as_lines(store, job_id), media_type="application/x-ndjson")

@@ -13,12 +13,18 @@ from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
 class LogChannel(Response):
     """A channel of a log."""
 
-    name: str = described("`q1`, `v1`, `a1`, `effort1`, `temperature1`, `wrench1`, … or `power`.", None, "effort2")
-    column: str | None = described("Its column in the file; null if it was made from another.", None, "i2")
+    name: str = described(
+        "`q1`, `v1`, `a1`, `effort1`, `temperature1`, `wrench1`, … or `power`.", None, "effort2"
+    )
+    column: str | None = described(
+        "Its column in the file; null if it was made from another.", None, "i2"
+    )
     unit: str = described("Its unit.", None, "A")
     min: float = described("Least value, in this unit.", "SI", -3.2)
     max: float = described("Greatest value.", "SI", 6.5)
-    noise: float = described("Robust standard deviation of what is above the filter's band.", "SI", 0.03)
+    noise: float = described(
+        "Robust standard deviation of what is above the filter's band.", "SI", 0.03
+    )
 
 
 class LogEffort(Response):
@@ -26,11 +32,16 @@ class LogEffort(Response):
 
     meaning: EffortMeaning = described("What they are taken for.", None, "current")
     confidence: float = described(
-        "1 if the slopes are exactly those of this meaning, 0 if they could be another's or do not tell.", "1", 0.9
+        "1 if the slopes are exactly those of this meaning, 0 if they could be another's or do not "
+        "tell.",
+        "1",
+        0.9,
     )
     slope: dict[str, float | None] = described(
-        "Slope of the effort against the torque of the rigid model, with friction beside it, at the two joints next to "
-        "the base that carry most. About 1 / torque constant: current; 1: torque; 0: without gravity. Null: the motion "
+        "Slope of the effort against the torque of the rigid model, with friction beside it, at "
+        "the two joints next to "
+        "the base that carry most. About 1 / torque constant: current; 1: torque; 0: without "
+        "gravity. Null: the motion "
         "does not tell.",
         "1/A or 1",
         {"shoulder_lift_joint": 0.1, "elbow_joint": 0.1},
@@ -53,7 +64,9 @@ class LogSummary(Response):
     robot: str = described("Name of the robot.", None, "ur5e")
     tags: list[str] = described("Its tags.", None, ["cold"])
     created: datetime = described("Time at which it was added, in UTC.", None, CREATED)
-    owner: str | None = described("Name of the API key that added it; null without one.", None, "press_shop")
+    owner: str | None = described(
+        "Name of the API key that added it; null without one.", None, "press_shop"
+    )
     size: int = described("Its size in the database, compressed.", "byte", 1_200_000)
     rows: int = described("Rows that were read.", "1", 15_000)
     duration: float = described("Time from the first row to the last.", "s", 30.0)
@@ -62,8 +75,12 @@ class LogSummary(Response):
 class LogDetail(LogSummary):
     """A stored log, and what was seen in it. The samples themselves are not returned."""
 
-    dropped: int = described("Lines that were dropped, because they have too few or too many cells.", "1", 0)
-    rate: float = described("Rows per second of the uniform grid on which the log is used.", "Hz", 500.0)
+    dropped: int = described(
+        "Lines that were dropped, because they have too few or too many cells.", "1", 0
+    )
+    rate: float = described(
+        "Rows per second of the uniform grid on which the log is used.", "Hz", 500.0
+    )
     jitter: list[float] = described(
         "5th and 95th percentile of the deviation of a time step from 1 / rate.", "s", [-1e-4, 1e-4]
     )
@@ -71,11 +88,13 @@ class LogDetail(LogSummary):
     channels: list[LogChannel] = part("All channels.")
     effort: LogEffort | None = part("What the efforts are; null if none were logged.")
     moves: list[LogMove] = part(
-        "Moves and rests, in order. A move of more than 8 s is divided into blocks of about 5 s, with 0.5 s between "
+        "Moves and rests, in order. A move of more than 8 s is divided into blocks of about 5 s, "
+        "with 0.5 s between "
         "them left out."
     )
     warnings: list[str] = described(
-        "What is odd: gaps, constant or saturated channels, velocities that do not fit, an unknown payload, …",
+        "What is odd: gaps, constant or saturated channels, velocities that do not fit, an unknown "
+        "payload, …",
         None,
         ["No payload is given or logged: the arm is taken to have carried nothing."],
     )

@@ -17,15 +17,23 @@ Tag = Annotated[str, Field(min_length=1, max_length=32, pattern=NO_CONTROLS), PL
 class LogSettings(LogFile):
     """The query parameters of a log."""
 
-    robot: RobotName = described("Name of the robot, from `GET /robots`.", None, "ur5e", default="ur5e")
+    robot: RobotName = described(
+        "Name of the robot, from `GET /robots`.", None, "ur5e", default="ur5e"
+    )
     name: Name | None = described("A name of your own.", None, "Palletiser, morning", default=None)
-    tags: Annotated[list[Tag], Field(max_length=16)] = described("Tags of your own.", None, ["cold"], default=[])
+    tags: Annotated[list[Tag], Field(max_length=16)] = described(
+        "Tags of your own.", None, ["cold"], default=[]
+    )
     payload: Payload | None = described(
-        "What the arm carried. Null: what the log says (`payload`, `payload_cog_0` …), else nothing.",
+        "What the arm carried. Null: what the log says (`payload`, `payload_cog_0` …), else "
+        "nothing.",
         None,
         {"mass": 2.0, "com": [0.0, 0.0, 0.06]},
         default=None,
     )
     gravity: Vector3 = described(
-        "Acceleration of gravity in the base frame.", "m/s²", [0.0, 0.0, -9.81], default=[0.0, 0.0, -9.81]
+        "Acceleration of gravity in the base frame.",
+        "m/s²",
+        [0.0, 0.0, -9.81],
+        default=[0.0, 0.0, -9.81],
     )

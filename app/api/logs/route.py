@@ -13,7 +13,12 @@ from fastapi.concurrency import run_in_threadpool
 from joulepath.app.api.logs.models import LogDetail, LogList, LogPage, LogSummary
 from joulepath.app.api.logs.request import LogSettings
 from joulepath.app.api.logs.task import ReadLogTask
-from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from joulepath.app.api.shared.dependencies import (
+    ServiceArmEngine,
+    ServiceClient,
+    ServiceSettings,
+    ServiceStore,
+)
 from joulepath.app.api.shared.parameters import LOCATION_HEADER, set_location
 from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
 from joulepath.app.api.shared.query_settings import query_parameters, settings_of
@@ -34,7 +39,13 @@ from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogToo
 router = APIRouter(prefix="/logs", tags=["logs"])
 
 LogId = Annotated[str, Path(description="The log's id.", examples=[LOG_ID])]
-_TAKEN = ("text/csv", "application/octet-stream", "application/gzip", "application/x-gzip", *UNDECLARED)
+_TAKEN = (
+    "text/csv",
+    "application/octet-stream",
+    "application/gzip",
+    "application/x-gzip",
+    *UNDECLARED,
+)
 _GZIP = b"\x1f\x8b"
 _SHOWN = tuple(name for name in LogSummary.model_fields if name not in ("tags", "rows", "duration"))
 
@@ -68,8 +79,9 @@ async def add(
     store: ServiceStore,
     client: ServiceClient,
 ) -> LogDetail:
-    """Adds a log of one arm, from which its friction, rotors and powers can be identified: a CSV file, plain or packed
-    with gzip. The columns are those of RTDE, of ROS `JointState`, of this service, or what `columns` says."""
+    """Adds a log of one arm, from which its friction, rotors and powers can be identified: a CSV
+    file, plain or packed with gzip. The columns are those of RTDE, of ROS `JointState`, of this
+    service, or what `columns` says."""
     declared = media_type(request.headers)
     if declared not in _TAKEN:
         raise UnsupportedMediaType
@@ -117,7 +129,8 @@ async def list_logs(page: Annotated[LogPage, Query()], store: ServiceStore) -> L
     responses=problem_responses(UnknownLog, StoreUnavailable),
 )
 async def show(id: LogId, store: ServiceStore) -> LogDetail:
-    """What is known of a log: its channels, moves, efforts, and what is odd in it. Not its samples."""
+    """What is known of a log: its channels, moves, efforts, and what is odd in it. Not its
+    samples."""
     return _detail(await store.read(partial(logs.about, log_id=id)))
 
 

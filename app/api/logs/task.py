@@ -20,7 +20,9 @@ from joulepath.optimizer.identify.logs.reading import LogReading, read_log
 
 @dataclass(frozen=True)
 class ReadLogTask:
-    """A received body in `file`, of at most `most_bytes` after unpacking, and the settings of its request."""
+    """A received body in `file`, of at most `most_bytes` after unpacking, and the settings of its
+    request.
+    """
 
     file: str
     request: LogSettings
@@ -30,12 +32,15 @@ class ReadLogTask:
     def run(self, deadline: float) -> TaskResult:
         """The report on the log, within about `deadline` seconds.
 
-        Raises UnknownRobot, InvalidTable, LogTooLarge, EffortNotUsable, InvalidRequest or DeadlineExceeded.
+        Raises UnknownRobot, InvalidTable, LogTooLarge, EffortNotUsable, InvalidRequest or
+        DeadlineExceeded.
         """
         try:
             robot = robot_named(self.request.robot)
             with until(Deadline.after(deadline)):
-                reading = read_log(Path(self.file), robot, to_log_options(self.request, self.most_bytes))
+                reading = read_log(
+                    Path(self.file), robot, to_log_options(self.request, self.most_bytes)
+                )
         except InvalidProblem as error:
             raise InvalidRequest([{"loc": location(error, "query"), "msg": str(error)}]) from None
         return TaskResult.of_json(_report_fields(reading))
@@ -54,7 +59,8 @@ def _report_fields(reading: LogReading) -> dict[str, Any]:
         "channels": [asdict(channel) for channel in report.channels],
         "effort": None if report.effort is None else asdict(report.effort),
         "moves": [
-            {"start": move.start / log.rate, "end": move.end / log.rate, "at_rest": move.at_rest} for move in log.moves
+            {"start": move.start / log.rate, "end": move.end / log.rate, "at_rest": move.at_rest}
+            for move in log.moves
         ],
         "warnings": list(report.warnings),
     }

@@ -50,10 +50,11 @@ async def optimize(
     reply: ServiceReply,
     cache: ServiceCache,
 ) -> Response:
-    """Finds the motion of least energy from standstill at `start` to standstill at `goal`, over all arm configurations.
-    The answer has its energy breakdown, and a certificate that the motion is within all limits. `GET /answers/{id}`
-    returns it again. The same request is answered from the database the next time; with `Cache-Control: no-cache` it is
-    computed again. `Accept: text/event-stream` returns events while the search runs, and then the answer."""
+    """Finds the motion of least energy from standstill at `start` to standstill at `goal`, over all
+    arm configurations. The answer has its energy breakdown, and a certificate that the motion is
+    within all limits. `GET /answers/{id}` returns it again. The same request is answered from the
+    database the next time; with `Cache-Control: no-cache` it is computed again. `Accept:
+    text/event-stream` returns events while the search runs, and then the answer."""
     if later.wanted:
         return await later.respond("optimize", body)
     task = OptimizeTask(body, request.state.id)

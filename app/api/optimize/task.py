@@ -18,7 +18,12 @@ from joulepath.app.tasks.certified import certified
 from joulepath.optimizer.declared import NotEmpty, Seconds
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.problem import MethodName
-from joulepath.optimizer.result.candidates import CandidateCounts, CandidateReport, UnreachableTarget, count_by_status
+from joulepath.optimizer.result.candidates import (
+    CandidateCounts,
+    CandidateReport,
+    UnreachableTarget,
+    count_by_status,
+)
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.energy import Objective
 from joulepath.optimizer.result.solution import (
@@ -66,9 +71,10 @@ class OptimizeAnswer(MotionAnswer):
     """Duration of the motion."""
     status: Literal["optimal", "feasible"]
     """`optimal`: the method converged, and every other candidate was solved, is infeasible, or was
-    ruled out by its lower bound or its energy; for mechanical work, `optimality_gap` is at most 0.01,
-    too. It does not say that no better motion exists: see `optimality_gap`. `feasible`: the motion is
-    certified, but the search was not complete, or arm configurations may have been missed."""
+    ruled out by its lower bound or its energy; for mechanical work, `optimality_gap` is at most
+    0.01, too. It does not say that no better motion exists: see `optimality_gap`. `feasible`: the
+    motion is certified, but the search was not complete, or arm configurations may have been
+    missed."""
     branch: Branches
     """Arm configurations of the chosen candidate."""
     trajectory: Trajectory
@@ -89,10 +95,10 @@ class OptimizeAnswer(MotionAnswer):
     certificate: Certificate
     """Independent check of the motion."""
     warnings: list[str]
-    """Remarks on the motion, in words; empty if there are none. If two bodies come closer than 2 mm,
-    one names them, their distance without margins, and the time. Others say that arm configurations
-    may have been missed, that a baseline is left out, or what a tool or payload without a shape would
-    touch."""
+    """Remarks on the motion, in words; empty if there are none. If two bodies come closer than 2
+    mm, one names them, their distance without margins, and the time. Others say that arm
+    configurations may have been missed, that a baseline is left out, or what a tool or payload
+    without a shape would touch."""
     solver: SolverReport
     """Effort of the computation."""
     answer: str | None = None
@@ -101,7 +107,9 @@ class OptimizeAnswer(MotionAnswer):
     part of another answer."""
 
     @classmethod
-    def of(cls, request: Asked, request_id: str, solution: Solution, arm: dict[str, Any] | None) -> Self:
+    def of(
+        cls, request: Asked, request_id: str, solution: Solution, arm: dict[str, Any] | None
+    ) -> Self:
         """The answer to a request, not kept yet. `arm` is that of `arm_fields`."""
         return cls(
             request=request_id,
@@ -140,5 +148,7 @@ class OptimizeTask:
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /optimize`, within about `deadline` seconds."""
         solution = certified(optimize(to_problem(self.request, deadline), tell=listener()))
-        answer = OptimizeAnswer.of(self.request, self.request_id, solution, arm_fields(self.request))
+        answer = OptimizeAnswer.of(
+            self.request, self.request_id, solution, arm_fields(self.request)
+        )
         return TaskResult.of_kept_json(answer, answer.figures)

@@ -63,7 +63,8 @@ class _Evaluated(Part):
 
 
 def to_planned_motion(move: Move, answer: dict[str, Any]) -> PlannedMotion:
-    """The motion of an answer, whose samples are checked, with the energies that the answer reports.
+    """The motion of an answer, whose samples are checked, with the energies that the answer
+    reports.
 
     Raises ValidationError (of pydantic).
     """
@@ -73,9 +74,16 @@ def to_planned_motion(move: Move, answer: dict[str, Any]) -> PlannedMotion:
         return _planned(move, answer["samples"], energy)
     given = _Optimized.model_validate(answer)
     ends = spline.control_points[0], spline.control_points[-1]
-    named = [np.array(each.q_goal, dtype=float) for each in given.candidates if len(each.q_goal) == arm.robot.nq]
+    named = [
+        np.array(each.q_goal, dtype=float)
+        for each in given.candidates
+        if len(each.q_goal) == arm.robot.nq
+    ]
     names = ReportedBaseline.__dataclass_fields__
-    reported = [ReportedBaseline(**{name: getattr(each, name) for name in names}) for each in given.baselines]
+    reported = [
+        ReportedBaseline(**{name: getattr(each, name) for name in names})
+        for each in given.baselines
+    ]
     return replace(
         _planned(move, answer["trajectory"], given.energy),
         objective=given.objective,
@@ -92,5 +100,7 @@ def _planned(move: Move, samples: dict[str, Any], energy: _Energy) -> PlannedMot
         duration=move.duration,
         electrical=energy.electrical.total - energy.electrical.dwell,
         mechanical=energy.mechanical.total,
-        torques=PlannedTorques(*(np.array(samples[name], dtype=float) for name in ("q", "v", "a", "tau"))),
+        torques=PlannedTorques(
+            *(np.array(samples[name], dtype=float) for name in ("q", "v", "a", "tau"))
+        ),
     )

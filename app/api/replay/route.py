@@ -33,9 +33,9 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 async def replay(
     request: Request, body: ReplayRequest, settings: ServiceSettings, engine: ServiceArmEngine
 ) -> Response:
-    """Plays the motion of an answer in MuJoCo, with a controller, and puts what happens beside what the answer says:
-    deviation, torques, contacts and energy. With `perturb`, also on arms that are not quite the one planned with, and
-    with what is left of the savings there."""
+    """Plays the motion of an answer in MuJoCo, with a controller, and puts what happens beside what
+    the answer says: deviation, torques, contacts and energy. With `perturb`, also on arms that are
+    not quite the one planned with, and with what is left of the savings there."""
     task = ReplayTask(body, request.state.id)
     work = engine.run(task, deadline_of(body, settings.max_deadline))
     return result_response(await unless_disconnected(request, work))

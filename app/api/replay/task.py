@@ -27,7 +27,8 @@ from joulepath.optimizer.replay.simulator import mujoco
 
 PERTURBED_NOTHING = "The arm carries no payload: to change it has no effect."
 NO_BASELINES = (
-    "The motions of the baselines do not follow from this answer, so that their savings are not replayed. They do for "
+    "The motions of the baselines do not follow from this answer, so that their savings are not "
+    "replayed. They do for "
     "goals that are joint positions or whole poses, without a path."
 )
 CONTROLS: dict[Literal["feed_forward", "pd", "both"], tuple[ControlName, ...]] = {
@@ -39,7 +40,8 @@ Fraction = Annotated[float, Field(gt=0, le=0.9)]
 
 
 class Perturb(Request):
-    """Quantities of the arm that the controller does not know exactly. Each is changed by itself."""
+    """Quantities of the arm that the controller does not know exactly. Each is changed by
+    itself."""
 
     payload: Fraction | None = described(
         "Fraction by which mass and inertia of the payload are less, and more. Null: not changed.",
@@ -48,7 +50,10 @@ class Perturb(Request):
         default=None,
     )
     friction: Fraction | None = described(
-        "Fraction by which the friction of all joints is less, and more. Null: not changed.", "1", 0.3, default=None
+        "Fraction by which the friction of all joints is less, and more. Null: not changed.",
+        "1",
+        0.3,
+        default=None,
     )
 
 
@@ -56,17 +61,24 @@ class ReplayRequest(AnswerRequest):
     """An answer whose motion is played in MuJoCo."""
 
     control: Literal["feed_forward", "pd", "both"] = described(
-        "Controller of the joints. `feed_forward`: torques known in advance, friction included, and a PD loop. `pd`: "
+        "Controller of the joints. `feed_forward`: torques known in advance, friction included, "
+        "and a PD loop. `pd`: "
         "the loop alone, as simple controllers have it.",
         None,
         "feed_forward",
         default="both",
     )
     step: float = described(
-        "Step of the simulation and of its controller.", "s", 2.5e-4, default=2.5e-4, ge=1e-5, le=1e-2
+        "Step of the simulation and of its controller.",
+        "s",
+        2.5e-4,
+        default=2.5e-4,
+        ge=1e-5,
+        le=1e-2,
     )
     perturb: Perturb | None = described(
-        "Changes of the arm that the controller does not know: how the motion and its savings stand them. Null: none.",
+        "Changes of the arm that the controller does not know: how the motion and its savings "
+        "stand them. Null: none.",
         None,
         {"payload": 0.1, "friction": 0.3},
         default=None,
@@ -122,7 +134,8 @@ class ReplayTask:
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /replay`, within about `deadline` seconds.
 
-        Raises PartsNeeded with the answers that must be kept at hand first, and what its parts raise.
+        Raises PartsNeeded with the answers that must be kept at hand first, and what its parts
+        raise.
         """
         simulator, end = f"MuJoCo {mujoco().__version__}", Deadline.after(deadline)
         began = end.clock()
@@ -153,16 +166,22 @@ class ReplayTask:
         legs: list[int | None] = [None]
         if paths:
             legs = [k for k, leg in enumerate(answer["legs"]) if leg["answer"] is not None]
-        return [(leg, to_planned_motion(*each)) for leg, *each in zip(legs, moves, single, strict=True)]
+        return [
+            (leg, to_planned_motion(*each)) for leg, *each in zip(legs, moves, single, strict=True)
+        ]
 
-    def _replayed(self, leg: int | None, planned: PlannedMotion, end: Deadline, warnings: list[str]) -> ReplayedMotion:
+    def _replayed(
+        self, leg: int | None, planned: PlannedMotion, end: Deadline, warnings: list[str]
+    ) -> ReplayedMotion:
         """The entry of one motion; adds its warnings."""
         perturb, said = _perturbation(self.asked.perturb), list[str]()
         if "payload" in perturb and planned.arm.payload.mass == 0:
             said.append(PERTURBED_NOTHING)
         if perturb and planned.compared and not planned.baselines:
             said.append(NO_BASELINES)
-        found = replay(planned, CONTROLS[self.asked.control], self.asked.step, perturb, end.left, end.clock)
+        found = replay(
+            planned, CONTROLS[self.asked.control], self.asked.step, perturb, end.left, end.clock
+        )
         where = "" if leg is None else f"Leg {leg}: "
         warnings += [f"{where}{words}" for words in (*said, *replay_warnings(planned, found))]
         return ReplayedMotion.of(leg, found)

@@ -11,13 +11,17 @@ class Parameter(Response):
     """One parameter of a robot. A list has one entry per joint or link, from base to flange."""
 
     value: float | str | list[float] | list[list[float]] | list[str] = described(
-        "Value of the parameter; a word or names, where it is no number.", None, [150.0, 150.0, 150.0, 28.0, 28.0, 28.0]
+        "Value of the parameter; a word or names, where it is no number.",
+        None,
+        [150.0, 150.0, 150.0, 28.0, 28.0, 28.0],
     )
     unit: str = described("Unit; `1` if it has none.", None, "N·m")
     source: str = described(
         "Source of the value.", None, "github.com/UniversalRobots/Universal_Robots_ROS2_Description"
     )
-    trust: Literal["A", "B", "C", "T", "E"] = described("Quality of the source: see `trust` of the robot.", None, "A")
+    trust: Literal["A", "B", "C", "T", "E"] = described(
+        "Quality of the source: see `trust` of the robot.", None, "A"
+    )
     note: str = described("Remarks.", None, "Of the motor at the joint.")
 
 
@@ -50,14 +54,21 @@ class RobotSummary(Response):
     name: str = described("Name in requests.", None, "ur5e")
     title: str = described("Manufacturer and model.", None, "Universal Robots UR5e")
     joints: list[str] = described(
-        "Names of the joints, from base to flange.", None, ["shoulder_pan_joint", "shoulder_lift_joint"]
+        "Names of the joints, from base to flange.",
+        None,
+        ["shoulder_pan_joint", "shoulder_lift_joint"],
     )
-    added: bool = described("Whether a user added it; the others come with the service.", None, False)
-    owner: str | None = described("Name of the API key that added it; null without one.", None, "press_shop")
+    added: bool = described(
+        "Whether a user added it; the others come with the service.", None, False
+    )
+    owner: str | None = described(
+        "Name of the API key that added it; null without one.", None, "press_shop"
+    )
     energy_trust: str = described(
         "What the energies of this robot rest on, from the trust letters of its parameters.",
         None,
-        "Energies rest on the maker's own figures (link masses) and figures fitted to measured data (friction).",
+        "Energies rest on the maker's own figures (link masses) and figures fitted to measured "
+        "data (friction).",
     )
 
 
@@ -79,30 +90,38 @@ class FormBody(Response):
 class RobotDetail(RobotSummary):
     """The parameters of a robot, each with its source and trust letter."""
 
-    trust: dict[str, str] = described("Meaning of the trust letters.", None, {"A": "maker's own file or data packet"})
+    trust: dict[str, str] = described(
+        "Meaning of the trust letters.", None, {"A": "maker's own file or data packet"}
+    )
     kinematics: Parameters = part("Geometry.")
     inertials: Parameters = part("Masses, centres of mass and inertias of the links.")
     limits: Parameters = part("Limits and rated payload.")
     collision: Parameters = part(
-        "Capsules that hold each link, the mesh sets that they hold (`meshes`), the link that carries the elbow, and "
-        "pairs of links that are never in collision. A capsule is [x1, y1, z1, x2, y2, z2, radius]: both ends of its "
+        "Capsules that hold each link, the mesh sets that they hold (`meshes`), the link that "
+        "carries the elbow, and "
+        "pairs of links that are never in collision. A capsule is [x1, y1, z1, x2, y2, z2, "
+        "radius]: both ends of its "
         "axis in the link frame."
     )
     drives: Parameters = part("Motors, gears and inverters.")
-    electronics: Parameters = part("Power that the electronics draw, and what the supply takes back.")
+    electronics: Parameters = part(
+        "Power that the electronics draw, and what the supply takes back."
+    )
     friction: Friction = part("Joint friction.")
     default_motion: Parameters | None = part(
         "Default speed and acceleration of the robot's own controller; null if they are unknown."
     )
     form: list[list[FormBody]] = part(
-        "What each link looks like by these parameters, base first: tubes between the joints and round housings with "
+        "What each link looks like by these parameters, base first: tubes between the joints and "
+        "round housings with "
         "caps at them. No collision check sees it."
     )
     has_meshes: bool = described(
         "Whether `GET /robots/{name}/meshes.glb` has the maker's meshes of the links.", None, True
     )
     warnings: list[str] = described(
-        "Of a robot that a user added: what is hardly real, and which parameters are engineering defaults.",
+        "Of a robot that a user added: what is hardly real, and which parameters are engineering "
+        "defaults.",
         None,
         ["Engineering defaults, see their notes: limits.jerk."],
     )

@@ -1,4 +1,6 @@
-"""GET /robots/{name}/meshes.glb in a worker: simplifies the meshes once, and keeps the file in the cache."""
+"""GET /robots/{name}/meshes.glb in a worker: simplifies the meshes once, and keeps the file in the
+cache.
+"""
 
 from __future__ import annotations
 
@@ -23,13 +25,20 @@ MEDIA_TYPE = "model/gltf-binary"
 
 @cache
 def digest(robot: str) -> str | None:
-    """Hash of everything that the picture of a robot depends on; None if its meshes are not installed."""
+    """Hash of everything that the picture of a robot depends on; None if its meshes are not
+    installed.
+    """
     sources = picture_sources(robot)
     if sources is None:
         return None
-    h = hashlib.sha256(repr([version(name) for name in ("trimesh", "fast-simplification")]).encode())
+    h = hashlib.sha256(
+        repr([version(name) for name in ("trimesh", "fast-simplification")]).encode()
+    )
     for path in (
-        *(Path(str(module.__file__)) for module in (joulepath.models.meshes, joulepath.models.pictures)),
+        *(
+            Path(str(module.__file__))
+            for module in (joulepath.models.meshes, joulepath.models.pictures)
+        ),
         *sources,
     ):
         h.update(path.read_bytes())
@@ -52,7 +61,9 @@ class PictureTask:
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """The GLB file, made once however many processes ask. `deadline` is not watched: it takes about a second."""
+        """The GLB file, made once however many processes ask. `deadline` is not watched: it takes
+        about a second.
+        """
         path = _path(self.robot)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -28,11 +28,15 @@ OwnName = Annotated[str, Field(min_length=1, max_length=ROBOT_LENGTH, pattern=NA
 
 
 class OwnDrives(Request):
-    """Motors and gears, joint-side: one value for all joints, or one per joint from base to tip. Null: by a rule from
-    the torque limits, whose range the note of the parameter tells."""
+    """Motors and gears, joint-side: one value for all joints, or one per joint from base to tip.
+    Null: by a rule from the torque limits, whose range the note of the parameter tells."""
 
-    rotor_inertia: PerJoint | None = described("Inertia of the rotors behind the gear.", "kg·m²", 0.4, default=None)
-    coulomb: PerJoint | None = described("Coulomb friction.", "N·m", [6.0, 6.0, 4.0, 1.5, 1.5, 1.5], default=None)
+    rotor_inertia: PerJoint | None = described(
+        "Inertia of the rotors behind the gear.", "kg·m²", 0.4, default=None
+    )
+    coulomb: PerJoint | None = described(
+        "Coulomb friction.", "N·m", [6.0, 6.0, 4.0, 1.5, 1.5, 1.5], default=None
+    )
     viscous: PerJoint | None = described("Viscous friction.", "N·m·s/rad", 1.2, default=None)
     copper: PositivePerJoint | None = described(
         "Copper loss over the square of the motor torque.", "W/(N·m)²", 0.005, default=None
@@ -43,18 +47,22 @@ class OwnElectronics(Request):
     """Power that the electronics draw. Null: a default, which is marked so."""
 
     idle_power: NotNegative | None = described("Of the arm at rest.", "W", 40.0, default=None)
-    controller_power: NotNegative | None = described("Of the control box. Null: 0.", "W", 60.0, default=None)
+    controller_power: NotNegative | None = described(
+        "Of the control box. Null: 0.", "W", 60.0, default=None
+    )
     regeneration: Annotated[float, Field(ge=0, le=1)] | None = described(
         "Share of surplus power that the supply takes back. Null: 0.", "1", 0.0, default=None
     )
 
 
 class OwnCollision(Request):
-    """Shape of the links. A link without `capsules` has one around each of its `<collision>` shapes in the URDF, meshes
-    as far as they are in `meshes`; a link without shapes has one from joint to joint."""
+    """Shape of the links. A link without `capsules` has one around each of its `<collision>` shapes
+    in the URDF, meshes as far as they are in `meshes`; a link without shapes has one from joint to
+    joint."""
 
     capsules: dict[Named, Annotated[list[Capsule], Field(max_length=50)]] | None = described(
-        "Capsules by the name of a link: [x1, y1, z1, x2, y2, z2, radius], both ends of the axis in the link's URDF "
+        "Capsules by the name of a link: [x1, y1, z1, x2, y2, z2, radius], both ends of the axis "
+        "in the link's URDF "
         "frame.",
         "m",
         {"forearm": [[0.0, 0.0, 0.05, 0.0, 0.0, 0.3, 0.05]]},
@@ -62,10 +70,14 @@ class OwnCollision(Request):
         max_length=200,
     )
     radius: Annotated[float, Field(ge=SIZES.smallest, le=WIDEST)] | None = described(
-        "Radius of the capsules from joint to joint. Null: 4.5 % of the arm's length.", "m", 0.05, default=None
+        "Radius of the capsules from joint to joint. Null: 4.5 % of the arm's length.",
+        "m",
+        0.05,
+        default=None,
     )
     never_meet: Annotated[list[Pair], Field(max_length=200)] | None = described(
-        "Pairs of links that are not compared. Null: those whose capsules meet in nearly every configuration.",
+        "Pairs of links that are not compared. Null: those whose capsules meet in nearly every "
+        "configuration.",
         None,
         [["base_link", "upper_arm"]],
         default=None,
@@ -83,7 +95,8 @@ class OwnArm(Request):
     """An arm of a user's own: its URDF, and what a URDF does not hold."""
 
     urdf: str = described(
-        "Text of the URDF: a tree of links. Of its joints, those from `base` to `tip` move; they must be revolute or "
+        "Text of the URDF: a tree of links. Of its joints, those from `base` to `tip` move; they "
+        "must be revolute or "
         "continuous. All else that hangs on them must be fixed, or `locked`.",
         None,
         URDF,
@@ -91,32 +104,53 @@ class OwnArm(Request):
     )
     tip: Named = described("Link at the end of the arm: its frame is the flange.", None, "tool")
     base: Named | None = described(
-        "Link whose frame is the world frame. Null: the root link of the URDF.", None, "base", default=None
+        "Link whose frame is the world frame. Null: the root link of the URDF.",
+        None,
+        "base",
+        default=None,
     )
-    title: Text | None = described("Manufacturer and model. Null: the name.", None, "Example arm", default=None)
+    title: Text | None = described(
+        "Manufacturer and model. Null: the name.", None, "Example arm", default=None
+    )
     source: Text = described(
-        "Where the URDF and the other values are from.", None, "maker's repository, 2025", default="given by the user"
+        "Where the URDF and the other values are from.",
+        None,
+        "maker's repository, 2025",
+        default="given by the user",
     )
     trust: Literal["A", "B", "C", "T"] = described(
-        "Trust letter of the URDF and the other values: see `trust` of a robot.", None, "C", default="C"
+        "Trust letter of the URDF and the other values: see `trust` of a robot.",
+        None,
+        "C",
+        default="C",
     )
     acceleration: PositivePerJoint = described("Limits on the acceleration.", "rad/s²", 8.0)
-    payload: Annotated[float, Field(ge=0, le=1e4)] = described("Greatest mass of a payload.", "kg", 2.0)
+    payload: Annotated[float, Field(ge=0, le=1e4)] = described(
+        "Greatest mass of a payload.", "kg", 2.0
+    )
     velocity: PositivePerJoint | None = described(
         "Limits on the speed. Null: those of the URDF.", "rad/s", 3.0, default=None
     )
     torque: PositivePerJoint | None = described(
-        "Limits on the torque at the joint. Null: `effort` of the URDF.", "N·m", [60.0, 40.0], default=None
+        "Limits on the torque at the joint. Null: `effort` of the URDF.",
+        "N·m",
+        [60.0, 40.0],
+        default=None,
     )
     torque_side: Literal["motor", "link"] | None = described(
-        "What the limits on the torque are for: the `motor` behind its gear, friction and rotor included; or the "
-        "`link`, without them, as with torque sensors. Null: the motor, nearly always the tighter reading.",
+        "What the limits on the torque are for: the `motor` behind its gear, friction and rotor "
+        "included; or the "
+        "`link`, without them, as with torque sensors. Null: the motor, nearly always the tighter "
+        "reading.",
         None,
         "link",
         default=None,
     )
     jerk: PositivePerJoint | None = described(
-        "Limits on the jerk. Null: 20 1/s times those on the acceleration.", "rad/s³", 160.0, default=None
+        "Limits on the jerk. Null: 20 1/s times those on the acceleration.",
+        "rad/s³",
+        160.0,
+        default=None,
     )
     locked: dict[Named, Annotated[float, Field(ge=-100, le=100)]] | None = described(
         "Positions of joints that are held: of fingers, or of joints of the arm.",
@@ -125,25 +159,36 @@ class OwnArm(Request):
         default=None,
         max_length=100,
     )
-    drives: OwnDrives = described("Motors and gears.", None, {"rotor_inertia": 0.4}, default=OwnDrives())
-    electronics: OwnElectronics = described("Electronics.", None, {"idle_power": 40.0}, default=OwnElectronics())
-    collision: OwnCollision = described("Shape of the links.", None, {"radius": 0.05}, default=OwnCollision())
+    drives: OwnDrives = described(
+        "Motors and gears.", None, {"rotor_inertia": 0.4}, default=OwnDrives()
+    )
+    electronics: OwnElectronics = described(
+        "Electronics.", None, {"idle_power": 40.0}, default=OwnElectronics()
+    )
+    collision: OwnCollision = described(
+        "Shape of the links.", None, {"radius": 0.05}, default=OwnCollision()
+    )
     srdf: str | None = described(
         "Text of an SRDF: the pairs of its `disable_collisions` are not compared. Null: none.",
         None,
-        '<robot name="example"><disable_collisions link1="base" link2="forearm" reason="Never"/></robot>',
+        '<robot name="example"><disable_collisions link1="base" link2="forearm" '
+        'reason="Never"/></robot>',
         default=None,
         min_length=1,
     )
     meshes: str | None = described(
-        "Mesh files (STL, OBJ) that the URDF names, as a zip in base64. Null: a link whose shape is a mesh has a "
+        "Mesh files (STL, OBJ) that the URDF names, as a zip in base64. Null: a link whose shape "
+        "is a mesh has a "
         "capsule from joint to joint.",
         None,
         "UEsFBgAAAAAAAAAAAAAAAAAAAAAAAA==",
         default=None,
     )
     default_motion: OwnMotion | None = described(
-        "Default motion of the controller. Null: unknown.", None, {"velocity": 1.0, "acceleration": 1.4}, default=None
+        "Default motion of the controller. Null: unknown.",
+        None,
+        {"velocity": 1.0, "acceleration": 1.4},
+        default=None,
     )
 
 

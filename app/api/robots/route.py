@@ -12,11 +12,22 @@ from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
 from joulepath.app.access.client import Client
-from joulepath.app.api.robots.models import Friction, FrictionLaw, RobotDetail, RobotList, RobotSummary
+from joulepath.app.api.robots.models import (
+    Friction,
+    FrictionLaw,
+    RobotDetail,
+    RobotList,
+    RobotSummary,
+)
 from joulepath.app.api.robots.pictures import MEDIA_TYPE, PictureTask, digest, kept
 from joulepath.app.api.robots.request import NewRobot, OwnArm, OwnName
 from joulepath.app.api.robots.task import OwnRobotTask
-from joulepath.app.api.shared.dependencies import ServiceClient, ServiceClientEngine, ServiceSettings, ServiceStore
+from joulepath.app.api.shared.dependencies import (
+    ServiceClient,
+    ServiceClientEngine,
+    ServiceSettings,
+    ServiceStore,
+)
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.parameters import LOCATION_HEADER, set_location
 from joulepath.app.api.shared.problem_lists import ADDING_PROBLEMS
@@ -41,18 +52,39 @@ router = APIRouter(prefix="/robots", tags=["robots"], route_class=LargeBodyRoute
 Name = Annotated[str, Path(description="Name of the robot, from `GET /robots`.", examples=["ur5e"])]
 NewName = Annotated[OwnName, Path(description="Name of the robot.", examples=["my_arm"])]
 
-_SECTIONS = ("kinematics", "inertials", "limits", "collision", "drives", "electronics", "default_motion")
+_SECTIONS = (
+    "kinematics",
+    "inertials",
+    "limits",
+    "collision",
+    "drives",
+    "electronics",
+    "default_motion",
+)
 
 
-@router.get("", summary="All robots", response_model=RobotList, responses=problem_responses(StoreUnavailable))
+@router.get(
+    "",
+    summary="All robots",
+    response_model=RobotList,
+    responses=problem_responses(StoreUnavailable),
+)
 async def list_robots(store: ServiceStore) -> RobotList:
     """Names, titles and joints of all robots, and what their energies rest on."""
-    bundled = await run_in_threadpool(lambda: {name: load_robot(name).figures for name in robot_names()})
+    bundled = await run_in_threadpool(
+        lambda: {name: load_robot(name).figures for name in robot_names()}
+    )
     added = await store.read(robots.all_of)
     return RobotList(
         robots=[
-            *(RobotSummary(**_summary(name, figures, added=False, owner=None)) for name, figures in bundled.items()),
-            *(RobotSummary(**_summary(each.name, each.figures, added=True, owner=each.owner)) for each in added),
+            *(
+                RobotSummary(**_summary(name, figures, added=False, owner=None))
+                for name, figures in bundled.items()
+            ),
+            *(
+                RobotSummary(**_summary(each.name, each.figures, added=True, owner=each.owner))
+                for each in added
+            ),
         ]
     )
 
@@ -62,7 +94,10 @@ async def list_robots(store: ServiceStore) -> RobotList:
     summary="Add a robot",
     status_code=201,
     response_model=RobotDetail,
-    responses={201: {"headers": LOCATION_HEADER}, **problem_responses(*ADDING_PROBLEMS, RobotExists)},
+    responses={
+        201: {"headers": LOCATION_HEADER},
+        **problem_responses(*ADDING_PROBLEMS, RobotExists),
+    },
 )
 async def add(
     request: Request,
@@ -73,8 +108,8 @@ async def add(
     store: ServiceStore,
     client: ServiceClient,
 ) -> RobotDetail:
-    """Adds an arm of your own, from its URDF and what a URDF does not hold. What is missing follows from stated rules,
-    is marked with the trust letter E, and listed in `warnings`."""
+    """Adds an arm of your own, from its URDF and what a URDF does not hold. What is missing follows
+    from stated rules, is marked with the trust letter E, and listed in `warnings`."""
     robots.check_own(body.name)
     robot = await _computed(request, body.name, body, engine, settings.max_deadline, client)
     try:
@@ -92,8 +127,8 @@ async def add(
     responses=problem_responses(UnknownRobot, StoreUnavailable),
 )
 async def show_robot(name: Name, store: ServiceStore) -> RobotDetail:
-    """Kinematics, inertials, limits, drives and electronics, each parameter with its source and trust letter. Also the
-    friction laws with their coefficients."""
+    """Kinematics, inertials, limits, drives and electronics, each parameter with its source and
+    trust letter. Also the friction laws with their coefficients."""
     if name in robot_names():
         return _detail(name, load_robot(name).figures, added=False, owner=None, warnings=[])
     return _of_user(await store.read(partial(robots.get, name=name)))
@@ -104,12 +139,17 @@ async def show_robot(name: Name, store: ServiceStore) -> RobotDetail:
     summary="The URDF of a robot",
     response_class=Response,
     responses={
-        200: {"content": {"application/xml": {"schema": {"type": "string"}}}, "description": "The URDF"},
+        200: {
+            "content": {"application/xml": {"schema": {"type": "string"}}},
+            "description": "The URDF",
+        },
         **problem_responses(UnknownRobot, StoreUnavailable),
     },
 )
 async def urdf(name: Name, store: ServiceStore) -> Response:
-    """The chain of joints from `base` to `flange`, with masses, inertias and limits, without meshes."""
+    """The chain of joints from `base` to `flange`, with masses, inertias and limits, without
+    meshes.
+    """
     figures = load_robot(name).figures if name in robot_names() else None
     if figures is None:
         figures = (await store.read(partial(robots.get, name=name))).figures
@@ -121,7 +161,10 @@ async def urdf(name: Name, store: ServiceStore) -> Response:
     summary="The meshes of a robot",
     response_class=Response,
     responses={
-        200: {"content": {MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}}}, "description": "The file"},
+        200: {
+            "content": {MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}}},
+            "description": "The file",
+        },
         304: {"description": "The client has it, by `If-None-Match`"},
         **problem_responses(
             UnknownRobot,
@@ -134,10 +177,14 @@ async def urdf(name: Name, store: ServiceStore) -> Response:
     },
 )
 async def meshes(
-    request: Request, name: Name, settings: ServiceSettings, engine: ServiceClientEngine, store: ServiceStore
+    request: Request,
+    name: Name,
+    settings: ServiceSettings,
+    engine: ServiceClientEngine,
+    store: ServiceStore,
 ) -> Response:
-    """The maker's meshes, simplified, as a glTF file with one node for each link, named as it and in its frame. Where
-    `has_meshes` of `GET /robots/{name}` is true."""
+    """The maker's meshes, simplified, as a glTF file with one node for each link, named as it and
+    in its frame. Where `has_meshes` of `GET /robots/{name}` is true."""
     tag = await run_in_threadpool(digest, name) if name in robot_names() else None
     if tag is None:
         if name not in robot_names():
@@ -149,7 +196,9 @@ async def meshes(
     content = await run_in_threadpool(kept, name)
     if content is None:
         task = PictureTask(name, request.state.id)
-        content = (await unless_disconnected(request, engine.run(task, settings.max_deadline))).document
+        content = (
+            await unless_disconnected(request, engine.run(task, settings.max_deadline))
+        ).document
     return Response(content, headers=headers, media_type=MEDIA_TYPE)
 
 
@@ -172,11 +221,13 @@ async def put(
     store: ServiceStore,
     client: ServiceClient,
 ) -> RobotDetail:
-    """Adds an arm of your own under this name, or replaces it. Requests from then on use the new one; stored answers
-    stay."""
+    """Adds an arm of your own under this name, or replaces it. Requests from then on use the new
+    one; stored answers stay."""
     robots.check_own(name)
     robot = await _computed(request, name, body, engine, settings.max_deadline, client)
-    is_new = await store.create(partial(robots.put, robot=robot, most=settings.max_robots, client=client))
+    is_new = await store.create(
+        partial(robots.put, robot=robot, most=settings.max_robots, client=client)
+    )
     if is_new:
         response.status_code = 201
         set_location(request, response, f"/robots/{name}")
@@ -195,11 +246,18 @@ async def delete(name: Name, store: ServiceStore, client: ServiceClient) -> None
 
 
 async def _computed(
-    request: Request, name: str, arm: OwnArm, engine: ServiceClientEngine, deadline: float, client: Client
+    request: Request,
+    name: str,
+    arm: OwnArm,
+    engine: ServiceClientEngine,
+    deadline: float,
+    client: Client,
 ) -> OwnRobot:
     """The row of a user's arm. Raises InvalidProblem."""
     task = OwnRobotTask(name, arm, request.state.id)
-    content = orjson.loads((await unless_disconnected(request, engine.run(task, deadline))).document)
+    content = orjson.loads(
+        (await unless_disconnected(request, engine.run(task, deadline))).document
+    )
     return OwnRobot(name=name, created=now(), owner=client.owner, **content)
 
 
@@ -207,7 +265,9 @@ def _of_user(row: OwnRobot) -> RobotDetail:
     return _detail(row.name, row.figures, added=True, owner=row.owner, warnings=row.warnings)
 
 
-def _detail(name: str, figures: dict[str, Any], added: bool, owner: str | None, warnings: list[str]) -> RobotDetail:
+def _detail(
+    name: str, figures: dict[str, Any], added: bool, owner: str | None, warnings: list[str]
+) -> RobotDetail:
     content: dict[str, Any] = {section: figures.get(section) for section in _SECTIONS}
     content |= _summary(name, figures, added, owner)
     content |= {"trust": TRUST, "friction": _friction(figures), "warnings": warnings}

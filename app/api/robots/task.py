@@ -1,4 +1,6 @@
-"""POST /robots and PUT /robots/{name} in a worker, because no URDF is to end the service: figures of a user's arm."""
+"""POST /robots and PUT /robots/{name} in a worker, because no URDF is to end the service: figures
+of a user's arm.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,9 @@ class OwnRobotTask:
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """`figures` and `warnings`, within about `deadline` seconds. Raises InvalidProblem or DeadlineExceeded."""
+        """`figures` and `warnings`, within about `deadline` seconds. Raises InvalidProblem or
+        DeadlineExceeded.
+        """
         try:
             with until(Deadline.after(deadline)):
                 figures, warnings = own_figures(self.name, to_description(self.arm), checkpoint)
@@ -45,11 +49,15 @@ class OwnRobotTask:
 
 
 def to_description(arm: OwnArm) -> Description:
-    """The description of the library. Raises InvalidArm or InvalidProblem for meshes that are no zip,
-    and DeadlinePassed once a watched deadline has passed."""
+    """The description of the library. Raises InvalidArm or InvalidProblem for meshes that are no
+    zip, and DeadlinePassed once a watched deadline has passed."""
     motion, collision = arm.default_motion, arm.collision
     capsules = {name: tuple(map(_row, rows)) for name, rows in (collision.capsules or {}).items()}
-    pairs = None if collision.never_meet is None else tuple((first, second) for first, second in collision.never_meet)
+    pairs = (
+        None
+        if collision.never_meet is None
+        else tuple((first, second) for first, second in collision.never_meet)
+    )
     return Description(
         urdf=arm.urdf,
         tip=arm.tip,

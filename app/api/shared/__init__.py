@@ -1,1 +1,2 @@
-"""What several routes share: parameters, what the service provides, and how requests are answered."""
+"""What several routes share: parameters, what the service provides, and how requests are
+answered."""

@@ -1,4 +1,6 @@
-"""What the service provides to its routes. The only module of this room that reads the application's state."""
+"""What the service provides to its routes. The only module of this room that reads the
+application's state.
+"""
 
 from __future__ import annotations
 

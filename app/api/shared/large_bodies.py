@@ -18,14 +18,18 @@ from joulepath.app.http.weights import JSON
 from joulepath.app.tasks.read_body import HeldBody, ReadBodyTask, held
 
 LARGE = 1 << 16
-"""Size of a body [byte] above which a worker reads it. The largest that is read here takes a few milliseconds."""
+"""Size of a body [byte] above which a worker reads it. The largest that is read here takes a few
+milliseconds.
+"""
 
 _NAME = "body"
 """Name of the parameter of a route that gets the body."""
 
 
 class LargeBodyRoute(JsonRoute):
-    """A route that gets a `HeldBody` in place of its model if the body is large. Its model has one JSON body."""
+    """A route that gets a `HeldBody` in place of its model if the body is large. Its model has one
+    JSON body.
+    """
 
     def __init__(self, path: str, endpoint: Callable[..., Any], **options: Any) -> None:
         signature = inspect.signature(endpoint, eval_str=True)
@@ -44,7 +48,9 @@ class LargeBodyRoute(JsonRoute):
 
         async def handle_either(request: Request) -> Response:
             request = strictly(request)
-            is_large = media_type(request.headers) == JSON and sum(map(len, await request.parts())) > LARGE
+            is_large = (
+                media_type(request.headers) == JSON and sum(map(len, await request.parts())) > LARGE
+            )
             return await (handle_large if is_large else handle)(request)
 
         return handle_either
@@ -55,7 +61,9 @@ def _taking_held(
 ) -> Callable[..., Any]:
     """The endpoint, with its body from a worker."""
 
-    async def body(request: Request, settings: ServiceSettings, engine: ServiceClientEngine) -> HeldBody:
+    async def body(
+        request: Request, settings: ServiceSettings, engine: ServiceClientEngine
+    ) -> HeldBody:
         task = ReadBodyTask(model, await strictly(request).parts(), request.state.id)
         return held(await unless_disconnected(request, engine.run(task, settings.max_deadline)))
 
@@ -64,7 +72,9 @@ def _taking_held(
         return await endpoint(**arguments)
 
     parameters = [
-        each.replace(annotation=Annotated[Any, Depends(body)] if each.name == _NAME else each.annotation)
+        each.replace(
+            annotation=Annotated[Any, Depends(body)] if each.name == _NAME else each.annotation
+        )
         for each in signature.parameters.values()
     ]
     taking_held.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]

@@ -1,4 +1,5 @@
-"""`Prefer: respond-async` (RFC 7240): the request becomes a job, and its answer is fetched later."""
+"""`Prefer: respond-async` (RFC 7240): the request becomes a job, and its answer is fetched
+later."""
 
 from __future__ import annotations
 
@@ -9,7 +10,12 @@ from typing import Annotated, Any
 import orjson
 from fastapi import Depends, Header, Request, Response
 
-from joulepath.app.api.shared.dependencies import ServiceClient, ServiceClientEngine, ServiceJobs, ServiceSettings
+from joulepath.app.api.shared.dependencies import (
+    ServiceClient,
+    ServiceClientEngine,
+    ServiceJobs,
+    ServiceSettings,
+)
 from joulepath.app.api.shared.parameters import CREATED_HEADERS, Key, is_fresh, set_location
 from joulepath.app.convert.packed import unpacked
 from joulepath.app.http.disconnect import unless_disconnected
@@ -25,7 +31,8 @@ from joulepath.app.tasks.read_body import HeldBody
 ACCEPTED: dict[int | str, dict[str, Any]] = {
     202: {
         "model": Job,
-        "description": "With `Prefer: respond-async`: the request is a job, at the path in `Location`.",
+        "description": "With `Prefer: respond-async`: the request is a job, at the path in "
+        "`Location`.",
         "headers": {
             **CREATED_HEADERS,
             "Preference-Applied": {"description": "`respond-async`.", "schema": {"type": "string"}},
@@ -36,15 +43,19 @@ ACCEPTED: dict[int | str, dict[str, Any]] = {
 
 _PREFER = Header(
     alias="Prefer",
-    description="`respond-async`: the request becomes a job, see `POST /jobs`, and the status is 202. With "
-    "`respond-async, wait=5`, the answer comes with 200 if it is there within 5 s. Anything else has no effect.",
+    description="`respond-async`: the request becomes a job, see `POST /jobs`, and the status is "
+    "202. With "
+    "`respond-async, wait=5`, the answer comes with 200 if it is there within 5 s. Anything else "
+    "has no effect.",
     examples=["respond-async"],
 )
 
 
 @dataclass(frozen=True)
 class Later:
-    """How the client wants a request to be answered. `wait` is the time [s] that it waits for the answer."""
+    """How the client wants a request to be answered. `wait` is the time [s] that it waits for the
+    answer.
+    """
 
     wanted: bool
     wait: int
@@ -55,8 +66,8 @@ class Later:
     request: Request
 
     async def respond(self, kind: str, asked: RequestModel | HeldBody) -> Response:
-        """The response to a validated request to the endpoint `kind`. Raises InvalidRequest, KeyReused,
-        TooManyWaiting or StoreUnavailable."""
+        """The response to a validated request to the endpoint `kind`. Raises InvalidRequest,
+        KeyReused, TooManyWaiting or StoreUnavailable."""
         longest = deadlines(self.jobs.settings)
         if isinstance(asked, HeldBody):
             new = await self.validated(
@@ -67,8 +78,12 @@ class Later:
         return await self.respond_with(new)
 
     async def validated(self, task: JobBodyTask | JobOfOneTask) -> NewJob:
-        """The job that a worker makes of a body. Raises InvalidRequest, and what `Engine.run` raises."""
-        result = await unless_disconnected(self.request, self.engine.run(task, self.jobs.settings.max_deadline))
+        """The job that a worker makes of a body. Raises InvalidRequest, and what `Engine.run`
+        raises.
+        """
+        result = await unless_disconnected(
+            self.request, self.engine.run(task, self.jobs.settings.max_deadline)
+        )
         assert isinstance(result, Validated)
         return result.job
 
@@ -89,19 +104,25 @@ class Later:
 
     async def _ended(self, job_id: str) -> Response:
         """The answer or the problem of a job of one request that has ended."""
-        request, body = await self.jobs.store.read(lambda session: stored_jobs.outcome(session, job_id, 0))
+        request, body = await self.jobs.store.read(
+            lambda session: stored_jobs.outcome(session, job_id, 0)
+        )
         if body is not None:
             return Response(unpacked(body), media_type="application/json")
         if request.problem is None:  # somebody cancelled it meanwhile
             view = await self.jobs.view(job_id)
-            return Response(Job(**summary(view)).model_dump_json(), 202, media_type="application/json")
+            return Response(
+                Job(**summary(view)).model_dump_json(), 202, media_type="application/json"
+            )
         content = orjson.dumps(request.problem | {"instance": self.request.state.id})
         return Response(content, request.problem["status"], media_type=PROBLEM_MEDIA_TYPE)
 
 
 def deadlines(settings: ServiceSettings) -> Deadlines:
     """Deadlines of the requests of jobs."""
-    return Deadlines(settings.max_job_deadline, min(settings.max_deadline, settings.max_job_deadline))
+    return Deadlines(
+        settings.max_job_deadline, min(settings.max_deadline, settings.max_job_deadline)
+    )
 
 
 async def _later(
@@ -114,7 +135,11 @@ async def _later(
 ) -> Later:
     given = ", ".join(request.headers.getlist("prefer")) if prefer is not None else ""
     preferences = {text.partition(";")[0].replace(" ", "").lower() for text in given.split(",")}
-    waits = [int(found[1]) for text in preferences if (found := re.fullmatch(r'wait="?([0-9]{1,9})"?', text))]
+    waits = [
+        int(found[1])
+        for text in preferences
+        if (found := re.fullmatch(r'wait="?([0-9]{1,9})"?', text))
+    ]
     longest = int(jobs.settings.max_deadline)
     wanted = "respond-async" in preferences
     return Later(wanted, min(*waits, longest) if waits else 0, jobs, engine, client, key, request)

@@ -28,14 +28,18 @@ class WithDeadline(Protocol):
 
 
 def deadline_of(body: WithDeadline, longest: float) -> float:
-    """The deadline of a request [s]. If it has none, the default, but at most `longest`. Raises InvalidRequest."""
+    """The deadline of a request [s]. If it has none, the default, but at most `longest`. Raises
+    InvalidRequest.
+    """
     given = body.deadline if "deadline" in body.model_fields_set else None
     return allowed_deadline(given, body.deadline, longest)
 
 
-def allowed_deadline(given: float | None, default: float, longest: float, where: str = "body") -> float:
-    """`given` [s], or if it is None, the default, but at most `longest`. Raises InvalidRequest above it, with the part
-    `where` of the request."""
+def allowed_deadline(
+    given: float | None, default: float, longest: float, where: str = "body"
+) -> float:
+    """`given` [s], or if it is None, the default, but at most `longest`. Raises InvalidRequest
+    above it, with the part `where` of the request."""
     if given is None:
         return min(default, longest)
     if given > longest:
@@ -45,7 +49,9 @@ def allowed_deadline(given: float | None, default: float, longest: float, where:
 
 
 async def _wanted_format(request: Request) -> Literal["json", "csv"]:
-    return "csv" if is_wanted(request, "text/csv") and not is_wanted(request, EVENT_STREAM) else "json"
+    return (
+        "csv" if is_wanted(request, "text/csv") and not is_wanted(request, EVENT_STREAM) else "json"
+    )
 
 
 WantedFormat = Annotated[Literal["json", "csv"], Depends(_wanted_format)]
@@ -55,7 +61,8 @@ Key = Annotated[
     IdempotencyKey | None,
     Header(
         alias=KEY_HEADER,
-        description="A text of your own that identifies this request. If you send the same request again with the same "
+        description="A text of your own that identifies this request. If you send the same request "
+        "again with the same "
         "key, for example after a lost connection, nothing new is created.",
         examples=["2f6f3d0c-try-1"],
     ),
@@ -70,7 +77,9 @@ CACHED_HEADERS = {
 """Headers of an answer that may come from the database."""
 REPLAYED = "Idempotency-Replayed"
 """Header of a response to a request that was sent before."""
-LOCATION_HEADER = {"Location": {"description": "Path of the created resource.", "schema": {"type": "string"}}}
+LOCATION_HEADER = {
+    "Location": {"description": "Path of the created resource.", "schema": {"type": "string"}}
+}
 CREATED_HEADERS = {
     **LOCATION_HEADER,
     REPLAYED: {
@@ -81,12 +90,16 @@ CREATED_HEADERS = {
 
 
 def is_fresh(request: Request) -> bool:
-    """Whether the client wants its request to be computed, although an equal one was answered before."""
+    """Whether the client wants its request to be computed, although an equal one was answered
+    before.
+    """
     return "no-cache" in request.headers.get("cache-control", "").lower()
 
 
 def set_location(request: Request, response: Response, path: str, again: bool = False) -> None:
-    """Sets the headers of a response about a created resource; `again`: an earlier request with this key created it."""
+    """Sets the headers of a response about a created resource; `again`: an earlier request with
+    this key created it.
+    """
     response.headers["Location"] = f"{request.scope.get('root_path', '')}{path}"
     if again:
         response.headers[REPLAYED] = "true"

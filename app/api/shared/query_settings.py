@@ -18,7 +18,9 @@ _REF = "#/components/schemas/{model}"
 
 
 def query_parameters(model: type[RequestModel], condition: str = "") -> list[dict[str, Any]]:
-    """The parameters of an OpenAPI operation whose query has the fields of the model, under a condition in words."""
+    """The parameters of an OpenAPI operation whose query has the fields of the model, under a
+    condition in words.
+    """
     schema = model.model_json_schema(ref_template=_REF)
     return [
         {

@@ -1,4 +1,6 @@
-"""How a request is answered: at once when its work is done, or by events from the begin of the work on."""
+"""How a request is answered: at once when its work is done, or by events from the begin of the work
+on.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ class Reply:
     by_events: bool
 
     async def of(self, work: Work) -> Response:
-        """The response with what `work` returns. If the client closes the connection, the work is cancelled."""
+        """The response with what `work` returns. If the client closes the connection, the work is
+        cancelled.
+        """
         if self.by_events:
             return EventStream(self.request, work)
         return result_response(await unless_disconnected(self.request, work(nobody)))

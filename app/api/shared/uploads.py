@@ -1,5 +1,5 @@
-"""Files of received bodies, which workers read. They have no name, so that nothing is left of them, however the service
-ends."""
+"""Files of received bodies, which workers read. They have no name, so that nothing is left of them,
+however the service ends."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from typing import BinaryIO
 
 @contextmanager
 def upload() -> Iterator[tuple[BinaryIO, str]]:
-    """A file to write a body to, unbuffered, and the path by which a worker can open it until the context ends."""
+    """A file to write a body to, unbuffered, and the path by which a worker can open it until the
+    context ends.
+    """
     with TemporaryFile(prefix="joulepath-", buffering=0) as file:
         yield file, f"/proc/{os.getpid()}/fd/{file.fileno()}"

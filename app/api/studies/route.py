@@ -10,12 +10,23 @@ from fastapi.concurrency import run_in_threadpool
 
 from joulepath.app.api.shared.dependencies import ServiceClient, ServiceStore
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
-from joulepath.app.api.shared.parameters import CREATED_HEADERS, Key, StudyId, WantedFormat, set_location
+from joulepath.app.api.shared.parameters import (
+    CREATED_HEADERS,
+    Key,
+    StudyId,
+    WantedFormat,
+    set_location,
+)
 from joulepath.app.convert.identified import identified_as, with_figures
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.queue import ShuttingDown, WorkerLost
-from joulepath.app.exceptions.stored import KeyReused, StoreUnavailable, UnknownFigures, UnknownStudy
+from joulepath.app.exceptions.stored import (
+    KeyReused,
+    StoreUnavailable,
+    UnknownFigures,
+    UnknownStudy,
+)
 from joulepath.app.exceptions.transport import BodyTooLarge, RequestTimeout
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.examples.studies import STUDY_CSV
@@ -57,12 +68,16 @@ async def create(
     client: ServiceClient,
     key: Key = None,
 ) -> StudySummary:
-    """Begins a study: a motion that is improved step by step until its energy is at most `threshold`."""
+    """Begins a study: a motion that is improved step by step until its energy is at most
+    `threshold`.
+    """
     robot = await robot_in(store, body.robot)
     if body.figures is not None:
         with identified_as(await identified(store, body.figures)):
             with_figures(robot, body.figures)
-    study = studies.new_study(body.name, body.robot, body.objective, body.threshold, key, client.owner, body.figures)
+    study = studies.new_study(
+        body.name, body.robot, body.objective, body.threshold, key, client.owner, body.figures
+    )
     made, again = await store.create(partial(studies.create, study=study))
     set_location(request, response, f"/studies/{made.id}", again)
     return StudySummary(**summary(await store.read(partial(studies.state, study_id=made.id))))
@@ -90,8 +105,8 @@ async def list_studies(page: Annotated[StudyPage, Query()], store: ServiceStore)
     },
 )
 async def show(id: StudyId, wanted: WantedFormat, store: ServiceStore) -> Response:
-    """The study with its iterations: energy, change from the previous and from the best iteration, and whether the
-    threshold is met. `Accept: text/csv` returns the history as a table."""
+    """The study with its iterations: energy, change from the previous and from the best iteration,
+    and whether the threshold is met. `Accept: text/csv` returns the history as a table."""
     history = await store.read(partial(studies.history, study_id=id))
     if wanted == "csv":
         return Response(await run_in_threadpool(as_csv, history), media_type="text/csv")

@@ -97,13 +97,15 @@ class WhatifRequest(Request):
     """A motion, as exactly one of `optimize` and `evaluate`, and changes of its arm."""
 
     optimize: OptimizeRequest | None = described(
-        "The base, if a motion is optimised: a body of `POST /optimize`. Its `deadline` applies to each run.",
+        "The base, if a motion is optimised: a body of `POST /optimize`. Its `deadline` applies to "
+        "each run.",
         None,
         OPTIMIZE,
         default=None,
     )
     evaluate: EvaluateRequest | None = described(
-        "The base, if a motion is given: a body of `POST /evaluate`. Its `deadline` applies to each run.",
+        "The base, if a motion is given: a body of `POST /evaluate`. Its `deadline` applies to "
+        "each run.",
         None,
         EVALUATE,
         default=None,

@@ -1,4 +1,6 @@
-"""Examples of request bodies; a file `examples/<endpoint>/<name>.json` holds the same request as its namesake here."""
+"""Examples of request bodies; a file `examples/<endpoint>/<name>.json` holds the same request as
+its namesake here.
+"""
 
 from __future__ import annotations
 

@@ -12,17 +12,26 @@ UNKNOWN_ID = "9d1f4f1c-0a43-5f4a-8ad0-d1b75c0a0e0f"
 
 
 def _identified(value: list[float], unit: str, sd: list[float] | None = None) -> dict[str, Any]:
-    figure = {"value": value, "unit": unit, "source": "identified from logs, 2025-03-14", "trust": "B"}
+    figure = {
+        "value": value,
+        "unit": unit,
+        "source": "identified from logs, 2025-03-14",
+        "trust": "B",
+    }
     return figure if sd is None else figure | {"sd": sd}
 
 
 FRICTION: dict[str, Any] = {
     "identified": {
-        "coulomb": _identified([6.1, 7.2, 5.3, 1.5, 1.3, 1.4], "N·m", [0.2, 0.3, 0.2, 0.1, 0.1, 0.1]),
+        "coulomb": _identified(
+            [6.1, 7.2, 5.3, 1.5, 1.3, 1.4], "N·m", [0.2, 0.3, 0.2, 0.1, 0.1, 0.1]
+        ),
         "curved": _identified([0.0] * 6, "N·m"),
         "speed": _identified([1.0] * 6, "rad/s"),
         "viscous": _identified([4.1, 5.0, 4.6, 1.0, 0.9, 0.9], "N·m·s/rad"),
-        "load": _identified([0.0, 0.067, 0.071, 0.0, 0.0, 0.0], "1", [0.0, 0.008, 0.01, 0.0, 0.0, 0.0]),
+        "load": _identified(
+            [0.0, 0.067, 0.071, 0.0, 0.0, 0.0], "1", [0.0, 0.008, 0.01, 0.0, 0.0, 0.0]
+        ),
     }
 }
 DRIVES: dict[str, Any] = {"rotor_inertia": _identified([1.9, 1.95, 1.9, 0.21, 0.2, 0.2], "kg·m²")}

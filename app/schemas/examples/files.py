@@ -1,9 +1,9 @@
 """Examples of requests and answers, from the files in the folder `examples` of the repository.
 
 `examples/openapi/<path>.json` lists the requests that the OpenAPI document shows, by the names of
-their files in `examples/<path>`, each with its summary and description. It has an answer, too, unless
-the models of the answer have examples of their own. Parameters are left out of a path: where it has
-one, the files may be in folders, which give the examples their names.
+their files in `examples/<path>`, each with its summary and description. It has an answer, too,
+unless the models of the answer have examples of their own. Parameters are left out of a path: where
+it has one, the files may be in folders, which give the examples their names.
 """
 
 from __future__ import annotations
@@ -33,7 +33,9 @@ def shown() -> dict[str, dict[str, Any]]:
     """What `examples/openapi` has, by the path of the endpoint."""
     listed = folder() / "openapi"
     return {
-        f"/{file.relative_to(listed).with_suffix('').as_posix()}": json.loads(file.read_text(encoding="utf-8"))
+        f"/{file.relative_to(listed).with_suffix('').as_posix()}": json.loads(
+            file.read_text(encoding="utf-8")
+        )
         for file in sorted(listed.rglob("*.json"))
     }
 
@@ -46,5 +48,8 @@ def body_examples(path: str) -> dict[str, dict[str, Example]]:
         file = folder() / _PARAMETER.sub("", path)[1:] / name
         text = file.read_text(encoding="utf-8")
         value = json.loads(text) if file.suffix == ".json" else text
-        found.setdefault(_MEDIA_TYPES[file.suffix], {})[Path(Path(name).parts[0]).stem] = {**words, "value": value}
+        found.setdefault(_MEDIA_TYPES[file.suffix], {})[Path(Path(name).parts[0]).stem] = {
+            **words,
+            "value": value,
+        }
     return found

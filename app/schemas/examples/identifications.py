@@ -13,12 +13,14 @@ IDENTIFY_EXAMPLES: dict[str, Example] = {
     },
     "payload": {
         "summary": "A payload, from a log without it and one with it",
-        "description": "The last of the logs carries it. What that log says of its payload does not count.",
+        "description": "The last of the logs carries it. What that log says of its payload does "
+        "not count.",
         "value": {"logs": [LOG_ID, OTHER_LOG_ID], "fit": ["payload"]},
     },
     "base_parameters": {
         "summary": "Base parameters and friction, without any knowledge of the links",
-        "description": "A method of the literature by its name; `automatic` suits nearly every log.",
+        "description": "A method of the literature by its name; `automatic` suits nearly every "
+        "log.",
         "value": {"logs": [LOG_ID], "method": "base_parameters"},
     },
     "robust_refit": {

@@ -16,7 +16,10 @@ def _there_and_back() -> str:
     lines = ["t,q1,q2,q3,q4,q5,q6"]
     for k in range(_ROWS):
         share = min(max((k * _PERIOD - 0.5) / 2.0, 0.0), 1.0)
-        q = [home + reach * (1 - cos(2 * pi * share)) / 2 for home, reach in zip(_HOME, _REACH, strict=True)]
+        q = [
+            home + reach * (1 - cos(2 * pi * share)) / 2
+            for home, reach in zip(_HOME, _REACH, strict=True)
+        ]
         lines.append(",".join(f"{value:.5g}" for value in (k * _PERIOD, *q)))
     return "\n".join(lines) + "\n"
 
@@ -24,7 +27,8 @@ def _there_and_back() -> str:
 LOG_EXAMPLES: dict[str, Example] = {
     "positions": {
         "summary": "A short log of positions, with ?robot=ur5e&name=short",
-        "description": "Velocities and accelerations are made from the positions. To identify friction, log currents, "
+        "description": "Velocities and accelerations are made from the positions. To identify "
+        "friction, log currents, "
         "too, and at 100 Hz or more.",
         "value": _there_and_back(),
     },

@@ -42,7 +42,12 @@ PUT_EXAMPLES: dict[str, Example] = {
             **ARM,
             "source": "maker's data sheet",
             "trust": "A",
-            "drives": {"coulomb": [3.0, 2.0], "viscous": [2.5, 1.5], "rotor_inertia": [0.5, 0.3], "copper": 0.01},
+            "drives": {
+                "coulomb": [3.0, 2.0],
+                "viscous": [2.5, 1.5],
+                "rotor_inertia": [0.5, 0.3],
+                "copper": 0.01,
+            },
             "electronics": {"idle_power": 14.0},
         },
     },

@@ -25,9 +25,18 @@ from joulepath.optimizer.exceptions import (
 )
 from joulepath.optimizer.excitation.errors import ExcitationInfeasible
 from joulepath.optimizer.export.errors import FormatUnsuitable
-from joulepath.optimizer.identify.errors import MethodNotApplicable, NotExcited, NothingHeldOut, PayloadUnknown
+from joulepath.optimizer.identify.errors import (
+    MethodNotApplicable,
+    NotExcited,
+    NothingHeldOut,
+    PayloadUnknown,
+)
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
-from joulepath.optimizer.result.candidates import CandidateReport, CandidateStatus, UnreachableTarget
+from joulepath.optimizer.result.candidates import (
+    CandidateReport,
+    CandidateStatus,
+    UnreachableTarget,
+)
 from joulepath.optimizer.search.errors import (
     CollidingBranch,
     DurationTooShort,
@@ -41,7 +50,8 @@ from joulepath.optimizer.search.errors import (
 )
 
 _OUT_OF_REACH = (
-    "The goal pose is 0.12 m out of reach in this orientation: move the position closer to the robot's workspace, or "
+    "The goal pose is 0.12 m out of reach in this orientation: move the position closer to the "
+    "robot's workspace, or "
     "change the orientation."
 )
 _COLLIDES = "it collides: table and forearm miss 0.031 m of clearance"
@@ -56,7 +66,9 @@ _CANDIDATE = CandidateReport(
     reason=_COLLIDES,
     lower_bound=171.0,
 )
-_COLLIDING = CollidingBranch(label=LABEL, target=0, q=np.array(HOME), pair=("table", "forearm"), depth=0.031)
+_COLLIDING = CollidingBranch(
+    label=LABEL, target=0, q=np.array(HOME), pair=("table", "forearm"), depth=0.031
+)
 _ATTEMPT = PathAttempt(label=LABEL, followed=0.62, reason="outside_limits")
 
 _EXAMPLES: dict[type[DeclaredError], DeclaredError] = {
@@ -64,7 +76,8 @@ _EXAMPLES: dict[type[DeclaredError], DeclaredError] = {
     for error in (
         InvalidRequest([{"loc": ["body", "start", "q"], "msg": "Give at least 1 items, not 0"}]),
         ContradictoryOrder(
-            "before asks for 'pick' before 'place', but together lists 'place' first: leave out one of them.",
+            "before asks for 'pick' before 'place', but together lists 'place' first: leave out "
+            "one of them.",
             ["pick", "place"],
         ),
         InvalidTable("q3 in line 17 is no finite number: correct or delete it.", 17, "q3"),

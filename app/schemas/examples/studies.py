@@ -9,7 +9,12 @@ _OPTIMIZE = body_examples("/optimize")["application/json"]
 ITERATION_EXAMPLES: dict[str, Example] = {
     "evaluate": {
         "summary": "The energy of the present motion",
-        "value": {"evaluate": {"configurations": [HOME, [1.2, -1.1, 1.9, -2.2, -1.3, 0.4]], "time_per_segment": 3.0}},
+        "value": {
+            "evaluate": {
+                "configurations": [HOME, [1.2, -1.1, 1.9, -2.2, -1.3, 0.4]],
+                "time_per_segment": 3.0,
+            }
+        },
     }
 }
 ITERATION_EXAMPLES |= {

@@ -10,7 +10,9 @@ NEAR = [0.3, -1.4, 1.4, -1.5, -1.57, 0.2]
 """Joint positions [rad] near those of HOME."""
 PAPER_HOME = [0.0, -1.5708, 1.5708, -1.5708, 3.1416, 0.0]
 PAPER_POSE = [-0.1243, -0.9639, 1.6165, -2.2211, 4.7124, 0.1251]
-"""Joint positions [rad] of the founding paper: its home, and the first configuration of its Table 2."""
+"""Joint positions [rad] of the founding paper: its home, and the first configuration of its Table
+2.
+"""
 LABEL = "left/up/no_flip"
 REQUEST_ID = "0b0f3b0e-4c4f-4a43-9d6b-1f6f2f1f6a55"
 ANSWER_ID = "7b5f3a52-3a26-4a3e-8f0e-3c1d0e6f5a11"
@@ -28,7 +30,11 @@ OPTIMIZE: dict[str, Any] = {"start": {"q": HOME}, "goal": {"pose": POSE}}
 """A body of POST /optimize."""
 EVALUATE: dict[str, Any] = {"configurations": [HOME, NEAR], "time_per_segment": 1.5}
 """A body of POST /evaluate."""
-BOX = {"shape": "box", "size": [0.1, 0.1, 0.2], "pose": {"position": [0.0, 0.0, 0.2], "rotvec": [0.0, 0.0, 0.0]}}
+BOX = {
+    "shape": "box",
+    "size": [0.1, 0.1, 0.2],
+    "pose": {"position": [0.0, 0.0, 0.2], "rotvec": [0.0, 0.0, 0.0]},
+}
 """A shape in the flange frame."""
 TOOL = {"capsules": [{"start": [0.0, 0.0, 0.03], "end": [0.0, 0.0, 0.12], "radius": 0.04}]}
 

@@ -1,4 +1,6 @@
-"""Alembic's environment: `joulepath.app.store.database.migrate` passes a connection, `alembic revision` does not."""
+"""Alembic's environment: `joulepath.app.store.database.migrate` passes a connection, `alembic
+revision` does not.
+"""
 
 from __future__ import annotations
 

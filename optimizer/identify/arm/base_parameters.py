@@ -1,8 +1,9 @@
-"""Base parameters: the least set of combinations on which the torques depend (Gautier 1991, by QR with pivoting).
+"""Base parameters: the least set of combinations on which the torques depend (Gautier 1991, by QR
+with pivoting).
 
-Most of the parameters of a body have no effect on any torque, or only together with others. At random states the
-regressor has as many independent columns as there are base parameters; the QR decomposition with column pivoting finds
-them, and how the other columns are combined from them.
+Most of the parameters of a body have no effect on any torque, or only together with others. At
+random states the regressor has as many independent columns as there are base parameters; the QR
+decomposition with column pivoting finds them, and how the other columns are combined from them.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from scipy.linalg import qr, solve_triangular
 from joulepath.models.robot import Array
 from joulepath.optimizer.energy.link_regressor import rigid_regressor
 
-# of the largest diagonal entry of R; between independent and dependent columns lie many orders of magnitude
+# of the largest diagonal entry of R; between independent and dependent columns lie many orders of
+# magnitude
 TOLERANCE = 1e-8
 # coefficients of an expression below it are rounding
 LEAST_COEFFICIENT = 1e-6
@@ -26,9 +28,11 @@ NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 
 @dataclass(frozen=True, eq=False)
 class BaseParameters:
-    """`independent` (b,) numbers of the columns that are kept; `combination` (b, p): base = combination @ standard.
+    """`independent` (b,) numbers of the columns that are kept; `combination` (b, p): base =
+    combination @ standard.
 
-    `names` (p,) are those of the standard parameters, of bodies and, if asked for, of rotors behind them.
+    `names` (p,) are those of the standard parameters, of bodies and, if asked for, of rotors behind
+    them.
     """
 
     names: tuple[str, ...]
@@ -43,7 +47,10 @@ class BaseParameters:
     @property
     def expressions(self) -> tuple[str, ...]:
         """Each base parameter as a sum of standard parameters."""
-        return tuple(self._expression(row, main) for row, main in zip(self.combination, self.independent, strict=True))
+        return tuple(
+            self._expression(row, main)
+            for row, main in zip(self.combination, self.independent, strict=True)
+        )
 
     def lone(self, bodies: int) -> tuple[int, ...]:
         """Numbers of the base parameters that are a single rotor's, behind so many parameters of
@@ -70,8 +77,12 @@ def base_parameters(model: pin.Model, rotors: bool = True) -> BaseParameters:
     return BaseParameters(tuple(names), independent, combination)
 
 
-def independent_columns(matrix: Array, tolerance: float = TOLERANCE) -> tuple[tuple[int, ...], Array]:
-    """Numbers (b,) of independent columns of a matrix (n, p), and the combination (b, p) of all columns from them."""
+def independent_columns(
+    matrix: Array, tolerance: float = TOLERANCE
+) -> tuple[tuple[int, ...], Array]:
+    """Numbers (b,) of independent columns of a matrix (n, p), and the combination (b, p) of all
+    columns from them.
+    """
     _, R, order = qr(matrix, mode="economic", pivoting=True)
     diagonal = np.abs(np.diag(R))
     rank = int((diagonal > tolerance * diagonal[0]).sum()) if diagonal[0] > 0 else 0

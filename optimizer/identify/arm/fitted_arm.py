@@ -18,10 +18,12 @@ FRICTION_TERMS = ("coulomb", "viscous", "load", "curved", "offset")
 
 @dataclass(frozen=True, eq=False)
 class FittedArm:
-    """Figures (nq,) of an arm: those of the friction law, `rotor_inertia`, `torque_constant`; and its electrics.
+    """Figures (nq,) of an arm: those of the friction law, `rotor_inertia`, `torque_constant`; and
+    its electrics.
 
-    `couplings` has the terms of motors that several joints share, `bodies` (10 nq,) the change of the links' parameters
-    from the robot's own; None for its own links. `links` is a factor on their masses.
+    `couplings` has the terms of motors that several joints share, `bodies` (10 nq,) the change of
+    the links' parameters from the robot's own; None for its own links. `links` is a factor on their
+    masses.
     """
 
     coulomb: Array
@@ -67,7 +69,9 @@ class FittedArm:
         step, other = v / np.hypot(v, self.knee), np.tile(self.offset, (len(v), 1))
         for coupling, terms in self.couplings:
             at, by = v @ coupling.ratios, a @ coupling.ratios
-            motor = sum(value * column(term, at, by, at, self.knee) for term, value in terms.items())
+            motor = sum(
+                value * column(term, at, by, at, self.knee) for term, value in terms.items()
+            )
             other += np.outer(motor, coupling.ratios)
         dry = self.coulomb * step
         if self.curved.any():
@@ -108,10 +112,15 @@ def own_arm(robot: Robot, knee: float | None = None) -> FittedArm:
     )
 
 
-def with_torques(arm: FittedArm, names: tuple[Name, ...], value: Array, couplings: tuple[Coupling, ...]) -> FittedArm:
-    """The arm with the figures `names` at these values (p,). A joint whose viscous friction is among them, and is not
-    the arm's own, has no other curved part than a fitted one."""
-    parts = {name: getattr(arm, name).copy() for name in (*FRICTION_TERMS, "rotor_inertia", "torque_constant", "speed")}
+def with_torques(
+    arm: FittedArm, names: tuple[Name, ...], value: Array, couplings: tuple[Coupling, ...]
+) -> FittedArm:
+    """The arm with the figures `names` at these values (p,). A joint whose viscous friction is
+    among them, and is not the arm's own, has no other curved part than a fitted one."""
+    parts = {
+        name: getattr(arm, name).copy()
+        for name in (*FRICTION_TERMS, "rotor_inertia", "torque_constant", "speed")
+    }
     shared = [(each, dict[str, float]()) for each in couplings]
     fitted = {name for name, _ in names}
     for (figure, joint), found in zip(names, value.tolist(), strict=True):
@@ -119,7 +128,11 @@ def with_torques(arm: FittedArm, names: tuple[Name, ...], value: Array, coupling
         if figure.startswith(COUPLED):
             shared[joint][1][figure.removeprefix(COUPLED)] = found
         else:
-            if figure == "viscous" and "curved" not in fitted and found != float(arm.viscous[joint]):
+            if (
+                figure == "viscous"
+                and "curved" not in fitted
+                and found != float(arm.viscous[joint])
+            ):
                 parts["curved"][joint] = 0.0
             parts[figure][joint] = found
     return replace(arm, **parts, couplings=tuple(shared))

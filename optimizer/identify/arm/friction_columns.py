@@ -1,6 +1,8 @@
-"""Columns of a joint's or a motor's friction and inertia: the torque is linear in their coefficients.
+"""Columns of a joint's or a motor's friction and inertia: the torque is linear in their
+coefficients.
 
-tau = (coulomb + load·|tau_rigid|)·v/sqrt(v² + knee²) + curved·asinh(v/speed) + viscous·v + offset + rotor_inertia·a
+tau = (coulomb + load·|tau_rigid|)·v/sqrt(v² + knee²) + curved·asinh(v/speed) + viscous·v + offset +
+rotor_inertia·a
 """
 
 from __future__ import annotations
@@ -33,7 +35,9 @@ def column(term: str, v: Array, a: Array, rigid: Array, knee: float, speed: floa
     return np.asarray(step * np.abs(rigid) if term == "load" else step)
 
 
-def columns(terms: Sequence[str], v: Array, a: Array, rigid: Array, knee: float, speed: float = 1.0) -> Array:
+def columns(
+    terms: Sequence[str], v: Array, a: Array, rigid: Array, knee: float, speed: float = 1.0
+) -> Array:
     """The columns (n, terms)."""
     return np.column_stack([column(term, v, a, rigid, knee, speed) for term in terms])
 

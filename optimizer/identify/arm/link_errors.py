@@ -7,7 +7,8 @@ import numpy as np
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.energy.link_regressor import BODY, body_parameters
 
-# standard deviations of a link: of mass over mass, of the centre of mass [m], of inertia over inertia
+# standard deviations of a link: of mass over mass, of the centre of mass [m], of inertia over
+# inertia
 LINK_MASS, LINK_COM, LINK_INERTIA = 0.1, 0.02, 0.3
 # of any parameter, at least [SI]
 LEAST = 1e-6

@@ -15,10 +15,11 @@ Name = tuple[str, int | None]
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Values (p,) of the figures `names`, and their values (G, p) with each cluster of moves left out.
+    """Values (p,) of the figures `names`, and their values (G, p) with each cluster of moves left
+    out.
 
-    `drift` (p, p) is the covariance that an assumption before the fit adds. `why` (p,) says why the robot's own value
-    was kept, or is empty for a figure that was found.
+    `drift` (p, p) is the covariance that an assumption before the fit adds. `why` (p,) says why the
+    robot's own value was kept, or is empty for a figure that was found.
     """
 
     names: tuple[Name, ...]
@@ -34,7 +35,9 @@ class Estimate:
 
 
 def joined(estimates: list[Estimate], shared: Array | None = None) -> Estimate:
-    """Several estimates from the same clusters as one. `shared` is the drift between the first and the second."""
+    """Several estimates from the same clusters as one. `shared` is the drift between the first and
+    the second.
+    """
     estimates = [each for each in estimates if each.names]
     if not estimates:
         return Estimate((), np.zeros(0), np.zeros((0, 0)), (), np.zeros((0, 0)))

@@ -9,14 +9,17 @@ from joulepath.models.robot import Array
 
 Numbers = npt.NDArray[np.int64]
 
-# residuals beyond so many robust standard deviations have no weight (Tukey's bisquare, 95 % efficient)
+# residuals beyond so many robust standard deviations have no weight (Tukey's bisquare, 95 %
+# efficient)
 CUT = 4.685
 # median of |x| of a normal distribution with standard deviation 1
 MEDIAN = 0.6744897501960817
 
 
 def bisquare_weights(residuals: Array) -> Array:
-    """Tukey's weights (n,) of residuals (n,), scaled by their median size; all 1 where most residuals are 0."""
+    """Tukey's weights (n,) of residuals (n,), scaled by their median size; all 1 where most
+    residuals are 0.
+    """
     size = float(np.median(np.abs(residuals))) / MEDIAN if residuals.size else 0.0
     if size <= 0:
         return np.ones_like(residuals)
@@ -24,7 +27,9 @@ def bisquare_weights(residuals: Array) -> Array:
 
 
 def weights_of(joint: Numbers, residuals: Array, robust: bool) -> Array:
-    """Of each row (n,): the inverse variance of its joint's residuals, less for outliers if `robust`."""
+    """Of each row (n,): the inverse variance of its joint's residuals, less for outliers if
+    `robust`.
+    """
     weight = np.ones_like(residuals)
     for each in np.unique(joint):
         rows = joint == each

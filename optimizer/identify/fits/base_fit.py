@@ -53,7 +53,11 @@ class BaseTerms:
         expressed = tuple(k for k in range(base.count) if k not in alone)
         names: list[Name] = [(base.expressions[k], None) for k in expressed]
         names += [(ROTOR, base.independent[k] - len(own)) for k in alone]
-        own_values = [*values[list(expressed)], *values[list(alone)], *(own_value(robot, name) for name in friction)]
+        own_values = [
+            *values[list(expressed)],
+            *values[list(alone)],
+            *(own_value(robot, name) for name in friction),
+        ]
         return BaseTerms((*names, *friction), np.array(own_values), base, expressed)
 
     def columns(self, arm: WholeArm) -> Array:
@@ -65,13 +69,17 @@ class BaseTerms:
 
         count = len(self.expressed)
         kept = [at(self.base.independent[k]) for k in self.expressed]
-        return arm.columns[:, [*kept, *(bodies + arm.block.names.index(name) for name in self.names[count:])]]
+        return arm.columns[
+            :, [*kept, *(bodies + arm.block.names.index(name) for name in self.names[count:])]
+        ]
 
     @property
     def lower(self) -> Array:
         """Least values (p,)."""
         count = len(self.expressed)
-        return np.append(np.full(count, -np.inf), lower_bounds([term for term, _ in self.names[count:]]))
+        return np.append(
+            np.full(count, -np.inf), lower_bounds([term for term, _ in self.names[count:]])
+        )
 
     def bodies(self, bodies: int) -> Array:
         """The matrix (10 nq, b) that turns changes of the base parameters into the least change of
@@ -79,7 +87,9 @@ class BaseTerms:
         return np.asarray(np.linalg.pinv(self.base.combination[list(self.expressed), :bodies]))
 
 
-def fit_base(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions) -> Estimate:
+def fit_base(
+    robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions
+) -> Estimate:
     """Base parameters and friction from motor torques (n, nq) [N·m], by ordinary, weighted or
     reweighted least squares.
 
@@ -111,10 +121,14 @@ def fit_base(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, option
     return Estimate(terms.names, value, replicates, tuple(why), np.zeros((len(own), len(own))))
 
 
-def base_arm(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions) -> WholeArm:
+def base_arm(
+    robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions
+) -> WholeArm:
     """Rows and columns of motor torques (n, nq) [N·m], from rows with the regressor."""
     assert rows.regressor is not None
-    return whole_arm(robot, rows, torque, clusters, options, rows.regressor, np.zeros(BODY * robot.nq))
+    return whole_arm(
+        robot, rows, torque, clusters, options, rows.regressor, np.zeros(BODY * robot.nq)
+    )
 
 
 def terms_of_arm(robot: Robot, arm: WholeArm, options: IdentificationOptions) -> BaseTerms:

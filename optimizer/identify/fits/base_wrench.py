@@ -27,7 +27,9 @@ AXES = 6
 WEIGHINGS = 2
 
 
-def fit_wrench(robot: Robot, rows: Rows, clusters: Clusters, options: IdentificationOptions) -> Estimate:
+def fit_wrench(
+    robot: Robot, rows: Rows, clusters: Clusters, options: IdentificationOptions
+) -> Estimate:
     """The links' 10 nq parameters, those of real bodies, from rows with a wrench and its regressor.
 
     The robot's own parameters are the prior, as in a refit from torques (`fit_whole`).
@@ -43,7 +45,10 @@ def fit_wrench(robot: Robot, rows: Rows, clusters: Clusters, options: Identifica
     for _ in range(WEIGHINGS):
         weight = _weights(values - columns @ value, clusters)
         grouped = Grouped.of(columns, values, weight, cluster, clusters.count)
-        gram, moment = grouped.gram.sum(axis=0) + precision, grouped.moment.sum(axis=0) + precision @ own
+        gram, moment = (
+            grouped.gram.sum(axis=0) + precision,
+            grouped.moment.sum(axis=0) + precision @ own,
+        )
         value = solve_consistent(gram, moment, len(own) // BODY, np.full(len(own), -np.inf))
     spread = np.linalg.solve(gram, precision)
     return Estimate(

@@ -17,15 +17,19 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 Numbers = npt.NDArray[np.int64]
 SCALE = "scale"
-"""The term by which the rigid torque is multiplied: the robot's own torque constant over the real one."""
+"""The term by which the rigid torque is multiplied: the robot's own torque constant over the real
+one.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Columns (n, p) of the terms `names`, the torques (n,) that they add up to, joint and cluster (n,) of each row.
+    """Columns (n, p) of the terms `names`, the torques (n,) that they add up to, joint and cluster
+    (n,) of each row.
 
-    `own` are the robot's own values of the terms, `lower` (p,) their least ones. `spread` [N·m] is the standard
-    deviation of each joint's rigid torque. `speed` [rad/s] is the curved term's where it was sought.
+    `own` are the robot's own values of the terms, `lower` (p,) their least ones. `spread` [N·m] is
+    the standard deviation of each joint's rigid torque. `speed` [rad/s] is the curved term's where
+    it was sought.
     """
 
     names: tuple[Name, ...]
@@ -60,7 +64,9 @@ def block_of(
     `speed` [rad/s] is that of the curved term; None: the robot's own, joint by joint.
     """
     terms, knee = terms_of(options), robot.friction.knee if options.knee is None else options.knee
-    couplings = [(k, each) for k, each in enumerate(options.couplings) if set(each.joints) <= set(joints)]
+    couplings = [
+        (k, each) for k, each in enumerate(options.couplings) if set(each.joints) <= set(joints)
+    ]
     coupled = [term for term in terms if term in ("coulomb", "viscous", "rotor_inertia")]
     names = [(term, joint) for joint in joints for term in terms]
     names += [(COUPLED + term, k) for k, _ in couplings for term in coupled]
@@ -80,7 +86,9 @@ def block_of(
             ratios = coupling.ratios
             for k, term in enumerate(coupled):
                 place = len(joints) * len(terms) + c * len(coupled) + k
-                columns[:, place] = ratios[joint] * column(term, v @ ratios, a @ ratios, rigid[:, joint], knee)
+                columns[:, place] = ratios[joint] * column(
+                    term, v @ ratios, a @ ratios, rigid[:, joint], knee
+                )
         parts.append((columns, torque[use, joint] - known[use, joint], joint, clusters.of_row[use]))
     return Block(
         names=tuple(names),
@@ -95,8 +103,12 @@ def block_of(
     )
 
 
-def moving(rows: Rows, torque: Array, joint: int, threshold: float, couplings: Sequence[Coupling]) -> Mask:
-    """The rows (n,) in which a joint moves faster than the threshold, as the motors coupled to it do."""
+def moving(
+    rows: Rows, torque: Array, joint: int, threshold: float, couplings: Sequence[Coupling]
+) -> Mask:
+    """The rows (n,) in which a joint moves faster than the threshold, as the motors coupled to it
+    do.
+    """
     use = np.isfinite(torque[:, joint]) & (np.abs(rows.v[:, joint]) > threshold)
     for coupling in couplings:
         if joint in coupling.joints:
@@ -118,7 +130,9 @@ def own_value(robot: Robot, name: Name) -> float:
 
 
 def _known(robot: Robot, rows: Rows, options: IdentificationOptions) -> Array:
-    """Torque (n, nq) [N·m] of what is not fitted: rigid bodies, and the robot's own friction or rotors."""
+    """Torque (n, nq) [N·m] of what is not fitted: rigid bodies, and the robot's own friction or
+    rotors.
+    """
     known = np.zeros_like(rows.rigid) if "torque_constant" in options.targets else rows.rigid.copy()
     if "friction" not in options.targets:
         known += robot.friction.torque(rows.v, rows.rigid)

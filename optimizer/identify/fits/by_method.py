@@ -19,18 +19,25 @@ from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 
-def prepared(logs: Sequence[Log], options: IdentificationOptions) -> tuple[list[Log], IdentificationOptions]:
-    """The logs and options as the method takes them. Raises MethodNotApplicable and InvalidProblem."""
+def prepared(
+    logs: Sequence[Log], options: IdentificationOptions
+) -> tuple[list[Log], IdentificationOptions]:
+    """The logs and options as the method takes them. Raises MethodNotApplicable and
+    InvalidProblem."""
     missing = _missing(logs, options)
     if missing:
         raise MethodNotApplicable(options.method, missing)
     if options.method == "motor_current":
-        return [*logs], replace(options, fit=tuple(dict.fromkeys((*options.fit, "torque_constant"))))
+        return [*logs], replace(
+            options, fit=tuple(dict.fromkeys((*options.fit, "torque_constant")))
+        )
     if options.method == "electrical_power":
         return [replace(log, effort=None, effort_meaning=None) for log in logs], options
     if options.method == "periodic":
         if options.period is None:
-            raise InvalidProblem("period", "The method periodic needs the period of the motion: give `period` in s.")
+            raise InvalidProblem(
+                "period", "The method periodic needs the period of the motion: give `period` in s."
+            )
         return [periods_of(log, options.period) for log in logs], options
     return [*logs], options
 
@@ -45,7 +52,9 @@ def fit_by_method(robot: Robot, rows: Rows, options: IdentificationOptions) -> F
     if options.method == "temperature":
         for _ in range(SETTINGS.passes):
             torque = motor_torque(fitted.arm, rows)
-            warm = temperatures_of(rows, torque, fitted.arm, fitted.clusters, options.velocity_threshold)
+            warm = temperatures_of(
+                rows, torque, fitted.arm, fitted.clusters, options.velocity_threshold
+            )
             fitted = fit_rows(robot, at_reference(rows, fitted.arm, warm), options)
     return fitted
 
@@ -72,7 +81,10 @@ def _missing(logs: Sequence[Log], options: IdentificationOptions) -> str:
             if len(logs) > 1:
                 return "it needs a single log, of a motion that is repeated."
             if options.held_out:
-                return "all its periods are one motion, so that none can be held out. Name other logs in `validate`."
+                return (
+                    "all its periods are one motion, so that none can be held out. Name other "
+                    "logs in `validate`."
+                )
     return ""
 
 
@@ -82,5 +94,8 @@ def _missing_temperature(logs: Sequence[Log]) -> str:
         return "it needs the temperatures of the joints in every log."
     span = float(np.ptp(np.concatenate(known), axis=0).max())
     if span < SETTINGS.least_span:
-        return f"the temperatures of its joints span {span:.2g} K, and at least {SETTINGS.least_span:g} K are needed."
+        return (
+            f"the temperatures of its joints span {span:.2g} K, and at least "
+            f"{SETTINGS.least_span:g} K are needed."
+        )
     return ""

@@ -1,7 +1,8 @@
-"""The least-squares figures whose links are real bodies: a semidefinite program, solved by Clarabel.
+"""The least-squares figures whose links are real bodies: a semidefinite program, solved by
+Clarabel.
 
-The problem is convex, so that its one solution is found, whatever the start. Clarabel (Goulart, Chen 2024) is an
-interior-point solver for quadratic objectives with semidefinite cones.
+The problem is convex, so that its one solution is found, whatever the start. Clarabel (Goulart,
+Chen 2024) is an interior-point solver for quadratic objectives with semidefinite cones.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ _FACTORS = np.where(_ENTRIES[0] == _ENTRIES[1], 1.0, np.sqrt(2.0))
 
 
 def solve_consistent(gram: Array, moment: Array, bodies: int, lower: Array) -> Array:
-    """The x (p,) ≥ lower that minimises xᵀ gram x / 2 - momentᵀ x, its first 10 · bodies entries those of real bodies.
+    """The x (p,) ≥ lower that minimises xᵀ gram x / 2 - momentᵀ x, its first 10 · bodies entries
+    those of real bodies.
 
     Raises ArithmeticError if the solver fails, as it does for a gram that is not positive definite.
     """
@@ -35,7 +37,9 @@ def solve_consistent(gram: Array, moment: Array, bodies: int, lower: Array) -> A
     bounded = np.flatnonzero(np.isfinite(lower))
     matrix = np.zeros((len(bounded) + BODY * bodies, p))
     matrix[np.arange(len(bounded)), bounded] = -scale[bounded]
-    matrix[len(bounded) :, : BODY * bodies] = -np.kron(np.eye(bodies), entries) * scale[: BODY * bodies]
+    matrix[len(bounded) :, : BODY * bodies] = (
+        -np.kron(np.eye(bodies), entries) * scale[: BODY * bodies]
+    )
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     solution = clarabel.DefaultSolver(

@@ -23,7 +23,8 @@ from joulepath.optimizer.identify.results import MeasuredNoise
 from joulepath.optimizer.identify.rows.clusters import Clusters, clusters_of
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
-# share of the greatest variance, of parameters that are scaled to one size: below it, a common error is rounding
+# share of the greatest variance, of parameters that are scaled to one size: below it, a common
+# error is rounding
 LEAST_ERROR = 1e-3
 LINK_MASS_SCALE = "link_mass_scale"
 """The figure of the factor on the masses of all links."""
@@ -72,7 +73,9 @@ def fit_rows(robot: Robot, rows: Rows, options: IdentificationOptions) -> Fitted
         tilted=(),
         drift=np.zeros((packed_size(robot.nq),) * 2),
         lost=np.zeros((clusters.count, *(packed_size(robot.nq),) * 2)),
-        mean_power=float(np.mean(rows.power[np.isfinite(rows.power) & ~rows.rest])) if with_power else np.nan,
+        mean_power=float(np.mean(rows.power[np.isfinite(rows.power) & ~rows.rest]))
+        if with_power
+        else np.nan,
     )
     if options.method == "base_wrench":
         return _with_wrench(robot, rows, fitted, options)
@@ -94,7 +97,9 @@ def _with_torque(
         fit = fit_whole if options.refit else fit_base if options.reduced else fit_torques
         found = fit(robot, rows, torque, fitted.clusters, options)
     of_links = np.array([joint is None or name.startswith(LINK) for name, joint in found.names])
-    terms = tuple(name for name, of_link in zip(found.names, of_links.tolist(), strict=True) if not of_link)
+    terms = tuple(
+        name for name, of_link in zip(found.names, of_links.tolist(), strict=True) if not of_link
+    )
     turn, before = _link_changes(robot, options)
 
     def arm(values: Array) -> FittedArm:
@@ -125,7 +130,9 @@ def _link_changes(robot: Robot, options: IdentificationOptions) -> tuple[Array, 
     return terms.bodies(len(links)), terms.own[: len(terms.expressed)]
 
 
-def _with_wrench(robot: Robot, rows: Rows, fitted: Fitted, options: IdentificationOptions) -> Fitted:
+def _with_wrench(
+    robot: Robot, rows: Rows, fitted: Fitted, options: IdentificationOptions
+) -> Fitted:
     """With the links fitted to the wrench beneath the base; all else is the robot's own."""
     found, own = fit_wrench(robot, rows, fitted.clusters, options), body_parameters(robot.model)
 
@@ -144,7 +151,9 @@ def _with_wrench(robot: Robot, rows: Rows, fitted: Fitted, options: Identificati
 
 
 def _errors(covariance: Array) -> Array:
-    """Independent errors (k, p) of parameters (p,), whose squares add up to their covariance but for rounding."""
+    """Independent errors (k, p) of parameters (p,), whose squares add up to their covariance but
+    for rounding.
+    """
     sd = np.sqrt(np.diag(covariance))
     scale = np.where(sd > 0, sd, 1.0)
     sizes, directions = np.linalg.eigh(covariance / np.outer(scale, scale))
@@ -157,22 +166,33 @@ def motor_torque(arm: FittedArm, rows: Rows) -> Array:
     return rows.effort * arm.torque_constant if rows.current else rows.effort
 
 
-def _with_power(robot: Robot, rows: Rows, fitted: Fitted, errors: Array, options: IdentificationOptions) -> Fitted:
+def _with_power(
+    robot: Robot, rows: Rows, fitted: Fitted, errors: Array, options: IdentificationOptions
+) -> Fitted:
     """With the power fitted, whose figures follow the `errors` (k, p) of the tilted arms."""
     use, clusters, arm = np.isfinite(rows.power), fitted.clusters, fitted.arm
     part, of_row = rows.take(use), Clusters(clusters.of_row[use], clusters.count)
     torque_known = len(fitted.estimate.names) > 0
     prior = prior_of(robot, torque_known)
     fit = fit_power(
-        arm.motion(part), part.power, arm.torque_constant, arm.regeneration, prior, of_row, options.estimator == "irls"
+        arm.motion(part),
+        part.power,
+        arm.torque_constant,
+        arm.regeneration,
+        prior,
+        of_row,
+        options.estimator == "irls",
     )
     # an error of the torques moves the electrics, too: one step of the fit with each of them
     others = fitted.without if torque_known else ()
     here = replace(arm, electrics=Electrics.unpacked(fit.value)).power(part)[0]
-    moved = np.array([
-        fit.gain @ (here - replace(each, electrics=Electrics.unpacked(fit.value)).power(part)[0])
-        for each in (*others, *fitted.tilted)
-    ]).reshape(-1, len(fit.value))  # fmt: skip
+    moved = np.array(
+        [
+            fit.gain
+            @ (here - replace(each, electrics=Electrics.unpacked(fit.value)).power(part)[0])
+            for each in (*others, *fitted.tilted)
+        ]
+    ).reshape(-1, len(fit.value))
     shifts = moved[len(others) :]
     by_torques = moved[: len(others)] if torque_known else 0.0
     without, varied = fit.without + by_torques, fit.adjusted + by_torques
@@ -188,12 +208,17 @@ def _with_power(robot: Robot, rows: Rows, fitted: Fitted, errors: Array, options
     untold = np.diag(estimate.covariance) > WORTH**2 * np.diag(before)
     estimate = replace(estimate, why=tuple(HARDLY if each else "" for each in untold.tolist()))
     # of factors, as they are scaled in the arm
-    relative, factors = np.ones(packed_size(robot.nq)), [*range(1 + 2 * robot.nq, 1 + 5 * robot.nq), -1]
+    relative, factors = (
+        np.ones(packed_size(robot.nq)),
+        [*range(1 + 2 * robot.nq, 1 + 5 * robot.nq), -1],
+    )
     relative[factors] /= np.maximum(fit.value[factors], 1e-3)
     return replace(
         fitted,
         arm=_with_electrics(arm, fit.value, torque_known),
-        estimate=joined([fitted.estimate, estimate], errors.T @ shifts @ turn.T if torque_known else None),
+        estimate=joined(
+            [fitted.estimate, estimate], errors.T @ shifts @ turn.T if torque_known else None
+        ),
         without=_each_with_electrics(fitted.without, without, torque_known),
         varied=_each_with_electrics(fitted.varied, varied, torque_known),
         tilted=_each_with_electrics(fitted.tilted, fit.value + shifts, torque_known),
@@ -202,8 +227,12 @@ def _with_power(robot: Robot, rows: Rows, fitted: Fitted, errors: Array, options
     )
 
 
-def _each_with_electrics(arms: Sequence[FittedArm], values: Array, torque_known: bool) -> tuple[FittedArm, ...]:
-    return tuple(_with_electrics(arm, each, torque_known) for arm, each in zip(arms, values, strict=True))
+def _each_with_electrics(
+    arms: Sequence[FittedArm], values: Array, torque_known: bool
+) -> tuple[FittedArm, ...]:
+    return tuple(
+        _with_electrics(arm, each, torque_known) for arm, each in zip(arms, values, strict=True)
+    )
 
 
 def _with_electrics(arm: FittedArm, values: Array, torque_known: bool) -> FittedArm:
@@ -224,8 +253,12 @@ def _with_electrics(arm: FittedArm, values: Array, torque_known: bool) -> Fitted
     )
 
 
-def _figures_of_power(robot: Robot, prior: Prior, torque_known: bool) -> tuple[Array, Array, tuple[Name, ...]]:
-    """The matrix (f, p) and the constants (f,) that make figures of packed ones (p,), and the figures' names."""
+def _figures_of_power(
+    robot: Robot, prior: Prior, torque_known: bool
+) -> tuple[Array, Array, tuple[Name, ...]]:
+    """The matrix (f, p) and the constants (f,) that make figures of packed ones (p,), and the
+    figures' names.
+    """
     nq, own, every = robot.nq, own_arm(robot), np.eye(packed_size(robot.nq))
     names: list[Name] = [("idle_power", None)]
     names += [(figure, joint) for figure in ("copper", "inverter_linear") for joint in range(nq)]

@@ -1,8 +1,8 @@
 """Mass and centre of mass of a payload, from a log with it and at least one without it.
 
-The torques of the log with the payload have a term more than those of the others: that of a body at the flange.
-Friction, rotors, sensors' offsets and the errors of the links are the same in all logs, and are found with it. What is
-left for the payload is the difference between the logs.
+The torques of the log with the payload have a term more than those of the others: that of a body at
+the flange. Friction, rotors, sensors' offsets and the errors of the links are the same in all logs,
+and are found with it. What is left for the payload is the difference between the logs.
 """
 
 from __future__ import annotations
@@ -29,12 +29,16 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows
 from joulepath.optimizer.problem.arm import Payload
 
 TERMS = ("coulomb", "viscous", "load", "curved", "offset", "rotor_inertia")
-NAMES: tuple[Name, ...] = tuple((f"payload_{part}", None) for part in ("mass", "com_x", "com_y", "com_z"))
+NAMES: tuple[Name, ...] = tuple(
+    (f"payload_{part}", None) for part in ("mass", "com_x", "com_y", "com_z")
+)
 # the weights of joints and the payload's share of load friction follow from the fit before
 PASSES = 4
-# standard deviations of a payload before any log: mass [kg], first moments [kg·m], inertia about the last joint [kg·m²]
+# standard deviations of a payload before any log: mass [kg], first moments [kg·m], inertia about
+# the last joint [kg·m²]
 MASS, MOMENT, INERTIA = 100.0, 30.0, 0.1
-# a term of friction is anything up to so many times the joint's torque limit, per unit of its column
+# a term of friction is anything up to so many times the joint's torque limit, per unit of its
+# column
 FRICTION = 10.0
 # kg; a mass that a torque sensor or a current does not show
 LEAST_MASS = 1e-3
@@ -45,9 +49,9 @@ SAME = "The log with the payload does not differ from the others by a load."
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """A payload: `mass` [kg], `com` (3,) [m] in the flange frame, their covariance (4, 4), and its `body` (10,) in the
-    frame of the last joint. `log` is the number of the log that carries it. `why` it is not told, or empty: `body` is
-    then 0."""
+    """A payload: `mass` [kg], `com` (3,) [m] in the flange frame, their covariance (4, 4), and its
+    `body` (10,) in the frame of the last joint. `log` is the number of the log that carries it.
+    `why` it is not told, or empty: `body` is then 0."""
 
     log: int
     mass: float
@@ -59,20 +63,30 @@ class Carried:
     def parameters(self, stated: Payload) -> tuple[Parameter, ...]:
         """Its figures, beside those that the log states."""
         own = [stated.mass, *stated.com.tolist()]
-        values, deviations = [self.mass, *self.com.tolist()], np.sqrt(np.diag(self.covariance)).tolist()
+        values, deviations = (
+            [self.mass, *self.com.tolist()],
+            np.sqrt(np.diag(self.covariance)).tolist(),
+        )
         parts = zip(NAMES, values, deviations, own, strict=True)
-        return tuple(Parameter(*name, value, sd, said, not self.why, self.why) for name, value, sd, said in parts)
+        return tuple(
+            Parameter(*name, value, sd, said, not self.why, self.why)
+            for name, value, sd, said in parts
+        )
 
 
 def loaded(rows: Rows, carried: Carried) -> Rows:
     """The rows with the payload in the rigid torques of the log that carries it."""
     assert rows.regressor is not None
-    rigid = rows.rigid + np.where((rows.log == carried.log)[:, None], rows.regressor[:, :, -BODY:] @ carried.body, 0.0)
+    rigid = rows.rigid + np.where(
+        (rows.log == carried.log)[:, None], rows.regressor[:, :, -BODY:] @ carried.body, 0.0
+    )
     return replace(rows, rigid=rigid, regressor=None)
 
 
 def joints_without_gravity(robot: Robot, rows: Rows, logs: Sequence[Log]) -> list[int]:
-    """Joints at which the weight of the links hardly varies over the logs: no torque constant follows from it."""
+    """Joints at which the weight of the links hardly varies over the logs: no torque constant
+    follows from it.
+    """
     every = max(1, len(rows.q) // MOST_POSES)
     parts = list[Array]()
     for number, log in enumerate(logs):
@@ -85,10 +99,11 @@ def joints_without_gravity(robot: Robot, rows: Rows, logs: Sequence[Log]) -> lis
 
 
 def payload_of(robot: Robot, rows: Rows, torque: Array, log: int, threshold: float) -> Carried:
-    """The payload in rows with regressors, whose rigid torques are without it in the `log` that carries it.
+    """The payload in rows with regressors, whose rigid torques are without it in the `log` that
+    carries it.
 
-    `torque` (n, nq) [N·m] are motor torques, `threshold` [rad/s] the speed above which a joint's rows count. Raises
-    InvalidProblem if that log carries less than nothing.
+    `torque` (n, nq) [N·m] are motor torques, `threshold` [rad/s] the speed above which a joint's
+    rows count. Raises InvalidProblem if that log carries less than nothing.
     """
     clusters, prior = clusters_of(rows), np.diag(_precision(robot))
     body, variance = np.zeros(BODY), np.ones(robot.nq)
@@ -100,11 +115,19 @@ def payload_of(robot: Robot, rows: Rows, torque: Array, log: int, threshold: flo
         for joint, (at, left, right, of_row) in enumerate(parts):
             if len(right):
                 error = right - left @ value[at]
-                variance[joint] = shared_variance(error, np.ones_like(error), Clusters(of_row, clusters.count))
+                variance[joint] = shared_variance(
+                    error, np.ones_like(error), Clusters(of_row, clusters.count)
+                )
         body = value[links : links + BODY]
     replicates = left_out(grouped, value, np.ones(len(value), dtype=bool), prior)
     inverse = np.linalg.inv(gram)
-    return _told(robot, log, body, replicates[:, links : links + BODY], (inverse @ prior @ inverse)[links:, links:])
+    return _told(
+        robot,
+        log,
+        body,
+        replicates[:, links : links + BODY],
+        (inverse @ prior @ inverse)[links:, links:],
+    )
 
 
 def _equations(
@@ -117,8 +140,9 @@ def _equations(
     body: Array,
     variance: Array,
 ) -> tuple[Grouped, list[tuple[list[int], Array, Array, npt.NDArray[np.int64]]]]:
-    """Normal equations over all joints, weighted by their `variance` (nq,), and of each joint the places of its terms,
-    its columns, its torques and the clusters of its rows. Load friction is that of the payload `body` (10,)."""
+    """Normal equations over all joints, weighted by their `variance` (nq,), and of each joint the
+    places of its terms, its columns, its torques and the clusters of its rows. Load friction is
+    that of the payload `body` (10,)."""
     assert rows.regressor is not None
     nq, speed = robot.nq, np.maximum(robot.friction.speed, 0.05)
     count, shared = (BODY + len(TERMS)) * nq + BODY, [*range(BODY * nq + BODY)]
@@ -130,12 +154,22 @@ def _equations(
         carried = np.where((rows.log[use] == log)[:, None], links[:, -BODY:], 0.0)
         rigid = rows.rigid[use, joint]
         friction = columns(
-            TERMS, rows.v[use, joint], rows.a[use, joint], rigid + carried @ body, robot.friction.knee, speed[joint]
+            TERMS,
+            rows.v[use, joint],
+            rows.a[use, joint],
+            rigid + carried @ body,
+            robot.friction.knee,
+            speed[joint],
         )
         left, right = np.hstack([links, carried, friction]), torque[use, joint] - rigid
-        at = [*shared, *range(len(shared) + joint * len(TERMS), len(shared) + (joint + 1) * len(TERMS))]
+        at = [
+            *shared,
+            *range(len(shared) + joint * len(TERMS), len(shared) + (joint + 1) * len(TERMS)),
+        ]
         of_row = clusters.of_row[use]
-        part = Grouped.of(left, right, np.full(len(right), 1 / variance[joint]), of_row, clusters.count)
+        part = Grouped.of(
+            left, right, np.full(len(right), 1 / variance[joint]), of_row, clusters.count
+        )
         gram[np.ix_(range(clusters.count), at, at)] += part.gram
         moment[:, at] += part.moment
         parts.append((at, left, right, of_row))
@@ -150,7 +184,9 @@ def _precision(robot: Robot) -> Array:
 
 
 def _told(robot: Robot, log: int, body: Array, replicates: Array, drift: Array) -> Carried:
-    """The payload from its body (10,), that without each cluster (G, 10), and the covariance that the prior adds."""
+    """The payload from its body (10,), that without each cluster (G, 10), and the covariance that
+    the prior adds.
+    """
     flange = robot.model.frames[robot.model.getFrameId("flange")].placement
     mass = float(body[0])
     spread = jackknife(replicates[:, :4]) + drift[:4, :4]
@@ -158,7 +194,8 @@ def _told(robot: Robot, log: int, body: Array, replicates: Array, drift: Array) 
     if mass < -max(3 * sd, LEAST_MASS):
         raise InvalidProblem(
             "logs",
-            f"The last of the logs carries {-mass:.3g} kg less than the others say of theirs: name the log with the "
+            f"The last of the logs carries {-mass:.3g} kg less than the others say of theirs: name "
+            "the log with the "
             "payload last, and give the `payload` of the others.",
         )
     if not max(sd, LEAST_MASS) <= MOST_RELATIVE_SD * mass:

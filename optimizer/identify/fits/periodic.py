@@ -1,8 +1,10 @@
-"""Maximum likelihood from a periodic excitation (Swevers et al. 1997): the noise is measured, not assumed.
+"""Maximum likelihood from a periodic excitation (Swevers et al. 1997): the noise is measured, not
+assumed.
 
-The arm repeats a Fourier series, so that everything but noise repeats, too. The mean over periods has less noise, and
-the spread over periods is the noise of each joint. With it as weights, least squares is the maximum-likelihood estimate
-of Gaussian noise, and the covariance of the figures follows without any residual.
+The arm repeats a Fourier series, so that everything but noise repeats, too. The mean over periods
+has less noise, and the spread over periods is the noise of each joint. With it as weights, least
+squares is the maximum-likelihood estimate of Gaussian noise, and the covariance of the figures
+follows without any residual.
 """
 
 from __future__ import annotations
@@ -60,7 +62,8 @@ def periods_of(log: Log, period: float, settings: PeriodicSettings | None = None
     if apart > settings.most_apart:
         raise MethodNotApplicable(
             "periodic",
-            f"its periods of {period:g} s are up to {apart:.2g} rad apart. Give the `period` of the "
+            f"its periods of {period:g} s are up to {apart:.2g} rad apart. Give the `period` of "
+            "the "
             "motion, and log the same motion again and again.",
         )
     return replace(log, moves=tuple(LogMove(each, each + length, False) for each in starts))
@@ -76,7 +79,13 @@ def fit_periodic(
     periods = torque.reshape(count, -1, robot.nq)
     noise = np.sqrt(periods.var(axis=0, ddof=1).mean(axis=0))
     mean = mean_period(rows, count)
-    arm = base_arm(robot, mean, periods.mean(axis=0), Clusters(np.zeros(len(mean.q), dtype=np.int64), 1), options)
+    arm = base_arm(
+        robot,
+        mean,
+        periods.mean(axis=0),
+        Clusters(np.zeros(len(mean.q), dtype=np.int64), 1),
+        options,
+    )
     terms = terms_of_arm(robot, arm, options)
     deviation = np.maximum(noise[arm.block.joint], 1e-9) / np.sqrt(count)
     columns, values = terms.columns(arm) / deviation[:, None], arm.values / deviation
@@ -99,5 +108,8 @@ def mean_period(rows: Rows, count: int) -> Rows:
     means = {name: getattr(rows, name) for name in _AVERAGED}
     return replace(
         first,
-        **{name: each.reshape(count, length, *each.shape[1:]).mean(axis=0) for name, each in means.items()},
+        **{
+            name: each.reshape(count, length, *each.shape[1:]).mean(axis=0)
+            for name, each in means.items()
+        },
     )

@@ -1,8 +1,9 @@
 """The speed below which Coulomb and viscous friction do not hold (Vuong and Ang 2009).
 
-Near standstill friction is no function of the speed: bristles bend, and the lubricant's film is not there yet. Samples
-below a threshold would bias the figures. Here the residuals of a fit to fast samples are averaged in classes of speed.
-The threshold is the greatest speed below which a class is off by more than it can be by chance.
+Near standstill friction is no function of the speed: bristles bend, and the lubricant's film is not
+there yet. Samples below a threshold would bias the figures. Here the residuals of a fit to fast
+samples are averaged in classes of speed. The threshold is the greatest speed below which a class is
+off by more than it can be by chance.
 """
 
 from __future__ import annotations
@@ -38,8 +39,12 @@ class ThresholdSettings:
     """Share of the greatest speed above which the law is taken to hold."""
 
 
-def velocity_threshold(v: Array, friction: Array, settings: ThresholdSettings | None = None) -> float:
-    """The threshold [rad/s] of a joint with friction torques (n,) [N·m] at speeds v (n,); 0 if there is none."""
+def velocity_threshold(
+    v: Array, friction: Array, settings: ThresholdSettings | None = None
+) -> float:
+    """The threshold [rad/s] of a joint with friction torques (n,) [N·m] at speeds v (n,); 0 if
+    there is none.
+    """
     settings = settings or ThresholdSettings()
     speed, greatest = np.abs(v), float(np.abs(v).max())
     fast = speed > settings.fast * greatest
@@ -69,5 +74,6 @@ def thresholds_of(arm: FittedArm, rows: Rows, torque: Array) -> Array:
 
 
 def faster(rows: Rows, thresholds: Array) -> Rows:
-    """The rows without the efforts of joints that are slower than their thresholds (nq,) [rad/s]."""
+    """The rows without the efforts of joints that are slower than their thresholds (nq,)
+    [rad/s]."""
     return replace(rows, effort=np.where(np.abs(rows.v) > thresholds, rows.effort, np.nan))

@@ -16,8 +16,8 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 @dataclass(frozen=True, eq=False)
 class WholeArm:
-    """Columns (n, 10 bodies) of the links, and the block (n, p) of the other terms. `values` (n,) are the torques that
-    both add up to: those of motors, without what the arm carries."""
+    """Columns (n, 10 bodies) of the links, and the block (n, p) of the other terms. `values` (n,)
+    are the torques that both add up to: those of motors, without what the arm carries."""
 
     bodies: Array
     block: Block
@@ -43,11 +43,15 @@ def whole_arm(
     bodies: Array,
     change: Array,
 ) -> WholeArm:
-    """All joints, from motor torques (n, nq) [N·m]. `bodies` (n, nq, 10 bodies) is the regressor of the links, and of
-    others that are to be found; `change` (10 nq,) of the links is in the rigid torques of `rows` already."""
+    """All joints, from motor torques (n, nq) [N·m]. `bodies` (n, nq, 10 bodies) is the regressor of
+    the links, and of others that are to be found; `change` (10 nq,) of the links is in the rigid
+    torques of `rows` already."""
     joints = range(robot.nq)
     block = block_of(robot, rows, torque, clusters, options, joints)
-    uses = [moving(rows, torque, joint, options.velocity_threshold, options.couplings) for joint in joints]
+    uses = [
+        moving(rows, torque, joint, options.velocity_threshold, options.couplings)
+        for joint in joints
+    ]
     ends = np.cumsum([int(use.sum()) for use in uses])
     columns = np.empty((int(ends[-1]), bodies.shape[2]))
     # filled in place: they are the largest array of a fit

@@ -1,7 +1,9 @@
-"""Inertials of the links, friction and rotors of all joints together, with links that are real bodies.
+"""Inertials of the links, friction and rotors of all joints together, with links that are real
+bodies.
 
-The links' parameters are held to the robot's own by a prior (`nearness`), since the torques tell only combinations of
-them. The rows are weighted by the inverse variance of their joint, and by how many independent ones they are worth.
+The links' parameters are held to the robot's own by a prior (`nearness`), since the torques tell
+only combinations of them. The rows are weighted by the inverse variance of their joint, and by how
+many independent ones they are worth.
 """
 
 from __future__ import annotations
@@ -29,14 +31,17 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows
 PASSES, WEIGHINGS = 2, 2
 LINK = "inertials."
 LINK_NAMES = frozenset(LINK + part for part in LINKS)
-# standard deviations of the prior of terms that the robot has no figure of: load friction [1], offset over the torque
-# limit, and any other term [SI]; of one that it has, over its value
+# standard deviations of the prior of terms that the robot has no figure of: load friction [1],
+# offset over the torque limit, and any other term [SI]; of one that it has, over its value
 LOAD_SD, OFFSET_SD, OTHER_SD, RELATIVE_SD = 0.1, 0.05, 10.0, 1.0
 NOT_LOADED = "It is below {:g} standard deviations, or the rigid torque hardly varies."
 
 
-def fit_whole(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions) -> Estimate:
-    """Friction, rotors and couplings, then the links' 10 nq parameters, from motor torques (n, nq) [N·m].
+def fit_whole(
+    robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions
+) -> Estimate:
+    """Friction, rotors and couplings, then the links' 10 nq parameters, from motor torques (n, nq)
+    [N·m].
 
     `rows` have the regressor."""
     own, bodies = body_parameters(robot.model), rows.regressor
@@ -68,7 +73,9 @@ def fit_whole(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, optio
     )
 
 
-def _prior(robot: Robot, arm: WholeArm, options: IdentificationOptions, held: frozenset[int]) -> tuple[Array, Array]:
+def _prior(
+    robot: Robot, arm: WholeArm, options: IdentificationOptions, held: frozenset[int]
+) -> tuple[Array, Array]:
     """Mean (p,) and precision (p, p) of bodies and other terms; those `held` are all but fixed."""
     own, names = body_parameters(robot.model), arm.block.names
     mean = np.concatenate([own, [arm.block.own[name] for name in names]])
@@ -90,22 +97,36 @@ def _prior_sd(robot: Robot, name: Name, own: float) -> float:
 
 
 def _solve(
-    arm: WholeArm, clusters: Clusters, options: IdentificationOptions, mean: Array, precision: Array, links: int
+    arm: WholeArm,
+    clusters: Clusters,
+    options: IdentificationOptions,
+    mean: Array,
+    precision: Array,
+    links: int,
 ) -> tuple[Array, Grouped]:
     """The solution (p,), and the weighted normal equations."""
     block = arm.block
     lower = np.concatenate([np.full(BODY * links, -np.inf), block.lower])
     value, weight = mean, _weights(arm, arm.values - arm.torque(mean), clusters, False)
     for _ in range(WEIGHINGS):
-        grouped = Grouped.of((arm.bodies, block.columns), arm.values, weight, block.cluster, clusters.count)
-        gram, moment = grouped.gram.sum(axis=0) + precision, grouped.moment.sum(axis=0) + precision @ mean
+        grouped = Grouped.of(
+            (arm.bodies, block.columns), arm.values, weight, block.cluster, clusters.count
+        )
+        gram, moment = (
+            grouped.gram.sum(axis=0) + precision,
+            grouped.moment.sum(axis=0) + precision @ mean,
+        )
         value = solve_consistent(gram, moment, links, lower)
-        weight = _weights(arm, arm.values - arm.torque(value), clusters, options.estimator == "irls")
+        weight = _weights(
+            arm, arm.values - arm.torque(value), clusters, options.estimator == "irls"
+        )
     return value, grouped
 
 
 def _weights(arm: WholeArm, residuals: Array, clusters: Clusters, robust: bool) -> Array:
-    """Of each row (n,): the inverse of its joint's variance, as large as if all rows were independent."""
+    """Of each row (n,): the inverse of its joint's variance, as large as if all rows were
+    independent.
+    """
     weight = np.ones_like(residuals)
     for joint in np.unique(arm.block.joint):
         rows = arm.block.joint == joint
@@ -120,7 +141,9 @@ def _unloaded(robot: Robot, arm: WholeArm, value: Array, sd: Array, bodies: int)
     found = list[int]()
     for k, (term, joint) in enumerate(arm.block.names):
         if term == "load" and joint is not None:
-            little = arm.block.spread[joint] < LEAST_LOAD_SPREAD * float(robot.limits.tau_max[joint])
+            little = arm.block.spread[joint] < LEAST_LOAD_SPREAD * float(
+                robot.limits.tau_max[joint]
+            )
             if little or not value[bodies + k] >= LOAD_SDS * sd[bodies + k] > 0:
                 found.append(k)
     return frozenset(found)

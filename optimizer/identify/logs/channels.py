@@ -21,7 +21,13 @@ def channels_of(log: Log, columns: Columns, effort: Group | None) -> tuple[Chann
 
 def _channels(log: Log, columns: Columns, effort: Group | None) -> Iterator[Channel]:
     units = _UNITS | {"effort": _EFFORT_UNITS.get(log.effort_meaning or "", "")}
-    sources: dict[str, Group | None] = {"q": "q", "v": "v", "a": "a", "effort": effort, "temperature": "temperature"}
+    sources: dict[str, Group | None] = {
+        "q": "q",
+        "v": "v",
+        "a": "a",
+        "effort": effort,
+        "temperature": "temperature",
+    }
     for name, group in sources.items():
         values: Array | None = getattr(log, name)
         if values is None:
@@ -33,7 +39,13 @@ def _channels(log: Log, columns: Columns, effort: Group | None) -> Iterator[Chan
     if log.wrench is not None:
         for j, size in enumerate(noise(log.wrench, log.rate)):
             column = columns.names[columns.groups["wrench"][j]]
-            yield Channel(f"wrench{j + 1}", column, "N" if j < 3 else "N·m", *_range(log.wrench[:, j]), float(size))
+            yield Channel(
+                f"wrench{j + 1}",
+                column,
+                "N" if j < 3 else "N·m",
+                *_range(log.wrench[:, j]),
+                float(size),
+            )
     if log.power is not None:
         column = " · ".join(columns.names[k] for k in columns.groups["power"])
         (size,) = noise(log.power[:, None], log.rate)

@@ -9,17 +9,31 @@ from typing import ClassVar, Literal
 
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 
-Group = Literal["q", "v", "a", "current", "torque", "effort", "temperature", "commanded", "power", "payload", "wrench"]
-"""What columns hold: joint positions, speeds, accelerations, currents, torques, efforts of unknown meaning,
-temperatures, commanded speeds; power of the arm, or voltage and current that multiply to it; mass and centre of the
-payload; force and torque on a sensor beneath the base."""
+Group = Literal[
+    "q",
+    "v",
+    "a",
+    "current",
+    "torque",
+    "effort",
+    "temperature",
+    "commanded",
+    "power",
+    "payload",
+    "wrench",
+]
+"""What columns hold: joint positions, speeds, accelerations, currents, torques, efforts of unknown
+meaning, temperatures, commanded speeds; power of the arm, or voltage and current that multiply to
+it; mass and centre of the payload; force and torque on a sensor beneath the base."""
 WRENCH = 6
 """Columns of a wrench: three of the force, then three of the torque."""
 
 
 @dataclass(frozen=True)
 class Form:
-    """Names of the columns of one kind of log: expressions whose first group, if any, is the number of a joint."""
+    """Names of the columns of one kind of log: expressions whose first group, if any, is the number
+    of a joint.
+    """
 
     name: str
     time: str
@@ -32,7 +46,9 @@ class Form:
 AT = r"[._\[ ]?([0-9]{1,3})\]?"
 """Brackets, underscores, points or spaces before the number of a joint."""
 _BEFORE = r"(?:.*[./])?(?:joint_?|measured_?|msr_?|actual_?|motor_?)*"
-"""Of names of a topic or a structure, as `/joint_states/position[0]` or `state.q[0]`, and words for a measurement."""
+"""Of names of a topic or a structure, as `/joint_states/position[0]` or `state.q[0]`, and words for
+a measurement.
+"""
 FORMS = (
     Form(
         "rtde",
@@ -84,19 +100,23 @@ FORMS = (
         ("power",),
     ),
 )
-_TIME = r"(?:.*[./])?(?:__|%)?(?:time|timestamp|t|stamp|rosbagtimestamp|duration)(?:[_ ]?(?:n|u|µ|m)?s(?:ec)?)?"
+_TIME = (
+    r"(?:.*[./])?(?:__|%)?(?:time|timestamp|t|stamp|rosbagtimestamp|duration)(?:[_ "
+    r"]?(?:n|u|µ|m)?s(?:ec)?)?"
+)
 _STAMPS = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"), ("secs", "nanosecs"))
 """Ends of the names of the two columns of a stamp of time."""
 _KNOWN = (
-    "timestamp, actual_q_0, … (RTDE), t, q1, … (this service's own) or time, position1, … (ROS JointState as CSV). "
+    "timestamp, actual_q_0, … (RTDE), t, q1, … (this service's own) or time, position1, … (ROS "
+    "JointState as CSV). "
     "Otherwise say in `columns` which columns hold what"
 )
 
 
 @dataclass(frozen=True)
 class Columns:
-    """Indices of the columns of a log: its `form`, `time`, or seconds and nanoseconds of it, and `groups`, those of
-    joints with one index per joint."""
+    """Indices of the columns of a log: its `form`, `time`, or seconds and nanoseconds of it, and
+    `groups`, those of joints with one index per joint."""
 
     form: str
     names: Sequence[str]
@@ -119,9 +139,13 @@ class Columns:
     """What a map of columns may name."""
 
     def without(self, first: Sequence[str]) -> tuple[Columns, list[Group]]:
-        """The columns without the groups of which the `first` row has no number, and these; positions stay."""
+        """The columns without the groups of which the `first` row has no number, and these;
+        positions stay.
+        """
         gone: list[Group] = [
-            group for group, indices in self.groups.items() if group != "q" and all(_empty(first[k]) for k in indices)
+            group
+            for group, indices in self.groups.items()
+            if group != "q" and all(_empty(first[k]) for k in indices)
         ]
         groups = {group: indices for group, indices in self.groups.items() if group not in gone}
         return replace(self, groups=groups), gone
@@ -137,36 +161,49 @@ def _empty(cell: str) -> bool:
 
 
 def recognised(names: Sequence[str], nq: int) -> Columns:
-    """The columns of a header for an arm with nq joints, of one of the FORMS. Raises InvalidTable."""
+    """The columns of a header for an arm with nq joints, of one of the FORMS. Raises
+    InvalidTable."""
     for form in FORMS:
-        found = {group: indices for group, pattern in form.joints.items() if (indices := _numbered(names, pattern))}
+        found = {
+            group: indices
+            for group, pattern in form.joints.items()
+            if (indices := _numbered(names, pattern))
+        }
         if "q" not in found:
             continue
         time = time_of(names, form.time)
         if not time:
             raise InvalidTable(
-                f"The header has joint positions, as {names[found['q'][0]]}, but no column `{form.time.strip('%?')}`: "
+                f"The header has joint positions, as {names[found['q'][0]]}, but no column "
+                f"`{form.time.strip('%?')}`: "
                 "a log needs the time [s] of every row.",
                 1,
                 form.time.strip("%?"),
             )
         _check_counts(found, names, nq)
         return Columns(form.name, names, time, found | dict(_single(form, names)))
-    raise InvalidTable(f"The header names no joint positions that are known: begin it with {_KNOWN}.", 1)
+    raise InvalidTable(
+        f"The header names no joint positions that are known: begin it with {_KNOWN}.", 1
+    )
 
 
 def other_positions(names: Sequence[str], columns: Columns) -> str | None:
-    """A column with positions that is not read, as those of another form are; None if there is none."""
+    """A column with positions that is not read, as those of another form are; None if there is
+    none.
+    """
     for form in FORMS:
         for name in names:
-            if re.fullmatch(form.joints["q"], name) and names.index(name) not in columns.groups["q"]:
+            if (
+                re.fullmatch(form.joints["q"], name)
+                and names.index(name) not in columns.groups["q"]
+            ):
                 return name
     return None
 
 
 def time_of(names: Sequence[str], first: str = "time") -> tuple[int, ...]:
-    """The index of the column of time, best one whose name is like `first`; or those of seconds and nanoseconds, which
-    are together more exact; empty if there is none."""
+    """The index of the column of time, best one whose name is like `first`; or those of seconds and
+    nanoseconds, which are together more exact; empty if there is none."""
     return _first(names, first) or _stamp(names) or _first(names, _TIME)
 
 
@@ -184,8 +221,8 @@ def _stamp(names: Sequence[str]) -> tuple[int, ...]:
 
 
 def _numbered(names: Sequence[str], pattern: str) -> tuple[int, ...]:
-    """Indices of the columns whose names match, by the number in them. Raises InvalidTable unless these are
-    consecutive from 0 or 1."""
+    """Indices of the columns whose names match, by the number in them. Raises InvalidTable unless
+    these are consecutive from 0 or 1."""
     found: dict[int, int] = {}
     for k, name in enumerate(names):
         match = re.fullmatch(pattern, name)
@@ -193,12 +230,17 @@ def _numbered(names: Sequence[str], pattern: str) -> tuple[int, ...]:
             continue
         number = int(match[1])
         if number in found:
-            raise InvalidTable(f"The header has the column {name} twice: delete one of them.", 1, name)
+            raise InvalidTable(
+                f"The header has the column {name} twice: delete one of them.", 1, name
+            )
         found[number] = k
     if found and sorted(found) not in ([*range(len(found))], [*range(1, len(found) + 1)]):
         name = names[found[min(found)]]
         raise InvalidTable(
-            f"The columns like {name} are not numbered without gaps from 0 or from 1: a log has every joint.", 1, name
+            f"The columns like {name} are not numbered without gaps from 0 or from 1: a log has "
+            "every joint.",
+            1,
+            name,
         )
     return tuple(found[number] for number in sorted(found))
 
@@ -224,28 +266,39 @@ def mapped(names: Sequence[str], columns: Mapping[str, str | Sequence[str]], nq:
     unknown = sorted(set(columns) - set(Columns.MAPPED))
     if unknown or not {"time", "q"} <= set(columns):
         raise InvalidProblem(
-            "columns", f"columns must name `time` and `q`, and beside them only {', '.join(Columns.MAPPED[2:])}."
+            "columns",
+            "columns must name `time` and `q`, and beside them only "
+            f"{', '.join(Columns.MAPPED[2:])}.",
         )
     found: dict[str, tuple[int, ...]] = {}
     for group, given in columns.items():
         wanted = [given] if isinstance(given, str) else [*given]
         if group in ("time", "nanoseconds", "power") and len(wanted) != 1:
-            raise InvalidProblem(f"columns.{group}", f"columns.{group} must be the name of one column.")
+            raise InvalidProblem(
+                f"columns.{group}", f"columns.{group} must be the name of one column."
+            )
         if group == "wrench" and len(wanted) != WRENCH:
             raise InvalidProblem(
-                "columns.wrench", "columns.wrench must name six columns: of the force, then the torque."
+                "columns.wrench",
+                "columns.wrench must name six columns: of the force, then the torque.",
             )
         found[group] = tuple(_index(names, each) for each in wanted)
     time = (*found.pop("time"), *found.pop("nanoseconds", ()))
     groups: dict[Group, tuple[int, ...]] = found  # type: ignore[assignment]
-    _check_counts({group: indices for group, indices in groups.items() if group not in ("power", "wrench")}, names, nq)
+    _check_counts(
+        {group: indices for group, indices in groups.items() if group not in ("power", "wrench")},
+        names,
+        nq,
+    )
     return Columns("mapped", names, time, groups)
 
 
 def _index(names: Sequence[str], name: str) -> int:
     if names.count(name.lower()) != 1:
         has = "does not have" if name.lower() not in names else "has more than once"
-        raise InvalidTable(f"The header {has} the column {name}: correct `columns` or the header.", 1, name)
+        raise InvalidTable(
+            f"The header {has} the column {name}: correct `columns` or the header.", 1, name
+        )
     return names.index(name.lower())
 
 
@@ -254,7 +307,8 @@ def _check_counts(groups: Mapping[Group, tuple[int, ...]], names: Sequence[str],
         if len(indices) != nq:
             name = names[indices[0]] if indices else None
             raise InvalidTable(
-                f"The header has {len(indices)} columns like {name}, but the robot has {nq} joints: a log is of one "
+                f"The header has {len(indices)} columns like {name}, but the robot has {nq} "
+                "joints: a log is of one "
                 "robot, with one column for each of its joints.",
                 1,
                 name,

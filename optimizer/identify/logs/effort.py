@@ -12,7 +12,8 @@ from joulepath.optimizer.identify.logs.motion import Motion, thinned
 
 _MOST_ROWS = 4000  # that the slope is taken from
 _KNEE = 0.02  # rad/s over which the sign of the speed is smoothed
-_LEAST_TORQUE = 0.01  # of the torque limit: standard deviation of the rigid torque beyond which it tells a slope
+# of the torque limit: standard deviation of the rigid torque beyond which it tells a slope
+_LEAST_TORQUE = 0.01
 _EXTERNAL = 0.5  # slope · torque constant below which efforts are without gravity
 _NEAR = 1.6  # factor within which a slope is that of a meaning
 
@@ -21,10 +22,11 @@ _NEAR = 1.6  # factor within which a slope is that of a meaning
 class EffortReport:
     """What the efforts of a log are.
 
-    `slope` is that of the effort against the torque of the rigid body and rotor model, with friction beside it, at the
-    two joints (by name) that carry most of the gravity: about 1 / torque constant for currents [A], 1 for torques, 0
-    for efforts without gravity; None where the motion does not tell. `confidence` is 1 where the slopes are those of
-    the meaning, 0 where they could as well be another's, or do not tell.
+    `slope` is that of the effort against the torque of the rigid body and rotor model, with
+    friction beside it, at the two joints (by name) that carry most of the gravity: about 1 / torque
+    constant for currents [A], 1 for torques, 0 for efforts without gravity; None where the motion
+    does not tell. `confidence` is 1 where the slopes are those of the meaning, 0 where they could
+    as well be another's, or do not tell.
     """
 
     meaning: EffortMeaning | None
@@ -40,8 +42,15 @@ def effort_report(motion: Motion, effort: Array) -> EffortReport:
     weights = replace(part, v=still, a=still).rigid_torques()
     # of those next to the base: at a wrist, cables and friction outweigh what it carries
     heaviest = np.sort(np.argsort(-weights[:, : (robot.nq + 1) // 2].std(axis=0))[:2])
-    slopes = {int(j): _slope(rigid[:, j], part.v[:, j], effort[:, j], robot.limits.tau_max[j]) for j in heaviest}
-    judged = [_judged(slope, robot.drives.torque_constant[j]) for j, slope in slopes.items() if slope is not None]
+    slopes = {
+        int(j): _slope(rigid[:, j], part.v[:, j], effort[:, j], robot.limits.tau_max[j])
+        for j in heaviest
+    }
+    judged = [
+        _judged(slope, robot.drives.torque_constant[j])
+        for j, slope in slopes.items()
+        if slope is not None
+    ]
     meanings = {meaning for meaning, _ in judged}
     meaning = meanings.pop() if len(meanings) == 1 else None
     return EffortReport(
@@ -52,9 +61,12 @@ def effort_report(motion: Motion, effort: Array) -> EffortReport:
 
 
 def _slope(rigid: Array, v: Array, effort: Array, limit: float) -> float | None:
-    """Slope of effort (n,) against the rigid torque (n,), with Coulomb and viscous friction and an offset beside it."""
+    """Slope of effort (n,) against the rigid torque (n,), with Coulomb and viscous friction and an
+    offset beside it.
+    """
     beside = np.stack([v / np.sqrt(v * v + _KNEE * _KNEE), v, np.ones_like(v)], axis=1)
-    # what the other columns do not explain of both: the slope of a multiple regression (Frisch, Waugh, Lovell)
+    # what the other columns do not explain of both: the slope of a multiple regression (Frisch,
+    # Waugh, Lovell)
     rest, other = (x - beside @ np.linalg.lstsq(beside, x, rcond=None)[0] for x in (rigid, effort))
     if rest.std() < _LEAST_TORQUE * limit:
         return None
@@ -65,7 +77,10 @@ def _judged(slope: float, torque_constant: float) -> tuple[EffortMeaning | None,
     """The meaning that a slope speaks for, and how clearly, from 0 to 1."""
     if abs(slope) * torque_constant < _EXTERNAL and abs(slope) < 1 / _NEAR:
         return "external", 1 - abs(slope) * torque_constant / _EXTERNAL
-    off = {meaning: _away(slope, at) for meaning, at in (("current", 1 / torque_constant), ("torque", 1.0))}
+    off = {
+        meaning: _away(slope, at)
+        for meaning, at in (("current", 1 / torque_constant), ("torque", 1.0))
+    }
     nearest = min(off, key=off.__getitem__)
     clear = 1 - off[nearest]
     # where both are near, the torque constant is about 1, and only the name of the column can tell

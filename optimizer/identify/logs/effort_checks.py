@@ -1,5 +1,5 @@
-"""Whether the efforts of each joint can be those of its motion: their sign, their size, and how much of them the rigid
-model with friction explains."""
+"""Whether the efforts of each joint can be those of its motion: their sign, their size, and how
+much of them the rigid model with friction explains."""
 
 from __future__ import annotations
 
@@ -18,18 +18,23 @@ from joulepath.optimizer.identify.logs.motion import Motion, thinned
 _MOST_ROWS, _LEAST_ROWS = 4000, 100  # that are compared, of all and of a joint
 _LEAST_SPEED = 0.05  # rad/s
 _KNEE = 0.02  # rad/s over which the sign of the speed is smoothed
-_BLOCKS, _SDS = 8, 4.0  # parts of a log that are left out in turn, and standard deviations of what is told
+_BLOCKS, _SDS = (
+    8,
+    4.0,
+)  # parts of a log that are left out in turn, and standard deviations of what is told
 _LEAST_SHARE = 0.7  # of the square of the efforts that the motion explains
-_LEAST_WEIGHT = 0.03  # of the torque limit: standard deviation of the weight from which on its slope is looked at
+# of the torque limit: standard deviation of the weight from which on its slope is looked at
+_LEAST_WEIGHT = 0.03
 _SLOPES = (0.3, 3.0)  # times the torques of the robot's own links between which the slope is
 _MOST_TORQUE = 3.0  # times the torque limit
 
 
 @dataclass(frozen=True)
 class JointEffort:
-    """What a regression of a joint's efforts says: its `slope` against the rigid torque, `friction` as the mean effort
-    against the motion, both with standard deviations, and the `share` of the square that is explained. `weight` is the
-    standard deviation of the rigid torque beside the friction [N·m]."""
+    """What a regression of a joint's efforts says: its `slope` against the rigid torque, `friction`
+    as the mean effort against the motion, both with standard deviations, and the `share` of the
+    square that is explained. `weight` is the standard deviation of the rigid torque beside the
+    friction [N·m]."""
 
     joint: int
     slope: float
@@ -54,7 +59,9 @@ def joint_efforts(motion: Motion, effort: Array) -> list[JointEffort]:
         use = np.abs(part.v[:, joint]) > _LEAST_SPEED
         values = smooth(without_spikes(effort[:, joint]), motion.rate)[rows[use]].astype(float)
         if use.sum() >= _LEAST_ROWS and np.ptp(values) > 0:
-            found.append(_of_joint(joint, rigid[use, joint], part.v[use, joint], part.a[use, joint], values))
+            found.append(
+                _of_joint(joint, rigid[use, joint], part.v[use, joint], part.a[use, joint], values)
+            )
     return found
 
 
@@ -86,13 +93,17 @@ def _spread(parts: Array) -> float:
 
 
 def check_signs(found: Sequence[JointEffort], names: Sequence[str]) -> None:
-    """Raises EffortNotUsable if some joints, but not all, have efforts of the other sign; `names` are their columns."""
+    """Raises EffortNotUsable if some joints, but not all, have efforts of the other sign; `names`
+    are their columns.
+    """
     turned = [each.joint for each in found if each.turned]
     if turned and len(turned) < len(found):
         columns = ", ".join(names[joint] for joint in turned)
         raise EffortNotUsable(
-            f"The efforts in {columns} have the other sign than the motion: friction would drive the joint. Turn their "
-            "sign, or that of the joint's positions and speeds; or the joints are in another order than the robot's, "
+            f"The efforts in {columns} have the other sign than the motion: friction would drive "
+            "the joint. Turn their "
+            "sign, or that of the joint's positions and speeds; or the joints are in another order "
+            "than the robot's, "
             "from base to flange (name the columns in `columns`).",
             None,
             {},
@@ -106,16 +117,20 @@ def effort_warnings(
     if meaning == "external":
         return
     constants = robot.drives.torque_constant if meaning == "current" else np.ones(robot.nq)
-    large = np.percentile(np.abs(effort), 98, axis=0) * constants > _MOST_TORQUE * robot.limits.tau_max
+    large = (
+        np.percentile(np.abs(effort), 98, axis=0) * constants > _MOST_TORQUE * robot.limits.tau_max
+    )
     if large.any():
         yield (
-            f"The efforts of joints {numbers_of_joints(np.flatnonzero(large).tolist())} are beyond {_MOST_TORQUE:g} "
+            f"The efforts of joints {numbers_of_joints(np.flatnonzero(large).tolist())} are beyond "
+            f"{_MOST_TORQUE:g} "
             "times the greatest torque of the joint: check their unit, column by column."
         )
     odd = [each.joint for each in found if not large[each.joint] and _odd(each, robot, constants)]
     if odd:
         yield (
-            f"The efforts of joints {numbers_of_joints(odd)} are not what the motion makes by the robot's model: check "
+            f"The efforts of joints {numbers_of_joints(odd)} are not what the motion makes by the "
+            "robot's model: check "
             "the order of the joints, zeros and signs of the positions, units, payload and gravity."
         )
 

@@ -22,7 +22,9 @@ def cutoff(rate: float) -> float:
 
 
 def low_passed(values: Array, rate: float) -> Array:
-    """Channels (n, k) without what is above the cut-off, and without delay: a Butterworth filter, both ways."""
+    """Channels (n, k) without what is above the cut-off, and without delay: a Butterworth filter,
+    both ways.
+    """
     smooth = np.empty_like(values)
     # one channel at a time: the filter copies what it is given
     for k, channel in enumerate(values.T):
@@ -41,8 +43,8 @@ def filtered(channel: Array, rate: float, highest: float) -> Array:
 def derivative(values: Array, rate: float) -> Array:
     """Rates of change (n, k) of the low-passed channels (n, k), by central differences.
 
-    The cut-off is the highest at which the noise leaves even the second derivative as it is: a low one flattens the
-    accelerations of fast moves.
+    The cut-off is the highest at which the noise leaves even the second derivative as it is: a low
+    one flattens the accelerations of fast moves.
     """
     rates = np.empty_like(values)
     for k, channel in enumerate(values.T):
@@ -59,7 +61,8 @@ def _clean_cutoff(channel: Array, rate: float) -> float:
             smooth = filtered(channel, rate, highest)
             above = float(_ROBUST * np.median(np.abs(channel - smooth)))
             second = np.gradient(np.gradient(smooth, 1 / rate), 1 / rate)
-            # of noise that is the same at all frequencies, what is below the cut-off, differentiated twice
+            # of noise that is the same at all frequencies, what is below the cut-off,
+            # differentiated twice
             share = 2 * highest**5 / (5 * (rate - 2 * highest))
             if (2 * np.pi) ** 2 * above * np.sqrt(share) < _CLEAN * second.std():
                 return highest

@@ -16,26 +16,32 @@ LEAST_RATE, MOST_RATE = 20.0, 10_000.0
 LEAST_ROWS = 32
 """Least rows of a log: its filter needs some."""
 MOST_REPEATED = 0.2
-"""Greatest fraction of repeated times: beyond it, the times are too coarse to say when a row was measured."""
+"""Greatest fraction of repeated times: beyond it, the times are too coarse to say when a row was
+measured.
+"""
 GAP = 5.0
 """Steps [median steps] from which on a step is a gap."""
-_REGULAR = 1.8  # steps [median steps] up to which a step counts in the mean: no row is missing in it
+_REGULAR = (
+    1.8  # steps [median steps] up to which a step counts in the mean: no row is missing in it
+)
 _UNIFORM = 1e-3  # deviation [steps] from the grid up to which rows are taken as they are
 _MOST_GROWTH = 2.0  # rows of the grid for each row of the log
 _LATEST = 1e12  # |time| [s]
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "µs": 1e-6, "ns": 1e-9}
 """Units that times may have, in s."""
 _PIECE = 16384  # rows of the grid that a spline is evaluated at
-_BESIDE = 32  # rows of the log beside them: what is farther away changes a cubic spline by less than rounding
+# rows of the log beside them: what is farther away changes a cubic spline by less than rounding
+_BESIDE = 32
 
 
 @dataclass(frozen=True)
 class Grid:
     """A uniform grid `time` (n,) [s] from 0 with `rate` [Hz] for rows at times `at` (m,) [s].
 
-    `kept` are the indices of these rows in the log; `gaps` (k, 2) are rows of the grid: the last one before a gap and
-    the first one behind it. `jitter` [s]: P5 and P95 of the steps' deviation from 1 / rate. `repeated` counts dropped
-    rows with the time of the row before. `uniform`: the rows are the grid's. `unit` is that of the times in the file.
+    `kept` are the indices of these rows in the log; `gaps` (k, 2) are rows of the grid: the last
+    one before a gap and the first one behind it. `jitter` [s]: P5 and P95 of the steps' deviation
+    from 1 / rate. `repeated` counts dropped rows with the time of the row before. `uniform`: the
+    rows are the grid's. `unit` is that of the times in the file.
     """
 
     time: Array
@@ -49,7 +55,9 @@ class Grid:
     unit: str = "s"
 
     def resampled(self, values: Array, smooth: bool = False) -> Array:
-        """Channels (m, k) of the rows on the grid (n, k), linear in between, or if `smooth` by cubic splines."""
+        """Channels (m, k) of the rows on the grid (n, k), linear in between, or if `smooth` by
+        cubic splines.
+        """
         if self.uniform:
             return np.ascontiguousarray(values)
         result = np.empty((len(self.time), values.shape[1]), values.dtype)
@@ -67,7 +75,8 @@ class Grid:
 
 
 def grid_of(t: Array, rows: Array, column: str) -> Grid:
-    """The grid for times t (m,) in lines `rows` (m,) of a file, from its column `column`. Raises InvalidTable.
+    """The grid for times t (m,) in lines `rows` (m,) of a file, from its column `column`. Raises
+    InvalidTable.
 
     They are in seconds, or in the unit that makes a rate of them that is read: no two units do.
     """
@@ -76,13 +85,18 @@ def grid_of(t: Array, rows: Array, column: str) -> Grid:
     if (steps < 0).any():
         row = int(rows[int(np.argmax(steps < 0)) + 1])
         raise InvalidTable(
-            f"{column} goes back in line {row}: a log is one recording, in the order of time.", row, column
+            f"{column} goes back in line {row}: a log is one recording, in the order of time.",
+            row,
+            column,
         )
     fresh = np.flatnonzero(np.append(True, steps > 0))
     repeated = len(t) - len(fresh)
     if repeated > MOST_REPEATED * len(t):
         raise InvalidTable(
-            f"{column} repeats itself in {repeated} of {len(t)} rows: write times with more digits.", None, column
+            f"{column} repeats itself in {repeated} of {len(t)} rows: write times with more "
+            "digits.",
+            None,
+            column,
         )
     if len(fresh) < LEAST_ROWS:
         raise InvalidTable(f"The log has {len(fresh)} rows: it needs {LEAST_ROWS} or more.")
@@ -93,7 +107,8 @@ def grid_of(t: Array, rows: Array, column: str) -> Grid:
     rate = 1 / step
     if not LEAST_RATE * 0.99 <= rate <= MOST_RATE * 1.01:
         raise InvalidTable(
-            f"The log has {rate:.4g} rows per second of {column}: give times in seconds, and {LEAST_RATE:g} to "
+            f"The log has {rate:.4g} rows per second of {column}: give times in seconds, and "
+            f"{LEAST_RATE:g} to "
             f"{MOST_RATE:g} rows per second.",
             None,
             column,
@@ -103,7 +118,8 @@ def grid_of(t: Array, rows: Array, column: str) -> Grid:
         worst = int(steps.argmax())
         row = int(rows[fresh[worst + 1]])
         raise InvalidTable(
-            f"More than half of the log is missing, {steps[worst]:.4g} s before line {row} alone: divide it there.",
+            f"More than half of the log is missing, {steps[worst]:.4g} s before line {row} alone: "
+            "divide it there.",
             row,
             column,
         )
@@ -125,17 +141,25 @@ def grid_of(t: Array, rows: Array, column: str) -> Grid:
 
 
 def _seconds(t: Array, rows: Array, column: str) -> tuple[Array, str]:
-    """Times t (m,) in seconds, and the unit that they are in by their median step. Raises InvalidTable."""
+    """Times t (m,) in seconds, and the unit that they are in by their median step. Raises
+    InvalidTable.
+    """
     steps, unit = np.diff(t), "s"
     steps = steps[steps > 0]
     if steps.size:
         rate = 1 / float(np.median(steps))
-        read = [name for name, size in TIME_UNITS.items() if LEAST_RATE * 0.99 <= rate / size <= MOST_RATE * 1.01]
+        read = [
+            name
+            for name, size in TIME_UNITS.items()
+            if LEAST_RATE * 0.99 <= rate / size <= MOST_RATE * 1.01
+        ]
         unit = read[0] if read else "s"
     t = t if unit == "s" else t * TIME_UNITS[unit]
     if np.abs(t).max() > _LATEST:
         at = int(np.abs(t).argmax())
         raise InvalidTable(
-            f"{column} in line {rows[at]:.0f} is too large: give times in seconds.", int(rows[at]), column
+            f"{column} in line {rows[at]:.0f} is too large: give times in seconds.",
+            int(rows[at]),
+            column,
         )
     return t, unit

@@ -1,4 +1,6 @@
-"""Where the table of a log begins: behind comments, with a header, and perhaps with a line of units."""
+"""Where the table of a log begins: behind comments, with a header, and perhaps with a line of
+units.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +24,8 @@ _STAMP = ("sec", "nanosec", "frame_id")
 
 @dataclass(frozen=True)
 class Head:
-    """Names of the columns, in lower case, and what separates them. `row` is the number of the first line behind the
-    header, which has been read already if it is `first`."""
+    """Names of the columns, in lower case, and what separates them. `row` is the number of the
+    first line behind the header, which has been read already if it is `first`."""
 
     names: list[str]
     separator: str
@@ -34,15 +36,20 @@ class Head:
 def head_of(file: Lines, joints: Sequence[str]) -> Head:
     """The head of the log of an arm with these joints. Raises InvalidTable.
 
-    Lines of comments, of a spreadsheet's separator, and empty ones may stand above the header. A header may be the last
-    of the comments. A JointState without a header, as `ros2 topic echo --csv` prints it, gets one.
+    Lines of comments, of a spreadsheet's separator, and empty ones may stand above the header. A
+    header may be the last of the comments. A JointState without a header, as `ros2 topic echo
+    --csv` prints it, gets one.
     """
     comment, separators = "", SEPARATORS + " "
     for row in count(1):
         line = line_of(file, row, LONGEST_LINE)
         if not line or row > MOST_LINES:
-            where = "The file is empty" if row == 1 else f"There is no header in the first {row} lines"
-            raise InvalidTable(f"{where}: send a header and two or more rows.", None if row == 1 else row)
+            where = (
+                "The file is empty" if row == 1 else f"There is no header in the first {row} lines"
+            )
+            raise InvalidTable(
+                f"{where}: send a header and two or more rows.", None if row == 1 else row
+            )
         text = line.removeprefix("\ufeff").strip() if row == 1 else line.strip()
         said = _SEPARATOR.fullmatch(text.strip('"'))
         if said:
@@ -80,14 +87,20 @@ def number(cell: str) -> bool:
 
 
 def _joint_state(cells: Sequence[str], joints: Sequence[str]) -> list[str] | None:
-    """The header of rows of a JointState: seconds, nanoseconds, frame, names, and as many positions, velocities and
-    efforts; None if these cells are none."""
-    if len(cells) < len(_STAMP) or not (number(cells[0]) and number(cells[1])) or not set(joints) <= set(cells):
+    """The header of rows of a JointState: seconds, nanoseconds, frame, names, and as many
+    positions, velocities and efforts; None if these cells are none."""
+    if (
+        len(cells) < len(_STAMP)
+        or not (number(cells[0]) and number(cells[1]))
+        or not set(joints) <= set(cells)
+    ):
         return None
     behind = cells[len(_STAMP) :]
     names = behind[: next((k for k, cell in enumerate(behind) if number(cell)), len(behind))]
     kinds, rest = divmod(len(behind) - len(names), max(len(names), 1))
     if rest or not 1 <= kinds <= 3:
         return None
-    values = [f"{name}/{kind}" for kind in ("position", "velocity", "effort")[:kinds] for name in names]
+    values = [
+        f"{name}/{kind}" for kind in ("position", "velocity", "effort")[:kinds] for name in names
+    ]
     return [*_STAMP, *(f"name{k}" for k in range(len(names))), *values]

@@ -1,4 +1,6 @@
-"""Columns of a log by the names of the joints, which drivers of ROS publish in an order of their own."""
+"""Columns of a log by the names of the joints, which drivers of ROS publish in an order of their
+own.
+"""
 
 from __future__ import annotations
 
@@ -20,9 +22,14 @@ _BETWEEN = "[^a-z0-9]+"
 
 
 def by_joint_name(names: Sequence[str], joints: Sequence[str]) -> Columns | None:
-    """The columns of a header whose names hold those of the robot's `joints`, as `/joint_states/elbow_joint/position`
-    or `elbow_joint_velocity`; None if they do not. Raises InvalidTable for a joint that is missing, or there twice."""
-    found = {group: columns for group, word in _WORDS.items() if (columns := _of_word(names, word, joints))}
+    """The columns of a header whose names hold those of the robot's `joints`, as
+    `/joint_states/elbow_joint/position` or `elbow_joint_velocity`; None if they do not. Raises
+    InvalidTable for a joint that is missing, or there twice."""
+    found = {
+        group: columns
+        for group, word in _WORDS.items()
+        if (columns := _of_word(names, word, joints))
+    }
     time = time_of(names)
     if "q" not in found or not time:
         return None
@@ -37,7 +44,8 @@ def _of_word(names: Sequence[str], word: str, joints: Sequence[str]) -> tuple[in
         if len(columns) != 1:
             has = "no column" if not columns else "more than one column"
             raise InvalidTable(
-                f"The header has {has} `{word.partition('|')[0]}` of {joint}: a log has every joint once. Correct the "
+                f"The header has {has} `{word.partition('|')[0]}` of {joint}: a log has every "
+                "joint once. Correct the "
                 "header, or name the columns in `columns`.",
                 1,
                 None if not columns else names[columns[1]],
@@ -52,7 +60,9 @@ def _matching(names: Sequence[str], word: str, joint: str) -> Iterator[int]:
 
 
 def in_order_of_joints(columns: Columns, first: Sequence[str], joints: Sequence[str]) -> Columns:
-    """The columns in the order of the robot's `joints`, where the `first` row has their names, as a JointState does."""
+    """The columns in the order of the robot's `joints`, where the `first` row has their names, as a
+    JointState does.
+    """
     named: dict[int, str] = {}
     for k, name in enumerate(columns.names):
         match = re.fullmatch(rf"(?:.*[./])?name{AT}", name)
@@ -63,5 +73,9 @@ def in_order_of_joints(columns: Columns, first: Sequence[str], joints: Sequence[
     if sorted(logged) != sorted(wanted):
         return columns
     order = [logged.index(joint) for joint in wanted]
-    groups = {group: tuple(indices[k] for k in order) for group, indices in columns.groups.items() if len(indices) > 1}
+    groups = {
+        group: tuple(indices[k] for k in order)
+        for group, indices in columns.groups.items()
+        if len(indices) > 1
+    }
     return replace(columns, form="named", groups={**columns.groups, **groups})

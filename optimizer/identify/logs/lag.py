@@ -1,7 +1,8 @@
-"""By how much the efforts or the power of a log come later than its motion: another clock, or a filter of the driver's.
+"""By how much the efforts or the power of a log come later than its motion: another clock, or a
+filter of the driver's.
 
-An effort that comes late falls into wrong accelerations and beside the turns of the friction. The figures would be
-wrong, and their standard deviations would not tell.
+An effort that comes late falls into wrong accelerations and beside the turns of the friction. The
+figures would be wrong, and their standard deviations would not tell.
 """
 
 from __future__ import annotations
@@ -21,16 +22,26 @@ _MOST_LAG = 0.2  # s that is sought
 _MOST_ROWS, _STEPS = 4000, 20
 _LEAST_SPEED = 0.02  # rad/s of the rows that are compared
 _LEAST_ROWS = 50  # of a joint
-_BLOCKS, _SDS = 10, 4.0  # parts of the log that are left out in turn, and standard deviations of a lag that is told
-_MOST_LEFT = 0.997  # share of the square of the misfit that the lag leaves of it: what leaves more is no lag
+_BLOCKS, _SDS = (
+    10,
+    4.0,
+)  # parts of the log that are left out in turn, and standard deviations of a lag that is told
+_MOST_LEFT = (
+    0.997  # share of the square of the misfit that the lag leaves of it: what leaves more is no lag
+)
 _LEAST_SHARE = 1e-6  # below it, all is explained
 _AVERAGE = 0.01  # s before and behind, of efforts that are compared
-_NEIGHBOURS, _FAR = 5, 0.3  # of the range of an effort that it is off its neighbours' median: a spike
+_NEIGHBOURS, _FAR = (
+    5,
+    0.3,
+)  # of the range of an effort that it is off its neighbours' median: a spike
 
 
 @dataclass(frozen=True, eq=False)
 class _Channel:
-    """A channel (n,) of a log, of which the motion explains what the `columns` (k, p) span, at the rows (k,)."""
+    """A channel (n,) of a log, of which the motion explains what the `columns` (k, p) span, at the
+    rows (k,).
+    """
 
     values: Array
     rows: Indices
@@ -54,7 +65,14 @@ def lag_of(motion: Motion, effort: Array) -> float:
         values = smooth(without_spikes(effort[:, joint]), motion.rate)
         if use.sum() >= _LEAST_ROWS and np.ptp(values) > 0:
             load, speed, sign = rigid[use, joint], part.v[use, joint], np.sign(part.v[use, joint])
-            columns = [load, part.a[use, joint], sign, np.abs(load) * sign, speed, np.ones_like(speed)]
+            columns = [
+                load,
+                part.a[use, joint],
+                sign,
+                np.abs(load) * sign,
+                speed,
+                np.ones_like(speed),
+            ]
             channels.append(_Channel(values, rows[use], np.stack(columns, axis=1), blocks[use]))
     return _lag(channels, motion.rate)
 
@@ -66,16 +84,29 @@ def power_lag_of(motion: Motion, power: Array) -> float:
         return 0.0
     part, drives = motion.at(rows), motion.robot.drives
     rigid = part.rigid_torques()
-    torque, drag = rigid + drives.rotor_inertia * part.a, motion.robot.friction.torque(part.v, rigid)
+    torque, drag = (
+        rigid + drives.rotor_inertia * part.a,
+        motion.robot.friction.torque(part.v, rigid),
+    )
     heat = drives.copper / drives.torque_constant**2
-    parts = [torque * part.v, drag * part.v, heat * torque**2, heat * torque * drag, heat * part.v**2]
+    parts = [
+        torque * part.v,
+        drag * part.v,
+        heat * torque**2,
+        heat * torque * drag,
+        heat * part.v**2,
+    ]
     columns = np.column_stack([*(each.sum(axis=1) for each in parts), np.ones(len(rows))])
     blocks = np.arange(len(rows)) * _BLOCKS // len(rows)
-    return _lag([_Channel(smooth(without_spikes(power), motion.rate), rows, columns, blocks)], motion.rate)
+    return _lag(
+        [_Channel(smooth(without_spikes(power), motion.rate), rows, columns, blocks)], motion.rate
+    )
 
 
 def _compared(count: int, rate: float) -> Indices:
-    """The rows of a log of so many that are compared: others can be as far from them as the longest lag."""
+    """The rows of a log of so many that are compared: others can be as far from them as the longest
+    lag.
+    """
     edge = max(2, round(_MOST_LAG * rate))
     return thinned(count, _MOST_ROWS, edge)
 
@@ -101,13 +132,16 @@ def _least(shifts: Indices, left: Array) -> float:
     """Where the parabola through the least value and its neighbours is least, in rows."""
     best = int(np.clip(np.argmin(left), 1, len(left) - 2))
     before, here, after = left[best - 1 : best + 2]
-    between = float(np.clip(0.5 * (before - after) / max(before - 2 * here + after, 1e-300), -0.5, 0.5))
+    between = float(
+        np.clip(0.5 * (before - after) / max(before - 2 * here + after, 1e-300), -0.5, 0.5)
+    )
     return float(shifts[best] + between * (shifts[1] - shifts[0]))
 
 
 def _left(channels: Sequence[_Channel], shifts: Indices) -> Array:
-    """The logarithm of the share of the square of the channels that the motion leaves, if they come `shifts` rows
-    later, as a mean over them: of all rows, and of those without each of the blocks, (blocks + 1, shifts)."""
+    """The logarithm of the share of the square of the channels that the motion leaves, if they come
+    `shifts` rows later, as a mean over them: of all rows, and of those without each of the blocks,
+    (blocks + 1, shifts)."""
     found = [np.zeros((_BLOCKS + 1, len(shifts)))]
     for channel in channels:
         shifted = channel.values[channel.rows[:, None] + shifts].astype(float)

@@ -14,13 +14,14 @@ from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Payload
 
 EffortMeaning = Literal["current", "torque", "external"]
-"""What the channel of efforts has: motor currents [A], motor torques at the joints [N·m], or torques from outside
-[N·m], which are those without gravity, rigid body and friction."""
+"""What the channel of efforts has: motor currents [A], motor torques at the joints [N·m], or
+torques from outside [N·m], which are those without gravity, rigid body and friction."""
 
 
 @dataclass(frozen=True)
 class LogMove:
-    """Rows `start` to `end` of a log, the latter not among them; `at_rest`: no joint moves in them."""
+    """Rows `start` to `end` of a log, the latter not among them; `at_rest`: no joint moves in
+    them."""
 
     start: int
     end: int
@@ -64,14 +65,21 @@ class Log:
 
     def __post_init__(self) -> None:
         rows, joints = len(self.time), np.shape(self.q)[-1]
-        shapes: dict[str, tuple[int, ...]] = {"time": (rows,), "power": (rows,), "wrench": (rows, 6), "gravity": (3,)}
+        shapes: dict[str, tuple[int, ...]] = {
+            "time": (rows,),
+            "power": (rows,),
+            "wrench": (rows, 6),
+            "gravity": (3,),
+        }
         shapes |= dict.fromkeys(("q", "v", "a", "effort", "temperature"), (rows, joints))
         for name, shape in shapes.items():
             values = getattr(self, name)
             if values is not None:
                 object.__setattr__(self, name, _view(values, shape, name))
         if (self.effort is None) != (self.effort_meaning is None):
-            raise InvalidProblem("effort", "effort and effort_meaning must be given together, or neither of them.")
+            raise InvalidProblem(
+                "effort", "effort and effort_meaning must be given together, or neither of them."
+            )
 
     @property
     def joints(self) -> int:
@@ -80,8 +88,11 @@ class Log:
 
     @property
     def segment_rows(self) -> list[int]:
-        """Rows that bound the segments: the first, each in which motion or rest begins, the last."""
-        begins = [move.start for before, move in pairwise(self.moves) if move.at_rest != before.at_rest]
+        """Rows that bound the segments: the first, each in which motion or rest begins, the
+        last."""
+        begins = [
+            move.start for before, move in pairwise(self.moves) if move.at_rest != before.at_rest
+        ]
         last = len(self.time) - 1
         return [0, *(row for row in begins if 0 < row < last), last]
 
@@ -99,8 +110,12 @@ class Log:
 
 def _view(values: Array, shape: tuple[int, ...], name: str) -> Array:
     """A read-only view: a log can be too large to be copied. Raises InvalidProblem."""
-    view = np.asarray(values, dtype=None if np.asarray(values).dtype == np.float32 else float).view()
+    view = np.asarray(
+        values, dtype=None if np.asarray(values).dtype == np.float32 else float
+    ).view()
     if view.shape != shape:
-        raise InvalidProblem(name, f"{name} of a log must have the shape {shape}, not {view.shape}.")
+        raise InvalidProblem(
+            name, f"{name} of a log must have the shape {shape}, not {view.shape}."
+        )
     view.setflags(write=False)
     return view

@@ -24,19 +24,21 @@ class LogTooLarge(JoulepathError):
 
     def __str__(self) -> str:
         return (
-            f"The log has more than {self.limit} {self.unit}: send it in parts, at a lower rate, or only the columns "
+            f"The log has more than {self.limit} {self.unit}: send it in parts, at a lower rate, "
+            "or only the columns "
             "that count."
         )
 
 
 @dataclass(eq=False)
 class EffortNotUsable(JoulepathError):
-    """The efforts of a log say nothing of the arm, because they are without gravity (`meaning` is `external`), or it is
-    not clear what they are (null)."""
+    """The efforts of a log say nothing of the arm, because they are without gravity (`meaning` is
+    `external`), or it is not clear what they are (null)."""
 
     title = "Logged efforts not usable"
     remedy = (
-        "Log motor currents: the ROS 2 driver of Universal Robots has the option `actual_current_as_torque`, which "
+        "Log motor currents: the ROS 2 driver of Universal Robots has the option "
+        "`actual_current_as_torque`, which "
         "must be off. If you know what they are, say so with `effort`."
     )
 
@@ -45,8 +47,8 @@ class EffortNotUsable(JoulepathError):
     meaning: Literal["external"] | None
     """`external`: torques from outside, without gravity. Null: it is not clear."""
     slope: Annotated[dict[str, float | None], Unit("1/A or 1")]
-    """Slope of the effort against the torque of the rigid model, by the name of a joint. About 1 / torque constant:
-    current; 1: torque; 0: without gravity. Null: the motion does not tell."""
+    """Slope of the effort against the torque of the rigid model, by the name of a joint. About 1 /
+    torque constant: current; 1: torque; 0: without gravity. Null: the motion does not tell."""
 
     def __str__(self) -> str:
         return self.message

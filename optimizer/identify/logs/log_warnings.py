@@ -12,14 +12,18 @@ from joulepath.optimizer.identify.logs.grid import Grid
 from joulepath.optimizer.identify.logs.log import Log
 
 _SATURATED, _LEAST_SATURATED = 0.005, 10
-"""Fraction and number of moving rows at exactly the greatest effort beyond which it is cut off there."""
+"""Fraction and number of moving rows at exactly the greatest effort beyond which it is cut off
+there.
+"""
 _NEIGHBOURS = 5
 """Rows among which one or two are a spike."""
 _LEAPS, _OF_NOISE = {"effort": 0.8, "power": 0.3}, 10.0
-"""Of the range of a channel, and of its noise, that a spike is away from its neighbours; friction makes steps of the
-efforts of small joints."""
+"""Of the range of a channel, and of its noise, that a spike is away from its neighbours; friction
+makes steps of the efforts of small joints."""
 _MOVING, _HELD = 0.05, 0.7  # rad/s
-"""Fraction of moving rows with the values of the row before beyond which a channel is written again and again."""
+"""Fraction of moving rows with the values of the row before beyond which a channel is written again
+and again.
+"""
 
 
 def log_warnings(log: Log, grid: Grid, columns: Columns) -> list[str]:
@@ -29,7 +33,8 @@ def log_warnings(log: Log, grid: Grid, columns: Columns) -> list[str]:
         found.append("No payload is given or logged: the arm is taken to have carried nothing.")
     if columns.form == "ros" and any(name.rstrip("]")[-1:].isdigit() for name in columns.names):
         found.append(
-            "The joints are taken in the order of their numbers, from base to flange: drivers of ROS may publish them "
+            "The joints are taken in the order of their numbers, from base to flange: drivers of "
+            "ROS may publish them "
             "in another one. Then name the columns in `columns`."
         )
     return found
@@ -43,13 +48,23 @@ def _times(grid: Grid) -> Iterator[str]:
             f"{grid.time[grid.gaps[lengths.argmax(), 0]]:.3g} s. No move reaches across one."
         )
     if grid.unit != "s":
-        yield f"The times are taken for {grid.unit}: no other unit makes a rate of them that a log has."
+        yield (
+            f"The times are taken for {grid.unit}: no other unit makes a rate of them that a "
+            "log has."
+        )
     if grid.repeated:
-        yield f"Rows with the time of the row before: {grid.repeated}. The first row of each time counts."
+        yield (
+            f"Rows with the time of the row before: {grid.repeated}. The first row of each time "
+            "counts."
+        )
 
 
 def _constant(log: Log) -> Iterator[str]:
-    for words, values in (("position", log.q), ("effort", log.effort), ("temperature", log.temperature)):
+    for words, values in (
+        ("position", log.q),
+        ("effort", log.effort),
+        ("temperature", log.temperature),
+    ):
         if values is None:
             continue
         same = np.flatnonzero(np.ptp(values, axis=0) == 0)
@@ -68,7 +83,10 @@ def _saturated(log: Log) -> Iterator[str]:
     # joint by joint: a log can fill half of the memory
     wrong = [joint for joint, effort in enumerate(log.effort.T) if _cut_off(effort, moving)]
     if wrong:
-        yield f"The effort of joints {numbers_of_joints(wrong)} stays at its greatest value: it is cut off there."
+        yield (
+            f"The effort of joints {numbers_of_joints(wrong)} stays at its greatest value: it "
+            "is cut off there."
+        )
 
 
 def _cut_off(effort: Array, moving: Mask) -> bool:
@@ -85,8 +103,10 @@ def _spikes(log: Log) -> Iterator[str]:
             rows |= _leaps(channel, _LEAPS[words])
         if rows.any():
             yield (
-                f"The {words} has spikes in {rows.sum()} rows, the first at {log.time[int(np.argmax(rows))]:.4g} s: "
-                "delete these rows, or identify with estimator=irls, which gives outliers less weight."
+                f"The {words} has spikes in {rows.sum()} rows, the first at "
+                f"{log.time[int(np.argmax(rows))]:.4g} s: "
+                "delete these rows, or identify with estimator=irls, which gives outliers less "
+                "weight."
             )
 
 
@@ -98,7 +118,9 @@ def _measured(log: Log) -> Iterator[tuple[str, Array]]:
 
 
 def _leaps(channel: Array, share: float) -> Mask:
-    """Where a channel (n,) is farther from the median of its neighbours than a share of the range of these medians."""
+    """Where a channel (n,) is farther from the median of its neighbours than a share of the range
+    of these medians.
+    """
     # every process that serves requests would hold it, and only logs are filtered
     from scipy.ndimage import median_filter
 
@@ -109,13 +131,19 @@ def _leaps(channel: Array, share: float) -> Mask:
 
 
 def held_warning(words: str, values: Array, v: Array, rate: float) -> list[str]:
-    """What is said of a channel (n, k) that hardly ever changes while joints move at v (n, joints) [rad/s]."""
+    """What is said of a channel (n, k) that hardly ever changes while joints move at v (n, joints)
+    [rad/s].
+    """
     moving = np.flatnonzero((np.abs(v[1:]) > _MOVING).any(axis=1)) + 1
-    changes = sum(int((values[part] != values[part - 1]).any(axis=1).sum()) for part in np.array_split(moving, 16))
+    changes = sum(
+        int((values[part] != values[part - 1]).any(axis=1).sum())
+        for part in np.array_split(moving, 16)
+    )
     if not 0 < changes < (1 - _HELD) * len(moving):
         return []
     return [
-        f"The {words} changes only every {len(moving) / changes / rate:.2g} s while the arm moves: it is measured less "
+        f"The {words} changes only every {len(moving) / changes / rate:.2g} s while the arm moves: "
+        "it is measured less "
         "often than it is written. Log at the rate at which it is measured."
     ]
 

@@ -20,7 +20,9 @@ def thinned(count: int, most: int, edge: int = 0) -> Indices:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """q, v, a (n, joints) [rad, s] of an arm with a payload, under `gravity` (3,) [m/s²], at a rate [Hz]."""
+    """q, v, a (n, joints) [rad, s] of an arm with a payload, under `gravity` (3,) [m/s²], at a rate
+    [Hz].
+    """
 
     robot: Robot
     payload: Payload
@@ -32,7 +34,12 @@ class Motion:
 
     def at(self, rows: Indices) -> Self:
         """The motion at some rows, in double precision."""
-        return replace(self, q=self.q[rows].astype(float), v=self.v[rows].astype(float), a=self.a[rows].astype(float))
+        return replace(
+            self,
+            q=self.q[rows].astype(float),
+            v=self.v[rows].astype(float),
+            a=self.a[rows].astype(float),
+        )
 
     def rigid_torques(self) -> Array:
         """Torques (n, joints) [N·m] of links and payload."""

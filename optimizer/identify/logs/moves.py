@@ -15,11 +15,16 @@ from joulepath.optimizer.identify.logs.log import LogMove
 SHORTEST = 0.1
 """A shorter move [s] is noise, and rest."""
 LONGEST = 8.0
-"""A longer move [s] is divided into blocks: else a log of a long excitation would have one move only."""
+"""A longer move [s] is divided into blocks: else a log of a long excitation would have one move
+only.
+"""
 BLOCK, PAUSE = 5.0, 0.5
-"""Length of a block [s], about, and of what is left out between two [s]: neighbours are correlated."""
+"""Length of a block [s], about, and of what is left out between two [s]: neighbours are
+correlated."""
 STILL_COMMAND, STILL = 1e-4, 0.01
-"""Speeds [rad/s] below which a joint is at rest: by the controller's command, and by its measured speed."""
+"""Speeds [rad/s] below which a joint is at rest: by the controller's command, and by its measured
+speed.
+"""
 _OF_NOISE = 4.0  # speeds of so many times their noise are no motion
 _LEAST_REST = 0.05  # s; measured speeds also cross zero while the arm moves
 
@@ -30,7 +35,9 @@ def still_by_command(commanded: Array) -> Mask:
 
 
 def still_by_speed(v: Array, rate: float) -> Mask:
-    """Rows (n,) at rest for 0.05 s or more, by speeds v (n, joints) [rad/s], low-passed and against their noise."""
+    """Rows (n,) at rest for 0.05 s or more, by speeds v (n, joints) [rad/s], low-passed and against
+    their noise.
+    """
     still = np.ones(len(v), dtype=bool)
     for channel in np.split(v, v.shape[1], axis=1):
         least = max(STILL, _OF_NOISE * float(noise(channel, rate)[0]))
@@ -42,14 +49,20 @@ def still_by_speed(v: Array, rate: float) -> Mask:
 
 
 def cut(still: Mask, rate: float, gaps: Indices) -> tuple[LogMove, ...]:
-    """Moves and rests of rows (n,) that are `still` or not, in their order; none reaches into one of `gaps` (k, 2)."""
+    """Moves and rests of rows (n,) that are `still` or not, in their order; none reaches into one
+    of `gaps` (k, 2).
+    """
     still = still.copy()
     for start, end in _runs(still, False):
         if end - start < SHORTEST * rate:
             still[start:end] = True
     edges = [0, *(int(row) for row in gaps.ravel()), len(still)]
     parts = zip(edges[::2], edges[1::2], strict=True)
-    return tuple(move for low, high in parts for move in _cut_part(still, low, min(high + 1, len(still)), rate))
+    return tuple(
+        move
+        for low, high in parts
+        for move in _cut_part(still, low, min(high + 1, len(still)), rate)
+    )
 
 
 def _cut_part(still: Mask, low: int, high: int, rate: float) -> Iterator[LogMove]:

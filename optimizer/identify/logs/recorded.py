@@ -24,12 +24,14 @@ class MeasuredEnergy:
     electrical: Joules | None
     """Integral of the logged power of the arm's bus. Null if the log has none."""
     by_efforts: Joules | None
-    """Integral of the power that the motors take by their logged currents or torques, with the losses
-    of the robot's drives and its idle power. Null if the log has none."""
+    """Integral of the power that the motors take by their logged currents or torques, with the
+    losses of the robot's drives and its idle power. Null if the log has none."""
 
     def joined(self, other: MeasuredEnergy) -> MeasuredEnergy:
         """The energies of two parts together."""
-        return MeasuredEnergy(_sum(self.electrical, other.electrical), _sum(self.by_efforts, other.by_efforts))
+        return MeasuredEnergy(
+            _sum(self.electrical, other.electrical), _sum(self.by_efforts, other.by_efforts)
+        )
 
 
 def measured(log: Log, arm: Arm) -> list[MeasuredEnergy]:
@@ -42,7 +44,9 @@ def measured(log: Log, arm: Arm) -> list[MeasuredEnergy]:
         return []
     plant, found = Plant(arm), list[MeasuredEnergy]()
     for first, last in pairwise(log.segment_rows):
-        parts = [_part(log, plant, torque, slice(low, high + 1)) for low, high in _pieces(first, last)]
+        parts = [
+            _part(log, plant, torque, slice(low, high + 1)) for low, high in _pieces(first, last)
+        ]
         whole = parts[0]
         for part in parts[1:]:
             whole = whole.joined(part)
@@ -66,7 +70,9 @@ def _part(log: Log, plant: Plant, torque: Array | None, rows: slice) -> Measured
 
 
 def _pieces(first: int, last: int) -> Iterator[tuple[int, int]]:
-    """Rows from `first` to `last` in pieces of BLOCK rows at most, so that memory does not grow with a log's length."""
+    """Rows from `first` to `last` in pieces of BLOCK rows at most, so that memory does not grow
+    with a log's length.
+    """
     return pairwise([*range(first, last, BLOCK), last])
 
 

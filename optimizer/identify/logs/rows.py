@@ -1,4 +1,6 @@
-"""Rows of a log's CSV file as arrays, some thousand lines at a time. Lines of a wrong length are dropped."""
+"""Rows of a log's CSV file as arrays, some thousand lines at a time. Lines of a wrong length are
+dropped.
+"""
 
 from __future__ import annotations
 
@@ -24,13 +26,15 @@ from joulepath.optimizer.identify.logs.log_errors import LogTooLarge
 MOST_BYTES = 1 << 30
 """Most bytes of a log after unpacking, if the caller does not allow fewer."""
 MOST_DROPPED = 0.1
-"""Greatest fraction of lines with a wrong number of cells: beyond it, something is wrong with the file as a whole."""
+"""Greatest fraction of lines with a wrong number of cells: beyond it, something is wrong with the
+file as a whole.
+"""
 _GZIP = b"\x1f\x8b"
 
 
 class _Watched(RawIOBase):
-    """A file whose every reading looks at the watched deadline: gzip may have millions of members with nothing in
-    them."""
+    """A file whose every reading looks at the watched deadline: gzip may have millions of members
+    with nothing in them."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
@@ -54,10 +58,16 @@ class _Watched(RawIOBase):
 
 
 class Source:
-    """The bytes of a log, unpacked if they are gzip, at most `most` of them. Raises LogTooLarge, InvalidTable."""
+    """The bytes of a log, unpacked if they are gzip, at most `most` of them. Raises LogTooLarge,
+    InvalidTable.
+    """
 
     def __init__(self, source: Path | bytes, most: int = MOST_BYTES) -> None:
-        raw = BufferedReader(_Watched(BytesIO(source) if isinstance(source, bytes) else source.open("rb", buffering=0)))
+        raw = BufferedReader(
+            _Watched(
+                BytesIO(source) if isinstance(source, bytes) else source.open("rb", buffering=0)
+            )
+        )
         self._raw = raw
         packed = raw.peek(2)[:2] == _GZIP
         self._file: BufferedIOBase = gzip.GzipFile(fileobj=raw) if packed else raw
@@ -75,7 +85,9 @@ class Source:
         try:
             line = self._file.readline(size)
         except (OSError, EOFError, ZlibError):
-            raise InvalidTable("The file is broken gzip: pack it anew, or send it unpacked.") from None
+            raise InvalidTable(
+                "The file is broken gzip: pack it anew, or send it unpacked."
+            ) from None
         self._read += len(line)
         if self._read > self._most:
             raise LogTooLarge(self._most, "bytes after unpacking")
@@ -86,8 +98,8 @@ class Source:
 class Rows:
     """The rows of a file below its head: `blocks` yields (line numbers, values (k, used)).
 
-    `dropped` counts, while the blocks are read, lines with too few or too many cells. Comments and repetitions of the
-    header are no rows.
+    `dropped` counts, while the blocks are read, lines with too few or too many cells. Comments and
+    repetitions of the header are no rows.
     """
 
     file: Source
@@ -120,7 +132,9 @@ class Rows:
                 raise LogTooLarge(MOST_ROWS, "rows")
             if good:
                 points = good if self.head.separator == "," else [*with_points(good, numbers[0])]
-                values = numbers_of(points, numbers, self.head.names, self.head.separator, self.used)
+                values = numbers_of(
+                    points, numbers, self.head.names, self.head.separator, self.used
+                )
                 yield np.array(numbers), values
         if self.dropped > MOST_DROPPED * (kept + self.dropped) and self._first_dropped is not None:
             raise self._first_dropped
@@ -167,7 +181,9 @@ class Rows:
     def _is_header(self, line: str) -> bool:
         """Whether a line is the header again, as where files were joined."""
         begin = line[:1].strip("\"'")
-        return bool(begin) and not begin.isdigit() and begin not in "+-. " and self._same_names(line)
+        return (
+            bool(begin) and not begin.isdigit() and begin not in "+-. " and self._same_names(line)
+        )
 
     def _same_names(self, line: str) -> bool:
         return names_of(line, self.head.separator)[0] == self.head.names

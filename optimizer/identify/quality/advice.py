@@ -1,11 +1,14 @@
-"""Which figure to measure better: the one that would take the largest share of the energy's variance away.
+"""Which figure to measure better: the one that would take the largest share of the energy's
+variance away.
 
-If a figure were known, the variance would fall by the square of its correlation with the energy. Errors of figures make
-up for each other: a figure's own term of the variance can be larger than the whole, and tells less.
+If a figure were known, the variance would fall by the square of its correlation with the energy.
+Errors of figures make up for each other: a figure's own term of the variance can be larger than the
+whole, and tells less.
 
 
-The standard deviation of a figure falls with the square root of the time in motion (Verdonck 2004, Radkhah 2007: what a
-log tells of a figure depends on how it excites it). To halve it takes four times the moves.
+The standard deviation of a figure falls with the square root of the time in motion (Verdonck 2004,
+Radkhah 2007: what a log tells of a figure depends on how it excites it). To halve it takes four
+times the moves.
 """
 
 from __future__ import annotations
@@ -24,19 +27,24 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows
 _DO = {
     "coulomb": "Log slow and fast moves of this joint, in both directions.",
     "viscous": "Log moves of this joint near its greatest speed.",
-    "load": "Log slow moves of this joint with the arm stretched out and folded, or with a payload.",
+    "load": "Log slow moves of this joint with the arm stretched out and folded, or with a "
+    "payload.",
     "curved": "Log moves of this joint at several constant speeds.",
     "rotor_inertia": "Log moves in which this joint speeds up as fast as it may.",
     "idle_power": "Log some seconds of rest, and the power of the arm's bus.",
-    "copper": "Log the arm at rest stretched out and folded, with its power: the current that holds it differs.",
-    LINK_MASS_SCALE: "Log moves that lift the arm and lower it, with its power; or its currents or torques.",
+    "copper": "Log the arm at rest stretched out and folded, with its power: the current that "
+    "holds it differs.",
+    LINK_MASS_SCALE: "Log moves that lift the arm and lower it, with its power; or its currents or "
+    "torques.",
     "inverter_linear": "Log the arm at rest in poses of different load, with its power.",
 }
 STEP = 1e-4
 
 
 def advice_of(fitted: Fitted, rows: Rows) -> Advice | None:
-    """The figure to measure, for motions like those of the logs; None without power figures to weigh them by."""
+    """The figure to measure, for motions like those of the logs; None without power figures to
+    weigh them by.
+    """
     names, covariance = fitted.estimate.names, fitted.estimate.covariance
     known = [k for k, (name, _) in enumerate(names) if name in _DO]
     gradient = np.array([slope(fitted.arm, rows, *names[k]) for k in known])

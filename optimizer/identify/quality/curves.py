@@ -17,7 +17,8 @@ MOST = 1500
 
 
 def curves_of(parts: Sequence[tuple[FittedArm, Rows, Mask]], threshold: float) -> Curves:
-    """Every k-th of the rows in motion that each part's mask (n,) allows, with what its arm makes of them.
+    """Every k-th of the rows in motion that each part's mask (n,) allows, with what its arm makes
+    of them.
 
     The torque of a joint is modelled where it moves faster than the threshold [rad/s].
     """
@@ -41,4 +42,6 @@ def curves_of(parts: Sequence[tuple[FittedArm, Rows, Mask]], threshold: float) -
                 modelled_power=np.where(np.isfinite(shown.power), arm.power(shown)[0], np.nan),
             )
         )
-    return Curves(**{name: np.concatenate([getattr(each, name) for each in found]) for name in vars(found[0])})
+    return Curves(
+        **{name: np.concatenate([getattr(each, name) for each in found]) for name in vars(found[0])}
+    )

@@ -1,8 +1,9 @@
-"""The interval of an energy: from the figures' covariance, the effect of the move and that of the day.
+"""The interval of an energy: from the figures' covariance, the effect of the move and that of the
+day.
 
-The figures' covariance alone is far too narrow. A move has an error of its own that no figures of this model can
-express, and friction differs from day to day. Both are measured: the first on moves that were left out of the fit, the
-second on logs of different days.
+The figures' covariance alone is far too narrow. A move has an error of its own that no figures of
+this model can express, and friction differs from day to day. Both are measured: the first on moves
+that were left out of the fit, the second on logs of different days.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from joulepath.optimizer.identify.estimates.grouped import jackknife
 from joulepath.optimizer.identify.fits.fitting import Fitted
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
-# relative standard deviation of friction from day to day, where there are too few logs to measure it: 2 to 4 % in
-# twelve logs of a UR10e over two months
+# relative standard deviation of friction from day to day, where there are too few logs to measure
+# it: 2 to 4 % in twelve logs of a UR10e over two months
 SESSION = 0.03
 LEAST_SESSIONS = 3
 # share of the square of the moves' mean errors that is their own at least
@@ -32,7 +33,9 @@ MEDIAN_SQUARE = 0.455
 
 @dataclass(frozen=True)
 class Spread:
-    """`move` [W]: standard deviation of the mean power of a move. `session` [1]: relative, of friction between days."""
+    """`move` [W]: standard deviation of the mean power of a move. `session` [1]: relative, of
+    friction between days.
+    """
 
     move: float
     session: float
@@ -58,12 +61,14 @@ def without_friction(arm: FittedArm) -> FittedArm:
 
 
 def figures_variance(fitted: Fitted, rows: Rows) -> float:
-    """Variance [J²] of the energy by the errors of the figures: those of the fit, and of the robot's own beneath it."""
+    """Variance [J²] of the energy by the errors of the figures: those of the fit, and of the
+    robot's own beneath it.
+    """
     without = np.array([[_energy(arm, rows)] for arm in fitted.varied])
     power, slope = fitted.arm.power(rows)
     gradient = rows.weight @ slope
-    # what the electrics make of an error of held friction, they make up for in the energy; links load other motions
-    # otherwise
+    # what the electrics make of an error of held friction, they make up for in the energy; links
+    # load other motions otherwise
     tilted = fitted.tilted if fitted.arm.bodies is not None else ()
     by_links = sum((_energy(arm, rows) - float(rows.weight @ power)) ** 2 for arm in tilted)
     return float(jackknife(without)[0, 0] + gradient @ fitted.drift @ gradient + by_links)
@@ -75,7 +80,9 @@ def spread_of(fitted: Fitted, rows: Rows) -> Spread:
 
 
 def _move_sd(fitted: Fitted, rows: Rows) -> float:
-    """Standard deviation [W] of the mean error of a move, less what the figures' own errors make of it."""
+    """Standard deviation [W] of the mean error of a move, less what the figures' own errors make of
+    it.
+    """
     use = np.isfinite(rows.power) & ~rows.rest
     squares, explained = list[float](), list[float]()
     for cluster in np.unique(fitted.clusters.of_row[use]):
@@ -95,10 +102,11 @@ def _move_sd(fitted: Fitted, rows: Rows) -> float:
 
 
 def own_variance(squares: Array, explained: Array) -> float:
-    """The variance τ² that errors have besides `explained` variances (n,), from their `squares` (n,).
+    """The variance τ² that errors have besides `explained` variances (n,), from their `squares`
+    (n,).
 
-    Σ squares / (explained + τ²) = n: an error that can be explained by much tells little of τ² (Paule and Mandel 1982).
-    A small share of the errors is their own at least.
+    Σ squares / (explained + τ²) = n: an error that can be explained by much tells little of τ²
+    (Paule and Mandel 1982). A small share of the errors is their own at least.
     """
 
     def excess(own: float) -> float:
@@ -111,7 +119,9 @@ def own_variance(squares: Array, explained: Array) -> float:
 
 
 def sessions(fitted: Fitted, rows: Rows) -> tuple[float, ...]:
-    """The size of each log's friction relative to the fit's, from its torques; empty without torques."""
+    """The size of each log's friction relative to the fit's, from its torques; empty without
+    torques.
+    """
     effort = rows.effort * fitted.arm.torque_constant if rows.current else rows.effort
     friction = fitted.arm.friction_torque(rows) - fitted.arm.offset
     rest = effort - fitted.arm.link_torque(rows) - fitted.arm.offset
@@ -126,5 +136,7 @@ def sessions(fitted: Fitted, rows: Rows) -> tuple[float, ...]:
 
 
 def session_sd(found: tuple[float, ...]) -> float:
-    """Relative standard deviation of friction between logs; the usual one where there are too few of them."""
+    """Relative standard deviation of friction between logs; the usual one where there are too few
+    of them.
+    """
     return float(np.std(found, ddof=1)) if len(found) >= LEAST_SESSIONS else SESSION

@@ -14,14 +14,17 @@ from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.results import Physical, Structure
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
-# of the largest singular value of the scaled columns: below it, a combination of base parameters is not excited
+# of the largest singular value of the scaled columns: below it, a combination of base parameters is
+# not excited
 LEAST_EXCITED = 1e-3
 # of the largest entry: rounding of a solver's least eigenvalue
 ROUNDED = 1e-8
 
 
 def structure_of(robot: Robot, rows: Rows, options: IdentificationOptions) -> Structure:
-    """Standard and base parameters of bodies and, if they are fitted, rotors; what the rows tell of the bodies'."""
+    """Standard and base parameters of bodies and, if they are fitted, rotors; what the rows tell of
+    the bodies'.
+    """
     rotors = "rotor" in options.fit
     base = base_parameters(robot.model, rotors)
     condition, excited = None, None
@@ -46,12 +49,15 @@ def physical_of(robot: Robot, arm: FittedArm) -> Physical | None:
         return None
     matrices = pseudo_inertias(body_parameters(robot.model) + arm.bodies)
     least = np.linalg.eigvalsh(matrices)[:, 0]
-    return Physical(bool((least >= -ROUNDED * np.abs(matrices).max(axis=(1, 2))).all()), np.asarray(least))
+    return Physical(
+        bool((least >= -ROUNDED * np.abs(matrices).max(axis=(1, 2))).all()), np.asarray(least)
+    )
 
 
 def inertials_of(robot: Robot, change: Array) -> dict[str, Array]:
-    """Figures of links whose parameters are changed by (10 nq,): mass (nq,) [kg], center_of_mass (nq, 3) [m], and
-    inertia (nq, 6) [kg·m²] about it as ixx, ixy, ixz, iyy, iyz, izz; all in the link frames."""
+    """Figures of links whose parameters are changed by (10 nq,): mass (nq,) [kg], center_of_mass
+    (nq, 3) [m], and inertia (nq, 6) [kg·m²] about it as ixx, ixy, ixz, iyy, iyz, izz; all in the
+    link frames."""
     parameters = (body_parameters(robot.model) + change).reshape(-1, BODY)
     bodies = [pin.Inertia.FromDynamicParameters(each) for each in parameters]
     rows, columns = (0, 0, 0, 1, 1, 2), (0, 1, 2, 1, 2, 2)

@@ -27,7 +27,9 @@ class Fold:
 
 
 def validate(robot: Robot, folds: Sequence[Fold], threshold: float) -> Validation:
-    """Errors of fitted and of the robot's own figures; `threshold` [rad/s] is the speed above which a joint moves."""
+    """Errors of fitted and of the robot's own figures; `threshold` [rad/s] is the speed above which
+    a joint moves.
+    """
     own, power = own_arm(robot), any(np.isfinite(fold.rows.power).any() for fold in folds)
     covered = [coverage(fold) for fold in folds]
     inside, half = (np.concatenate(each) for each in zip(*covered, strict=True))
@@ -35,12 +37,16 @@ def validate(robot: Robot, folds: Sequence[Fold], threshold: float) -> Validatio
         moves=sum(len(np.unique(fold.rows.move[~fold.rows.rest])) for fold in folds),
         fitted=_prediction([(fold.fitted.arm, fold.rows) for fold in folds], threshold),
         own=_prediction([(own, fold.rows) for fold in folds], threshold),
-        constant=power_errors([(fold.rows, np.full(len(fold.rows.q), fold.fitted.mean_power)) for fold in folds])
+        constant=power_errors(
+            [(fold.rows, np.full(len(fold.rows.q), fold.fitted.mean_power)) for fold in folds]
+        )
         if power
         else None,
         coverage=float(inside.mean()) if len(inside) else None,
         half_width=float(half.mean()) if len(half) else None,
-        curves=curves_of([(fold.fitted.arm, fold.rows, ~fold.rows.rest) for fold in folds], threshold),
+        curves=curves_of(
+            [(fold.fitted.arm, fold.rows, ~fold.rows.rest) for fold in folds], threshold
+        ),
     )
 
 
@@ -55,7 +61,9 @@ def _prediction(folds: Sequence[tuple[FittedArm, Rows]], threshold: float) -> Pr
 
 def torque_errors(folds: Sequence[tuple[FittedArm, Rows]], threshold: float) -> TorqueErrors:
     """Errors of predicted torques."""
-    parts = [(motor_torque(arm, rows), arm.torque(rows), rows.v, rows.weight) for arm, rows in folds]
+    parts = [
+        (motor_torque(arm, rows), arm.torque(rows), rows.v, rows.weight) for arm, rows in folds
+    ]
     measured, predicted, v, weight = (np.concatenate(each) for each in zip(*parts, strict=True))
     use = np.isfinite(measured).all(axis=1)
     measured, predicted, v, weight = measured[use], predicted[use], v[use], weight[use]
@@ -63,12 +71,18 @@ def torque_errors(folds: Sequence[tuple[FittedArm, Rows]], threshold: float) -> 
 
     def relative(chosen: Array) -> Array:
         size = np.sqrt((chosen * measured**2).sum(axis=0))
-        return np.asarray(100 * np.sqrt((chosen * error**2).sum(axis=0)) / np.where(size > 0, size, np.nan))
+        return np.asarray(
+            100 * np.sqrt((chosen * error**2).sum(axis=0)) / np.where(size > 0, size, np.nan)
+        )
 
     arm = folds[0][0]
     copper = arm.electrics.copper / arm.torque_constant**2
-    work, predicted_work = (float(weight @ (each * v).sum(axis=1)) for each in (measured, predicted))
-    loss, predicted_loss = (float(weight @ (copper * each**2).sum(axis=1)) for each in (measured, predicted))
+    work, predicted_work = (
+        float(weight @ (each * v).sum(axis=1)) for each in (measured, predicted)
+    )
+    loss, predicted_loss = (
+        float(weight @ (copper * each**2).sum(axis=1)) for each in (measured, predicted)
+    )
     return TorqueErrors(
         rmse=np.sqrt((moving * error**2).sum(axis=0) / np.maximum(moving.sum(axis=0), 1)),
         relative=relative(moving),
@@ -87,7 +101,10 @@ def power_errors(folds: Sequence[tuple[Rows, Array]]) -> PowerErrors:
         number = np.unique(rows.move[use], return_inverse=True)[1]
         errors.append(error)
         relative.append(
-            100 * np.abs(np.bincount(number, weight * error) / np.bincount(number, weight * rows.power[use]))
+            100
+            * np.abs(
+                np.bincount(number, weight * error) / np.bincount(number, weight * rows.power[use])
+            )
         )
     energies = np.concatenate(relative)
     return PowerErrors(
@@ -99,7 +116,9 @@ def power_errors(folds: Sequence[tuple[Rows, Array]]) -> PowerErrors:
 
 
 def coverage(fold: Fold) -> tuple[Array, Array]:
-    """Whether each move's measured energy lies between P5 and P95 (moves,), and half that interval (moves,) [%]."""
+    """Whether each move's measured energy lies between P5 and P95 (moves,), and half that interval
+    (moves,) [%].
+    """
     inside, half, rows = list[bool](), list[float](), fold.rows
     for move in np.unique(rows.move[~rows.rest & np.isfinite(rows.power)]):
         part = rows.take((rows.move == move) & ~rows.rest & np.isfinite(rows.power))

@@ -12,7 +12,8 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 Numbers = npt.NDArray[np.int64]
 
-# fewer motions than this tell little of the spread: single moves take their place; if they are as few, seconds of them
+# fewer motions than this tell little of the spread: single moves take their place; if they are as
+# few, seconds of them
 LEAST_GROUPS = 5
 SECOND = 1.0
 # more clusters than this tell nothing more and take time
@@ -30,7 +31,9 @@ class Clusters:
 
 
 def clusters_of(rows: Rows) -> Clusters:
-    """Motions as clusters, or moves where there are few motions, or seconds where there are few moves."""
+    """Motions as clusters, or moves where there are few motions, or seconds where there are few
+    moves.
+    """
     unit = rows.group
     if len(rows.groups) < LEAST_GROUPS:
         unit = rows.move
@@ -44,10 +47,11 @@ def clusters_of(rows: Rows) -> Clusters:
 
 
 def shared_variance(residuals: Array, weight: Array, clusters: Clusters) -> float:
-    """Variance of a row (n,) that tells as much as if all rows were independent, in the unit of the residuals squared.
+    """Variance of a row (n,) that tells as much as if all rows were independent, in the unit of the
+    residuals squared.
 
-    The rows of a move share an error that the model cannot express. The mean residual of a cluster of n rows has then a
-    larger variance than 1/n of a row's.
+    The rows of a move share an error that the model cannot express. The mean residual of a cluster
+    of n rows has then a larger variance than 1/n of a row's.
     """
     weighted = np.sqrt(weight) * residuals
     size = np.bincount(clusters.of_row, minlength=clusters.count)

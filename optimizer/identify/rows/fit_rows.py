@@ -1,6 +1,8 @@
-"""The rows that fits see: logs averaged over short blocks of samples, with the moves that they belong to.
+"""The rows that fits see: logs averaged over short blocks of samples, with the moves that they
+belong to.
 
-An average over a block is a low-pass filter. It is the same for torques and for motion, so that it adds no phase.
+An average over a block is a low-pass filter. It is the same for torques and for motion, so that it
+adds no phase.
 """
 
 from __future__ import annotations
@@ -28,31 +30,34 @@ Numbers = npt.NDArray[np.int64]
 
 # rate [Hz] of the rows: motions of arms and their torques are slower by far
 RATE = 100.0
-# of all logs together, and with regressors, of 3 kB each: residuals of neighbours are so alike that more tell no more
+# of all logs together, and with regressors, of 3 kB each: residuals of neighbours are so alike that
+# more tell no more
 MOST_ROWS, MOST_REGRESSORS = 20_000, 8_000
 # rad; a joint that stays within it over a move does not move
 STILL = 1e-3
 # rad/s; a slower joint that stands still has no speed but noise
 SLOW = 0.02
-# times the power at rest by the robot's own figures that no mean of a log reaches, nor the same part of it
+# times the power at rest by the robot's own figures that no mean of a log reaches, nor the same
+# part of it
 FAR_POWER = 20.0
-# a move longer than this [s] is cut into blocks, each of which counts as a move; the pause [s] between them is left out
+# a move longer than this [s] is cut into blocks, each of which counts as a move; the pause [s]
+# between them is left out
 LONGEST, BLOCK, PAUSE = 7.5, 5.0, 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Rows (n, nq) of all logs: q [rad], v [rad/s], a [rad/s²], `rigid` torques of links and load [N·m], and those of
-    the `links` alone.
+    """Rows (n, nq) of all logs: q [rad], v [rad/s], a [rad/s²], `rigid` torques of links and load
+    [N·m], and those of the `links` alone.
 
-    `time` (n,) [s] is the middle of a row, from the start of its log.
-    `effort` (n, nq) is the motor torque [N·m], or the motor current [A] if `current`; `power` (n,) [W] and
-    `temperature` (n, nq) [°C]; all of them NaN where not logged. `log`, `move` (n,) are numbers from 0; moves count
-    through all logs, and rows at rest belong to the move before. `group` (n,): moves along the same motion share one.
-    `weight` (n,) [s] is the time that a row stands for, `regressor`
-    (n, nq, 10 nq) is that of the links, None where their inertials are taken as known.
-    `wrench` (n, 6) [N, N·m] acts beneath the base, NaN where not logged. `wrench_regressor`
-    (n, 6, 10 nq) is that of the links; with it, the wrench is without what the arm carries.
+    `time` (n,) [s] is the middle of a row, from the start of its log. `effort` (n, nq) is the motor
+    torque [N·m], or the motor current [A] if `current`; `power` (n,) [W] and `temperature` (n, nq)
+    [°C]; all of them NaN where not logged. `log`, `move` (n,) are numbers from 0; moves count
+    through all logs, and rows at rest belong to the move before. `group` (n,): moves along the same
+    motion share one. `weight` (n,) [s] is the time that a row stands for, `regressor` (n, nq, 10
+    nq) is that of the links, None where their inertials are taken as known. `wrench` (n, 6) [N,
+    N·m] acts beneath the base, NaN where not logged. `wrench_regressor` (n, 6, 10 nq) is that of
+    the links; with it, the wrench is without what the arm carries.
     """
 
     time: Array
@@ -76,7 +81,11 @@ class Rows:
 
     def take(self, rows: Mask) -> Rows:
         """Only these rows (n,)."""
-        parts = {name: value[rows] for name, value in self.__dict__.items() if isinstance(value, np.ndarray)}
+        parts = {
+            name: value[rows]
+            for name, value in self.__dict__.items()
+            if isinstance(value, np.ndarray)
+        }
         return Rows(**parts, current=self.current)
 
     @property
@@ -85,19 +94,26 @@ class Rows:
         return np.unique(self.group[~self.rest])
 
 
-def rows_of(robot: Robot, logs: Sequence[Log], regressor: bool = False, wrench: bool = False) -> Rows:
+def rows_of(
+    robot: Robot, logs: Sequence[Log], regressor: bool = False, wrench: bool = False
+) -> Rows:
     """The rows of logs of one robot, with the regressors of its links or without.
 
-    Raises InvalidProblem if a log is of another robot, has other joints, or a power that is none of the arm's bus."""
+    Raises InvalidProblem if a log is of another robot, has other joints, or a power that is none of
+    the arm's bus."""
     if not logs:
         raise InvalidProblem("logs", "logs must name at least one log.")
     for log in logs:
         if log.robot != robot.name or log.joints != robot.nq:
-            raise InvalidProblem("logs", f"A log is of {log.robot} ({log.joints} joints), not of {robot.name}.")
+            raise InvalidProblem(
+                "logs", f"A log is of {log.robot} ({log.joints} joints), not of {robot.name}."
+            )
         _check_power(robot, log)
     meanings = sorted({log.effort_meaning for log in logs if log.effort_meaning is not None})
     if len(meanings) > 1:
-        raise InvalidProblem("logs", f"The efforts of the logs must mean the same, not {' and '.join(meanings)}.")
+        raise InvalidProblem(
+            "logs", f"The efforts of the logs must mean the same, not {' and '.join(meanings)}."
+        )
     every = _stride(logs, MOST_REGRESSORS if regressor else MOST_ROWS)
     pieces, moves, number = [], 0, 0
     for number, log in enumerate(logs):
@@ -133,8 +149,10 @@ def _check_power(robot: Robot, log: Log) -> None:
     if not expected / FAR_POWER < mean < FAR_POWER * expected:
         raise InvalidProblem(
             "logs",
-            f"The power of {'a log' if log.name is None else log.name} is {mean:.3g} W in the mean, and {robot.name} "
-            f"draws some {expected:.3g} W at rest: this is not the power of the arm's bus in W. Log it in W, with the "
+            f"The power of {'a log' if log.name is None else log.name} is {mean:.3g} W in the "
+            f"mean, and {robot.name} "
+            f"draws some {expected:.3g} W at rest: this is not the power of the arm's bus in W. "
+            "Log it in W, with the "
             "sign that is positive where the arm draws power, or leave its column out.",
         )
 
@@ -149,8 +167,12 @@ def _stride(logs: Sequence[Log], most: int) -> int:
     return max(1, int(np.ceil(rows / most)))
 
 
-def _rows_of_log(robot: Robot, log: Log, number: int, moves: int, every: int) -> tuple[dict[str, Array], int]:
-    """The rows of one log by name, and the number of moves up to its end; `moves` is that of the logs before."""
+def _rows_of_log(
+    robot: Robot, log: Log, number: int, moves: int, every: int
+) -> tuple[dict[str, Array], int]:
+    """The rows of one log by name, and the number of moves up to its end; `moves` is that of the
+    logs before.
+    """
     size = max(1, round(log.rate / RATE))
     starts, of_move, rest = _blocks(log, size, every)
     if not len(starts):
@@ -171,7 +193,9 @@ def _rows_of_log(robot: Robot, log: Log, number: int, moves: int, every: int) ->
     rigid = rigid_torques(model, q, v, a)
     links = rigid
     if payload.mass > 0:
-        links = rigid_torques(robot.loaded_model(0.0, payload.com, payload.inertia * 0.0, log.gravity), q, v, a)
+        links = rigid_torques(
+            robot.loaded_model(0.0, payload.com, payload.inertia * 0.0, log.gravity), q, v, a
+        )
     return {
         "time": mean(log.time, ()),
         "q": q,
@@ -191,7 +215,9 @@ def _rows_of_log(robot: Robot, log: Log, number: int, moves: int, every: int) ->
 
 
 def _still(q: Array, move: Numbers, rest: Mask) -> Mask:
-    """Where a joint stands still (n, nq): in rests, and in moves over which it stays in place. Its speed is noise."""
+    """Where a joint stands still (n, nq): in rests, and in moves over which it stays in place. Its
+    speed is noise.
+    """
     still = np.repeat(rest[:, None], q.shape[1], axis=1)
     for number in np.unique(move):
         rows = np.flatnonzero((move == number) & ~rest)

@@ -1,7 +1,7 @@
 """Which moves run along the same motion: they must not stand on both sides of a split.
 
-Moves are the same if their ends are, in either direction. A log that never rests is cut into blocks anywhere: a block
-is the same as another move if most of its states are close to states of that.
+Moves are the same if their ends are, in either direction. A log that never rests is cut into blocks
+anywhere: a block is the same as another move if most of its states are close to states of that.
 """
 
 from __future__ import annotations
@@ -27,10 +27,15 @@ MOST_COMPARED = 4000
 
 
 def groups_of_motions(q: Array, v: Array, move: Numbers, rest: Mask) -> Numbers:
-    """The group (n,) of every row: moves (n,) along the same motion share one. q (n, nq) [rad], v (n, nq) [rad/s]."""
+    """The group (n,) of every row: moves (n,) along the same motion share one. q (n, nq) [rad], v
+    (n, nq) [rad/s].
+    """
     moving = np.flatnonzero(~rest)
     count = int(move.max()) + 1
-    pairs = [*_same_ends(q[moving], move[moving]), *_same_states(q[moving], v[moving], move[moving])]
+    pairs = [
+        *_same_ends(q[moving], move[moving]),
+        *_same_states(q[moving], v[moving], move[moving]),
+    ]
     links = np.array(pairs, dtype=int).reshape(-1, 2)
     graph = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(count, count))
     return np.asarray(connected_components(graph, directed=False)[1], dtype=int)[move]
@@ -62,7 +67,11 @@ def _same_states(q: Array, v: Array, move: Numbers) -> list[tuple[int, int]]:
         met[own, np.unique(move[others])] += 1
     same = np.argwhere(met > MOST_STATES * np.maximum(size, 1)[:, None])
     block = _begin_or_end_in_motion(v, moves)
-    return [(int(one), int(other)) for one, other in same if one != other and (block[one] or block[other])]
+    return [
+        (int(one), int(other))
+        for one, other in same
+        if one != other and (block[one] or block[other])
+    ]
 
 
 def _begin_or_end_in_motion(v: Array, move: Numbers) -> Mask:

@@ -10,7 +10,8 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 
 def held_out(rows: Rows, fraction: float) -> list[Mask]:
-    """The rows (n,) of motions held out: about `fraction` of the moving time; if that is 1, each motion in its turn.
+    """The rows (n,) of motions held out: about `fraction` of the moving time; if that is 1, each
+    motion in its turn.
 
     The same rows give the same ones. Raises NothingHeldOut if there are fewer than two motions.
     """

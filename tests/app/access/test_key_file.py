@@ -48,7 +48,9 @@ def test_changes_wait_for_each_other(file: Path) -> None:
     with ThreadPoolExecutor(8) as pool:
         secrets = list(pool.map(lambda k: add(file, f"client_{k}"), range(40)))
     keys = KeyRing(file)
-    assert sorted(key.name for key in map(keys.find, secrets) if key) == sorted(f"client_{k}" for k in range(40))
+    assert sorted(key.name for key in map(keys.find, secrets) if key) == sorted(
+        f"client_{k}" for k in range(40)
+    )
     assert list(file.parent.iterdir()) == [file], "no temporary file is left"
 
 
@@ -72,7 +74,16 @@ def test_finds_its_keys_only(file: Path) -> None:
     found = keys.find(secret)
     assert found is not None and (found.name, found.role) == ("press", "read")
     entry = read_keys(file)[0]
-    for wrong in ("", secret[:-1], secret + "x", secret.upper(), entry.sha256, entry.id, "ü" * 100, "press"):
+    for wrong in (
+        "",
+        secret[:-1],
+        secret + "x",
+        secret.upper(),
+        entry.sha256,
+        entry.id,
+        "ü" * 100,
+        "press",
+    ):
         assert keys.find(wrong) is None
 
 
@@ -93,7 +104,8 @@ def test_a_change_applies_at_once(file: Path) -> None:
 BROKEN: dict[str, str] = {
     "no YAML": "- name: [",
     "no list": "press: compute",
-    "no hash": "- {name: press, role: compute, sha256: plain-text-key, created: 2026-01-01T00:00:00Z}",
+    "no hash": "- {name: press, role: compute, sha256: plain-text-key, created: "
+    "2026-01-01T00:00:00Z}",
     "no role": f"- {{name: press, role: root, sha256: {'0' * 63}a, created: 2026-01-01T00:00:00Z}}",
     "no name": f"- {{name: '../x', role: read, sha256: {'0' * 63}a, created: 2026-01-01T00:00:00Z}}",
     "a word too much": f"- {{name: x, role: read, sha256: {'0' * 63}a, created: 2026-01-01T00:00:00Z, admin: true}}",

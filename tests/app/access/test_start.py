@@ -26,7 +26,9 @@ def test_needs_no_key_on_this_machine(host: str) -> None:
     check_access(Settings(host=host))
 
 
-@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.0.2.1", "robots.example", "", "localhost.example"])
+@pytest.mark.parametrize(
+    "host", ["0.0.0.0", "::", "192.0.2.1", "robots.example", "", "localhost.example"]
+)
 def test_other_addresses_need_keys_or_consent(host: str, tmp_path: Path) -> None:
     with pytest.raises(WrongSettings, match=r"(?s)joulepath keys add.*JOULEPATH_OPEN=1"):
         check_access(Settings(host=host))
@@ -61,14 +63,18 @@ def test_the_process_ends_with_the_remedies() -> None:
         ("0.0.0.0", logging.WARNING, "everyone who reaches 0.0.0.0, port 8000"),
     ],
 )
-def test_the_log_says_to_whom_access_is_open(host: str, level: int, to: str, caplog: pytest.LogCaptureFixture) -> None:
+def test_the_log_says_to_whom_access_is_open(
+    host: str, level: int, to: str, caplog: pytest.LogCaptureFixture
+) -> None:
     with caplog.at_level(logging.INFO):
         log_access(Settings(host=host, port=8000, open=True))
     (record,) = caplog.records
     assert (record.message, record.levelno, vars(record)["to"]) == ("access is open", level, to)
 
 
-def test_the_log_says_that_keys_are_required(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_the_log_says_that_keys_are_required(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     with caplog.at_level(logging.INFO):
         log_access(Settings(host="0.0.0.0", open=True, api_keys_file=tmp_path / "keys.yaml"))
     assert [record.message for record in caplog.records] == ["API keys are required"]

@@ -19,7 +19,16 @@ from joulepath.app.answers.declared import as_json, model_of, shown_fields, text
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.engine.result import json_document
 from joulepath.optimizer.collision.close_pass import CLOSE
-from joulepath.optimizer.declared import Axes, Internal, Joules, Keys, NotEmpty, NullIfInfinite, PerJoint, Unit
+from joulepath.optimizer.declared import (
+    Axes,
+    Internal,
+    Joules,
+    Keys,
+    NotEmpty,
+    NullIfInfinite,
+    PerJoint,
+    Unit,
+)
 from joulepath.optimizer.result.certificate import Certificate, Clearance
 from joulepath.optimizer.result.solution import Baseline
 from tests.app.live import ROOT
@@ -111,7 +120,9 @@ def test_the_model_takes_the_json_and_nothing_else() -> None:
             model.model_validate_json(orjson.dumps(content | wrong))
     for name in content:
         with pytest.raises(ValidationError):
-            model.model_validate_json(orjson.dumps({key: content[key] for key in content if key != name}))
+            model.model_validate_json(
+                orjson.dumps({key: content[key] for key in content if key != name})
+            )
 
 
 def test_the_schema_has_meanings_and_units() -> None:
@@ -119,8 +130,11 @@ def test_the_schema_has_meanings_and_units() -> None:
     place, own = schema["$defs"]["Place"], schema["properties"]
     assert schema["description"] == "Everything at once." and place["description"] == "Where."
     assert place["properties"]["x"] == {
-        "title": "X", "type": "number", "description": "Distance [m]; from the base.", "x-unit": "m",
-    }  # fmt: skip
+        "title": "X",
+        "type": "number",
+        "description": "Distance [m]; from the base.",
+        "x-unit": "m",
+    }
     assert {name: own[name].get("x-unit") for name in ("name", "bound", "q")} == {
         "name": None,
         "bound": "J",
@@ -161,7 +175,11 @@ def test_only_one_module_reads_the_markers() -> None:
     """Elsewhere they are written into types."""
     readers = set()
     for path in (ROOT / "app").rglob("*.py"):
-        names = {node.id for node in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(node, ast.Name)}
+        names = {
+            node.id
+            for node in ast.walk(ast.parse(path.read_text("utf-8")))
+            if isinstance(node, ast.Name)
+        }
         if names & {"get_type_hints"}:
             readers.add(path.relative_to(Path(ROOT)).as_posix())
     assert readers == {"app/answers/declared.py"}
@@ -173,5 +191,7 @@ def test_a_task_does_without_the_web_framework() -> None:
         "import sys, joulepath.app.api.optimize.task\n"
         "print({'fastapi', 'starlette', 'sqlalchemy'} & sys.modules.keys())"
     )
-    told = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    told = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
     assert told.stdout == "set()\n"

@@ -20,5 +20,7 @@ def test_no_module_but_that_of_the_service_imports_a_route() -> None:
 
 
 def test_only_the_dependencies_read_the_applications_state() -> None:
-    readers = {file.relative_to(FOLDER).as_posix() for file in FILES if "app.state" in file.read_text()}
+    readers = {
+        file.relative_to(FOLDER).as_posix() for file in FILES if "app.state" in file.read_text()
+    }
     assert readers == {"shared/dependencies.py"}

@@ -50,7 +50,9 @@ def run(*arguments: str, stdin: str = "", cwd: Path = ROOT) -> subprocess.Comple
 
 @dataclass
 class Here:
-    """The command in this process, which has everything imported; for runs that do not write an answer."""
+    """The command in this process, which has everything imported; for runs that do not write an
+    answer.
+    """
 
     monkeypatch: pytest.MonkeyPatch
     capture: pytest.CaptureFixture[bytes]

@@ -30,12 +30,18 @@ def test_optimize_answers_as_the_service_does(tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_cycle_answers_as_the_service_does() -> None:
-    stops = [{"name": "there", "target": {"q": NEAR}, "payload": {"mass": 1.0, "com": [0.0, 0.0, 0.05]}}]
-    finished = run("cycle", "-", stdin=json.dumps({"start": {"q": HOME}, "stops": stops, **PATIENT}))
+    stops = [
+        {"name": "there", "target": {"q": NEAR}, "payload": {"mass": 1.0, "com": [0.0, 0.0, 0.05]}}
+    ]
+    finished = run(
+        "cycle", "-", stdin=json.dumps({"start": {"q": HOME}, "stops": stops, **PATIENT})
+    )
     assert (finished.returncode, finished.stderr) == (0, b"")
     answer = model_of(CycleAnswer).model_validate_json(finished.stdout)
     assert [leg.payload_mass for leg in answer.legs] == [0.0, 1.0]
-    assert answer.legs[0].goal.q == pytest.approx(NEAR) and answer.legs[1].goal.q == pytest.approx(HOME)
+    assert answer.legs[0].goal.q == pytest.approx(NEAR) and answer.legs[1].goal.q == pytest.approx(
+        HOME
+    )
 
 
 @pytest.mark.long
@@ -59,7 +65,9 @@ def test_optimize_reads_standard_input_and_writes_a_file(tmp_path: Path) -> None
         (request(colour="red"), ["body", "colour"]),
     ],
 )
-def test_an_invalid_request_is_a_validation_problem(here: Here, body: str | bytes, loc: list[str | int]) -> None:
+def test_an_invalid_request_is_a_validation_problem(
+    here: Here, body: str | bytes, loc: list[str | int]
+) -> None:
     code, content = here.problem("optimize", "-", stdin=body)
     assert (code, content["type"]) == (2, "/problems/invalid-request")
     assert [error["loc"] for error in content["errors"]] == [loc]
@@ -84,7 +92,9 @@ def test_a_file_that_does_not_exist_is_wrong_usage(here: Here, command: str) -> 
 
 
 def test_an_output_that_cannot_be_written_is_wrong_usage(here: Here, tmp_path: Path) -> None:
-    code, out, err = here.run("optimize", "-", "--output", str(tmp_path / "no" / "answer.json"), stdin=request())
+    code, out, err = here.run(
+        "optimize", "-", "--output", str(tmp_path / "no" / "answer.json"), stdin=request()
+    )
     assert (code, out) == (2, b"")
     assert b"answer.json" in err
     assert b"Traceback" not in err
@@ -100,8 +110,18 @@ def test_evaluate_answers_as_the_service_does() -> None:
 
 def test_evaluate_takes_a_csv_with_options_and_settings(here: Here, tmp_path: Path) -> None:
     settings, output = tmp_path / "settings.json", tmp_path / "answer.json"
-    settings.write_text(json.dumps({"payload": {"mass": 2.0, "com": [0, 0, 0.05]}, "time_per_segment": 9.0}))
-    given = ("evaluate", str(CSV), *CSV_OPTIONS, "--interpolation", "linear", "--output", str(output))
+    settings.write_text(
+        json.dumps({"payload": {"mass": 2.0, "com": [0, 0, 0.05]}, "time_per_segment": 9.0})
+    )
+    given = (
+        "evaluate",
+        str(CSV),
+        *CSV_OPTIONS,
+        "--interpolation",
+        "linear",
+        "--output",
+        str(output),
+    )
     energies = []
     for more in ((), ("--settings", str(settings))):
         assert here.run(*given, *more) == (0, b"", b"")
@@ -115,7 +135,11 @@ def test_evaluate_takes_a_csv_with_options_and_settings(here: Here, tmp_path: Pa
 def test_evaluate_writes_a_csv_table(here: Here, tmp_path: Path) -> None:
     output = tmp_path / "energies.csv"
     options = ("--input", "csv", "--format", "csv", "--output", str(output))
-    assert here.run("evaluate", "-", *CSV_OPTIONS, *options, stdin=CSV.read_bytes()) == (0, b"", b"")
+    assert here.run("evaluate", "-", *CSV_OPTIONS, *options, stdin=CSV.read_bytes()) == (
+        0,
+        b"",
+        b"",
+    )
     head, *rows = output.read_text().splitlines()
     assert head.startswith("segment,")
     assert [row.partition(",")[0] for row in rows] == ["1", "2", "total"]
@@ -128,10 +152,16 @@ def test_evaluate_writes_a_csv_table(here: Here, tmp_path: Path) -> None:
         (("-", "--input", "csv"), "q1,q2\n1,nan\n", "invalid-table"),
         (("-", "--input", "csv", "--robot", "r2d2"), CSV.read_bytes(), "unknown-robot"),
         (("-", "--input", "csv", "--sample-period", "nan"), CSV.read_bytes(), "invalid-request"),
-        (("-", "--input", "csv", "--units", "deg"), CSV.read_bytes(), "invalid-request"),  # no time_per_segment
+        (
+            ("-", "--input", "csv", "--units", "deg"),
+            CSV.read_bytes(),
+            "invalid-request",
+        ),  # no time_per_segment
     ],
 )
-def test_an_invalid_motion_is_a_problem(here: Here, arguments: tuple[str, ...], stdin: str | bytes, kind: str) -> None:
+def test_an_invalid_motion_is_a_problem(
+    here: Here, arguments: tuple[str, ...], stdin: str | bytes, kind: str
+) -> None:
     code, content = here.problem("evaluate", *arguments, stdin=stdin)
     assert (code, content["type"]) == (2, f"/problems/{kind}")
 
@@ -160,7 +190,18 @@ def test_robots_are_listed_with_their_trust() -> None:
 
 
 @pytest.mark.parametrize(
-    "command", ["", "serve", "optimize", "cycle", "evaluate", "replay", "robots", "robots add", "robots remove"]
+    "command",
+    [
+        "",
+        "serve",
+        "optimize",
+        "cycle",
+        "evaluate",
+        "replay",
+        "robots",
+        "robots add",
+        "robots remove",
+    ],
 )
 def test_every_help_has_an_example(here: Here, command: str) -> None:
     code, out, _ = here.run(*command.split(), "--help")
@@ -168,7 +209,9 @@ def test_every_help_has_an_example(here: Here, command: str) -> None:
     text = out.decode()
     assert re.search(rf"Examples?:\n\s+(echo .*\n.*)?(\S.*)?joulepath {command}", text)
     if not command:
-        assert all(re.search(rf"^\s+{code}  \S", text, re.MULTILINE) for code in (0, 1, 2, 130, 141))
+        assert all(
+            re.search(rf"^\s+{code}  \S", text, re.MULTILINE) for code in (0, 1, 2, 130, 141)
+        )
 
 
 def test_serve_takes_host_and_port(here: Here, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,9 @@ import pytest
 from tests.app.cli.console import ROOT as PROJECT
 from tests.app.cli.console import Here
 
-ANSWER = json.loads((PROJECT / "examples" / "export" / "urscript" / "slow_run.json").read_text())["answer"]
+ANSWER = json.loads((PROJECT / "examples" / "export" / "urscript" / "slow_run.json").read_text())[
+    "answer"
+]
 
 
 @pytest.fixture
@@ -20,12 +22,27 @@ def answer(tmp_path: Path) -> str:
     return str(file)
 
 
-def test_a_motion_is_written_with_the_options_of_its_format(here: Here, answer: str, tmp_path: Path) -> None:
+def test_a_motion_is_written_with_the_options_of_its_format(
+    here: Here, answer: str, tmp_path: Path
+) -> None:
     output = tmp_path / "slow.script"
-    options = ("--speed-scale", "0.1", "--set", "form=points", "--set", "rate=125", "--output", str(output))
+    options = (
+        "--speed-scale",
+        "0.1",
+        "--set",
+        "form=points",
+        "--set",
+        "rate=125",
+        "--output",
+        str(output),
+    )
     assert here.run("export", "urscript", answer, *options)[0] == 0
     text = output.read_text()
-    assert "slowed down to 0.1 of its speed" in text and "t=0.008" in text and "jp_piece(0.0" not in text
+    assert (
+        "slowed down to 0.1 of its speed" in text
+        and "t=0.008" in text
+        and "jp_piece(0.0" not in text
+    )
 
 
 def test_an_altered_answer_is_a_problem_and_wrong_usage_is_told(here: Here, answer: str) -> None:
@@ -34,10 +51,20 @@ def test_an_altered_answer_is_a_problem_and_wrong_usage_is_told(here: Here, answ
     assert (code, content["type"]) == (1, "/problems/not-certified")
     code, content = here.problem("export", "csv", "-", stdin="")
     assert (code, content["type"]) == (2, "/problems/invalid-request")
-    code, content = here.problem("export", "csv", "-", stdin=json.dumps({"robot": "ur5e", "legs": []}))
+    code, content = here.problem(
+        "export", "csv", "-", stdin=json.dumps({"robot": "ur5e", "legs": []})
+    )
     assert (code, content["type"]) == (2, "/problems/invalid-request")
-    leg = {"kind": "move", "start": {"stop": "a"}, "goal": {"stop": "b"}, "duration": 1.0, "answer": "/answers/none"}
-    code, content = here.problem("export", "csv", "-", stdin=json.dumps({"robot": "ur5e", "legs": [leg]}))
+    leg = {
+        "kind": "move",
+        "start": {"stop": "a"},
+        "goal": {"stop": "b"},
+        "duration": 1.0,
+        "answer": "/answers/none",
+    }
+    code, content = here.problem(
+        "export", "csv", "-", stdin=json.dumps({"robot": "ur5e", "legs": [leg]})
+    )
     assert (code, content["type"]) == (1, "/problems/unknown-answer")
     for wrong in (("--set", "form"), ("--speed-scale", "x")):
         assert here.run("export", "urscript", answer, *wrong)[0] == 2

@@ -33,7 +33,9 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 
 def test_logs_become_figures(here: Here, logs: list[str], tmp_path: Path) -> None:
     output = tmp_path / "figures.json"
-    code, _, told = here.run("identify", logs[0], "--validate", logs[1], "--payload", "0", "-o", str(output))
+    code, _, told = here.run(
+        "identify", logs[0], "--validate", logs[1], "--payload", "0", "-o", str(output)
+    )
     assert code == 0
     result = IdentificationResult.model_validate_json(output.read_bytes())
     assert result.validation.moves == 3
@@ -43,27 +45,51 @@ def test_logs_become_figures(here: Here, logs: list[str], tmp_path: Path) -> Non
 
 def test_what_is_found_can_be_chosen(here: Here, logs: list[str], tmp_path: Path) -> None:
     output = tmp_path / "figures.json"
-    chosen = ("--fit", "torque_constant", "--fit", "friction", "--term", "coulomb", "--term", "viscous")
+    chosen = (
+        "--fit",
+        "torque_constant",
+        "--fit",
+        "friction",
+        "--term",
+        "coulomb",
+        "--term",
+        "viscous",
+    )
     assert here.run("identify", logs[0], *chosen, "--payload", "0", "-o", str(output))[0] == 0
     result = IdentificationResult.model_validate_json(output.read_bytes())
     found = {each.figure for each in result.parameters}
     # the log has power, which is added by itself
-    assert found == {"torque_constant", "coulomb", "viscous", "idle_power", "copper", "inverter_linear"}
+    assert found == {
+        "torque_constant",
+        "coulomb",
+        "viscous",
+        "idle_power",
+        "copper",
+        "inverter_linear",
+    }
 
 
 def test_a_payload_is_that_of_the_last_log(here: Here, tmp_path: Path) -> None:
     files = list[str]()
-    for name, carried in (("empty", None), ("loaded", Payload(mass=2.0, com=np.array([0.0, 0.0, 0.06])))):
+    for name, carried in (
+        ("empty", None),
+        ("loaded", Payload(mass=2.0, com=np.array([0.0, 0.0, 0.06]))),
+    ):
         file = tmp_path / f"{name}.csv"
         truth = truth_of(ROBOT, payload=carried)
         file.write_bytes(csv_of(recorded(ROBOT, truth, moves=8, seed=len(name)), without="P"))
         files.append(str(file))
     output = tmp_path / "figures.json"
-    assert here.run("identify", *files, "--fit", "payload", "--payload", "0", "-o", str(output))[0] == 0
+    assert (
+        here.run("identify", *files, "--fit", "payload", "--payload", "0", "-o", str(output))[0]
+        == 0
+    )
     payload = IdentificationResult.model_validate_json(output.read_bytes()).payload
     assert payload is not None and payload.log == 1
     assert abs(payload.mass - 2.0) <= 4 * payload.mass_sd < 0.2
-    assert summary_of(json.loads(output.read_bytes()))["payload"].startswith(f"{payload.mass:.3g} kg")
+    assert summary_of(json.loads(output.read_bytes()))["payload"].startswith(
+        f"{payload.mass:.3g} kg"
+    )
 
 
 def test_power_is_refused_of_logs_without(here: Here, tmp_path: Path) -> None:
@@ -82,7 +108,9 @@ def test_a_method_is_asked_for_by_its_name(here: Here, logs: list[str], tmp_path
     assert any("·" in each.figure for each in result.parameters)
     assert result.physical is None and result.structure.excited == result.structure.base
     assert "inertials" not in result.document
-    code, content = here.problem(*command, "--method", "periodic", "--period", "5", "--validate", logs[1])
+    code, content = here.problem(
+        *command, "--method", "periodic", "--period", "5", "--validate", logs[1]
+    )
     assert code == 1
     assert checked(MethodNotApplicable, content).method == "periodic"
 

@@ -12,7 +12,9 @@ from joulepath.app.access.key_ring import KeyRing
 from tests.app.cli.console import ROOT, Here
 
 
-def test_a_key_is_made_listed_and_removed(here: Here, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_key_is_made_listed_and_removed(
+    here: Here, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     file = tmp_path / "keys.yaml"
     code, out, err = here.run("keys", "add", "press", "--role", "read", "--file", str(file))
     secret = out.decode().strip()
@@ -57,7 +59,16 @@ def test_what_is_refused(arguments: tuple[str, ...], word: str, here: Here, tmp_
 
 def test_where_the_package_is_not_installed(tmp_path: Path) -> None:
     """As in the image and in `deploy/compose.yaml`."""
-    command = [sys.executable, "-m", "joulepath.app.cli", "keys", "add", "press", "--file", tmp_path / "keys.yaml"]
+    command = [
+        sys.executable,
+        "-m",
+        "joulepath.app.cli",
+        "keys",
+        "add",
+        "press",
+        "--file",
+        tmp_path / "keys.yaml",
+    ]
     made = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     assert KeyRing(tmp_path / "keys.yaml").find(made.stdout.strip())
 

@@ -19,7 +19,10 @@ def test_a_robot_is_added_used_and_removed(here: Here, tmp_path: Path) -> None:
     code, out, err = here.run("robots", "add", str(file))
     first, warning = out.decode().splitlines()
     assert (code, err) == (0, b"")
-    assert first.startswith("cell_arm: 2 joints. Energies rest on") and "drives.rotor_inertia" in warning
+    assert (
+        first.startswith("cell_arm: 2 joints. Energies rest on")
+        and "drives.rotor_inertia" in warning
+    )
     code, problem = here.problem("robots", "add", str(file))
     assert (code, problem["type"]) == (1, "/problems/robot-exists")
     assert here.run("robots", "add", str(file), "--replace")[0] == 0
@@ -43,7 +46,13 @@ def test_what_makes_no_robot(here: Here, tmp_path: Path) -> None:
     (error,) = problem["errors"]
     assert code == 2 and error["loc"] == ["body", "tip"] and "no link 'hand'" in error["msg"]
     problem = here.problem("robots", "remove", "ur5e")[1]
-    assert problem["type"] == "/problems/robot-exists" and "neither replaced nor deleted" in problem["detail"]
+    assert (
+        problem["type"] == "/problems/robot-exists"
+        and "neither replaced nor deleted" in problem["detail"]
+    )
     # only what was added can be removed
     problem = here.problem("robots", "remove", "arm_2")[1]
-    assert (problem["known"], problem["detail"]) == ([], "There is no robot of that name: none has been added.")
+    assert (problem["known"], problem["detail"]) == (
+        [],
+        "There is no robot of that name: none has been added.",
+    )

@@ -38,7 +38,9 @@ def test_a_reader_that_has_gone_leaves_no_traceback() -> None:
 
 def test_a_broken_connection_later_on_is_an_error_like_any_other(here: Here) -> None:
     assert here.run("robots")[0] == 0
-    assert signal.getsignal(signal.SIGPIPE) == signal.SIG_IGN  # Python's own choice: a write raises BrokenPipeError
+    assert (
+        signal.getsignal(signal.SIGPIPE) == signal.SIG_IGN
+    )  # Python's own choice: a write raises BrokenPipeError
 
 
 def test_an_interrupt_that_is_dropped_is_raised_again(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -47,7 +49,9 @@ def test_an_interrupt_that_is_dropped_is_raised_again(monkeypatch: pytest.Monkey
             dropped.append(os.getpid())
             os.kill(os.getpid(), signal.SIGINT)
 
-    monkeypatch.setattr(sys, "unraisablehook", lambda _: None)  # it would report what this test expects
+    monkeypatch.setattr(
+        sys, "unraisablehook", lambda _: None
+    )  # it would report what this test expects
     dropped: list[int] = []
     one = [Drops()]
 

@@ -1,4 +1,6 @@
-"""A cluster in this process: results, errors, progress, cancelled work, machines and schedulers that go."""
+"""A cluster in this process: results, errors, progress, cancelled work, machines and schedulers
+that go.
+"""
 
 from __future__ import annotations
 
@@ -44,16 +46,27 @@ async def until(condition: Callable[[], bool]) -> None:
 
 def machine(scheduler: Scheduler, workers: int = 1) -> Worker:
     return Worker(
-        scheduler.address, nthreads=workers, memory_limit=0, preload=["joulepath.app.cluster"], dashboard=False
+        scheduler.address,
+        nthreads=workers,
+        memory_limit=0,
+        preload=["joulepath.app.cluster"],
+        dashboard=False,
     )
 
 
-def with_cluster(test: Callable[[Cluster, Scheduler], Awaitable[None]], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Runs a test against a cluster of one machine with one worker, which is not warm for any robot."""
+def with_cluster(
+    test: Callable[[Cluster, Scheduler], Awaitable[None]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Runs a test against a cluster of one machine with one worker, which is not warm for any
+    robot.
+    """
     monkeypatch.setenv("JOULEPATH_ROBOTS", "")
 
     async def run() -> None:
-        async with Scheduler(host="127.0.0.1", port=0, dashboard=False) as scheduler, machine(scheduler):
+        async with (
+            Scheduler(host="127.0.0.1", port=0, dashboard=False) as scheduler,
+            machine(scheduler),
+        ):
             cluster = Cluster(scheduler.address)
             cluster.start()
             try:
@@ -99,7 +112,9 @@ def test_results_errors_and_what_is_found_come_back(monkeypatch: pytest.MonkeyPa
     with_cluster(test, monkeypatch)
 
 
-def test_a_cancel_kills_what_runs_and_what_waits_never_begins(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_cancel_kills_what_runs_and_what_waits_never_begins(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     """Dask itself lets a task that runs go on to its end."""
 
     async def test(cluster: Cluster, _: Scheduler) -> None:
@@ -117,7 +132,9 @@ def test_a_cancel_kills_what_runs_and_what_waits_never_begins(monkeypatch: pytes
     with_cluster(test, monkeypatch)
 
 
-def test_what_a_service_leaves_behind_is_stopped(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_what_a_service_leaves_behind_is_stopped(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     async def test(cluster: Cluster, scheduler: Scheduler) -> None:
         other = Cluster(scheduler.address)
         other.start()
@@ -135,7 +152,9 @@ def test_what_a_service_leaves_behind_is_stopped(monkeypatch: pytest.MonkeyPatch
     with_cluster(test, monkeypatch)
 
 
-def test_work_of_a_machine_that_stops_is_done_elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_work_of_a_machine_that_stops_is_done_elsewhere(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     async def test(cluster: Cluster, scheduler: Scheduler) -> None:
         process = await start(cluster, ProcessId())
         running = start(cluster, hold(tmp_path / "runs"))
@@ -154,7 +173,9 @@ def test_work_of_a_machine_that_stops_is_done_elsewhere(monkeypatch: pytest.Monk
     with_cluster(test, monkeypatch)
 
 
-def test_a_scheduler_that_goes_and_comes_back(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_scheduler_that_goes_and_comes_back(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     async def test(cluster: Cluster, scheduler: Scheduler) -> None:
         running = start(cluster, hold(tmp_path / "runs"))
         await until((tmp_path / "runs" / "started").exists)
@@ -188,7 +209,9 @@ def short(task: Task, ended: list[Ended]) -> Work:
 
 
 def test_short_works_go_together(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One that dies takes none of the others with it, and what each finds gets to those who listen to it."""
+    """One that dies takes none of the others with it, and what each finds gets to those who listen
+    to it.
+    """
 
     async def test(cluster: Cluster, scheduler: Scheduler) -> None:
         ended, told = list[Ended](), list[Event]()
@@ -208,13 +231,17 @@ def test_short_works_go_together(monkeypatch: pytest.MonkeyPatch) -> None:
     with_cluster(test, monkeypatch)
 
 
-def test_those_whose_machine_died_are_tried_one_by_one(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_those_whose_machine_died_are_tried_one_by_one(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     """One of them may be what machines die of."""
 
     async def test(cluster: Cluster, scheduler: Scheduler) -> None:
         ended = list[Ended]()
         (first,) = cluster.workers
-        running = asyncio.create_task(cluster.run(taking(short(hold(tmp_path), ended), short(ProcessId(), ended))))
+        running = asyncio.create_task(
+            cluster.run(taking(short(hold(tmp_path), ended), short(ProcessId(), ended)))
+        )
         await until((tmp_path / "started").exists)
         async with machine(scheduler):
             (tmp_path / "started").unlink()
@@ -229,18 +256,32 @@ def test_those_whose_machine_died_are_tried_one_by_one(monkeypatch: pytest.Monke
 
 
 @contextmanager
-def scheduler_process(folder: Path, **environment: str) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
-    """A scheduler as a process of its own, with the package that is in a folder, or none; and its address."""
+def scheduler_process(
+    folder: Path, **environment: str
+) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
+    """A scheduler as a process of its own, with the package that is in a folder, or none; and its
+    address.
+    """
     if not (folder / "joulepath").exists() and "PYTHONPATH" not in environment:
         # the one that is installed is hidden
         (folder / "joulepath.py").write_text("raise ImportError('there is none')\n")
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    command = ["-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
+    command = [
+        "-m",
+        "distributed.cli.dask_scheduler",
+        "--host",
+        "127.0.0.1",
+        "--port",
+        str(port),
+        "--no-dashboard",
+    ]
     others = os.environ | {"PYTHONPATH": str(folder)} | environment
     with (folder / "scheduler.log").open("ab") as log:
-        process = subprocess.Popen([sys.executable, *command], cwd=folder, env=others, stdout=log, stderr=log)
+        process = subprocess.Popen(
+            [sys.executable, *command], cwd=folder, env=others, stdout=log, stderr=log
+        )
     try:
         yield process, f"tcp://127.0.0.1:{port}"
     finally:
@@ -252,7 +293,9 @@ async def refused_by(cluster: Cluster, caplog: pytest.LogCaptureFixture, reason:
     """Until the log has the reason why nothing is sent to the cluster, which it says once."""
 
     def told() -> list[str]:
-        records = [record for record in caplog.records if record.name == "joulepath.app.cluster.link"]
+        records = [
+            record for record in caplog.records if record.name == "joulepath.app.cluster.link"
+        ]
         return [vars(record)["reason"] for record in records if "cannot be used" in record.message]
 
     await until(lambda: bool(told()))
@@ -269,7 +312,9 @@ async def refused_by(cluster: Cluster, caplog: pytest.LogCaptureFixture, reason:
 def other_version(folder: Path) -> None:
     """A copy of this package with one character more."""
     copy = folder / "joulepath"
-    shutil.copytree(ROOT / "joulepath", copy, ignore=shutil.ignore_patterns("static", "__pycache__"))
+    shutil.copytree(
+        ROOT / "joulepath", copy, ignore=shutil.ignore_patterns("static", "__pycache__")
+    )
     with (copy / "optimizer" / "deadline.py").open("a", encoding="utf-8") as file:
         file.write("#")
 
@@ -308,7 +353,9 @@ def test_a_machine_of_another_version_gets_nothing(
         async with machine(scheduler, workers=4) as other:
             await until(lambda: len(scheduler.workers) == 2)
             monkeypatch.undo()
-            await until(lambda: any("another version" in record.message for record in caplog.records))
+            await until(
+                lambda: any("another version" in record.message for record in caplog.records)
+            )
             assert cluster.slots == PER_PROCESS
             pids = await asyncio.gather(*(start(cluster, ProcessId()) for _ in range(6)))
             assert len(set(pids)) == 1
@@ -321,7 +368,9 @@ def test_a_machine_of_another_version_gets_nothing(
 
 
 @pytest.mark.long
-def test_a_scheduler_that_hangs_and_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_scheduler_that_hangs_and_goes_on(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     """Its connections stay open, and say nothing."""
     monkeypatch.setattr(link, "_PATIENCE", 1.0)
     monkeypatch.setenv("JOULEPATH_ROBOTS", "")
@@ -330,7 +379,13 @@ def test_a_scheduler_that_hangs_and_goes_on(monkeypatch: pytest.MonkeyPatch, tmp
         cluster = Cluster(address)
         cluster.start()
         try:
-            async with Worker(address, nthreads=1, memory_limit=0, preload=["joulepath.app.cluster"], dashboard=False):
+            async with Worker(
+                address,
+                nthreads=1,
+                memory_limit=0,
+                preload=["joulepath.app.cluster"],
+                dashboard=False,
+            ):
                 await until(lambda: cluster.slots == PER_PROCESS)
                 running = start(cluster, hold(tmp_path / "runs"))
                 await until((tmp_path / "runs" / "started").exists)

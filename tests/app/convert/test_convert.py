@@ -18,7 +18,13 @@ from tests.app.requests import move
 
 # of a rotation computed in double precision in two ways
 ROUNDING = 1e-14
-ANGLES = [[0.0, 0.0, 0.0], [0.3, -0.8, 2.1], [np.pi, 0.0, 0.0], [1e-12, 0.0, 1e-9], [-3.0, 1.5707963, 7.0]]
+ANGLES = [
+    [0.0, 0.0, 0.0],
+    [0.3, -0.8, 2.1],
+    [np.pi, 0.0, 0.0],
+    [1e-12, 0.0, 1e-9],
+    [-3.0, 1.5707963, 7.0],
+]
 
 
 def matrix(**pose: Any) -> np.ndarray:
@@ -41,13 +47,17 @@ def problem(**fields: Any) -> Any:
         ({"duration": {"max": 2.0}, "objective": "mechanical"}, (None, 2.0)),
     ],
 )
-def test_durations_are_bounded(fields: dict[str, Any], expected: tuple[float | None, float | None]) -> None:
+def test_durations_are_bounded(
+    fields: dict[str, Any], expected: tuple[float | None, float | None]
+) -> None:
     converted = problem(**fields)
     assert (converted.duration_min, converted.duration_max) == expected
 
 
 def test_one_number_holds_for_every_joint() -> None:
-    limits = problem(limits={"velocity": 2, "position": {"lower": -3, "upper": [3, 3, 2, 3, 3, 3]}}).arm.active_limits
+    limits = problem(
+        limits={"velocity": 2, "position": {"lower": -3, "upper": [3, 3, 2, 3, 3, 3]}}
+    ).arm.active_limits
     robot = load_robot("ur5e").limits
     assert limits.v_max.tolist() == [2.0] * 6
     assert limits.q_min.tolist() == [-3.0] * 6
@@ -61,6 +71,11 @@ def test_limits_must_fit_the_robot() -> None:
 
 
 def test_payload_inertia_is_symmetric() -> None:
-    payload = problem(payload={"mass": 1, "com": [0, 0, 0.1], "inertia": [3, 0.1, 0.2, 4, 0.3, 5]}).arm.payload
+    payload = problem(
+        payload={"mass": 1, "com": [0, 0, 0.1], "inertia": [3, 0.1, 0.2, 4, 0.3, 5]}
+    ).arm.payload
     assert payload.inertia.tolist() == [[3, 0.1, 0.2], [0.1, 4, 0.3], [0.2, 0.3, 5]]
-    assert problem(payload={"mass": 1, "com": [0, 0, 0.1]}).arm.payload.inertia.tolist() == np.zeros((3, 3)).tolist()
+    assert (
+        problem(payload={"mass": 1, "com": [0, 0, 0.1]}).arm.payload.inertia.tolist()
+        == np.zeros((3, 3)).tolist()
+    )

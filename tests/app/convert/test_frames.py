@@ -39,7 +39,8 @@ def third_party() -> str:
 
 
 def in_ros(position: list[float]) -> dict[str, Any]:
-    """A pose in `base_link` whose TCP is at `position` of `base`, turned as QUATERNION says there."""
+    """A pose in `base_link` whose TCP is at `position` of `base`, turned as QUATERNION says
+    there."""
     x, y, z = position
     turned = pin.Quaternion(np.array(QUATERNION)).matrix()
     back = pin.Quaternion(HALF_TURN[:3, :3] @ turned)
@@ -55,7 +56,9 @@ def test_base_and_base_link_of_the_ur5e_are_those_of_a_description_that_others_w
     data, ours = model.createData(), load_robot("ur5e")
     for q in np.random.default_rng(4).uniform(-3, 3, (20, 6)):
         pin.framesForwardKinematics(model, data, q)
-        base, base_link, tool = (data.oMf[model.getFrameId(name)] for name in ("base", "base_link", "tool0"))
+        base, base_link, tool = (
+            data.oMf[model.getFrameId(name)] for name in ("base", "base_link", "tool0")
+        )
         assert np.abs(base.actInv(base_link).homogeneous - ours.T_base_base_link).max() < CHAIN
         flange = tcp_pose(Arm(robot=ours), q)
         assert np.abs(base.actInv(tool).homogeneous - flange).max() < CHAIN
@@ -63,13 +66,20 @@ def test_base_and_base_link_of_the_ur5e_are_those_of_a_description_that_others_w
 
 def test_an_own_arm_has_the_base_link_of_its_description() -> None:
     description = Description(urdf=third_party(), tip="tool0", acceleration=8.0, payload=2.0)
-    rooted, based = robot(description), robot(Description(**{**vars(description), "base": "base_link_inertia"}))
+    rooted, based = (
+        robot(description),
+        robot(Description(**{**vars(description), "base": "base_link_inertia"})),
+    )
     assert np.array_equal(rooted.T_base_base_link, np.eye(4))
     assert np.abs(based.T_base_base_link - HALF_TURN).max() < CHAIN
 
 
 def test_only_robots_of_universal_robots_turn_it() -> None:
-    turned = {name for name in robot_names() if not np.array_equal(load_robot(name).T_base_base_link, np.eye(4))}
+    turned = {
+        name
+        for name in robot_names()
+        if not np.array_equal(load_robot(name).T_base_base_link, np.eye(4))
+    }
     assert turned == {name for name in robot_names() if name.startswith("ur")}
     for name in turned:
         assert np.abs(load_robot(name).T_base_base_link - HALF_TURN).max() < EXACT
@@ -100,11 +110,15 @@ def poses_of(target: object) -> list[Array]:
             {
                 "position": [-0.4, 0.2, 0.3],
                 "frame": "base_link",
-                "orientation": {"cone": {"axis": [0, 0, 1], "direction": [1, 0, -1], "half_angle": 0.3}},
+                "orientation": {
+                    "cone": {"axis": [0, 0, 1], "direction": [1, 0, -1], "half_angle": 0.3}
+                },
             },
             {
                 "position": [0.4, -0.2, 0.3],
-                "orientation": {"cone": {"axis": [0, 0, 1], "direction": [-1, 0, -1], "half_angle": 0.3}},
+                "orientation": {
+                    "cone": {"axis": [0, 0, 1], "direction": [-1, 0, -1], "half_angle": 0.3}
+                },
             },
         ),
         (
@@ -113,14 +127,19 @@ def poses_of(target: object) -> list[Array]:
                 "frame": "base_link",
                 "orientation": {"free_about": [0, 0, 1], "rpy": [0.3, 1.2, np.pi]},
             },
-            {"position": [0.4, -0.2, 0.3], "orientation": {"free_about": [0, 0, 1], "rpy": [0.3, 1.2, 0.0]}},
+            {
+                "position": [0.4, -0.2, 0.3],
+                "orientation": {"free_about": [0, 0, 1], "rpy": [0.3, 1.2, 0.0]},
+            },
         ),
     ],
     ids=["quaternion", "rotvec", "free", "cone", "free about"],
 )
 def test_a_target_in_either_frame_is_the_same(ros: dict[str, Any], base: dict[str, Any]) -> None:
     first, second = (
-        to_problem(OptimizeRequest.model_validate({"start": {"q": [0.0] * 6}, "goal": goal}), 10.0).goal
+        to_problem(
+            OptimizeRequest.model_validate({"start": {"q": [0.0] * 6}, "goal": goal}), 10.0
+        ).goal
         for goal in ({"any_of": [{"pose": ros}]}, {"any_of": [{"pose": base}]})
     )
     for mine, other in zip(poses_of(first), poses_of(second), strict=True):
@@ -136,7 +155,10 @@ def test_obstacles_path_tool_cone_and_lines_follow_their_frames() -> None:
         to_problem(OptimizeRequest.model_validate(request | each), 10.0)
         for each in (
             {
-                "scene": {"frame": "base_link", "obstacles": [shape | {"pose": _bare(in_ros(via))}]},
+                "scene": {
+                    "frame": "base_link",
+                    "obstacles": [shape | {"pose": _bare(in_ros(via))}],
+                },
                 "path": {"via": [in_ros(via)], "blend": 0.01},
                 "tool_cone": cone | {"direction": [1, 2, 3], "frame": "base_link"},
             },
@@ -147,7 +169,12 @@ def test_obstacles_path_tool_cone_and_lines_follow_their_frames() -> None:
             },
         )
     )
-    assert ros.tool_path is not None and base.tool_path is not None and ros.arm.tool_cone and base.arm.tool_cone
+    assert (
+        ros.tool_path is not None
+        and base.tool_path is not None
+        and ros.arm.tool_cone
+        and base.arm.tool_cone
+    )
     pairs = (
         (ros.arm.scene.obstacles[0].T_base_shape, base.arm.scene.obstacles[0].T_base_shape),
         (ros.tool_path.via[0].T, base.tool_path.via[0].T),
@@ -156,15 +183,29 @@ def test_obstacles_path_tool_cone_and_lines_follow_their_frames() -> None:
     for mine, other in pairs:
         assert np.abs(mine - other).max() < 4 * EXACT
 
-    cell = {"pose": in_base(via), "scene": {"frame": "base_link", "obstacles": [shape | {"pose": _bare(in_ros(via))}]}}
+    cell = {
+        "pose": in_base(via),
+        "scene": {"frame": "base_link", "obstacles": [shape | {"pose": _bare(in_ros(via))}]},
+    }
     arm = to_ik_arm(IKRequest.model_validate(cell), load_robot("ur5e"))
-    assert np.abs(arm.scene.obstacles[0].T_base_shape - base.arm.scene.obstacles[0].T_base_shape).max() < 4 * EXACT
+    assert (
+        np.abs(arm.scene.obstacles[0].T_base_shape - base.arm.scene.obstacles[0].T_base_shape).max()
+        < 4 * EXACT
+    )
 
     stops = [
-        {"target": {"pose": in_ros(via)}, "approach": {"direction": [1, 2, 3], "frame": "base_link", "distance": 0.1}},
-        {"target": {"pose": in_base(via)}, "approach": {"direction": [-1, -2, 3], "frame": "base", "distance": 0.1}},
+        {
+            "target": {"pose": in_ros(via)},
+            "approach": {"direction": [1, 2, 3], "frame": "base_link", "distance": 0.1},
+        },
+        {
+            "target": {"pose": in_base(via)},
+            "approach": {"direction": [-1, -2, 3], "frame": "base", "distance": 0.1},
+        },
     ]
-    stopping = to_cycle(CycleRequest.model_validate({"start": {"q": [0.0] * 6}, "stops": stops}), 10.0).stops
+    stopping = to_cycle(
+        CycleRequest.model_validate({"start": {"q": [0.0] * 6}, "stops": stops}), 10.0
+    ).stops
     first, second = (stop.approach for stop in stopping)
     assert first is not None and second is not None
     assert first.frame == second.frame == "base"
@@ -206,4 +247,7 @@ def test_another_frame_is_refused_by_name(client: TestClient, where: str) -> Non
     part["frame"] = "world"
     answer = client.post("/optimize", json=body)
     assert answer.status_code == 422
-    assert any(error["loc"][-1] == "frame" and "base_link" in error["msg"] for error in answer.json()["errors"])
+    assert any(
+        error["loc"][-1] == "frame" and "base_link" in error["msg"]
+        for error in answer.json()["errors"]
+    )

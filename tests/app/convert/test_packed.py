@@ -7,10 +7,18 @@ import pytest
 
 from joulepath.app.convert.packed import packed, unpacked
 
-DOCUMENTS = [b"", b"{}", b'{"q":[1.5707963267948966,-0.0]}' * 1000, zlib.compress(b"x" * 99), packed(b"x" * 99)]
+DOCUMENTS = [
+    b"",
+    b"{}",
+    b'{"q":[1.5707963267948966,-0.0]}' * 1000,
+    zlib.compress(b"x" * 99),
+    packed(b"x" * 99),
+]
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=["empty", "short", "long", "compressed", "packed"])
+@pytest.mark.parametrize(
+    "document", DOCUMENTS, ids=["empty", "short", "long", "compressed", "packed"]
+)
 @pytest.mark.parametrize("keep", [packed, zlib.compress], ids=["now", "earlier"])
 def test_what_is_kept_comes_back(document: bytes, keep: Callable[[bytes], bytes]) -> None:
     assert unpacked(keep(document)) == document

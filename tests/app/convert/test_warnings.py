@@ -14,7 +14,9 @@ def solution(complete: bool, names: list[str]) -> Any:
     """As much of a solution as the warnings read."""
     baselines = [SimpleNamespace(name=name) for name in names]
     certificate = SimpleNamespace(close_pass=None)
-    return SimpleNamespace(complete=complete, baselines=baselines, certificate=certificate, unmodelled=[])
+    return SimpleNamespace(
+        complete=complete, baselines=baselines, certificate=certificate, unmodelled=[]
+    )
 
 
 @pytest.mark.parametrize(

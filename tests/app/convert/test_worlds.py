@@ -36,7 +36,9 @@ def shape_of(**fields: Any) -> Any:
 
 def bits_of(occupied: Any) -> str:
     """Base64 of an occupancy grid (nx, ny, nz) as the contract describes it."""
-    return base64_of(np.packbits(np.asarray(occupied, dtype=bool).ravel(order="F"), bitorder="little").tobytes())
+    return base64_of(
+        np.packbits(np.asarray(occupied, dtype=bool).ravel(order="F"), bitorder="little").tobytes()
+    )
 
 
 def torus() -> Any:
@@ -61,7 +63,9 @@ def test_points() -> None:
 def test_voxels_by_cells_and_by_bits_are_the_same() -> None:
     grid = np.random.default_rng(1).random((5, 3, 4)) < 0.3
     cells = shape_of(shape="voxels", size=0.05, cells=np.argwhere(grid).tolist())
-    bits = shape_of(shape="voxels", size=0.05, bits={"dimensions": [5, 3, 4], "data": bits_of(grid)})
+    bits = shape_of(
+        shape="voxels", size=0.05, bits={"dimensions": [5, 3, 4], "data": bits_of(grid)}
+    )
     assert isinstance(cells, Voxels) and isinstance(bits, Voxels)
     assert cells.cells.tolist() == bits.cells.tolist() == np.argwhere(grid).tolist()
 
@@ -72,7 +76,9 @@ def test_a_mesh_file_keeps_every_triangle(format_: Any) -> None:
     found = mesh_from_file(format_, base64_of(torus().export(file_type=format_)), 0.5)
     assert found.is_closed and found.corners.shape == (256, 3, 3)
     ours, theirs = in_order(found.corners * 2), in_order(torus().triangles)
-    assert np.abs(ours - theirs).max() < 2e-5  # rounded to five digits, so that corners can be sorted
+    assert (
+        np.abs(ours - theirs).max() < 2e-5
+    )  # rounded to five digits, so that corners can be sorted
 
 
 def test_text_stl_and_a_scene_of_several_bodies() -> None:
@@ -81,7 +87,9 @@ def test_text_stl_and_a_scene_of_several_bodies() -> None:
     moved = torus().apply_translation([1.0, 0.0, 0.0])
     scene = trimesh.Scene([torus(), moved])
     both = mesh_from_file("glb", base64_of(scene.export(file_type="glb")), 1.0)
-    assert len(both.corners) == 512 and both.corners[..., 0].max() == pytest.approx(1.35, abs=SINGLE)
+    assert len(both.corners) == 512 and both.corners[..., 0].max() == pytest.approx(
+        1.35, abs=SINGLE
+    )
 
 
 def test_the_example_of_the_contract_is_a_tetrahedron() -> None:
@@ -96,13 +104,19 @@ def test_the_example_of_the_contract_is_a_tetrahedron() -> None:
 
 def glb(**fields: Any) -> bytes:
     """A GLB whose JSON part has these fields, without any data."""
-    text = json.dumps({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}]} | fields).encode()
+    text = json.dumps(
+        {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}]} | fields
+    ).encode()
     text += b" " * (-len(text) % 4)
     return struct.pack("<4sIIII", b"glTF", 2, 20 + len(text), len(text), 0x4E4F534A) + text
 
 
 ACCESSOR = {"componentType": 5126, "count": 2**31, "type": "VEC3"}
-BOMB = {"accessors": [ACCESSOR], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}], "nodes": [{"mesh": 0}]}
+BOMB = {
+    "accessors": [ACCESSOR],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+    "nodes": [{"mesh": 0}],
+}
 REPEATED = {"nodes": [{"children": [1, 1]}, {"children": [2, 2]}, {"children": [3, 3]}, {}]}
 ONE_BIT = {"dimensions": [1, 1, 1], "data": "AQ=="}
 WITH_NAN = "v nan 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 2 3 4\n"
@@ -150,10 +164,26 @@ def test_too_many_triangles_are_refused() -> None:
         ({"shape": "points", "points": [[200.0, 0.0, 0.0]], "radius": 0.1}, "points"),
         ({"shape": "voxels", "size": 0.1}, "cells"),
         ({"shape": "voxels", "size": 0.1, "cells": [[0, 0, 0]], "bits": ONE_BIT}, "cells"),
-        ({"shape": "voxels", "size": 0.1, "bits": {"dimensions": [1, 1, 1], "data": "AAAA"}}, "bits.data"),
-        ({"shape": "voxels", "size": 0.1, "bits": {"dimensions": [1, 1, 1], "data": "AAAAA"}}, "bits.data"),
-        ({"shape": "voxels", "size": 0.1, "bits": {"dimensions": [2, 2, 2], "data": "AA=="}}, "cells"),
-        ({"shape": "voxels", "size": 0.1, "bits": {"dimensions": [4096, 4096, 1], "data": "AA=="}}, "bits.dimensions"),
+        (
+            {"shape": "voxels", "size": 0.1, "bits": {"dimensions": [1, 1, 1], "data": "AAAA"}},
+            "bits.data",
+        ),
+        (
+            {"shape": "voxels", "size": 0.1, "bits": {"dimensions": [1, 1, 1], "data": "AAAAA"}},
+            "bits.data",
+        ),
+        (
+            {"shape": "voxels", "size": 0.1, "bits": {"dimensions": [2, 2, 2], "data": "AA=="}},
+            "cells",
+        ),
+        (
+            {
+                "shape": "voxels",
+                "size": 0.1,
+                "bits": {"dimensions": [4096, 4096, 1], "data": "AA=="},
+            },
+            "bits.dimensions",
+        ),
         ({"shape": "mesh_file", "format": "stl", "data": "AAAAA"}, "data"),
         ({"shape": "mesh_file", "format": "obj", "data": MESH_FILE}, "data"),
         ({"shape": "mesh_file", "format": "stl", "data": MESH_FILE, "scale": 1000.0}, "data"),
@@ -166,11 +196,15 @@ def test_bad_obstacles_name_the_field(fields: dict[str, Any], field: str) -> Non
 
 
 def test_all_cells_of_the_greatest_grid_fit() -> None:
-    """One occupied cell, the last one: the text of the bits is within the length that the contract allows."""
+    """One occupied cell, the last one: the text of the bits is within the length that the contract
+    allows.
+    """
     grid = np.zeros((256, 256, 128), dtype=bool)
     assert grid.size == MOST_CELLS
     grid[-1, -1, -1] = True
-    shape = shape_of(shape="voxels", size=0.01, bits={"dimensions": [256, 256, 128], "data": bits_of(grid)})
+    shape = shape_of(
+        shape="voxels", size=0.01, bits={"dimensions": [256, 256, 128], "data": bits_of(grid)}
+    )
     assert shape.cells.tolist() == [[255, 255, 127]]
 
 

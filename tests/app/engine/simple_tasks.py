@@ -1,4 +1,5 @@
-"""Tasks for the engine that optimise nothing. In a module of their own, because workers import it."""
+"""Tasks for the engine that optimise nothing. In a module of their own, because workers import
+it."""
 
 from __future__ import annotations
 
@@ -30,7 +31,9 @@ class ProcessId:
 
 @dataclass(frozen=True)
 class Hold:
-    """Keeps its worker busy, whatever the deadline, until the file `released` is in the folder; then its process id."""
+    """Keeps its worker busy, whatever the deadline, until the file `released` is in the folder;
+    then its process id.
+    """
 
     folder: Path
     request_id: str = "hold"
@@ -98,7 +101,8 @@ class TimeLeft:
 
 @dataclass(frozen=True)
 class Die:
-    """Ends its worker as a crash in native code does; it notes that in the folder, if there is one."""
+    """Ends its worker as a crash in native code does; it notes that in the folder, if there is
+    one."""
 
     folder: Path | None = None
     request_id: str = "die"

@@ -1,4 +1,5 @@
-"""Clients take turns, have their share, and give back what others need. The tests move the clock."""
+"""Clients take turns, have their share, and give back what others need. The tests move the
+clock."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""The engine by itself: queue, deadlines, cancellation, errors, crashes, shutdown. The tests move its clock."""
+"""The engine by itself: queue, deadlines, cancellation, errors, crashes, shutdown. The tests move
+its clock.
+"""
 
 from __future__ import annotations
 
@@ -22,12 +24,21 @@ from joulepath.app.exceptions.queue import Busy, ShuttingDown
 from joulepath.app.settings import Settings
 from joulepath.optimizer.exceptions import DeadlineExceeded, OutsideLimits
 from joulepath.optimizer.progress import CandidatesFound, Event
-from tests.app.engine.simple_tasks import Count, Fail, Hold, ProcessId, TimeLeft, failing_warm_up, no_warm_up
+from tests.app.engine.simple_tasks import (
+    Count,
+    Fail,
+    Hold,
+    ProcessId,
+    TimeLeft,
+    failing_warm_up,
+    no_warm_up,
+)
 from tests.app.live import alive
 
 # What a busy machine may take for anything below [s]; no test waits for it to pass.
 PATIENCE = 120.0
-# A deadline, and two graces, that a busy machine does not reach by itself [s]; the tests move the clock beyond them.
+# A deadline, and two graces, that a busy machine does not reach by itself [s]; the tests move the
+# clock beyond them.
 LONG, DEADLINE_GRACE, SHUTDOWN_GRACE = 1000.0, 300.0, 500.0
 
 
@@ -70,7 +81,10 @@ class Bench:
 
 
 def with_engine(
-    folder: Path, test: Callable[[Bench], Awaitable[None]], warm: Callable[[], None] = no_warm_up, **given: Any
+    folder: Path,
+    test: Callable[[Bench], Awaitable[None]],
+    warm: Callable[[], None] = no_warm_up,
+    **given: Any,
 ) -> None:
     """Runs a test against an engine, which is ready unless it cannot warm up."""
     graces = {"deadline_grace": DEADLINE_GRACE, "shutdown_grace": SHUTDOWN_GRACE}
@@ -200,7 +214,9 @@ def test_errors_of_a_task_reach_its_caller_with_their_data(tmp_path: Path) -> No
     with_engine(tmp_path, test)
 
 
-def test_an_unforeseen_error_is_logged_with_the_requests_id(caplog: pytest.LogCaptureFixture) -> None:
+def test_an_unforeseen_error_is_logged_with_the_requests_id(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     failed = outcome(Fail(ZeroDivisionError("caller-secret"), request_id="the-id"), LONG)
     assert isinstance(failed, InternalError)
     assert "caller-secret" not in str(failed)
@@ -249,7 +265,9 @@ def test_drain_lets_short_tasks_finish_and_refuses_the_rest(tmp_path: Path) -> N
     with_engine(tmp_path, test, workers=2)
 
 
-def test_is_not_ready_without_a_warm_worker(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_is_not_ready_without_a_warm_worker(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     async def test(bench: Bench) -> None:
         await until(lambda: "worker did not start" in caplog.messages)
         assert not bench.engine.ready

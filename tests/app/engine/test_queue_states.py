@@ -1,6 +1,8 @@
-"""The queue in any order of events: it loses no worker, keeps nobody waiting beside an idle one, and confuses nobody.
+"""The queue in any order of events: it loses no worker, keeps nobody waiting beside an idle one,
+and confuses nobody.
 
-Events come in the same turn of the event loop or in different ones. No time passes but what a step lets pass.
+Events come in the same turn of the event loop or in different ones. No time passes but what a step
+lets pass.
 """
 
 from __future__ import annotations
@@ -13,7 +15,13 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule, run_state_machine_as_test
+from hypothesis.stateful import (
+    RuleBasedStateMachine,
+    invariant,
+    precondition,
+    rule,
+    run_state_machine_as_test,
+)
 
 from joulepath.app.engine import fair_queue
 from joulepath.app.engine.fair_queue import PATIENCE, FairQueue, Place, State
@@ -22,7 +30,8 @@ from joulepath.app.exceptions.queue import Busy
 CAPACITY, SHARE = 8, 5
 CLIENTS = st.sampled_from("abc")
 WORKERS = 3
-# a request that nobody waits for needs a turn to leave, one to give its worker back, and one to get the next
+# a request that nobody waits for needs a turn to leave, one to give its worker back, and one to get
+# the next
 SETTLING_TURNS = 20
 STEPS_OF_ONE_RUN = 100
 
@@ -129,7 +138,9 @@ class StillLoop(asyncio.SelectorEventLoop):
 
 
 class QueueMachine(RuleBasedStateMachine):
-    """Requests arrive, leave, time out and finish; workers die; spare work comes and goes; workers are given back."""
+    """Requests arrive, leave, time out and finish; workers die; spare work comes and goes; workers
+    are given back.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -181,7 +192,9 @@ class QueueMachine(RuleBasedStateMachine):
     @rule(client=CLIENTS, limit=st.sampled_from([0.5, 3.0, 1e6]))
     def arrives(self, client: str, limit: float) -> None:
         self.count += 1
-        self.requests.append(self._within(lambda: Request(self.queue, client, f"{client}{self.count}", limit)))
+        self.requests.append(
+            self._within(lambda: Request(self.queue, client, f"{client}{self.count}", limit))
+        )
 
     @precondition(lambda self: self.requests)
     @rule(data=st.data())
@@ -248,7 +261,11 @@ class QueueMachine(RuleBasedStateMachine):
         assert {worker for worker in alive if self.queue._loans[worker] is None} == set(idle), (
             "a worker is lent to nobody"
         )
-        waiting = [each for each in self.requests if each.place is not None and each.place.state is State.WAITING]
+        waiting = [
+            each
+            for each in self.requests
+            if each.place is not None and each.place.state is State.WAITING
+        ]
         assert not (waiting and idle), "a request waits while a worker is idle"
         assert self.queue.someone_waits == bool(waiting)
         assert self.queue.is_stuck == (bool(waiting) and not alive)
@@ -258,13 +275,17 @@ class QueueMachine(RuleBasedStateMachine):
     @invariant()
     def nobody_is_confused(self) -> None:
         assert not self.noticed, self.noticed
-        assert self.queue.mend({worker for worker in self.workers if worker.alive}) == [], "it has to be mended"
+        assert self.queue.mend({worker for worker in self.workers if worker.alive}) == [], (
+            "it has to be mended"
+        )
         for request in [each for each in self.requests if each.running.done()]:
             self.requests.remove(request)
             if request.running.cancelled():
                 continue
             error = request.running.exception()
-            assert error is None or isinstance(error, Busy | TimeoutError), f"{request.name} got {error!r}"
+            assert error is None or isinstance(error, Busy | TimeoutError), (
+                f"{request.name} got {error!r}"
+            )
             if error is None:
                 assert request.running.result() == request.name
         for spare in [each for each in self.spares if each.running.done()]:

@@ -1,4 +1,6 @@
-"""Work that can wait: it comes after callers, and gives its worker to one that waits. The tests move the clock."""
+"""Work that can wait: it comes after callers, and gives its worker to one that waits. The tests
+move the clock.
+"""
 
 from __future__ import annotations
 
@@ -122,11 +124,19 @@ def test_a_crash_is_told(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("is_short", [False, True])
 def test_one_after_another_on_one_worker(tmp_path: Path, is_short: bool) -> None:
-    """Errors of tasks end nothing but themselves; what kills the worker leaves the rest. Short ones are sent ahead."""
+    """Errors of tasks end nothing but themselves; what kills the worker leaves the rest. Short ones
+    are sent ahead.
+    """
 
     async def test(bench: Bench) -> None:
         ended: list[Ended] = []
-        tasks = [ProcessId(), Fail(OutsideLimits("start", 1, 9.0, -1.0, 1.0)), ProcessId(), Die(), ProcessId()]
+        tasks = [
+            ProcessId(),
+            Fail(OutsideLimits("start", 1, 9.0, -1.0, 1.0)),
+            ProcessId(),
+            Die(),
+            ProcessId(),
+        ]
         works = [Work(task, LONG, ended.append, expected=0.0, is_small=is_short) for task in tasks]
         await bench.engine.spare.run(taking(*works))
         first, limits, second, died = ended
@@ -142,7 +152,9 @@ def test_it_takes_nothing_more_while_a_caller_waits(tmp_path: Path) -> None:
     async def test(bench: Bench) -> None:
         ended: list[Ended] = []
         tmp_path.joinpath("held").mkdir()
-        take = taking(*(Work(task, LONG, ended.append) for task in (Hold(tmp_path / "held"), ProcessId())))
+        take = taking(
+            *(Work(task, LONG, ended.append) for task in (Hold(tmp_path / "held"), ProcessId()))
+        )
         running = asyncio.create_task(bench.engine.spare.run(take))
         await until((tmp_path / "held" / "started").exists)
         caller = await bench.queued(ProcessId())

@@ -1,4 +1,6 @@
-"""Tasks that nobody wants any more end by themselves; their workers stay warm, and answer nobody else's question."""
+"""Tasks that nobody wants any more end by themselves; their workers stay warm, and answer nobody
+else's question.
+"""
 
 from __future__ import annotations
 
@@ -18,13 +20,22 @@ from joulepath.app.exceptions.base import ServiceError
 from joulepath.app.exceptions.queue import Preempted, ShuttingDown, WorkerLost
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from tests.app.engine.simple_tasks import Die, DieOnce, EndEarly, Hold, HoldWatching, ProcessId
-from tests.app.engine.test_pool import DEADLINE_GRACE, LONG, SHUTDOWN_GRACE, Bench, until, with_engine
+from tests.app.engine.test_pool import (
+    DEADLINE_GRACE,
+    LONG,
+    SHUTDOWN_GRACE,
+    Bench,
+    until,
+    with_engine,
+)
 
 # no busy machine is so late that a worker that looks is killed [s]
 NEVER_KILLED = 200.0
 
 
-async def begun(bench: Bench, task: Any, deadline: float = LONG, client: str = "") -> asyncio.Task[Any]:
+async def begun(
+    bench: Bench, task: Any, deadline: float = LONG, client: str = ""
+) -> asyncio.Task[Any]:
     """A task with a folder, which runs in a worker."""
     task.folder.mkdir()
     running = asyncio.create_task(bench.engine.run(task, deadline, client))
@@ -117,14 +128,18 @@ def test_spare_work_gives_its_worker_back_warm(tmp_path: Path) -> None:
     async def test(bench: Bench) -> None:
         (pid,) = bench.engine.worker_pids
         tmp_path.joinpath("spare").mkdir()
-        spare = asyncio.create_task(result_of(bench.engine.spare.run, HoldWatching(tmp_path / "spare"), LONG))
+        spare = asyncio.create_task(
+            result_of(bench.engine.spare.run, HoldWatching(tmp_path / "spare"), LONG)
+        )
         await until((tmp_path / "spare" / "started").exists)
         caller = await bench.queued(ProcessId())
         bench.move_clock(PATIENCE)
         with pytest.raises(Preempted):
             await spare
         assert int((await caller).document) == pid
-        spare = asyncio.create_task(result_of(bench.engine.spare.run, HoldWatching(tmp_path / "spare"), LONG))
+        spare = asyncio.create_task(
+            result_of(bench.engine.spare.run, HoldWatching(tmp_path / "spare"), LONG)
+        )
         spare.cancel()
         await asyncio.gather(spare, return_exceptions=True)
         assert await bench.pid() == pid
@@ -132,16 +147,25 @@ def test_spare_work_gives_its_worker_back_warm(tmp_path: Path) -> None:
     with_engine(tmp_path, test, stop_grace=NEVER_KILLED)
 
 
-def test_a_task_whose_worker_dies_begins_again_once(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_task_whose_worker_dies_begins_again_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     async def test(bench: Bench) -> None:
-        assert int((await bench.engine.run(DieOnce(tmp_path), LONG)).document) in bench.engine.worker_pids
+        assert (
+            int((await bench.engine.run(DieOnce(tmp_path), LONG)).document)
+            in bench.engine.worker_pids
+        )
         deaths = tmp_path / "deaths"
         deaths.mkdir()
         with pytest.raises(WorkerLost):
             await bench.engine.run(Die(deaths), LONG)
         assert len(list(deaths.iterdir())) == 2, "it kills no third one"
         await bench.pid()
-        causes = [vars(each)["exit_code"] for each in caplog.records if each.message == "worker ended by itself"]
+        causes = [
+            vars(each)["exit_code"]
+            for each in caplog.records
+            if each.message == "worker ended by itself"
+        ]
         assert causes == [-signal.SIGKILL, -signal.SIGABRT, -signal.SIGABRT]
 
     with_engine(tmp_path, test)
@@ -218,7 +242,8 @@ def test_shutdown_in_the_turn_of_a_deadline(tmp_path: Path, turns: int) -> None:
 
 
 def test_workers_killed_at_random_beside_everything(tmp_path: Path) -> None:
-    """Requests that end, leave and time out, jobs beside them, and a worker killed again and again."""
+    """Requests that end, leave and time out, jobs beside them, and a worker killed again and
+    again."""
     rng = random.Random(1)
 
     async def test(bench: Bench) -> None:
@@ -228,7 +253,9 @@ def test_workers_killed_at_random_beside_everything(tmp_path: Path) -> None:
             folder = tmp_path / f"request {index}"
             folder.mkdir()
             task = rng.choice([ProcessId(), HoldWatching(folder), DieOnce(folder)])
-            running = asyncio.create_task(engine.run(task, rng.choice([0.05, 0.3, LONG]), rng.choice("abc")))
+            running = asyncio.create_task(
+                engine.run(task, rng.choice([0.05, 0.3, LONG]), rng.choice("abc"))
+            )
             if isinstance(task, HoldWatching):
                 await asyncio.sleep(rng.uniform(0.0, 0.05))
                 running.cancel()

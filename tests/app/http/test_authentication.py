@@ -1,4 +1,6 @@
-"""API keys over a real socket: who gets in, who may do what, whose things are whose, and what the log says."""
+"""API keys over a real socket: who gets in, who may do what, whose things are whose, and what the
+log says.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,9 @@ class Guarded:
     keys: dict[str, str]
     database: str
 
-    def send(self, who: str | None, method: str, path: str, body: Any = None, **headers: str) -> httpx2.Response:
+    def send(
+        self, who: str | None, method: str, path: str, body: Any = None, **headers: str
+    ) -> httpx2.Response:
         if who is not None:
             headers["Authorization"] = f"Bearer {self.keys[who]}"
         return CLIENT.request(method, self.server.url + path, json=body, headers=headers)
@@ -94,7 +98,9 @@ def test_needs_no_key(guarded: Guarded, path: str) -> None:
 
 def test_everything_else_needs_one(guarded: Guarded, document: dict[str, Any]) -> None:
     for template, operations in document["paths"].items():
-        path = template.format(id=STUDY_ID, name="ur5e", number=1, slug="invalid-request", format="csv")
+        path = template.format(
+            id=STUDY_ID, name="ur5e", number=1, slug="invalid-request", format="csv"
+        )
         for method, operation in operations.items():
             answer = guarded.send(None, method.upper(), path)
             if path in PUBLIC or template.startswith("/problems/"):
@@ -107,26 +113,55 @@ def test_everything_else_needs_one(guarded: Guarded, document: dict[str, Any]) -
 
 @pytest.mark.parametrize(
     "path",
-    ["/nothing", "//studies", "/studies/", "/docs/../studies", "/docs/%2e%2e/studies", "/healthz/../studies",
-     "/%2fdocs", "/docs%2f..%2fstudies", "/problems/../studies", "/HEALTHZ", "/healthz%0a",
-     "/docs;/../studies", "/metrics", "*", "/studio/../studies", "/studio/%2e%2e/studies", "/studio//studies"],
-)  # fmt: skip
+    [
+        "/nothing",
+        "//studies",
+        "/studies/",
+        "/docs/../studies",
+        "/docs/%2e%2e/studies",
+        "/healthz/../studies",
+        "/%2fdocs",
+        "/docs%2f..%2fstudies",
+        "/problems/../studies",
+        "/HEALTHZ",
+        "/healthz%0a",
+        "/docs;/../studies",
+        "/metrics",
+        "*",
+        "/studio/../studies",
+        "/studio/%2e%2e/studies",
+        "/studio//studies",
+    ],
+)
 def test_no_spelling_of_a_path_gets_around(guarded: Guarded, path: str) -> None:
     """Sent as it is: clients normalise paths."""
     host, port = guarded.server.url.removeprefix("http://").split(":")
     with socket.create_connection((host, int(port)), timeout=ANSWER) as connection:
-        connection.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode())
+        connection.sendall(
+            f"GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode()
+        )
         # a path that is public but unknown is answered as such; no other one is answered at all
         assert connection.recv(1000).split()[1] in (b"401", b"404", b"400")
 
 
 @pytest.mark.parametrize(
     "given",
-    ["Bearer", "Bearer wrong", "Basic {press}", "{press}", "Bearer {press}x", "Bearer {hash}", "Bearer \xff",
-     "Bearer {press} {press}", "Token {press}"],
-)  # fmt: skip
+    [
+        "Bearer",
+        "Bearer wrong",
+        "Basic {press}",
+        "{press}",
+        "Bearer {press}x",
+        "Bearer {hash}",
+        "Bearer \xff",
+        "Bearer {press} {press}",
+        "Token {press}",
+    ],
+)
 def test_what_is_no_key(guarded: Guarded, given: str) -> None:
-    header = given.format(press=guarded.keys["press"], hash=hash_of(guarded.keys["press"])).encode("latin-1")
+    header = given.format(press=guarded.keys["press"], hash=hash_of(guarded.keys["press"])).encode(
+        "latin-1"
+    )
     answer = CLIENT.get(guarded.server.url + "/studies", headers={b"Authorization": header})
     refused(answer, Unauthenticated)
     assert answer.headers["www-authenticate"].startswith('Bearer realm="joulepath"')
@@ -153,7 +188,9 @@ def test_a_refused_body_is_not_read(guarded: Guarded) -> None:
     with socket.create_connection((host, int(port)), timeout=ANSWER) as connection:
         head = b"POST /evaluate HTTP/1.1\r\nHost: localhost\r\nContent-Length: 60000000\r\n\r\n"
         connection.sendall(head)
-        assert connection.recv(1000).split()[1] == b"401", "answered before any of the body was sent"
+        assert connection.recv(1000).split()[1] == b"401", (
+            "answered before any of the body was sent"
+        )
 
 
 def test_a_reader_only_reads(guarded: Guarded) -> None:
@@ -196,7 +233,9 @@ def test_a_robot_is_its_owners(guarded: Guarded) -> None:
     assert guarded.send("press", "PUT", robot, ARM).json()["owner"] == "press"
     refused(guarded.send("cell", "PUT", robot, ARM), NotOwner)
     refused(guarded.send("cell", "DELETE", robot), NotOwner)
-    assert guarded.send("boss", "PUT", robot, ARM).json()["owner"] == "press", "a replaced robot keeps its owner"
+    assert guarded.send("boss", "PUT", robot, ARM).json()["owner"] == "press", (
+        "a replaced robot keeps its owner"
+    )
     assert guarded.send("press", "DELETE", robot).status_code == 204
 
 
@@ -249,9 +288,15 @@ def test_a_removed_key_is_refused_from_the_next_request_on(guarded: Guarded) -> 
 
 
 def test_the_log_has_names_and_no_keys(guarded: Guarded) -> None:
-    guarded.send("press", "GET", "/robots/named_in_the_log", **{"X-Forwarded-For": "192.0.2.66, 203.0.113.1"})
+    guarded.send(
+        "press", "GET", "/robots/named_in_the_log", **{"X-Forwarded-For": "192.0.2.66, 203.0.113.1"}
+    )
     entry = guarded.server.request_logged("/robots/named_in_the_log")
-    assert (entry["client"], entry["key"], entry["problem"]) == ("203.0.113.1", "press", "unknown-robot")
+    assert (entry["client"], entry["key"], entry["problem"]) == (
+        "203.0.113.1",
+        "press",
+        "unknown-robot",
+    )
     guarded.send(None, "GET", "/robots/without_a_key")
     assert guarded.server.request_logged("/robots/without_a_key")["key"] is None
     text = guarded.server.log.read_text()
@@ -263,7 +308,9 @@ def test_the_document_declares_the_keys(document: dict[str, Any]) -> None:
     assert document["components"]["securitySchemes"][name]["scheme"] == "bearer"
     assert document["paths"]["/studies"]["get"]["security"] == [{name: ["read"]}]
     assert document["paths"]["/optimize"]["post"]["security"] == [{name: ["compute"]}]
-    refs = document["paths"]["/studies/{id}"]["delete"]["responses"]["403"]["content"]["application/problem+json"]
+    refs = document["paths"]["/studies/{id}"]["delete"]["responses"]["403"]["content"][
+        "application/problem+json"
+    ]
     named = {each["$ref"].rpartition("/")[2] for each in refs["schema"]["oneOf"]}
     assert named == {"NotOwner", "RoleTooLow", "CrossSite"}
 

@@ -1,4 +1,6 @@
-"""The client's address: behind trusted proxies, what they report, and never what a client says of itself."""
+"""The client's address: behind trusted proxies, what they report, and never what a client says of
+itself.
+"""
 
 from __future__ import annotations
 
@@ -22,10 +24,18 @@ def scope_of(peer: str | None, *lines: str, header: ProxyHeader = "X-Forwarded-F
 @pytest.mark.parametrize(
     ("peer", "lines", "expected"),
     [
-        ("198.51.100.7", ["203.0.113.1"], "198.51.100.7"),  # no proxy: the header is the client's own word
+        (
+            "198.51.100.7",
+            ["203.0.113.1"],
+            "198.51.100.7",
+        ),  # no proxy: the header is the client's own word
         ("10.1.1.1", ["203.0.113.1"], "203.0.113.1"),
         ("10.1.1.1", ["203.0.113.1, 10.2.2.2"], "203.0.113.1"),
-        ("10.1.1.1", ["192.0.2.66, 203.0.113.1"], "203.0.113.1"),  # the left one came with the request
+        (
+            "10.1.1.1",
+            ["192.0.2.66, 203.0.113.1"],
+            "203.0.113.1",
+        ),  # the left one came with the request
         ("10.1.1.1", ["10.9.9.9, 203.0.113.1"], "203.0.113.1"),
         ("10.1.1.1", ["192.0.2.66", "203.0.113.1"], "203.0.113.1"),  # two lines are one list
         ("10.1.1.1", ["203.0.113.1, unknown"], "10.1.1.1"),
@@ -42,7 +52,9 @@ def scope_of(peer: str | None, *lines: str, header: ProxyHeader = "X-Forwarded-F
         ("testclient", ["203.0.113.1"], "testclient"),
     ],
 )
-def test_the_first_that_is_no_proxy_from_the_right(peer: str | None, lines: list[str], expected: str) -> None:
+def test_the_first_that_is_no_proxy_from_the_right(
+    peer: str | None, lines: list[str], expected: str
+) -> None:
     assert sender(scope_of(peer, *lines), PROXIES, "X-Forwarded-For") == Client(expected)
 
 
@@ -54,11 +66,16 @@ def test_the_first_that_is_no_proxy_from_the_right(peer: str | None, lines: list
         ("for=192.0.2.66, for=203.0.113.1;by=10.2.2.2, for=10.3.3.3", "203.0.113.1"),
         ("proto=https;host=x", "10.1.1.1"),
         ("for=_hidden", "10.1.1.1"),
-        ('for="192.0.2.66, for=203.0.113.1', "203.0.113.1"),  # a quote left open hides nothing that comes after it
+        (
+            'for="192.0.2.66, for=203.0.113.1',
+            "203.0.113.1",
+        ),  # a quote left open hides nothing that comes after it
     ],
 )
 def test_forwarded(line: str, expected: str) -> None:
-    assert sender(scope_of("10.1.1.1", line, header="Forwarded"), PROXIES, "Forwarded") == Client(expected)
+    assert sender(scope_of("10.1.1.1", line, header="Forwarded"), PROXIES, "Forwarded") == Client(
+        expected
+    )
 
 
 def test_the_header_that_the_proxies_do_not_set_is_ignored() -> None:
@@ -69,7 +86,11 @@ def test_the_header_that_the_proxies_do_not_set_is_ignored() -> None:
 
 def test_what_limits_count_by() -> None:
     assert Client("203.0.113.1").name == "203.0.113.1"
-    assert Client("2001:db8:1:2:aaaa::1").name == Client("2001:db8:1:2:bbbb::9").name == "2001:db8:1:2::/64"
+    assert (
+        Client("2001:db8:1:2:aaaa::1").name
+        == Client("2001:db8:1:2:bbbb::9").name
+        == "2001:db8:1:2::/64"
+    )
     assert Client("203.0.113.1", "press").name == Client("203.0.113.2", "press").name == "key press"
     assert Client("press").name != Client("203.0.113.1", "press").name
 

@@ -28,7 +28,9 @@ from tests.app.requests import move
 POSE = {"pose": {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
 
 
-def sent(server: Server, path: str, body: bytes | None, **headers: str) -> tuple[http.client.HTTPResponse, bytes]:
+def sent(
+    server: Server, path: str, body: bytes | None, **headers: str
+) -> tuple[http.client.HTTPResponse, bytes]:
     """The answer as its bytes are on the wire: no client unpacks it."""
     connection = http.client.HTTPConnection(server.url.removeprefix("http://"), timeout=ANSWER)
     connection.putrequest("GET" if body is None else "POST", path, skip_accept_encoding=True)
@@ -84,8 +86,12 @@ def unpacked(coding: str | None, content: bytes) -> bytes:
     return gzip.decompress(content) if coding == "gzip" else content
 
 
-@pytest.mark.parametrize(("header", "coding"), [("gzip", "gzip"), ("zstd", "zstd"), ("identity", None)])
-def test_answers_are_the_same_in_every_coding(server: Server, header: str, coding: str | None) -> None:
+@pytest.mark.parametrize(
+    ("header", "coding"), [("gzip", "gzip"), ("zstd", "zstd"), ("identity", None)]
+)
+def test_answers_are_the_same_in_every_coding(
+    server: Server, header: str, coding: str | None
+) -> None:
     plain, expected = sent(server, "/openapi.json", None)
     answer, content = sent(server, "/openapi.json", None, Accept_Encoding=header)
     assert (plain.status, plain.getheader("content-encoding")) == (200, None)
@@ -98,7 +104,9 @@ def test_answers_are_the_same_in_every_coding(server: Server, header: str, codin
 
 
 def test_a_coding_that_nobody_has_is_refused_before_any_work(server: Server) -> None:
-    answer, content = sent(server, "/optimize", json.dumps(move()).encode(), Accept_Encoding="br, identity;q=0")
+    answer, content = sent(
+        server, "/optimize", json.dumps(move()).encode(), Accept_Encoding="br, identity;q=0"
+    )
     assert answer.status == 406
     checked(NotAcceptable, content)
 
@@ -113,7 +121,12 @@ def transfers(app: ASGIApp) -> ASGIApp:
     """The middleware around an application, for requests without a key."""
 
     async def with_client(scope: Scope, receive: Receive, send: Send) -> None:
-        given = {"method": "POST", "path": "/ik", "query_string": b"", "state": {"client": Client("127.0.0.1")}}
+        given = {
+            "method": "POST",
+            "path": "/ik",
+            "query_string": b"",
+            "state": {"client": Client("127.0.0.1")},
+        }
         await Transfers(app, Bodies(Settings()), None)({**scope, **given}, receive, send)
 
     return with_client
@@ -130,7 +143,9 @@ def through(response: Response, header: str = "gzip") -> list[Message]:
         return {"type": "http.disconnect"}
 
     asyncio.run(
-        transfers(response)({"type": "http", "headers": [(b"accept-encoding", header.encode())]}, receive, send)
+        transfers(response)(
+            {"type": "http", "headers": [(b"accept-encoding", header.encode())]}, receive, send
+        )
     )
     return messages
 
@@ -147,12 +162,16 @@ def test_streams_pass_piece_by_piece() -> None:
     for kind in ("text/event-stream", "application/x-ndjson", "text/csv"):
         messages = through(StreamingResponse(events(), media_type=kind))
         assert b"content-encoding" not in headers_of(messages)
-        assert [len(message["body"]) for message in messages[1:]] == [len("data: 0\n\n" * 1000)] * 3 + [0]
+        assert [len(message["body"]) for message in messages[1:]] == [
+            len("data: 0\n\n" * 1000)
+        ] * 3 + [0]
 
 
 def test_a_strong_etag_becomes_weak_and_a_packed_body_is_left_alone() -> None:
     text = b"x" * 5000
-    messages = through(Response(text, media_type="text/plain", headers={"ETag": '"1"', "Vary": "Origin"}))
+    messages = through(
+        Response(text, media_type="text/plain", headers={"ETag": '"1"', "Vary": "Origin"})
+    )
     assert headers_of(messages)[b"etag"] == b'W/"1"'
     assert headers_of(messages)[b"vary"].lower() == b"origin, accept-encoding"
     packed = through(Response(text, media_type="text/plain", headers={"Content-Encoding": "br"}))
@@ -174,7 +193,11 @@ def test_a_strong_etag_becomes_weak_and_a_packed_body_is_left_alone() -> None:
 )
 @pytest.mark.parametrize("path", ["/ik", "/evaluate"])
 def test_packed_bodies_are_taken(server: Server, coding: str, pack: Any, path: str) -> None:
-    body = POSE if path == "/ik" else {"configurations": [[0.0] * 6, [0.1] * 6], "time_per_segment": 1.0}
+    body = (
+        POSE
+        if path == "/ik"
+        else {"configurations": [[0.0] * 6, [0.1] * 6], "time_per_segment": 1.0}
+    )
     answer, content = sent(server, path, pack(json.dumps(body).encode()), Content_Encoding=coding)
     assert answer.status == 200, content
 
@@ -198,7 +221,14 @@ LARGE_WINDOW = b"\x28\xb5\x2f\xfd\x00\x88" + b"\x01\x00\x00"
         *(
             (coding, body)
             for coding, whole in (("gzip", WHOLE), ("zstd", WHOLE_ZSTD))
-            for body in (whole[:-1], whole[:20], b"", b"{}", whole + b"more", whole[:-4] + b"\0" * 4)
+            for body in (
+                whole[:-1],
+                whole[:20],
+                b"",
+                b"{}",
+                whole + b"more",
+                whole[:-4] + b"\0" * 4,
+            )
         ),
         ("zstd", WHOLE),
         ("zstd", LARGE_WINDOW),
@@ -242,7 +272,10 @@ def test_a_bomb_is_never_whole_in_memory(coding: str) -> None:
 
     async def send(_: Message) -> None: ...
 
-    scope = {"type": "http", "headers": [(b"content-encoding", coding.encode()), (b"content-length", b"7")]}
+    scope = {
+        "type": "http",
+        "headers": [(b"content-encoding", coding.encode()), (b"content-length", b"7")],
+    }
     with pytest.raises(Enough):
         asyncio.run(transfers(app)(scope, receive, send))
     assert max(pieces) <= 5_000_000
@@ -252,9 +285,13 @@ def test_a_bomb_is_never_whole_in_memory(coding: str) -> None:
 def test_the_messages_of_an_unpacked_body_end(coding: str, whole: bytes) -> None:
     """Routes wait for the end of the connection after the body: it must come through."""
     arriving: list[Message] = [
-        {"type": "http.request", "body": whole[k : k + 1], "more_body": True} for k in range(len(whole))
+        {"type": "http.request", "body": whole[k : k + 1], "more_body": True}
+        for k in range(len(whole))
     ]
-    arriving += [{"type": "http.request", "body": b"", "more_body": False}, {"type": "http.disconnect"}]
+    arriving += [
+        {"type": "http.request", "body": b"", "more_body": False},
+        {"type": "http.disconnect"},
+    ]
     seen: list[Message] = []
 
     async def app(scope: Scope, receive: Receive, send: Send) -> None:
@@ -266,7 +303,11 @@ def test_the_messages_of_an_unpacked_body_end(coding: str, whole: bytes) -> None
 
     async def send(_: Message) -> None: ...
 
-    asyncio.run(transfers(app)({"type": "http", "headers": [(b"content-encoding", coding.encode())]}, receive, send))
+    asyncio.run(
+        transfers(app)(
+            {"type": "http", "headers": [(b"content-encoding", coding.encode())]}, receive, send
+        )
+    )
     body = b"".join(message["body"] for message in seen[:-1])
     assert json.loads(body) == POSE
     assert [message["more_body"] for message in seen[:-1]] == [True] * (len(seen) - 2) + [False]

@@ -1,4 +1,6 @@
-"""Ceilings of connections over a real socket: heads, bodies, answers that nobody reads, and how many there may be."""
+"""Ceilings of connections over a real socket: heads, bodies, answers that nobody reads, and how
+many there may be.
+"""
 
 from __future__ import annotations
 
@@ -29,14 +31,20 @@ MOST_HEAD = 4096
 MOST, MOST_OF_CLIENT = 12, 8
 OTHER, THIRD = "127.0.0.2", "127.0.0.3"
 SHORT = 0.5
-"""Times that clients have [s]. Whoever keeps them sends at once; no test waits for one to pass, but for its effect."""
+"""Times that clients have [s]. Whoever keeps them sends at once; no test waits for one to pass, but
+for its effect.
+"""
 GET = b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"
 
 
 @pytest.fixture(scope="module")
 def strict() -> Iterator[Server]:
     """A server with low ceilings."""
-    limits = {"max_head_bytes": MOST_HEAD, "max_connections": MOST, "client_connections": MOST_OF_CLIENT}
+    limits = {
+        "max_head_bytes": MOST_HEAD,
+        "max_connections": MOST,
+        "client_connections": MOST_OF_CLIENT,
+    }
     times = {"head_timeout": SHORT, "body_timeout": SHORT, "write_timeout": SHORT}
     with serving(recorded=True, **limits, **times) as server:
         yield server
@@ -170,8 +178,15 @@ def test_requests_far_ahead_of_their_answers_are_refused(strict: Server) -> None
 
 
 def test_uvicorn_has_what_a_connection_needs() -> None:
-    """The arguments of its protocol, the state of a request, and h11's error while it answers a malformed request."""
-    assert list(inspect.signature(H11Protocol).parameters) == ["config", "server_state", "app_state", "_loop"]
+    """The arguments of its protocol, the state of a request, and h11's error while it answers a
+    malformed request.
+    """
+    assert list(inspect.signature(H11Protocol).parameters) == [
+        "config",
+        "server_state",
+        "app_state",
+        "_loop",
+    ]
     states: list[Any] = []
     written: list[BaseException | None] = []
 
@@ -184,14 +199,18 @@ def test_uvicorn_has_what_a_connection_needs() -> None:
         transport = Mock(asyncio.Transport, is_closing=lambda: False, get_extra_info=lambda _: None)
         transport.write = lambda _: written.append(sys.exception())
         config = Config(app, lifespan="off", log_config=None)
-        protocol = H11Protocol(config=config, server_state=ServerState(), app_state={"connection": 1})
+        protocol = H11Protocol(
+            config=config, server_state=ServerState(), app_state={"connection": 1}
+        )
         protocol.connection_made(transport)
         protocol.data_received(GET)
         await asyncio.gather(*protocol.tasks)
         assert states == [{"connection": 1}] and set(written) == {None}
         written.clear()
         protocol.data_received(b"GET /" + b"x" * 100_000)
-        assert [each.error_status_hint for each in written if isinstance(each, h11.RemoteProtocolError)][:1] == [431]
+        assert [
+            each.error_status_hint for each in written if isinstance(each, h11.RemoteProtocolError)
+        ][:1] == [431]
 
     asyncio.run(run())
 
@@ -203,7 +222,9 @@ def test_one_client_has_its_share_of_connections(strict: Server) -> None:
             answer = answer_on(further)
             checked(TooManyRequests, answer.problem)
             assert int(answer.headers["retry-after"]) > 0
-        others = [stack.enter_context(connected(strict, OTHER)) for _ in range(MOST - MOST_OF_CLIENT)]
+        others = [
+            stack.enter_context(connected(strict, OTHER)) for _ in range(MOST - MOST_OF_CLIENT)
+        ]
         for connection in (*own, *others):
             connection.sendall(GET)
             assert answer_on(connection).status == 200
@@ -224,7 +245,12 @@ def test_sigterm_waits_for_no_client() -> None:
         upload.sendall(post("/evaluate", b"{", declared=1000))
         body.sendall(post("/optimize", b"{", declared=1000))
         unread.sendall(b"GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n" * 16)
-        until(lambda: sum(entry["message"] == "received" for entry in server.logged() if "path" in entry) >= 3)
+        until(
+            lambda: (
+                sum(entry["message"] == "received" for entry in server.logged() if "path" in entry)
+                >= 3
+            )
+        )
         server.process.send_signal(signal.SIGTERM)
         for connection in (upload, body):
             checked(ShuttingDown, answer_on(connection).problem)

@@ -1,4 +1,6 @@
-"""Progress of one request over a real socket: events, then the answer or the problem, and clients that leave."""
+"""Progress of one request over a real socket: events, then the answer or the problem, and clients
+that leave.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,9 @@ SHORT = {"method": "time_scaling"}
 @pytest.fixture(scope="module")
 def one() -> Iterator[Server]:
     """A server with one worker, and room for a small answer only."""
-    with serving(workers=1, deadline_grace=GRACE, stop_grace=GRACE, client_bytes_in_flight=150_000) as server:
+    with serving(
+        workers=1, deadline_grace=GRACE, stop_grace=GRACE, client_bytes_in_flight=150_000
+    ) as server:
         yield server
 
 
@@ -85,7 +89,9 @@ def test_other_paths_tell_too(one: Server) -> None:
     compared = told(one, "/compare", move(methods=["time_scaling", "uniform_scaling"]))
     model_of(CompareAnswer).model_validate_json(orjson.dumps(compared[-1][1]))
     assert [content["index"] for name, content in compared if name == "candidate"] == [0, 1]
-    cycle = told(one, "/cycle", {"start": start, "stops": [{"target": goal}], "windings": False, **SHORT})
+    cycle = told(
+        one, "/cycle", {"start": start, "stops": [{"target": goal}], "windings": False, **SHORT}
+    )
     model_of(CycleAnswer).model_validate_json(orjson.dumps(cycle[-1][1]))
     for events in (front, compared, cycle):
         assert names(events) == ["candidates", "candidate", "incumbent", "answer"]
@@ -93,7 +99,10 @@ def test_other_paths_tell_too(one: Server) -> None:
 
 def test_what_fails_before_its_search_is_answered_as_ever(one: Server) -> None:
     far = move(goal={"pose": {"position": [5.0, 0.0, 0.0], "quaternion": [0.0, 1.0, 0.0, 0.0]}})
-    wrong: list[tuple[Any, type[DeclaredError]]] = [({"start": 1}, InvalidRequest), (far, UnreachablePose)]
+    wrong: list[tuple[Any, type[DeclaredError]]] = [
+        ({"start": 1}, InvalidRequest),
+        (far, UnreachablePose),
+    ]
     for body, problem in wrong:
         answer = one.post("/optimize", body, headers=LISTEN)
         assert answer.headers["content-type"] == "application/problem+json"

@@ -1,4 +1,6 @@
-"""Clients that speak HTTP in ways of their own: without names, with offers of other protocols, for the head alone."""
+"""Clients that speak HTTP in ways of their own: without names, with offers of other protocols, for
+the head alone.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ def lines(*given: str) -> bytes:
 
 @pytest.mark.parametrize("offer", ["h2c", "websocket", "TLS/1.0, HTTP/1.1"])
 @pytest.mark.parametrize("cut", [0, 20, 1])
-def test_a_body_is_read_although_the_client_offers_another_protocol(server: Server, offer: str, cut: int) -> None:
+def test_a_body_is_read_although_the_client_offers_another_protocol(
+    server: Server, offer: str, cut: int
+) -> None:
     head = lines(
         "POST /optimize HTTP/1.1",
         "Host: localhost",
@@ -51,7 +55,9 @@ def test_offers_one_after_another_on_one_connection(server: Server) -> None:
     assert asked(server, lines("CONNECT localhost:80 HTTP/1.1", "Host: localhost")).status == 404
 
 
-@pytest.mark.parametrize("path", ["/healthz", "/robots", "/robots/ur5e", "/studio", "/problems/busy", "/nowhere"])
+@pytest.mark.parametrize(
+    "path", ["/healthz", "/robots", "/robots/ur5e", "/studio", "/problems/busy", "/nowhere"]
+)
 def test_a_head_is_that_of_the_whole_answer(server: Server, path: str) -> None:
     whole = asked(server, lines(f"GET {path} HTTP/1.1", "Host: localhost"))
     with connected(server) as connection:
@@ -68,7 +74,9 @@ def test_a_head_is_that_of_the_whole_answer(server: Server, path: str) -> None:
 
 def test_the_head_of_a_stream_ends(server: Server) -> None:
     """Nobody waits for what would follow it: the job has not ended."""
-    job = server.post("/jobs", {"requests": [{"optimize": {"start": {"q": [0.0] * 6}, "goal": {"q": [0.1] * 6}}}]})
+    job = server.post(
+        "/jobs", {"requests": [{"optimize": {"start": {"q": [0.0] * 6}, "goal": {"q": [0.1] * 6}}}]}
+    )
     with connected(server) as connection:
         path = f"{job.headers['location']}/events"
         connection.sendall(lines(f"HEAD {path} HTTP/1.1", "Host: localhost"))
@@ -91,13 +99,19 @@ def test_http_1_0_has_no_host(server: Server) -> None:
     post = lines("POST /optimize HTTP/1.0", f"Content-Length: {len(WRONG)}") + WRONG
     assert "`sart`" in json.dumps(asked(server, post).problem)
     assert (
-        asked(server, lines("GET /robots HTTP/1.1", "Connection: close")).problem["type"] == "/problems/malformed-http"
+        asked(server, lines("GET /robots HTTP/1.1", "Connection: close")).problem["type"]
+        == "/problems/malformed-http"
     )
 
 
 @pytest.mark.parametrize("declared", ["", " ", ";charset=utf-8"])
 def test_an_empty_content_type_is_none(server: Server, declared: str) -> None:
-    head = ("POST /optimize HTTP/1.1", "Host: localhost", f"Content-Type: {declared}", f"Content-Length: {len(WRONG)}")
+    head = (
+        "POST /optimize HTTP/1.1",
+        "Host: localhost",
+        f"Content-Type: {declared}",
+        f"Content-Length: {len(WRONG)}",
+    )
     assert "`sart`" in json.dumps(asked(server, lines(*head) + WRONG).problem)
 
 

@@ -1,4 +1,6 @@
-"""`curl -d @examples/optimize/….json` declares its body a form: the service takes it for the JSON that it is."""
+"""`curl -d @examples/optimize/….json` declares its body a form: the service takes it for the JSON
+that it is.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,9 @@ from fastapi.testclient import TestClient
 BODY = '{"start": {"q": [0, -1, 1, 0, 1, 0]}, "goal": {"q": [0.1, -1, 1, 0, 1, 0]}}'
 
 
-@pytest.mark.parametrize("declared", ["application/x-www-form-urlencoded", "application/json", None])
+@pytest.mark.parametrize(
+    "declared", ["application/x-www-form-urlencoded", "application/json", None]
+)
 def test_json_is_taken_however_it_is_declared(client: TestClient, declared: str | None) -> None:
     headers = {} if declared is None else {"content-type": declared}
     answer = client.post("/optimize", content=BODY, headers=headers)

@@ -28,7 +28,11 @@ def samples(server: Server) -> dict[tuple[str, tuple[str, ...]], float]:
     answer = server.get("/metrics")
     assert answer.status_code == 200 and answer.headers["content-type"].startswith("text/plain")
     families = text_string_to_metric_families(answer.text)
-    return {(each.name, tuple(each.labels.values())): each.value for family in families for each in family.samples}
+    return {
+        (each.name, tuple(each.labels.values())): each.value
+        for family in families
+        for each in family.samples
+    }
 
 
 def value(server: Server, name: str, *labels: str) -> float:
@@ -110,13 +114,17 @@ def test_the_database_and_the_process(service: Server) -> None:
 
 
 def test_a_database_that_does_not_answer() -> None:
-    settings = Settings(workers=1, robots=(), database_url="postgresql://tester:secret-word@127.0.0.1:1/postgres")
+    settings = Settings(
+        workers=1, robots=(), database_url="postgresql://tester:secret-word@127.0.0.1:1/postgres"
+    )
     with recorded_workers(), TestClient(create_app(settings), base_url=LOCAL) as client:
         text = client.get("/metrics").text
     assert "joulepath_store_up 0.0" in text
 
 
 def test_the_format_of_openmetrics(service: Server) -> None:
-    answer = CLIENT.get(service.url + "/metrics", headers={"Accept": "application/openmetrics-text; version=1.0.0"})
+    answer = CLIENT.get(
+        service.url + "/metrics", headers={"Accept": "application/openmetrics-text; version=1.0.0"}
+    )
     assert answer.headers["content-type"].startswith("application/openmetrics-text")
     assert answer.text.endswith("# EOF\n")

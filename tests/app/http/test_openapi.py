@@ -57,12 +57,18 @@ def test_every_field_is_described(document: dict[str, Any]) -> None:
 
 def test_every_plain_field_has_an_example(document: dict[str, Any]) -> None:
     # the example of a problem is a whole document, with the parts that it refers to
-    whole = {name for name, schema in document["components"]["schemas"].items() if "examples" in schema}
-    parts = whole.union(*(named(document["components"]["schemas"][name], document) for name in whole))
+    whole = {
+        name for name, schema in document["components"]["schemas"].items() if "examples" in schema
+    }
+    parts = whole.union(
+        *(named(document["components"]["schemas"][name], document) for name in whole)
+    )
     missing = [
         name
         for name, schema in properties(document)
-        if "examples" not in schema and not is_composite(schema) and name.partition(".")[0] not in parts
+        if "examples" not in schema
+        and not is_composite(schema)
+        and name.partition(".")[0] not in parts
     ]
     assert missing == []
 
@@ -94,7 +100,9 @@ def test_examples_are_valid(document: dict[str, Any]) -> None:
 
 
 def test_every_problem_is_documented(document: dict[str, Any]) -> None:
-    assert {problem.__name__ for problem in types_of_error()} <= document["components"]["schemas"].keys()
+    assert {problem.__name__ for problem in types_of_error()} <= document["components"][
+        "schemas"
+    ].keys()
     for path in document["paths"].values():
         for operation in path.values():
             for status, response in operation["responses"].items():
@@ -123,11 +131,21 @@ def test_no_error_model_of_the_framework_is_left(document: dict[str, Any]) -> No
 def test_every_deadline_is_the_services() -> None:
     document = create_app(Settings(max_deadline=7.5)).openapi()
     bodies = {name: schema for name, schema in properties(document) if name.endswith(".deadline")}
-    assert bodies.keys() >= {f"{kind}Request.deadline" for kind in ("Optimize", "Compare", "Pareto", "Whatif")}
-    numbers = [each for schema in bodies.values() for each in schema.get("anyOf", [schema]) if each["type"] == "number"]
+    assert bodies.keys() >= {
+        f"{kind}Request.deadline" for kind in ("Optimize", "Compare", "Pareto", "Whatif")
+    }
+    numbers = [
+        each
+        for schema in bodies.values()
+        for each in schema.get("anyOf", [schema])
+        if each["type"] == "number"
+    ]
     assert len(numbers) == len(bodies)
     assert {number["maximum"] for number in numbers} == {7.5}
-    assert {schema.get("default") for schema in bodies.values()} == {7.5, None}  # null: the service's longest
+    assert {schema.get("default") for schema in bodies.values()} == {
+        7.5,
+        None,
+    }  # null: the service's longest
     parameters = document["paths"]["/studies/{id}/suggest"]["get"]["parameters"]
     (query,) = [parameter["schema"] for parameter in parameters if parameter["name"] == "deadline"]
     assert [option.get("maximum") for option in query["anyOf"]] == [7.5, None]

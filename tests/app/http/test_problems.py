@@ -1,4 +1,6 @@
-"""Errors as problem details, without a server: every type has an example, a schema and a row in the documentation."""
+"""Errors as problem details, without a server: every type has an example, a schema and a row in the
+documentation.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,9 @@ def subclasses(kind: type[DeclaredError]) -> set[type[DeclaredError]]:
 
 
 def test_every_class_with_a_title_is_a_type() -> None:
-    declared = {kind for kind in subclasses(DeclaredError) if kind.__module__.startswith("joulepath.")}
+    declared = {
+        kind for kind in subclasses(DeclaredError) if kind.__module__.startswith("joulepath.")
+    }
     assert {kind for kind in declared if "title" in vars(kind)} == set(TYPES)
     assert len({kind.slug() for kind in TYPES}) == len(TYPES)
 
@@ -57,7 +61,9 @@ def test_its_document_fits_its_schema(kind: type[DeclaredError]) -> None:
     assert type(error) is kind
     content = checked(kind, sent(error))
     assert (content.type, content.detail, content.instance) == (path_of(kind), str(error), "the-id")
-    assert all(getattr(content, name) is not None for name in type(content).model_fields), "an example shows all"
+    assert all(getattr(content, name) is not None for name in type(content).model_fields), (
+        "an example shows all"
+    )
 
 
 @pytest.mark.parametrize("kind", TYPES)
@@ -78,7 +84,10 @@ def test_an_invalid_problem_is_an_invalid_request() -> None:
     error = InvalidProblem("scene.obstacles.3.pose", "pose must lie within 100 m of the origin.")
     content = checked(InvalidRequest, sent(error))
     assert content.detail == str(error)
-    assert content.errors[0].model_dump() == {"loc": ["body", "scene", "obstacles", 3, "pose"], "msg": str(error)}
+    assert content.errors[0].model_dump() == {
+        "loc": ["body", "scene", "obstacles", 3, "pose"],
+        "msg": str(error),
+    }
 
 
 def test_an_unforeseen_error_keeps_its_message_to_itself() -> None:
@@ -91,11 +100,20 @@ def test_every_fault_of_the_database_has_a_message() -> None:
 
 
 def test_an_unknown_distance_is_null() -> None:
-    assert checked(UnreachablePose, sent(UnreachablePose("goal", None, "It is out of reach."))).distance is None
+    assert (
+        checked(
+            UnreachablePose, sent(UnreachablePose("goal", None, "It is out of reach."))
+        ).distance
+        is None
+    )
 
 
 def test_the_most_telling_candidates_are_listed_and_all_are_counted() -> None:
-    numbers = {CandidateStatus.PRUNED: 100, CandidateStatus.INFEASIBLE: 30, CandidateStatus.FAILED: 20}
+    numbers = {
+        CandidateStatus.PRUNED: 100,
+        CandidateStatus.INFEASIBLE: 30,
+        CandidateStatus.FAILED: 20,
+    }
     reports = [
         CandidateReport(
             start="a",
@@ -119,12 +137,17 @@ def test_the_most_telling_candidates_are_listed_and_all_are_counted() -> None:
         "solved": 0,
         "unvisited": 0,
     }
-    assert content["candidates"][0]["q_goal"] == [1.0] * 6 and content["candidates"][0]["lower_bound"] is None
+    assert (
+        content["candidates"][0]["q_goal"] == [1.0] * 6
+        and content["candidates"][0]["lower_bound"] is None
+    )
 
 
 def test_the_configurations_that_collide_least_are_listed() -> None:
     depths = np.linspace(0.5, 0.1, 100)
-    branches = [CollidingBranch("a", 0, np.zeros(6), ("table", str(depth)), depth) for depth in depths]
+    branches = [
+        CollidingBranch("a", 0, np.zeros(6), ("table", str(depth)), depth) for depth in depths
+    ]
     content = checked(StartInCollision, sent(StartInCollision("start", branches)))
     assert content.depth == 0.1 and content.pair == ["table", "0.1"]
     assert [each.depth for each in content.branches] == sorted(depths)[:MOST_LISTED]

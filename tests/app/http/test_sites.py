@@ -1,4 +1,6 @@
-"""Attacks by web pages: a name that leads here, forms and plain text that need no preflight, and preflights."""
+"""Attacks by web pages: a name that leads here, forms and plain text that need no preflight, and
+preflights.
+"""
 
 from __future__ import annotations
 
@@ -24,11 +26,15 @@ PAGE = "https://cell4.example"
 @pytest.fixture(scope="module")
 def service() -> Iterator[Server]:
     """Open, with one name and one page that are allowed."""
-    with serving(recorded=True, allowed_hosts="robots.example", cors_origins=PAGE, host="127.0.0.1") as server:
+    with serving(
+        recorded=True, allowed_hosts="robots.example", cors_origins=PAGE, host="127.0.0.1"
+    ) as server:
         yield server
 
 
-def send(service: Server, method: str, path: str, content: str = "", **headers: str) -> httpx2.Response:
+def send(
+    service: Server, method: str, path: str, content: str = "", **headers: str
+) -> httpx2.Response:
     named = {name.replace("_", "-"): value for name, value in headers.items()}
     return CLIENT.request(method, service.url + path, content=content.encode(), headers=named)
 
@@ -45,7 +51,10 @@ ATTACKS: dict[str, dict[str, str]] = {
     "a frame without an origin": {"Content_Type": FORM, "Origin": "null"},
     "another port of this machine": {"Content_Type": FORM, "Origin": "http://127.0.0.1:1"},
     "another name of this machine": {"Content_Type": FORM, "Origin": "http://localhost"},
-    "a name that begins like the allowed one": {"Content_Type": FORM, "Origin": PAGE + ".evil.example"},
+    "a name that begins like the allowed one": {
+        "Content_Type": FORM,
+        "Origin": PAGE + ".evil.example",
+    },
     "the allowed name without TLS": {"Content_Type": FORM, "Origin": PAGE.replace("https", "http")},
     "what is no origin": {"Content_Type": FORM, "Origin": "http://[::1"},
     "cross-site": {"Content_Type": FORM, "Sec_Fetch_Site": "cross-site"},
@@ -69,7 +78,11 @@ OWN: dict[str, dict[str, str]] = {
     "no type": {},
     "the docs page": {"Content_Type": "application/json", "Sec_Fetch_Site": "same-origin"},
     "an address that was typed": {"Content_Type": "application/json", "Sec_Fetch_Site": "none"},
-    "the allowed page": {"Content_Type": "application/json", "Sec_Fetch_Site": "cross-site", "Origin": PAGE},
+    "the allowed page": {
+        "Content_Type": "application/json",
+        "Sec_Fetch_Site": "cross-site",
+        "Origin": PAGE,
+    },
 }
 
 
@@ -90,7 +103,10 @@ def test_a_page_behind_tls(service: Server) -> None:
 
 @pytest.mark.parametrize("method", ["POST", "DELETE", "PUT"])
 def test_a_preflight(service: Server, method: str) -> None:
-    asked = {"Access_Control_Request_Method": method, "Access_Control_Request_Headers": "authorization,content-type"}
+    asked = {
+        "Access_Control_Request_Method": method,
+        "Access_Control_Request_Headers": "authorization,content-type",
+    }
     answer = send(service, "OPTIONS", "/studies", Origin="https://evil.example", **asked)
     refused(answer, CrossSite)
     assert not [name for name in answer.headers if name.startswith("access-control-")]
@@ -102,16 +118,26 @@ def test_a_preflight(service: Server, method: str) -> None:
 
 
 def test_only_an_allowed_page_sees_an_answer(service: Server) -> None:
-    assert send(service, "GET", "/studies", Origin=PAGE).headers["access-control-allow-origin"] == PAGE
+    assert (
+        send(service, "GET", "/studies", Origin=PAGE).headers["access-control-allow-origin"] == PAGE
+    )
     seen = send(service, "GET", "/studies", Origin="https://evil.example")
     assert "access-control-allow-origin" not in seen.headers
     assert "origin" in seen.headers["vary"].lower(), "no cache gives one page the answer to another"
 
 
-def by_host(service: Server, *hosts: str, path: str = "/studies", version: str = "1.1") -> httpx2.Response:
+def by_host(
+    service: Server, *hosts: str, path: str = "/studies", version: str = "1.1"
+) -> httpx2.Response:
     """The answer to a request with these lines Host, as they are."""
     host, port = service.url.removeprefix("http://").split(":")
-    lines = [f"GET {path} HTTP/{version}", *(f"Host: {each}" for each in hosts), "Connection: close", "", ""]
+    lines = [
+        f"GET {path} HTTP/{version}",
+        *(f"Host: {each}" for each in hosts),
+        "Connection: close",
+        "",
+        "",
+    ]
     received = b""
     with socket.create_connection((host, int(port)), timeout=60) as connection:
         connection.sendall("\r\n".join(lines).encode())
@@ -145,9 +171,20 @@ def test_no_name_is_rebound_to_this_service(service: Server, hosts: list[str]) -
 
 @pytest.mark.parametrize(
     "host",
-    ["127.0.0.1", "127.0.0.1:8000", "192.0.2.1:80", "[::1]:8000", "[2001:db8::1]", "localhost", "LOCALHOST:1",
-     "localhost.", "robots.example", "Robots.Example:443", socket.gethostname()],
-)  # fmt: skip
+    [
+        "127.0.0.1",
+        "127.0.0.1:8000",
+        "192.0.2.1:80",
+        "[::1]:8000",
+        "[2001:db8::1]",
+        "localhost",
+        "LOCALHOST:1",
+        "localhost.",
+        "robots.example",
+        "Robots.Example:443",
+        socket.gethostname(),
+    ],
+)
 def test_a_name_of_this_service(service: Server, host: str) -> None:
     assert by_host(service, host).status_code == 200
 
@@ -170,9 +207,18 @@ def test_what_a_client_says_of_its_address_is_not_believed(service: Server) -> N
 
 
 def test_any_name_and_page_where_the_operator_says_so() -> None:
-    client = TestClient(create_app(Settings(allowed_hosts=("*",), cors_origins=("*",))), base_url="http://evil.example")
+    client = TestClient(
+        create_app(Settings(allowed_hosts=("*",), cors_origins=("*",))),
+        base_url="http://evil.example",
+    )
     headers = {"Origin": "https://evil.example", "Sec-Fetch-Site": "cross-site"}
-    assert client.get("/problems/busy", headers=headers).headers["access-control-allow-origin"] == "*"
-    preflight = client.options("/studies", headers=headers | {"Access-Control-Request-Method": "DELETE"})
+    assert (
+        client.get("/problems/busy", headers=headers).headers["access-control-allow-origin"] == "*"
+    )
+    preflight = client.options(
+        "/studies", headers=headers | {"Access-Control-Request-Method": "DELETE"}
+    )
     assert (preflight.status_code, preflight.headers["access-control-allow-origin"]) == (200, "*")
-    assert client.post("/problems/busy", headers=headers).status_code == 405, "not refused, but no such route"
+    assert client.post("/problems/busy", headers=headers).status_code == 405, (
+        "not refused, but no such route"
+    )

@@ -1,4 +1,6 @@
-"""Bytes in flight over a real socket: bodies and answers for which there is no room, and clients that leave."""
+"""Bytes in flight over a real socket: bodies and answers for which there is no room, and clients
+that leave.
+"""
 
 from __future__ import annotations
 
@@ -28,19 +30,27 @@ def tight() -> Iterator[Server]:
 
 
 def begun(server: Server, stack: ExitStack, path: str, address: str) -> None:
-    """A body of which the service has received the first byte; it keeps its place until the stack ends."""
+    """A body of which the service has received the first byte; it keeps its place until the stack
+    ends.
+    """
     count = len(received(server, path))
     stack.enter_context(connected(server, address)).sendall(post(path, b"{", declared=BODY))
     until(lambda: len(received(server, path)) > count)
 
 
 def received(server: Server, path: str) -> list[dict[str, Any]]:
-    return [entry for entry in server.logged() if entry["message"] == "received" and entry["path"] == path]
+    return [
+        entry
+        for entry in server.logged()
+        if entry["message"] == "received" and entry["path"] == path
+    ]
 
 
 def left(server: Server, path: str) -> list[dict[str, Any]]:
     """Lines of the log about requests whose clients left."""
-    return [entry for entry in server.logged() if entry.get("status") == 499 and entry["path"] == path]
+    return [
+        entry for entry in server.logged() if entry.get("status") == 499 and entry["path"] == path
+    ]
 
 
 def asked(server: Server, address: str, request: bytes) -> RawAnswer:
@@ -62,7 +72,9 @@ def test_bodies_count_against_a_share_and_a_total(tight: Server, path: str) -> N
         checked(Busy, asked(tight, THIRD, post(path, b"{", declared=BODY)).problem)
         # small ones still fit
         assert asked(tight, THIRD, post("/optimize", b"{}")).status == 422
-        assert asked(tight, THIRD, b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n").status == 200
+        assert (
+            asked(tight, THIRD, b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n").status == 200
+        )
         # and an answer, too, needs room
         large = b"GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n"
         checked(TooManyRequests, asked(tight, "127.0.0.1", large).problem)
@@ -89,7 +101,11 @@ def test_a_killed_service_leaves_no_files(tmp_path: Path, monkeypatch: pytest.Mo
         begun(server, stack, "/evaluate", OTHER)
         server.process.kill()
         server.process.wait()
-        assert not [path for path in tmp_path.rglob("*") if path.is_file() and path.name.startswith("joulepath-")]
+        assert not [
+            path
+            for path in tmp_path.rglob("*")
+            if path.is_file() and path.name.startswith("joulepath-")
+        ]
 
 
 def test_what_is_released_can_be_held_again() -> None:

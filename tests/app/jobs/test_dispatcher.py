@@ -1,5 +1,5 @@
-"""The dispatcher: two of them on one database, workers that die, a database that fails, a stop. The tests run the work
-and move the clock of the leases."""
+"""The dispatcher: two of them on one database, workers that die, a database that fails, a stop. The
+tests run the work and move the clock of the leases."""
 
 from __future__ import annotations
 
@@ -32,7 +32,9 @@ BODY = packed(b"{}")
 
 
 def answer(name: str) -> TaskResult:
-    return JobResult(packed(f'"{name}"'.encode()), "application/json", wall_time=0.1, parts="optimize")
+    return JobResult(
+        packed(f'"{name}"'.encode()), "application/json", wall_time=0.1, parts="optimize"
+    )
 
 
 class Work:
@@ -100,7 +102,9 @@ def with_store(folder: Path, test: Callable[[Store], Awaitable[None]]) -> None:
 
 
 async def sent(service: Service, count: int = 1, kind: str = "optimize") -> str:
-    job_id, _ = await service.jobs.create(NewJob([NewRequest(kind, BODY, 10.0)] * count, "x"), None, None)
+    job_id, _ = await service.jobs.create(
+        NewJob([NewRequest(kind, BODY, 10.0)] * count, "x"), None, None
+    )
     return job_id
 
 
@@ -129,7 +133,12 @@ def test_a_second_service_takes_over_and_the_late_answer_is_dropped(tmp_path: Pa
         await first.dispatcher.stop()
         await second.dispatcher.stop()
         (only,) = await requests(store, job_id)
-        assert (only.state, only.attempt, first.work.begun, second.work.begun) == ("done", 2, [0], [0])
+        assert (only.state, only.attempt, first.work.begun, second.work.begun) == (
+            "done",
+            2,
+            [0],
+            [0],
+        )
         _, body = await store.read(partial(jobs.outcome, job_id=job_id, number=0))
         assert body is not None
         assert unpacked(body) == b'"second"'
@@ -245,7 +254,9 @@ def test_a_stop_gives_everything_back(tmp_path: Path) -> None:
         await service.dispatcher.stop()
         assert sorted(service.work.stopped) == sorted(service.work.begun)
         found = await requests(store, job_id)
-        assert {(each.state, each.leased_by, each.deaths) for each in found} == {("waiting", None, 0)}
+        assert {(each.state, each.leased_by, each.deaths) for each in found} == {
+            ("waiting", None, 0)
+        }
 
     with_store(tmp_path, test)
 
@@ -270,7 +281,10 @@ def test_outcomes_outlive_a_database_that_fails(tmp_path: Path) -> None:
         job_id = await sent(service)
         service.dispatcher.start()
         await until(lambda: service.work.begun == [0])
-        engine, store._engine = store._engine, Store(f"sqlite:///{tmp_path}/no/such/folder.db")._engine
+        engine, store._engine = (
+            store._engine,
+            Store(f"sqlite:///{tmp_path}/no/such/folder.db")._engine,
+        )
         service.work.free.set()
         await until(lambda: len(service.dispatcher._outcomes) == 1)
         await asyncio.sleep(2 * module.LOOK)
@@ -287,6 +301,8 @@ def test_a_holder_is_gone_once_its_process_is() -> None:
     assert not is_gone(ours)
     *machine, pid, start, own = ours.split()
     assert int(pid) == os.getpid()
-    assert is_gone(" ".join([*machine, pid, str(int(start) - 1), own])), "another process had this id"
+    assert is_gone(" ".join([*machine, pid, str(int(start) - 1), own])), (
+        "another process had this id"
+    )
     assert is_gone(" ".join([*machine, str(2**22 + 1), start, own]))
     assert not is_gone(" ".join(["elsewhere", *machine[1:], pid, "1", own])), "nobody here knows"

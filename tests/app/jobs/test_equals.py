@@ -32,11 +32,20 @@ def computed(task: JobRequestTask, status: str = "optimal") -> TaskResult:
     )
     document = packed(result.document)
     return JobResult(
-        document, result.media_type, (), result.kept_as, figures, result.is_optimal, wall_time=0.1, parts="optimize"
+        document,
+        result.media_type,
+        (),
+        result.kept_as,
+        figures,
+        result.is_optimal,
+        wall_time=0.1,
+        parts="optimize",
     )
 
 
-def asks(digest: str = "a", deadline: float = 10.0, kind: str = "optimize", version: str = __version__) -> NewRequest:
+def asks(
+    digest: str = "a", deadline: float = 10.0, kind: str = "optimize", version: str = __version__
+) -> NewRequest:
     return NewRequest(kind, BODY, deadline, Meaning(version=version, digest=digest, robot="ur5e"))
 
 
@@ -50,7 +59,9 @@ async def send(service: Service, *asked: NewRequest, owner: str | None = None) -
     return (await service.jobs.create(NewJob(asked, "x"), None, owner))[0]
 
 
-async def done(service: Service, *asked: NewRequest, owner: str | None = None) -> tuple[str, list[JobRequest]]:
+async def done(
+    service: Service, *asked: NewRequest, owner: str | None = None
+) -> tuple[str, list[JobRequest]]:
     """A job after its end, and its requests."""
     job_id = await send(service, *asked, owner=owner)
     await until(lambda: is_done(service, job_id))
@@ -72,10 +83,17 @@ def test_one_is_computed_and_the_others_get_its_answer(tmp_path: Path) -> None:
         service.work.free.set()
         await until(lambda: is_done(service, first))
         found = await requests(store, first)
-        assert {each.state for each in found} == {"done"} and {each.energy for each in found} == {5.0}
+        assert {each.state for each in found} == {"done"} and {each.energy for each in found} == {
+            5.0
+        }
         for number in (*range(20), 21):
             kept = found[number].answer_id
-            own = {"request": f"{first}.{number}", "id": kept, "by": f"{first}.0", "answer": f"/answers/{kept}"}
+            own = {
+                "request": f"{first}.{number}",
+                "id": kept,
+                "by": f"{first}.0",
+                "answer": f"/answers/{kept}",
+            }
             assert await document(service, first, number) == own
         await done(service, asks(), asks("b"))
         assert len(service.work.begun) == 2, "those of another job are known, too"
@@ -117,9 +135,12 @@ def test_answers_that_refer_to_others_stay_in_their_job(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("error", "begun"), [(OutsideLimits("start", "elbow_joint", 9.0, -1.0, 1.0), [0]), (InternalError(), [0, 1])]
+    ("error", "begun"),
+    [(OutsideLimits("start", "elbow_joint", 9.0, -1.0, 1.0), [0]), (InternalError(), [0, 1])],
 )
-def test_only_a_request_that_is_wrong_fails_for_all(tmp_path: Path, error: Exception, begun: list[int]) -> None:
+def test_only_a_request_that_is_wrong_fails_for_all(
+    tmp_path: Path, error: Exception, begun: list[int]
+) -> None:
     async def test(store: Store) -> None:
         service = service_of(store, workers=2)
         service.work.errors = [error]
@@ -153,7 +174,9 @@ def test_one_that_waits_for_another_can_be_cancelled(tmp_path: Path) -> None:
         await until(lambda: is_done(service, first))
         service.work.free.set()
         await until(lambda: is_done(service, third))
-        assert [each.state for each in await requests(store, third)] == ["done"], "it is computed in its place"
+        assert [each.state for each in await requests(store, third)] == ["done"], (
+            "it is computed in its place"
+        )
         await service.dispatcher.stop()
 
     with_store(tmp_path, test)

@@ -43,14 +43,23 @@ def test_readers_at_the_same_place_share_one_read(tmp_path: Path) -> None:
         job_id = await sent(service, count=5)
         following: Any = counted
         readers = [
-            asyncio.create_task(text(events_after(following, service.dispatcher, job_id, 0))) for _ in range(READERS)
+            asyncio.create_task(text(events_after(following, service.dispatcher, job_id, 0)))
+            for _ in range(READERS)
         ]
         service.work.free.set()
         service.dispatcher.start()
         await until(lambda: is_done(service, job_id))
         first, *others = await asyncio.gather(*readers)
-        assert first.count(b"event: request\n") == 5 and first.endswith(b"\n\n") and b"event: end\n" in first
-        numbers = [int(line.removeprefix(b"id: ")) for line in first.splitlines() if line.startswith(b"id: ")]
+        assert (
+            first.count(b"event: request\n") == 5
+            and first.endswith(b"\n\n")
+            and b"event: end\n" in first
+        )
+        numbers = [
+            int(line.removeprefix(b"id: "))
+            for line in first.splitlines()
+            if line.startswith(b"id: ")
+        ]
         assert numbers == list(range(1, len(numbers) + 1))
         assert all(other == first for other in others)
         assert counted.reads <= MOST_READS
@@ -115,7 +124,9 @@ def test_a_read_that_fails_fails_for_all(caplog: pytest.LogCaptureFixture) -> No
         left, *asked = (asyncio.create_task(changes.shared("x", read)) for _ in range(3))
         await asyncio.sleep(0)
         left.cancel()
-        assert [type(each) for each in await asyncio.gather(*asked, return_exceptions=True)] == 2 * [ZeroDivisionError]
+        assert [
+            type(each) for each in await asyncio.gather(*asked, return_exceptions=True)
+        ] == 2 * [ZeroDivisionError]
 
     asyncio.run(test())
     assert not caplog.records

@@ -31,7 +31,9 @@ def test_progress_within_a_long_request_is_an_event(tmp_path: Path) -> None:
         job_id = await sent(service, kind="cycle")
 
         async def reports() -> list[dict[str, Any]]:
-            found, _ = await store.read(partial(job_events.after, job_id=job_id, number=0, limit=100))
+            found, _ = await store.read(
+                partial(job_events.after, job_id=job_id, number=0, limit=100)
+            )
             told = [each.data["requests"] for each in found if each.name == "progress"]
             return [only for each in told for only in each]
 
@@ -49,7 +51,12 @@ def test_progress_within_a_long_request_is_an_event(tmp_path: Path) -> None:
         first = {"index": 0, "attempt": 1, "found": None, "bound": None, "solved": 1}
         await tells(first, CandidatesFound(3), CandidateTried(1, "solved", 1.0, 9.0))
         best = {"index": 0, "attempt": 1, "found": 9.0, "bound": None, "solved": 1}
-        await tells(best, Improved(9.0, bound=-math.inf), Improved(9.5), CandidateTried(1, "solved", 1.0, 8.0))
+        await tells(
+            best,
+            Improved(9.0, bound=-math.inf),
+            Improved(9.5),
+            CandidateTried(1, "solved", 1.0, 8.0),
+        )
         await tells(best | {"found": 7.0, "bound": 5.0}, Improved(7.0, bound=5.0))
         service.work.free.set()
         await until(lambda: is_done(service, job_id))
@@ -121,19 +128,35 @@ class Runner:
 
 
 @pytest.mark.parametrize("where", ["here", "cluster"])
-def test_an_identification_gets_its_logs_wherever_it_is_computed(tmp_path: Path, where: str) -> None:
+def test_an_identification_gets_its_logs_wherever_it_is_computed(
+    tmp_path: Path, where: str
+) -> None:
     async def test(store: Store) -> None:
         log = StoredLog(
-            id=new_id(), robot="ur5e", created=now(), size=3, settings={"robot": "ur5e"}, report={}, body=b"log"
+            id=new_id(),
+            robot="ur5e",
+            created=now(),
+            size=3,
+            settings={"robot": "ur5e"},
+            report={},
+            body=b"log",
         )
         await store.write(partial(logs.add, log=log, most=100))
         body = packed(json.dumps({"logs": [log.id]}).encode())
         runner: Any = Runner()
-        executor = LocalExecutor(runner, store, 1) if where == "here" else ClusterExecutor(runner, store)
+        executor = (
+            LocalExecutor(runner, store, 1) if where == "here" else ClusterExecutor(runner, store)
+        )
         ended: list[Ended] = []
-        others = [Work(JobRequestTask(kind, body, "job.0"), 1.0, ended.append) for kind in (IDENTIFY, "optimize")]
+        others = [
+            Work(JobRequestTask(kind, body, "job.0"), 1.0, ended.append)
+            for kind in (IDENTIFY, "optimize")
+        ]
         await executor.run(taking(*others))
-        assert [task.logs for task in runner.tasks] == [(), (GivenLog(log.id, {"robot": "ur5e"}, b"log"),)]
+        assert [task.logs for task in runner.tasks] == [
+            (),
+            (GivenLog(log.id, {"robot": "ur5e"}, b"log"),),
+        ]
         assert [type(each) for each in ended] == [InternalError, InternalError]
 
     with_store(tmp_path, test)

@@ -1,4 +1,6 @@
-"""Answers of a sensible size: the candidates that are asked for, and every answer of /optimize again by its path."""
+"""Answers of a sensible size: the candidates that are asked for, and every answer of /optimize
+again by its path.
+"""
 
 from __future__ import annotations
 
@@ -28,22 +30,31 @@ TWO_POSES = EXAMPLES["joint_to_pose"]
 
 @pytest.fixture(scope="module")
 def everything(client: TestClient) -> dict[str, Any]:
-    content: dict[str, Any] = client.post("/optimize", json=TWO_POSES | {"candidates": "all"}).json()
+    content: dict[str, Any] = client.post(
+        "/optimize", json=TWO_POSES | {"candidates": "all"}
+    ).json()
     return content
 
 
 @pytest.mark.parametrize(
-    ("which", "kept"), [("computed", ("solved", "failed")), ("none", ()), (None, ("solved", "failed"))]
+    ("which", "kept"),
+    [("computed", ("solved", "failed")), ("none", ()), (None, ("solved", "failed"))],
 )
 def test_candidates_as_asked(
     client: TestClient, everything: dict[str, Any], which: str | None, kept: tuple[str, ...]
 ) -> None:
-    answer = client.post("/optimize", json=TWO_POSES | ({} if which is None else {"candidates": which}))
+    answer = client.post(
+        "/optimize", json=TWO_POSES | ({} if which is None else {"candidates": which})
+    )
     model_of(OptimizeAnswer).model_validate_json(answer.content)
     content = answer.json()
-    assert content["candidates"] == [each for each in everything["candidates"] if each["status"] in kept]
+    assert content["candidates"] == [
+        each for each in everything["candidates"] if each["status"] in kept
+    ]
     counted = Counter(each["status"] for each in everything["candidates"])
-    assert {status: count for status, count in content["candidate_counts"].items() if count} == counted
+    assert {
+        status: count for status, count in content["candidate_counts"].items() if count
+    } == counted
     assert content["energy"] == everything["energy"]
     assert len(everything["candidates"]) == 256
 
@@ -58,12 +69,21 @@ def test_every_answer_is_kept(recorded: TestClient) -> None:
 
 
 def test_the_answers_are_listed(recorded: TestClient) -> None:
-    """Newest first, page by page, each with the figures of its motion; those of studies and jobs, too."""
+    """Newest first, page by page, each with the figures of its motion; those of studies and jobs,
+    too.
+    """
     own = recorded.post("/optimize", json=move()).json()
     given = {"configurations": [HOME, NEAR], "time_per_segment": 1.5}
-    study = recorded.post("/studies", json={"name": "A study", "threshold": 1.0}).headers["location"]
+    study = recorded.post("/studies", json={"name": "A study", "threshold": 1.0}).headers[
+        "location"
+    ]
     step = recorded.post(f"{study}/iterations", json={"evaluate": given}).json()
-    round_ = {"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], "candidates": "none", **PATIENT}
+    round_ = {
+        "start": {"q": HOME},
+        "stops": [{"target": {"q": NEAR}}],
+        "candidates": "none",
+        **PATIENT,
+    }
     cycle_job = recorded.post("/cycle", json=round_, headers={"Prefer": "respond-async, wait=60"})
     assert cycle_job.status_code == 200
     pages, query = [], "/answers?limit=2"
@@ -75,7 +95,9 @@ def test_the_answers_are_listed(recorded: TestClient) -> None:
     found = [each for page in pages for each in page["answers"]]
     assert [len(page["answers"]) for page in pages[:2]] == [2, 2]
     assert len({each["id"] for each in found}) == len(found) > 4
-    assert sorted((each["created"] for each in found), reverse=True) == [each["created"] for each in found]
+    assert sorted((each["created"] for each in found), reverse=True) == [
+        each["created"] for each in found
+    ]
     by_id = {each["id"]: each for each in found}
     figures = [by_id[own["answer"].removeprefix("/answers/")], by_id[step["answer"]]]
     energies = [own["energy"]["electrical"]["total"], step["energy"]]
@@ -87,7 +109,10 @@ def test_the_answers_are_listed(recorded: TestClient) -> None:
     ]
     done = cycle_job.json()
     (whole,) = [each for each in found if each["kind"] == "cycle"]
-    assert whole["energy"] == done["energy"]["electrical"]["total"] and whole["duration"] == done["duration"]
+    assert (
+        whole["energy"] == done["energy"]["electrical"]["total"]
+        and whole["duration"] == done["duration"]
+    )
 
 
 @pytest.mark.parametrize("query", ["limit=0", "limit=201", "after=1", "after=x_y", "kind=optimize"])
@@ -99,34 +124,52 @@ def test_a_wrong_page_is_refused(recorded: TestClient, query: str) -> None:
 
 def test_a_result_that_is_not_kept_says_so() -> None:
     name = '","id":null,"answer":"x"}'
-    result = TaskResult.of_kept_json({"request": "r", "id": None, "name": name, "answer": None}, AnswerFigures())
+    result = TaskResult.of_kept_json(
+        {"request": "r", "id": None, "name": name, "answer": None}, AnswerFigures()
+    )
     assert result.document.startswith(f'{{"request":"r","id":"{result.kept_as}","name":'.encode())
     assert result.document.endswith(f'"answer":"/answers/{result.kept_as}"}}'.encode())
     without = result.not_kept()
-    assert orjson.loads(without.document) == {"request": "r", "id": None, "name": name, "answer": None}
+    assert orjson.loads(without.document) == {
+        "request": "r",
+        "id": None,
+        "name": name,
+        "answer": None,
+    }
     assert without.kept_as is None
 
 
 @pytest.mark.parametrize(("most", "kept"), [(0, False), (100, False), (1 << 20, True)])
-def test_an_answer_larger_than_all_that_may_be_kept_is_not(tmp_path: Any, most: int, kept: bool) -> None:
+def test_an_answer_larger_than_all_that_may_be_kept_is_not(
+    tmp_path: Any, most: int, kept: bool
+) -> None:
     content = {"request": "r", "id": None, "q": list(range(1000)), "answer": None}
     result = TaskResult.of_kept_json(content, AnswerFigures())
 
     async def test(store: Store) -> None:
-        answered = await keep_answer(store, Settings(answers_max_bytes=most), "optimize", result, None)
+        answered = await keep_answer(
+            store, Settings(answers_max_bytes=most), "optimize", result, None
+        )
         said = orjson.loads(answered.document)
         assert (said["id"] is not None, said["answer"] is not None) == (kept, kept)
 
     with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
 
 
-def test_the_answers_of_a_front_and_a_cycle_have_their_paths_and_candidates(client: TestClient) -> None:
+def test_the_answers_of_a_front_and_a_cycle_have_their_paths_and_candidates(
+    client: TestClient,
+) -> None:
     front = client.post("/pareto", json=move(points=2, candidates="none")).json()
     for point in front["points"]:
         kept = client.get(point["answer"]).json()["answer"]
         assert (kept["answer"], kept["candidates"]) == (point["answer"], [])
         assert sum(kept["candidate_counts"].values()) > 0
-    work = {"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], "candidates": "none", **PATIENT}
+    work = {
+        "start": {"q": HOME},
+        "stops": [{"target": {"q": NEAR}}],
+        "candidates": "none",
+        **PATIENT,
+    }
     answer = client.post("/cycle", json=work)
     model_of(CycleAnswer).model_validate_json(answer.content)
     for leg in answer.json()["legs"]:

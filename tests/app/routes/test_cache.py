@@ -1,4 +1,6 @@
-"""Answers that were computed before: found by the canonical form of a request, by nobody else, and not for ever."""
+"""Answers that were computed before: found by the canonical form of a request, by nobody else, and
+not for ever.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,9 @@ KNOWN = {"Cache-Control": "max-age=60"}
 
 def sent(client: TestClient, body: Any, **headers: str) -> Any:
     answer = client.post(
-        "/optimize", content=orjson.dumps(body), headers={"Content-Type": "application/json"} | headers
+        "/optimize",
+        content=orjson.dumps(body),
+        headers={"Content-Type": "application/json"} | headers,
     )
     assert answer.status_code == 200, answer.text
     return answer
@@ -56,10 +60,23 @@ def test_an_equal_request_has_the_same_answer(recorded: TestClient) -> None:
     again = sent(recorded, body, **KNOWN | {"X-Request-ID": "another-one"})
     assert is_hit(again) and 0 <= int(again.headers["age"]) < 1000
     assert again.json()["request"] == "another-one"
-    assert again.content == first.content.replace(first.json()["request"].encode(), b"another-one", 1)
+    assert again.content == first.content.replace(
+        first.json()["request"].encode(), b"another-one", 1
+    )
     assert again.json()["id"] == first.json()["id"], "the same answer"
-    spelled_out = {"windings": True, "payload": load(0.123), "goal": {"q": NEAR}, "start": {"q": HOME}}
-    assert is_hit(sent(recorded, spelled_out | {"method": "time_scaling", "robot": "ur5e", "deadline": 17}, **KNOWN))
+    spelled_out = {
+        "windings": True,
+        "payload": load(0.123),
+        "goal": {"q": NEAR},
+        "start": {"q": HOME},
+    }
+    assert is_hit(
+        sent(
+            recorded,
+            spelled_out | {"method": "time_scaling", "robot": "ur5e", "deadline": 17},
+            **KNOWN,
+        )
+    )
     assert not is_hit(sent(recorded, body | {"payload": load(0.124)}, **KNOWN))
     assert not is_hit(sent(recorded, body | {"candidates": "all"}, **KNOWN))
     events = sent(recorded, body, **KNOWN, Accept="text/event-stream").text
@@ -131,7 +148,9 @@ def test_two_services_that_answer_at_the_same_time_lose_nothing(tmp_path: Path) 
         first = await keep_answer(store, settings, "optimize", result(1, "optimal"), None, asked)
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(Session, "scalars", lambda *_: [])  # it sees nothing
-            second = await keep_answer(store, settings, "optimize", result(2, "optimal"), None, asked)
+            second = await keep_answer(
+                store, settings, "optimize", result(2, "optimal"), None, asked
+            )
         assert first.document != second.document and not second.document.endswith(b'"answer":null}')
         known = await AnswerCache(store, None, False).find(asked, "mine")
         assert known is not None and numbers(known.document) == 1
@@ -154,11 +173,21 @@ def test_keys_tell_clients_kinds_and_robots_apart(tmp_path: Path) -> None:
     body = OptimizeRequest.model_validate(move())
 
     async def test(store: Store) -> None:
-        async def key(owner: str | None = None, kind: str = "optimize", **fields: Any) -> str | None:
-            asked = await AnswerCache(store, owner, False).asked(kind, body.model_copy(update=fields), 1.0)
+        async def key(
+            owner: str | None = None, kind: str = "optimize", **fields: Any
+        ) -> str | None:
+            asked = await AnswerCache(store, owner, False).asked(
+                kind, body.model_copy(update=fields), 1.0
+            )
             return None if asked is None else asked.key
 
-        keys = [await key(), await key("a"), await key("b"), await key(kind="pareto"), await key(robot="ur10e")]
+        keys = [
+            await key(),
+            await key("a"),
+            await key("b"),
+            await key(kind="pareto"),
+            await key(robot="ur10e"),
+        ]
         assert len(set(keys)) == 5 and None not in keys
         assert await key() == await key(deadline=77.0)
         assert await key(robot="nobodys") is None
@@ -191,7 +220,9 @@ def job(client: TestClient, requests: list[Any], headers: dict[str, str]) -> lis
 
 
 def without_paths(answer: dict[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in answer.items() if name not in ("request", "id", "answer")}
+    return {
+        name: value for name, value in answer.items() if name not in ("request", "id", "answer")
+    }
 
 
 def test_jobs_have_what_was_answered_and_answer_what_comes(recorded: TestClient) -> None:
@@ -203,7 +234,10 @@ def test_jobs_have_what_was_answered_and_answer_what_comes(recorded: TestClient)
         # the wall times of its search, too
         assert without_paths(line["result"]) == without_paths(first)
         assert line["result"]["answer"] == line["answer"] != first["answer"]
-        assert line["energy"] == first["energy"]["electrical"]["total"] and line["status"] == first["status"]
+        assert (
+            line["energy"] == first["energy"]["electrical"]["total"]
+            and line["status"] == first["status"]
+        )
     other = move(method="time_scaling", payload=load(0.128))
     (line,) = job(recorded, [{"optimize": other}], KNOWN)
     again = sent(recorded, other, **KNOWN)

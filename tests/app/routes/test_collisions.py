@@ -1,4 +1,6 @@
-"""Obstacles, tool and cone over HTTP: what is avoided, what is refused, and what the certificate says of it."""
+"""Obstacles, tool and cone over HTTP: what is avoided, what is refused, and what the certificate
+says of it.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,11 @@ from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.nlp.clearance_constraint import RESERVE
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.search.errors import GoalInCollision, NoCollisionFreeTrajectory, StartInCollision
+from joulepath.optimizer.search.errors import (
+    GoalInCollision,
+    NoCollisionFreeTrajectory,
+    StartInCollision,
+)
 from tests.app.requests import EXAMPLES, HOME, move
 from tests.app.routes.test_examples import EXAMPLES as FILES
 from tests.app.routes.test_problems import DOWN, refused
@@ -36,10 +42,14 @@ def at(*position: float) -> dict[str, list[float]]:
 
 
 def floor(height: float, **fields: Any) -> dict[str, Any]:
-    return {"obstacles": [{"name": "floor", "shape": "half_space", "pose": at(0, 0, height), **fields}]}
+    return {
+        "obstacles": [{"name": "floor", "shape": "half_space", "pose": at(0, 0, height), **fields}]
+    }
 
 
-def answered(client: TestClient, request: dict[str, Any], path: str = "/optimize") -> dict[str, Any]:
+def answered(
+    client: TestClient, request: dict[str, Any], path: str = "/optimize"
+) -> dict[str, Any]:
     answer = client.post(path, json=request)
     assert answer.status_code == 200, answer.text
     content: dict[str, Any] = answer.json()
@@ -63,7 +73,9 @@ def test_goes_around_a_post(client: TestClient) -> None:
     assert least_distance(request, content["trajectory"]["spline"]) >= clearance["min_clearance"]
     through = answered(client, request | {"collisions": False})
     assert through["certificate"]["clearance"] is None
-    assert least_distance(request, through["trajectory"]["spline"]) < 0, "without looking, it goes through the post"
+    assert least_distance(request, through["trajectory"]["spline"]) < 0, (
+        "without looking, it goes through the post"
+    )
     assert content["energy"]["electrical"]["total"] > through["energy"]["electrical"]["total"]
 
 
@@ -81,7 +93,10 @@ def test_start_and_goal_in_collision(client: TestClient) -> None:
     arm = Arm(robot=ROBOT)
     found = CollisionModel(arm).closest_pairs([np.array(FOLDED)])[0].distance
     assert goal["depth"] == pytest.approx(RESERVE - found)
-    assert answered(client, move(goal={"q": FOLDED}, collisions=False))["certificate"]["clearance"] is None
+    assert (
+        answered(client, move(goal={"q": FOLDED}, collisions=False))["certificate"]["clearance"]
+        is None
+    )
 
 
 def test_every_branch_in_collision_is_listed(client: TestClient) -> None:
@@ -100,49 +115,82 @@ def test_every_branch_in_collision_is_listed(client: TestClient) -> None:
 def test_margin_counts_at_the_ends(client: TestClient) -> None:
     lowest = answered(client, move(scene=floor(-0.1)))
     assert lowest["certificate"]["clearance"]["min_clearance"] > 0
-    content = refused(client.post("/optimize", json=move(scene=floor(-0.1, margin=0.9))), StartInCollision)
+    content = refused(
+        client.post("/optimize", json=move(scene=floor(-0.1, margin=0.9))), StartInCollision
+    )
     assert content["pair"][0] == "floor" and 0.5 < content["depth"] < 0.9
 
 
 def test_some_branches_in_collision_are_candidates_ruled_out(client: TestClient) -> None:
     goal = {"pose": {"position": [-0.35, 0.4, 0.1], "quaternion": DOWN}}
     content = answered(
-        client, {"start": {"q": HOME}, "goal": goal, "windings": False, "scene": floor(-0.01), "candidates": "all"}
+        client,
+        {
+            "start": {"q": HOME},
+            "goal": goal,
+            "windings": False,
+            "scene": floor(-0.01),
+            "candidates": "all",
+        },
     )
     out = [c for c in content["candidates"] if c["status"] == "infeasible"]
-    assert out and all("at the goal, floor and" in c["reason"] and c["lower_bound"] is None for c in out)
+    assert out and all(
+        "at the goal, floor and" in c["reason"] and c["lower_bound"] is None for c in out
+    )
     assert content["branch"]["goal"]["label"] not in {c["goal"] for c in out}
 
 
 def test_no_way(client: TestClient) -> None:
     # a wall outwards from the base, between start and goal, higher and wider than the arm reaches
-    wall = {"name": "post", "shape": "box", "size": [1.4, 0.02, 3.0], "margin": 0.0, "pose": at(-0.85, 0.0, 1.0)}
-    request = EXAMPLES["over_a_post"] | {"method": "time_scaling", "scene": {"obstacles": [wall]}, "deadline": 3.0}
+    wall = {
+        "name": "post",
+        "shape": "box",
+        "size": [1.4, 0.02, 3.0],
+        "margin": 0.0,
+        "pose": at(-0.85, 0.0, 1.0),
+    }
+    request = EXAMPLES["over_a_post"] | {
+        "method": "time_scaling",
+        "scene": {"obstacles": [wall]},
+        "deadline": 3.0,
+    }
     content = refused(client.post("/optimize", json=request), NoCollisionFreeTrajectory)
     assert "post" in content["pair"] and content["depth"] > 0 and content["time"] > 0
-    assert content["candidates"][0]["status"] == "failed" and "post and" in content["candidates"][0]["reason"]
+    assert (
+        content["candidates"][0]["status"] == "failed"
+        and "post and" in content["candidates"][0]["reason"]
+    )
     assert content["start"] == content["candidates"][0]["start"]
 
 
 @pytest.mark.parametrize("methods", long_but([["uniform_scaling"]], [["uniform_scaling"], FAST]))
-def test_a_scan_voxels_and_a_mesh_file_are_obstacles(client: TestClient, methods: list[str]) -> None:
-    """All three at once, by a free and by a fixed path; Pinocchio's replay keeps off every point."""
+def test_a_scan_voxels_and_a_mesh_file_are_obstacles(
+    client: TestClient, methods: list[str]
+) -> None:
+    """All three at once, by a free and by a fixed path; Pinocchio's replay keeps off every
+    point."""
     request = EXAMPLES["past_a_scan"]
-    rows = answered(client, request | {"methods": methods, "answers": True, "deadline": 60.0}, "/compare")["methods"]
+    rows = answered(
+        client, request | {"methods": methods, "answers": True, "deadline": 60.0}, "/compare"
+    )["methods"]
     free = answered(client, request | {"collisions": False})
     assert [row["valid"] for row in rows] == [True] * len(methods)
     scan = request["scene"]["obstacles"][0]
     for answer in (*(row["answer"] for row in rows), free):
         spline = answer["trajectory"]["spline"]
         curve = BSpline(spline["knots"], spline["control_points"], spline["degree"])
-        gap = least_gap(curve(np.linspace(0.0, spline["knots"][-1], 2000)), np.array(scan["points"]))
+        gap = least_gap(
+            curve(np.linspace(0.0, spline["knots"][-1], 2000)), np.array(scan["points"])
+        )
         kept = gap >= scan["radius"] + scan["margin"]
         assert kept == (answer is not free)
     assert rows[0]["electrical"] > free["energy"]["electrical"]["total"]
 
 
 def least_gap(q: np.ndarray, points: np.ndarray) -> float:
-    """Least distance [m] of points (m, 3) from the capsules of the moving links, by Pinocchio and a plain formula."""
+    """Least distance [m] of points (m, 3) from the capsules of the moving links, by Pinocchio and a
+    plain formula.
+    """
     model, least = ROBOT.model, np.inf
     data = model.createData()
     for each in q:
@@ -150,9 +198,16 @@ def least_gap(q: np.ndarray, points: np.ndarray) -> float:
         for capsule in ROBOT.capsules:
             if capsule.link == 0:
                 continue
-            a, b = (data.oMi[capsule.link].act(np.asarray(end)) for end in np.asarray(capsule.axis)[[0, -1]])
+            a, b = (
+                data.oMi[capsule.link].act(np.asarray(end))
+                for end in np.asarray(capsule.axis)[[0, -1]]
+            )
             share = np.clip((points - a) @ (b - a) / max(float((b - a) @ (b - a)), 1e-12), 0.0, 1.0)
-            least = min(least, np.linalg.norm(points - a - share[:, None] * (b - a), axis=1).min() - capsule.radius)
+            least = min(
+                least,
+                np.linalg.norm(points - a - share[:, None] * (b - a), axis=1).min()
+                - capsule.radius,
+            )
     return float(least)
 
 
@@ -160,12 +215,19 @@ def test_many_points_are_answered_and_warned_of(client: TestClient) -> None:
     """A wall of 20,000 points; the warning names the obstacle, as of any other shape."""
     y, z = np.meshgrid(np.linspace(-0.8, 0.8, 200), np.linspace(0.0, 1.2, 100))
     wall = np.stack([np.full(y.size, 0.35), y.ravel(), z.ravel()], axis=1).round(4)
-    request = move(scene={"obstacles": [{"name": "wall", "shape": "points", "points": wall.tolist(), "radius": 0.01}]})
+    request = move(
+        scene={
+            "obstacles": [
+                {"name": "wall", "shape": "points", "points": wall.tolist(), "radius": 0.01}
+            ]
+        }
+    )
     content = answered(client, request)
     assert content["certificate"]["clearance"]["min_clearance"] >= 0
     nearest = answered(
         client,
-        {"configurations": [request["start"]["q"]] * 2, "time_per_segment": 1.0} | {"scene": request["scene"]},
+        {"configurations": [request["start"]["q"]] * 2, "time_per_segment": 1.0}
+        | {"scene": request["scene"]},
         "/evaluate",
     )["nearest"]
     assert nearest["distance"] > 0
@@ -198,10 +260,23 @@ def test_a_free_goal_keeps_within_the_cone(client: TestClient) -> None:
         ({"limits": {"tcp_speed": 0.0}}, ["body", "limits", "tcp_speed"]),
         ({"limits": {"elbow_speed": -1.0}}, ["body", "limits", "elbow_speed"]),
         ({"collisions": 1}, ["body", "collisions"]),
-        ({"scene": {"obstacles": floor(0)["obstacles"] * 2}}, ["body", "scene", "obstacles", 1, "name"]),
+        (
+            {"scene": {"obstacles": floor(0)["obstacles"] * 2}},
+            ["body", "scene", "obstacles", 1, "name"],
+        ),
         *[
             ({"scene": floor(0, name=name)}, ["body", "scene", "obstacles", 0, "name"])
-            for name in ("wrist_1", "tool", "payload", "Tool ", "\x7fkept/0\x7f", "a\u202eb", "", " ", "x" * 65)
+            for name in (
+                "wrist_1",
+                "tool",
+                "payload",
+                "Tool ",
+                "\x7fkept/0\x7f",
+                "a\u202eb",
+                "",
+                " ",
+                "x" * 65,
+            )
         ],
     ],
 )
@@ -219,8 +294,12 @@ def test_refused_fields(client: TestClient, fields: dict[str, Any], where: list[
 def test_compare_and_pareto_keep_clear_too(client: TestClient, methods: list[str]) -> None:
     """Also the methods whose straight line hits the post."""
     request = EXAMPLES["over_a_post"]
-    compared = answered(client, request | {"methods": methods, "deadline": 60.0}, "/compare")["methods"]
-    assert len(compared) == len(methods) and all(row["valid"] and row["problem"] is None for row in compared)
+    compared = answered(client, request | {"methods": methods, "deadline": 60.0}, "/compare")[
+        "methods"
+    ]
+    assert len(compared) == len(methods) and all(
+        row["valid"] and row["problem"] is None for row in compared
+    )
     front = answered(client, request | {"points": 2, "duration": {"max": 1.5}}, "/pareto")
     kept = client.get(front["points"][0]["answer"]).json()["answer"]
     assert kept["certificate"]["clearance"]["min_clearance"] >= 0
@@ -241,9 +320,14 @@ def test_evaluate_tells_what_comes_nearest(client: TestClient) -> None:
 
 
 def test_evaluate_samples_the_least_distance(client: TestClient) -> None:
-    request = move(scene=floor(0.02), goal={"q": [1.0, -1.0, 1.9, -1.57, -1.57, 0.0]}, collisions=False)
+    request = move(
+        scene=floor(0.02), goal={"q": [1.0, -1.0, 1.9, -1.57, -1.57, 0.0]}, collisions=False
+    )
     spline = (trajectory := answered(client, request)["trajectory"])["spline"]
-    given = {"trajectory": {name: trajectory[name] for name in ("t", "q")}, "scene": request["scene"]}
+    given = {
+        "trajectory": {name: trajectory[name] for name in ("t", "q")},
+        "scene": request["scene"],
+    }
     nearest = answered(client, given, "/evaluate")["nearest"]
     assert nearest["spacing"] <= 0.01
     # the arm moves at two metres per second at most: half a spacing is a centimetre
@@ -251,7 +335,11 @@ def test_evaluate_samples_the_least_distance(client: TestClient) -> None:
 
 
 def test_evaluate_takes_a_scene_as_a_query(client: TestClient) -> None:
-    rows = "q1,q2,q3,q4,q5,q6\n" + "\n".join(",".join(map(str, q)) for q in (HOME, [1.2, *HOME[1:]])) + "\n"
+    rows = (
+        "q1,q2,q3,q4,q5,q6\n"
+        + "\n".join(",".join(map(str, q)) for q in (HOME, [1.2, *HOME[1:]]))
+        + "\n"
+    )
     settings = {
         "time_per_segment": "1.5",
         "scene": json.dumps(floor(-0.1)),
@@ -259,26 +347,38 @@ def test_evaluate_takes_a_scene_as_a_query(client: TestClient) -> None:
         "limits": json.dumps({"tcp_speed": 0.2, "elbow_speed": 0.2}),
         "collisions": "true",
     }
-    answer = client.post("/evaluate", content=rows, headers={"Content-Type": "text/csv"}, params=settings)
+    answer = client.post(
+        "/evaluate", content=rows, headers={"Content-Type": "text/csv"}, params=settings
+    )
     assert answer.status_code == 200, answer.text
     limits = {report["limit"]: report for report in answer.json()["limits"]}
-    assert limits["tcp_speed"]["value"] / limits["tcp_speed"]["bound"] == limits["tcp_speed"]["worst_ratio"]
+    assert (
+        limits["tcp_speed"]["value"] / limits["tcp_speed"]["bound"]
+        == limits["tcp_speed"]["worst_ratio"]
+    )
     assert limits["tool_cone"]["held"] and limits["tool_cone"]["joint"] is None
     assert not answer.json()["collides"]
 
 
 def test_a_close_pass_is_warned_of(client: TestClient) -> None:
-    """A floor 1 mm below the tool at rest, without a margin; with the usual one, the start is refused."""
+    """A floor 1 mm below the tool at rest, without a margin; with the usual one, the start is
+    refused.
+    """
     request = move(scene=floor(-1.0, margin=0.0), tool=EXAMPLES["over_a_post"]["tool"])
     assert answered(client, request)["warnings"] == []
     arm = to_arm(OptimizeRequest.model_validate_json(json.dumps(request)))
     model = CollisionModel(arm)
     of_floor = [p for p in range(len(model.pairs)) if "floor" in model.names(p)]
-    lowest = float(model.signed_distances(np.array([HOME, request["goal"]["q"]]))[0][:, of_floor].min())
+    lowest = float(
+        model.signed_distances(np.array([HOME, request["goal"]["q"]]))[0][:, of_floor].min()
+    )
     near = request | {"scene": floor(lowest - 1.0 - 1e-3, margin=0.0)}
     (warning,) = answered(client, near)["warnings"]
     assert "floor and " in warning and "closer than 2 mm" in warning.lower()
-    refused(client.post("/optimize", json=request | {"scene": floor(lowest - 1.0 - 1e-3)}), StartInCollision)
+    refused(
+        client.post("/optimize", json=request | {"scene": floor(lowest - 1.0 - 1e-3)}),
+        StartInCollision,
+    )
 
 
 def test_a_given_motion_is_warned_of_too(client: TestClient) -> None:
@@ -291,11 +391,15 @@ def test_a_given_motion_is_warned_of_too(client: TestClient) -> None:
 def test_a_tool_declares_what_it_touches(client: TestClient) -> None:
     """A sleeve around wrist 2 is in collision with it, unless it touches it by design."""
     sleeve = {"start": [0.0, 0.0, -0.03], "end": [0.0, 0.0, 0.0], "radius": 0.03}
-    content = refused(client.post("/optimize", json=move(tool={"capsules": [sleeve]})), StartInCollision)
+    content = refused(
+        client.post("/optimize", json=move(tool={"capsules": [sleeve]})), StartInCollision
+    )
     assert content["pair"] == ["wrist_2", "tool"]
     by_design = {"capsules": [sleeve | {"touches": ["wrist_2", "wrist_3"]}]}
     assert answered(client, move(tool=by_design))["status"] in ("optimal", "feasible")
-    unknown = client.post("/optimize", json=move(tool={"capsules": [sleeve | {"touches": ["wrist_9"]}]}))
+    unknown = client.post(
+        "/optimize", json=move(tool={"capsules": [sleeve | {"touches": ["wrist_9"]}]})
+    )
     assert unknown.status_code == 422 and "tool.capsules.0.touches" in unknown.text
 
 

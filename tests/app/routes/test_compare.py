@@ -1,4 +1,5 @@
-"""`POST /compare`: the table against single requests, its order, its problems, and what it refuses."""
+"""`POST /compare`: the table against single requests, its order, its problems, and what it
+refuses."""
 
 from __future__ import annotations
 
@@ -39,7 +40,9 @@ def compared(client: TestClient, **given: Any) -> dict[str, Any]:
     [
         (QUICK, {}),
         pytest.param(ALL, {}, marks=pytest.mark.long),
-        pytest.param(ALL, {"objective": "mechanical", "duration": {"max": 1.5}}, marks=pytest.mark.long),
+        pytest.param(
+            ALL, {"objective": "mechanical", "duration": {"max": 1.5}}, marks=pytest.mark.long
+        ),
     ],
 )
 def test_the_table_is_what_single_requests_answer(
@@ -56,9 +59,13 @@ def test_the_table_is_what_single_requests_answer(
         assert row["duration"] == pytest.approx(alone["duration"], rel=SAME)
         assert row["electrical"] == pytest.approx(alone["energy"]["electrical"]["total"], rel=SAME)
         assert row["mechanical"] == pytest.approx(alone["energy"]["mechanical"]["total"], rel=SAME)
-        assert row["optimality_gap"] == pytest.approx(1 - table["lower_bound"] / row[which], abs=SAME)
+        assert row["optimality_gap"] == pytest.approx(
+            1 - table["lower_bound"] / row[which], abs=SAME
+        )
         bounds.append(alone["energy"]["lower_bound"])
-        assert row["status"] == alone["status"] and row["iterations"] == alone["solver"]["iterations"]
+        assert (
+            row["status"] == alone["status"] and row["iterations"] == alone["solver"]["iterations"]
+        )
         assert row["excess"] == pytest.approx(row[which] / least - 1, abs=SAME)
         assert row["valid"] and row["worst_ratio"] <= 1 + 1e-6 and row["wall_time"] > 0
         assert row["problem"] is None and row["answer"] is None
@@ -72,20 +79,30 @@ def test_whole_answers_on_request_in_the_order_asked(client: TestClient) -> None
     table = compared(client, methods=["uniform_scaling", "bspline"], answers=True)
     assert [row["method"] for row in table["methods"]] == ["uniform_scaling", "bspline"]
     for row in table["methods"]:
-        assert row["answer"]["method"] == row["method"] and row["answer"]["request"] == table["request"]
-        assert row["answer"]["id"] is row["answer"]["answer"] is table["id"] is None, "none of them is kept"
+        assert (
+            row["answer"]["method"] == row["method"]
+            and row["answer"]["request"] == table["request"]
+        )
+        assert row["answer"]["id"] is row["answer"]["answer"] is table["id"] is None, (
+            "none of them is kept"
+        )
         assert row["answer"]["energy"]["electrical"]["total"] == row["electrical"]
 
 
 def test_a_method_that_cannot_be_as_fast_says_so_in_its_row(client: TestClient) -> None:
     """Between the free spline's shortest duration and the polynomial's."""
     shortest = {
-        method: client.post("/optimize", json=MOVE | {"method": method, "duration": 0.2}).json()["shortest"]
+        method: client.post("/optimize", json=MOVE | {"method": method, "duration": 0.2}).json()[
+            "shortest"
+        ]
         for method in ("bspline", "lagrange")
     }
     between = sum(shortest.values()) / 2
     assert shortest["bspline"] < between
-    rows = {row["method"]: row for row in compared(client, methods=list(shortest), duration=between)["methods"]}
+    rows = {
+        row["method"]: row
+        for row in compared(client, methods=list(shortest), duration=between)["methods"]
+    }
     assert rows["bspline"]["problem"] is None and rows["bspline"]["duration"] == between
     problem = rows["lagrange"]["problem"]
     assert problem["type"] == "/problems/duration-too-short" and problem["shortest"] > between
@@ -93,7 +110,9 @@ def test_a_method_that_cannot_be_as_fast_says_so_in_its_row(client: TestClient) 
 
 
 @pytest.mark.parametrize("methods", long_but([QUICK], [QUICK, ALL]))
-def test_where_no_method_finds_a_motion_the_answer_is_a_problem(client: TestClient, methods: list[str]) -> None:
+def test_where_no_method_finds_a_motion_the_answer_is_a_problem(
+    client: TestClient, methods: list[str]
+) -> None:
     far = {"pose": {"position": [3.0, 0.0, 0.0], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
     answer = client.post("/compare", json=MOVE | {"goal": far})
     assert answer.status_code == 422 and answer.json()["type"] == "/problems/unreachable-pose"

@@ -1,4 +1,6 @@
-"""POST /cycle: the cycle as the contract lays it out, its answers by reference, and what is refused."""
+"""POST /cycle: the cycle as the contract lays it out, its answers by reference, and what is
+refused.
+"""
 
 from __future__ import annotations
 
@@ -82,12 +84,23 @@ def test_energies_add_up(answer: dict[str, Any]) -> None:
     energy, legs = answer["energy"], answer["legs"]
     for part in ("electrical", "mechanical"):
         assert energy[part]["total"] == pytest.approx(sum(leg[part] for leg in legs), rel=ROUNDING)
-    assert energy["electrical"]["dwell"] == pytest.approx(answer["legs"][1]["electrical"], rel=ROUNDING)
-    assert energy["lower_bound"] <= sum(leg["lower_bound"] for leg in answer["legs"]) * (1 + ROUNDING)
-    assert energy["optimality_gap"] == pytest.approx(1 - energy["lower_bound"] / energy["electrical"]["total"])
+    assert energy["electrical"]["dwell"] == pytest.approx(
+        answer["legs"][1]["electrical"], rel=ROUNDING
+    )
+    assert energy["lower_bound"] <= sum(leg["lower_bound"] for leg in answer["legs"]) * (
+        1 + ROUNDING
+    )
+    assert energy["optimality_gap"] == pytest.approx(
+        1 - energy["lower_bound"] / energy["electrical"]["total"]
+    )
     for each in answer["baselines"]:
-        assert each["saving"] == pytest.approx(1 - energy["electrical"]["total"] / each["electrical"], abs=ROUNDING)
-    assert answer["certificate"]["joins"] < ROUNDING and max(answer["certificate"]["worst_ratio"].values()) <= 1 + 1e-6
+        assert each["saving"] == pytest.approx(
+            1 - energy["electrical"]["total"] / each["electrical"], abs=ROUNDING
+        )
+    assert (
+        answer["certificate"]["joins"] < ROUNDING
+        and max(answer["certificate"]["worst_ratio"].values()) <= 1 + 1e-6
+    )
 
 
 def test_every_move_refers_to_its_answer(answer: dict[str, Any], client: TestClient) -> None:
@@ -99,16 +112,24 @@ def test_every_move_refers_to_its_answer(answer: dict[str, Any], client: TestCli
         kept = client.get(leg["answer"]).json()
         assert kept["kind"] == "optimize"
         own = model_of(OptimizeAnswer).model_validate(kept["answer"]).model_dump(exclude_unset=True)
-        assert own["energy"]["electrical"]["total"] == leg["electrical"] and own["duration"] == leg["duration"]
+        assert (
+            own["energy"]["electrical"]["total"] == leg["electrical"]
+            and own["duration"] == leg["duration"]
+        )
         assert own["branch"]["goal"]["q"] == leg["goal"]["q"]
         clearances.append(own["certificate"]["clearance"]["min_clearance"])
     nearest = answer["certificate"]["clearance"]
-    assert nearest["min_clearance"] == min(clearances) and answer["legs"][nearest["leg"]]["kind"] == "move"
+    assert (
+        nearest["min_clearance"] == min(clearances)
+        and answer["legs"][nearest["leg"]]["kind"] == "move"
+    )
 
 
 def test_a_payload_that_is_left_out_stays_and_null_puts_it_down(client: TestClient) -> None:
     stops = a_cycle()["stops"]
-    carried = client.post("/cycle", json=a_cycle(stops=[stops[0], {"target": stops[1]["target"]}], closed=False)).json()
+    carried = client.post(
+        "/cycle", json=a_cycle(stops=[stops[0], {"target": stops[1]["target"]}], closed=False)
+    ).json()
     assert [leg["payload_mass"] for leg in carried["legs"]] == [0.0, 2.0, 2.0]
     assert carried["legs"][-1]["goal"]["stop"] == "2"  # a stop without a name has its number
     put_down = client.post("/cycle", json=a_cycle(payload=PART, stops=[stops[1]])).json()
@@ -117,7 +138,11 @@ def test_a_payload_that_is_left_out_stays_and_null_puts_it_down(client: TestClie
 
 REFUSED: dict[str, tuple[str, list[Any] | None, dict[str, Any]]] = {
     "no stops": ("invalid-request", ["body", "stops"], {"stops": []}),
-    "unknown field": ("invalid-request", ["body", "stops", 0], {"stops": [{"target": {"q": HOME}, "speed": 1}]}),
+    "unknown field": (
+        "invalid-request",
+        ["body", "stops", 0],
+        {"stops": [{"target": {"q": HOME}, "speed": 1}]},
+    ),
     "same names": (
         "invalid-request",
         ["body", "stops", 1, "name"],
@@ -128,13 +153,24 @@ REFUSED: dict[str, tuple[str, list[Any] | None, dict[str, Any]]] = {
         ["body", "stops", 1, "name"],
         {"stops": [{"name": "2", "target": {"q": HOME}}, {"target": {"q": HOME}}]},
     ),
-    "joints": ("invalid-request", ["body", "stops", 0, "target", "q"], {"stops": [{"target": {"q": [0.0]}}]}),
+    "joints": (
+        "invalid-request",
+        ["body", "stops", 0, "target", "q"],
+        {"stops": [{"target": {"q": [0.0]}}]},
+    ),
     "free orientation of one of several": (
         "invalid-request",
         ["body", "stops", 0, "target"],
         {
             "stops": [
-                {"target": {"any_of": [{"pose": {"position": [0.4, 0.0, 0.3], "orientation": "free"}}, {"q": HOME}]}}
+                {
+                    "target": {
+                        "any_of": [
+                            {"pose": {"position": [0.4, 0.0, 0.3], "orientation": "free"}},
+                            {"q": HOME},
+                        ]
+                    }
+                }
             ]
         },
     ),
@@ -192,13 +228,17 @@ def test_what_is_wrong_is_named(name: str, client: TestClient) -> None:
         assert content["target"].startswith("stops/")
 
 
-@pytest.mark.parametrize(("count", "most", "allowed"), [(100, 600.0, 60.0), (101, 600.0, 120.0), (256, 90.0, 90.0)])
+@pytest.mark.parametrize(
+    ("count", "most", "allowed"), [(100, 600.0, 60.0), (101, 600.0, 120.0), (256, 90.0, 90.0)]
+)
 def test_many_stops_have_more_time_by_default_where_the_operator_allows_it(
     count: int, most: float, allowed: float
 ) -> None:
     asked = CycleRequest.model_validate({"start": {"q": HOME}, "stops": [REST] * count})
     assert deadline_of(asked, most) == allowed
-    given = CycleRequest.model_validate({"start": {"q": HOME}, "stops": [REST] * count, "deadline": 60.0})
+    given = CycleRequest.model_validate(
+        {"start": {"q": HOME}, "stops": [REST] * count, "deadline": 60.0}
+    )
     assert deadline_of(given, most) == 60.0
 
 
@@ -210,7 +250,9 @@ def test_no_time_is_a_deadline_exceeded(client: TestClient) -> None:
 def test_a_redundant_arm_warns_once_of_what_holds_for_the_whole_cycle(client: TestClient) -> None:
     q = [0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8]
     stops = [{"target": {"q": [0.4, *q[1:]]}}, {"target": {"q": [0.4, -0.3, *q[2:]]}}]
-    answer = client.post("/cycle", json={"robot": "panda", "start": {"q": q}, "stops": stops, **PATIENT}).json()
+    answer = client.post(
+        "/cycle", json={"robot": "panda", "start": {"q": q}, "stops": stops, **PATIENT}
+    ).json()
     assert answer["warnings"] == [NO_DEFAULT_MOTION]
     assert [each["name"] for each in answer["baselines"]] == ["move_by_move"]
 
@@ -222,30 +264,51 @@ def test_the_moves_repeat_the_scene_in_its_frame(client: TestClient) -> None:
         "frame": "base_link",
         "obstacles": [{"name": "box", "shape": "box", "size": [0.1, 0.1, 0.2], "pose": pose}],
     }
-    body = {"start": {"q": HOME}, "stops": [{"target": down(0.4, -0.35, 0.3)}], "scene": scene, **PATIENT}
+    body = {
+        "start": {"q": HOME},
+        "stops": [{"target": down(0.4, -0.35, 0.3)}],
+        "scene": scene,
+        **PATIENT,
+    }
     legs = client.post("/cycle", json=body | {"windings": False}).json()["legs"]
     arms = [client.get(leg["answer"]).json()["answer"]["arm"] for leg in legs]
     assert [arm["scene"]["frame"] for arm in arms] == ["base_link"] * len(legs)
 
 
-def test_a_cycle_in_a_given_time_waits_on_its_brakes(client: TestClient, answer: dict[str, Any]) -> None:
-    time, hold = 2.5 * answer["duration"], {"hold": "brakes", "brake_delay": 0.2, "brake_power": 2.0}
+def test_a_cycle_in_a_given_time_waits_on_its_brakes(
+    client: TestClient, answer: dict[str, Any]
+) -> None:
+    time, hold = (
+        2.5 * answer["duration"],
+        {"hold": "brakes", "brake_delay": 0.2, "brake_power": 2.0},
+    )
     found = client.post("/cycle", json=a_cycle(time=time, hold=hold)).json()
     assert found["duration"] == pytest.approx(time) and found["price_of_time"] < 0
     (wait,) = (leg for leg in found["legs"] if leg["kind"] == "wait")
     assert wait["start"] == wait["goal"] and wait["answer"] is None
     legs = found["legs"]
-    assert found["energy"]["electrical"]["total"] == pytest.approx(sum(leg["electrical"] for leg in legs), rel=ROUNDING)
+    assert found["energy"]["electrical"]["total"] == pytest.approx(
+        sum(leg["electrical"] for leg in legs), rel=ROUNDING
+    )
     assert legs[-1]["t0"] + legs[-1]["duration"] == pytest.approx(time)
-    assert "fastest_then_wait" in {each["name"] for each in found["baselines"]} and found["warnings"] == []
+    assert (
+        "fastest_then_wait" in {each["name"] for each in found["baselines"]}
+        and found["warnings"] == []
+    )
     at_most = client.post("/cycle", json=a_cycle(time={"max": time})).json()
     assert at_most["duration"] == answer["duration"] and at_most["price_of_time"] == 0
 
 
-def test_a_cycle_that_cannot_be_so_fast_says_how_fast_it_can_be(client: TestClient, answer: dict[str, Any]) -> None:
+def test_a_cycle_that_cannot_be_so_fast_says_how_fast_it_can_be(
+    client: TestClient, answer: dict[str, Any]
+) -> None:
     reply = client.post("/cycle", json=a_cycle(time=1.0))
     problem = reply.json()
-    assert (reply.status_code, problem["type"], problem["dwells"]) == (422, "/problems/cycle-too-short", 0.5)
+    assert (reply.status_code, problem["type"], problem["dwells"]) == (
+        422,
+        "/problems/cycle-too-short",
+        0.5,
+    )
     assert 1.0 < problem["shortest"] <= answer["duration"]
 
 
@@ -255,7 +318,10 @@ def test_a_free_order_is_told(client: TestClient) -> None:
     reply = client.post("/cycle", json=content)
     assert reply.status_code == 200, reply.text
     order = model_of(CycleAnswer).model_validate_json(reply.content).order
-    assert sorted(order) == ["look", "pick", "place"] and order.index("place") == order.index("pick") + 1
+    assert (
+        sorted(order) == ["look", "pick", "place"]
+        and order.index("place") == order.index("pick") + 1
+    )
 
 
 @pytest.mark.parametrize(
@@ -267,13 +333,18 @@ def test_a_free_order_is_told(client: TestClient) -> None:
         ({"wait": "nowhere"}, ["body", "wait"]),
     ],
 )
-def test_an_order_that_cannot_be_names_its_field(client: TestClient, fields: dict[str, Any], loc: list[Any]) -> None:
+def test_an_order_that_cannot_be_names_its_field(
+    client: TestClient, fields: dict[str, Any], loc: list[Any]
+) -> None:
     reply = client.post("/cycle", json=a_cycle(**fields))
     assert reply.status_code == 422 and reply.json()["errors"][0]["loc"] == loc
 
 
 def test_an_order_that_contradicts_itself_says_which_stops_do(client: TestClient) -> None:
-    reply = client.post("/cycle", json=a_cycle(order="free", before=[["place", "pick"]], together=[["pick", "place"]]))
+    reply = client.post(
+        "/cycle",
+        json=a_cycle(order="free", before=[["place", "pick"]], together=[["pick", "place"]]),
+    )
     problem = reply.json()
     assert (reply.status_code, problem["type"]) == (422, "/problems/contradictory-order")
     assert problem["names"] == ["place", "pick"] and "leave out" in problem["detail"]
@@ -286,7 +357,9 @@ def test_the_cycle_as_a_table(client: TestClient, answer: dict[str, Any]) -> Non
     times, power = (np.array([float(row[name]) for row in rows]) for name in ("t", "power"))
     assert (np.diff(times) >= 0).all() and times[-1] == pytest.approx(answer["duration"])
     # the trapezoidal rule over samples of 8 ms
-    assert np.trapezoid(power, times) == pytest.approx(answer["energy"]["electrical"]["total"], rel=5e-3)
+    assert np.trapezoid(power, times) == pytest.approx(
+        answer["energy"]["electrical"]["total"], rel=5e-3
+    )
     assert [float(rows[-1][f"q{k + 1}"]) for k in range(6)] == pytest.approx(HOME)
     assert {(row["leg"], row["kind"]) for row in rows} == {
         (str(k), leg["kind"]) for k, leg in enumerate(answer["legs"])

@@ -1,4 +1,6 @@
-"""POST /cycle through stops without a rest: one leg over all of them, in the answer, tables, programs and replays."""
+"""POST /cycle through stops without a rest: one leg over all of them, in the answer, tables,
+programs and replays.
+"""
 
 from __future__ import annotations
 
@@ -45,14 +47,21 @@ def test_a_pass_is_part_of_one_leg(answer: dict[str, Any]) -> None:
     assert answer["certificate"]["pass_error"] < ROUNDING
     stopping = next(each for each in answer["baselines"] if each["name"] == "stopping")
     own = answer["energy"]["electrical"]["total"]
-    assert stopping["electrical"] >= own and stopping["saving"] == pytest.approx(1 - own / stopping["electrical"])
+    assert stopping["electrical"] >= own and stopping["saving"] == pytest.approx(
+        1 - own / stopping["electrical"]
+    )
     assert answer["energy"]["lower_bound"] <= own
 
 
-def test_its_answer_is_a_motion_through_the_stop(answer: dict[str, Any], client: TestClient) -> None:
+def test_its_answer_is_a_motion_through_the_stop(
+    answer: dict[str, Any], client: TestClient
+) -> None:
     leg = answer["legs"][2]
     kept = model_of(OptimizeAnswer).model_validate(client.get(leg["answer"]).json()["answer"])
-    assert kept.energy.electrical.total == leg["electrical"] and kept.energy.lower_bound == leg["lower_bound"]
+    assert (
+        kept.energy.electrical.total == leg["electrical"]
+        and kept.energy.lower_bound == leg["lower_bound"]
+    )
     samples = kept.trajectory
     k = int(np.argmin(np.abs(np.array(samples.t) - leg["passes"][0]["t"])))
     # at most half a sample period away from the pass, at a speed of a few rad/s
@@ -63,12 +72,16 @@ def test_its_answer_is_a_motion_through_the_stop(answer: dict[str, Any], client:
 
 
 @pytest.mark.long
-def test_tables_programs_and_replays_have_the_whole_leg(answer: dict[str, Any], client: TestClient) -> None:
+def test_tables_programs_and_replays_have_the_whole_leg(
+    answer: dict[str, Any], client: TestClient
+) -> None:
     table = client.post("/cycle", json=a_cycle(), headers={"Accept": "text/csv"})
     rows = [row for row in csv.DictReader(table.text.splitlines()) if row["leg"] == "2"]
     assert {row["kind"] for row in rows} == {"move"}
     t = np.array([float(row["t"]) for row in rows]) - answer["legs"][2]["t0"]
-    assert t[0] == pytest.approx(0, abs=1e-9) and t[-1] == pytest.approx(answer["legs"][2]["duration"])
+    assert t[0] == pytest.approx(0, abs=1e-9) and t[-1] == pytest.approx(
+        answer["legs"][2]["duration"]
+    )
     program = client.post("/export/urscript", json={"answer": answer})
     assert program.status_code == 200, program.text
     replayed = client.post("/replay", json={"answer": answer, **PATIENT})
@@ -95,7 +108,9 @@ def test_what_needs_a_rest_is_refused_by_its_field(field: str, client: TestClien
     assert "via to false" in reply.text
 
 
-@pytest.mark.parametrize("fields", [{"order": "free"}, {"closed": False, "stops": a_cycle()["stops"][:2]}])
+@pytest.mark.parametrize(
+    "fields", [{"order": "free"}, {"closed": False, "stops": a_cycle()["stops"][:2]}]
+)
 def test_where_the_arm_cannot_pass_is_refused(fields: dict[str, Any], client: TestClient) -> None:
     reply = client.post("/cycle", json=a_cycle(**fields))
     assert reply.status_code == 422
@@ -105,5 +120,12 @@ def test_where_the_arm_cannot_pass_is_refused(fields: dict[str, Any], client: Te
 def test_via_is_true_or_false(client: TestClient) -> None:
     stops = a_cycle()["stops"]
     for wrong in ("yes", 1, None):
-        reply = client.post("/cycle", json=a_cycle(stops=[stops[0], stops[1] | {"via": wrong}, stops[2]]))
-        assert reply.status_code == 422 and reply.json()["errors"][0]["loc"] == ["body", "stops", 1, "via"]
+        reply = client.post(
+            "/cycle", json=a_cycle(stops=[stops[0], stops[1] | {"via": wrong}, stops[2]])
+        )
+        assert reply.status_code == 422 and reply.json()["errors"][0]["loc"] == [
+            "body",
+            "stops",
+            1,
+            "via",
+        ]

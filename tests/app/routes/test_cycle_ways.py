@@ -39,7 +39,9 @@ def test_lines_are_legs_of_their_own(client: TestClient) -> None:
     ]
     worst = content["certificate"]["worst_ratio"]
     assert 0 < worst["path_position"] <= 1 and 0.9 < worst["tcp_speed"] <= 1 + 1e-6
-    line = model_of(OptimizeAnswer).model_validate(client.get(content["legs"][3]["answer"]).json()["answer"])
+    line = model_of(OptimizeAnswer).model_validate(
+        client.get(content["legs"][3]["answer"]).json()["answer"]
+    )
     assert line.certificate.worst_ratio.path_rotation is not None
 
 
@@ -49,11 +51,16 @@ def test_lines_are_legs_of_their_own(client: TestClient) -> None:
         ({"approach": {"direction": [0.0, 0.0, 0.0], "distance": 0.1}}, ["approach", "direction"]),
         ({"approach": {"direction": [0.0, 0.0, 1.0]}}, ["approach", "distance"]),
         ({"retreat": {"direction": [0.0, 0.0, 1.0], "distance": 9.0}}, ["retreat", "distance"]),
-        ({"retreat": {"direction": [0.0, 0.0, 1.0], "distance": 0.1, "frame": "world"}}, ["retreat", "frame"]),
+        (
+            {"retreat": {"direction": [0.0, 0.0, 1.0], "distance": 0.1, "frame": "world"}},
+            ["retreat", "frame"],
+        ),
         ({"obstacles_ignored": ["part"]}, ["obstacles_ignored"]),
     ],
 )
-def test_a_wrong_line_names_its_field(client: TestClient, fields: dict[str, Any], where: list[str]) -> None:
+def test_a_wrong_line_names_its_field(
+    client: TestClient, fields: dict[str, Any], where: list[str]
+) -> None:
     reply = client.post("/cycle", json=with_lines(**fields))
     assert reply.status_code == 422
     assert reply.json()["errors"][0]["loc"] == ["body", "stops", 0, *where]
@@ -65,7 +72,9 @@ def test_a_line_that_no_configuration_follows_says_how_far_each_gets(client: Tes
     problem = reply.json()
     assert (reply.status_code, problem["type"]) == (422, "/problems/path-infeasible")
     assert problem["path"] == "stops/pick/retreat" and problem["length"] == pytest.approx(1.8)
-    assert len(problem["attempts"]) == 8 and all(0 < each["followed"] < 1 for each in problem["attempts"])
+    assert len(problem["attempts"]) == 8 and all(
+        0 < each["followed"] < 1 for each in problem["attempts"]
+    )
     assert "shorten the line" in problem["detail"]
 
 
@@ -111,7 +120,9 @@ def test_a_path_is_a_leg_of_its_own(client: TestClient) -> None:
     assert path["arm"]["limits"]["tcp_speed"] == 0.3
     program = client.post("/export/json", json={"answer": content})
     assert program.status_code == 200, program.text
-    table = client.post("/cycle", json=with_path(), headers={"accept": "text/csv"}).text.splitlines()
+    table = client.post(
+        "/cycle", json=with_path(), headers={"accept": "text/csv"}
+    ).text.splitlines()
     assert {row.split(",")[2] for row in table[1:]} == {"move", "line", "path", "dwell"}
 
 
@@ -146,7 +157,9 @@ def test_a_path_is_a_leg_of_its_own(client: TestClient) -> None:
         "axis",
     ],
 )
-def test_a_wrong_path_names_its_field(client: TestClient, fields: dict[str, Any], where: list[str]) -> None:
+def test_a_wrong_path_names_its_field(
+    client: TestClient, fields: dict[str, Any], where: list[str]
+) -> None:
     reply = client.post("/cycle", json=with_path(**fields))
     assert reply.status_code == 422
     assert reply.json()["errors"][0]["loc"] == ["body", "stops", 0, *where]
@@ -158,7 +171,9 @@ def test_a_path_is_divided_on_request(client: TestClient) -> None:
     points = [POINTS[0] | {"position": at} for at in ([0.45, -0.1, 0.2], [0.2, 0.5, 0.2])]
     path: dict[str, Any] = {"points": points, "split": True}
     stop = {"name": "glue", "path": path, "branch": {"shoulder": "left", "elbow": "up"}}
-    content = a_cycle(stops=[stop], limits={"position": {"lower": low, "upper": high}}, collisions=False)
+    content = a_cycle(
+        stops=[stop], limits={"position": {"lower": low, "upper": high}}, collisions=False
+    )
     reply = client.post("/cycle", json=content)
     assert reply.status_code == 200, reply.text
     answer = model_of(CycleAnswer).model_validate_json(reply.content)
@@ -178,7 +193,9 @@ def test_a_path_is_divided_on_request(client: TestClient) -> None:
     assert {each["reason"] for each in refusal["attempts"]} == {"outside_limits"}
 
 
-@pytest.mark.parametrize("fields", [{"target": down(0.4, 0.0, 0.2)}, {"path": None}], ids=["both", "neither"])
+@pytest.mark.parametrize(
+    "fields", [{"target": down(0.4, 0.0, 0.2)}, {"path": None}], ids=["both", "neither"]
+)
 def test_a_stop_has_a_target_or_a_path(client: TestClient, fields: dict[str, Any]) -> None:
     content = with_path()
     content["stops"][0] |= fields

@@ -13,8 +13,17 @@ from tests.app.requests import EXAMPLES, move
 
 BALANCE = 1e-4  # relative; quadrature of the corners of power
 PARTS = (
-    "idle", "potential", "kinetic", "friction", "copper", "inverter", "braking", "recovered", "storage_loss", "dwell",
-)  # fmt: skip
+    "idle",
+    "potential",
+    "kinetic",
+    "friction",
+    "copper",
+    "inverter",
+    "braking",
+    "recovered",
+    "storage_loss",
+    "dwell",
+)
 DOWN = EXAMPLES["storage_on_the_bus"]
 
 
@@ -24,7 +33,9 @@ def answered(client: TestClient, body: dict[str, Any]) -> dict[str, Any]:
     model_of(OptimizeAnswer).model_validate_json(answer.content)
     content: dict[str, Any] = answer.json()
     electrical = content["energy"]["electrical"]
-    assert sum(electrical[part] for part in PARTS) == pytest.approx(electrical["total"], rel=BALANCE)
+    assert sum(electrical[part] for part in PARTS) == pytest.approx(
+        electrical["total"], rel=BALANCE
+    )
     return content
 
 
@@ -63,7 +74,9 @@ def test_every_bus_is_answered(client: TestClient) -> None:
 def test_figures_of_the_drives_and_links_reach_the_optimiser(client: TestClient) -> None:
     plain = answered(client, move())
     assert plain["energy"]["electrical"]["inverter"] == 0
-    lossy = answered(client, move(drives={"inverter": {"constant": [1, 1, 1, 1, 1, 3]}}, duration=1.5))
+    lossy = answered(
+        client, move(drives={"inverter": {"constant": [1, 1, 1, 1, 1, 3]}}, duration=1.5)
+    )
     assert lossy["energy"]["electrical"]["inverter"] == pytest.approx(8 * 1.5, rel=1e-9)
     light = answered(client, move(link_mass_scale=[1, 0.5, 0.5, 1, 1, 1]))
     assert total(light) < total(plain)
@@ -74,7 +87,9 @@ def test_a_cycle_is_waited_out(client: TestClient) -> None:
     plain = answered(client, move())
     assert plain["energy"]["electrical"]["dwell"] == 0
     motors = answered(client, move(dwell={"time": 3.0}))
-    brakes = answered(client, move(dwell={"time": 3.0, "hold": "brakes", "brake_delay": 0.2, "brake_power": 10.0}))
+    brakes = answered(
+        client, move(dwell={"time": 3.0, "hold": "brakes", "brake_delay": 0.2, "brake_power": 10.0})
+    )
     assert total(plain) < total(brakes) < total(motors)
     assert brakes["energy"]["electrical"]["dwell"] > 0
     assert brakes["duration"] < 3.0

@@ -76,31 +76,50 @@ def test_evaluates_what_optimize_answered(client: TestClient) -> None:
     content = client.post("/evaluate", json={"trajectory": trajectory}).json()
     # splines through samples 4 ms apart instead of the spline itself
     for objective in ("electrical", "mechanical"):
-        ours, theirs = content["total"]["energy"][objective]["total"], found["energy"][objective]["total"]
+        ours, theirs = (
+            content["total"]["energy"][objective]["total"],
+            found["energy"][objective]["total"],
+        )
         assert ours == pytest.approx(theirs, rel=1e-3)
     assert content["total"]["balance_error"] < 1e-3
-    assert content["within_limits"] or content["limits"][3]["worst_ratio"] > 1  # a's spline bends at jumps of jerk
+    assert (
+        content["within_limits"] or content["limits"][3]["worst_ratio"] > 1
+    )  # a's spline bends at jumps of jerk
 
 
 def test_csv_and_json_agree(client: TestClient) -> None:
     value = body_examples("/evaluate")["text/csv"]["configurations"]["value"]
     q = np.radians([[float(cell) for cell in line.split(",")] for line in value.splitlines()[1:]])
     by_csv = upload(
-        client, value, units="deg", interpolation="linear", time_per_segment=1.5, payload='{"mass":1,"com":[0,0,0]}'
+        client,
+        value,
+        units="deg",
+        interpolation="linear",
+        time_per_segment=1.5,
+        payload='{"mass":1,"com":[0,0,0]}',
     )
     request = through(
-        *q.tolist(), time_per_segment=1.5, interpolation="linear", payload={"mass": 1.0, "com": [0, 0, 0]}
+        *q.tolist(),
+        time_per_segment=1.5,
+        interpolation="linear",
+        payload={"mass": 1.0, "com": [0, 0, 0]},
     )
     by_json = client.post("/evaluate", json=request).json()
     parts = [answer["total"]["energy"]["electrical"] for answer in (by_csv.json(), by_json)]
     intervals = [each.pop("interval") for each in parts]
     assert parts[0] == pytest.approx(parts[1], rel=SAME)
     shares = [each.pop("shares") for each in intervals]
-    assert intervals[0] == pytest.approx(intervals[1], rel=SAME) and shares[0] == pytest.approx(shares[1], rel=SAME)
+    assert intervals[0] == pytest.approx(intervals[1], rel=SAME) and shares[0] == pytest.approx(
+        shares[1], rel=SAME
+    )
     assert by_csv.json()["speed_jumps"] == by_json["speed_jumps"] == 1
     acceleration = next(limit for limit in by_json["limits"] if limit["limit"] == "acceleration")
     assert not by_json["within_limits"]
-    assert (acceleration["held"], acceleration["worst_ratio"], acceleration["t"]) == (False, None, 1.5)
+    assert (acceleration["held"], acceleration["worst_ratio"], acceleration["t"]) == (
+        False,
+        None,
+        1.5,
+    )
 
 
 def test_answers_a_table(client: TestClient) -> None:
@@ -111,7 +130,10 @@ def test_answers_a_table(client: TestClient) -> None:
     content = client.post("/evaluate", json=request).json()
     assert [row["segment"] for row in rows] == ["1", "2", "total"]
     assert float(rows[-1]["electrical.total"]) == content["total"]["energy"]["electrical"]["total"]
-    assert float(rows[0]["per_joint.copper.2"]) == content["segments"][0]["energy"]["per_joint"]["copper"][1]
+    assert (
+        float(rows[0]["per_joint.copper.2"])
+        == content["segments"][0]["energy"]["per_joint"]["copper"][1]
+    )
 
 
 @pytest.mark.long
@@ -234,7 +256,11 @@ def test_refuses_json(body: dict[str, Any], client: TestClient) -> None:
         ({"t": [0.0, 1.0, 1.0], "q": [HOME, NEAR, HOME]}, 2, "t"),
         ({"t": [0.0, 1.0, 0.5], "q": [HOME, NEAR, HOME]}, 2, "t"),
         ({"t": [0.0, 1.0], "q": [HOME, [0.0, -90.0, 90.0, 0.0, 0.0, 0.0]]}, 1, "q2"),
-        ({"t": [0.0, 1.0], "q": [HOME, NEAR], "v": [HOME, [0.0, 0.0, 1e6, 0.0, 0.0, 0.0]]}, 1, "v3"),
+        (
+            {"t": [0.0, 1.0], "q": [HOME, NEAR], "v": [HOME, [0.0, 0.0, 1e6, 0.0, 0.0, 0.0]]},
+            1,
+            "v3",
+        ),
     ],
 )
 def test_says_where_a_trajectory_is_wrong(
@@ -256,7 +282,9 @@ def test_unknown_robot(client: TestClient) -> None:
     refused(upload(client, f"{HEADER}\n{GOOD}\n{THEN}\n", robot="r2d2"), UnknownRobot)
 
 
-def test_leaves_no_file_behind(client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_leaves_no_file_behind(
+    client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     assert client.post("/evaluate", json=through(HOME, NEAR)).status_code == 200
     upload(client, b"\x00")

@@ -1,4 +1,6 @@
-"""Logs in `POST /evaluate`: every file that `POST /logs` reads, stored logs, and what was measured in each move."""
+"""Logs in `POST /evaluate`: every file that `POST /logs` reads, stored logs, and what was measured
+in each move.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,8 @@ CARRIED = Payload(1.5, np.array([0.0, 0.02, 0.06]))
 TRUTH = truth_of(ROBOT, payload=CARRIED)
 CSV = {"Content-Type": "text/csv"}
 PAYLOAD = {"mass": CARRIED.mass, "com": CARRIED.com.tolist()}
-# relative: integrals over rows 8 ms apart, once of the log and once of the reader's grid, which it low-passes
+# relative: integrals over rows 8 ms apart, once of the log and once of the reader's grid, which it
+# low-passes
 SAMPLED = 2e-3
 # relative: of the unit's drives against the robot's own figures, which differ by some ten per cent
 OWN_FIGURES = 0.25
@@ -44,7 +47,9 @@ def recording() -> Recording:
 
 
 def rtde(made: Recording) -> bytes:
-    """As Universal Robots' `record.py` writes it: separated by spaces, with voltage and current of the arm's bus."""
+    """As Universal Robots' `record.py` writes it: separated by spaces, with voltage and current of
+    the arm's bus.
+    """
     groups = {"actual_q": made.q, "actual_qd": made.v, "actual_current": made.current}
     names = ["timestamp", *(f"{name}_{j}" for name in groups for j in range(6))]
     names += [
@@ -56,7 +61,13 @@ def rtde(made: Recording) -> bytes:
         "payload_cog_2",
     ]
     carried = np.tile([CARRIED.mass, *CARRIED.com], (len(made.time), 1))
-    columns = [made.time + 7000.0, *groups.values(), np.full(len(made.time), 48.0), made.power / 48.0, carried]
+    columns = [
+        made.time + 7000.0,
+        *groups.values(),
+        np.full(len(made.time), 48.0),
+        made.power / 48.0,
+        carried,
+    ]
     return table(names, np.column_stack(columns), " ")
 
 
@@ -88,13 +99,19 @@ def stored(client: TestClient, recording: Recording) -> Iterator[str]:
     client.delete(answer.headers["location"])
 
 
-def test_the_measured_energy_of_each_move_stands_beside_the_models(client: TestClient, recording: Recording) -> None:
+def test_the_measured_energy_of_each_move_stands_beside_the_models(
+    client: TestClient, recording: Recording
+) -> None:
     answer = evaluated(client, rtde(recording))
     assert answer["arm"]["payload"]["mass"] == CARRIED.mass, "as the log says"
-    assert answer["segment_count"] == len(answer["segments"]) == len(recording.moves), "moves and rests"
+    assert answer["segment_count"] == len(answer["segments"]) == len(recording.moves), (
+        "moves and rests"
+    )
     for segment, move in zip(answer["segments"], recording.moves, strict=True):
         assert segment["start"] == pytest.approx(recording.time[move.start], abs=EDGES)
-        first, last = np.searchsorted(recording.time, [segment["start"] - 1e-6, segment["end"] - 1e-6])
+        first, last = np.searchsorted(
+            recording.time, [segment["start"] - 1e-6, segment["end"] - 1e-6]
+        )
         drawn = np.trapezoid(recording.power[first : last + 1], recording.time[first : last + 1])
         assert segment["measured"]["electrical"] == pytest.approx(drawn, rel=SAMPLED)
         ours = segment["energy"]["electrical"]["total"]
@@ -102,18 +119,30 @@ def test_the_measured_energy_of_each_move_stands_beside_the_models(client: TestC
     whole = np.trapezoid(recording.power, recording.time)
     assert answer["total"]["measured"]["electrical"] == pytest.approx(whole, rel=SAMPLED)
     for name, value in answer["total"]["measured"].items():
-        assert sum(segment["measured"][name] for segment in answer["segments"]) == pytest.approx(value)
+        assert sum(segment["measured"][name] for segment in answer["segments"]) == pytest.approx(
+            value
+        )
 
 
-def test_the_efforts_of_the_robots_own_figures_make_the_models_energy(client: TestClient, recording: Recording) -> None:
+def test_the_efforts_of_the_robots_own_figures_make_the_models_energy(
+    client: TestClient, recording: Recording
+) -> None:
     """Torques that the model itself needs: what the motors are measured to take is what it says."""
     model = evaluated(
-        client, csv_of(recording, without="aiP"), payload=json.dumps(PAYLOAD), sample_period=f"{1 / recording.rate}"
+        client,
+        csv_of(recording, without="aiP"),
+        payload=json.dumps(PAYLOAD),
+        sample_period=f"{1 / recording.rate}",
     )
     rows = len(recording.time)
     torque = np.array(model["samples"]["tau_motor"])[:rows]
     body = table(
-        ["t", *(f"q{j}" for j in range(1, 7)), *(f"v{j}" for j in range(1, 7)), *(f"tau{j}" for j in range(1, 7))],
+        [
+            "t",
+            *(f"q{j}" for j in range(1, 7)),
+            *(f"v{j}" for j in range(1, 7)),
+            *(f"tau{j}" for j in range(1, 7)),
+        ],
         np.column_stack([recording.time, recording.q, recording.v, torque]),
         ",",
     )
@@ -123,11 +152,17 @@ def test_the_efforts_of_the_robots_own_figures_make_the_models_energy(client: Te
     assert again["total"]["measured"]["by_efforts"] == pytest.approx(ours, rel=5 * SAMPLED)
 
 
-@pytest.mark.parametrize("write", [rtde, jointstate, csv_of], ids=["rtde", "joint names", "own, with power"])
-def test_whatever_is_a_log_is_a_motion(client: TestClient, recording: Recording, write: Any) -> None:
+@pytest.mark.parametrize(
+    "write", [rtde, jointstate, csv_of], ids=["rtde", "joint names", "own, with power"]
+)
+def test_whatever_is_a_log_is_a_motion(
+    client: TestClient, recording: Recording, write: Any
+) -> None:
     """The same motion, whatever the columns: within what their digits and derivatives leave."""
     plain = csv_of(recording, without="iP")
-    expected = evaluated(client, plain, payload=json.dumps(PAYLOAD))["total"]["energy"]["electrical"]["total"]
+    expected = evaluated(client, plain, payload=json.dumps(PAYLOAD))["total"]["energy"][
+        "electrical"
+    ]["total"]
     for body in (write(recording), gzip.compress(write(recording))):
         found = evaluated(client, body, payload=json.dumps(PAYLOAD))
         assert found["total"]["energy"]["electrical"]["total"] == pytest.approx(expected, rel=0.02)
@@ -138,7 +173,9 @@ def test_units_of_a_log(client: TestClient, recording: Recording) -> None:
     names = ["time", *(f"{name}_position" for name in ROBOT.joint_names)]
     degrees = table(names, np.column_stack([1e3 * recording.time, np.degrees(recording.q)]), ";")
     found = evaluated(client, degrees, units="deg")
-    assert found["duration"] == pytest.approx(recording.time[-1], rel=1e-6), "milliseconds are recognised"
+    assert found["duration"] == pytest.approx(recording.time[-1], rel=1e-6), (
+        "milliseconds are recognised"
+    )
     assert any("ms" in said for said in found["warnings"])
     refused(client.post("/evaluate", content=degrees, headers=CSV), InvalidTable)
 
@@ -150,16 +187,23 @@ def test_a_stored_log_brings_its_arm(client: TestClient, recording: Recording, s
     by_file = evaluated(client, rtde(recording))
     assert answer.json()["total"] == by_file["total"] and answer.json()["arm"] == by_file["arm"]
     other = client.post("/evaluate", json={"log": stored, "payload": None}).json()
-    assert other["total"]["energy"] != by_file["total"]["energy"] and not (other["arm"] or {}).get("payload")
+    assert other["total"]["energy"] != by_file["total"]["energy"] and not (other["arm"] or {}).get(
+        "payload"
+    )
 
 
 def test_a_stored_log_in_other_requests(client: TestClient, stored: str) -> None:
-    alone = client.post("/evaluate", json={"log": stored}).json()["total"]["energy"]["electrical"]["total"]
+    alone = client.post("/evaluate", json={"log": stored}).json()["total"]["energy"]["electrical"][
+        "total"
+    ]
     sent = client.post("/jobs", json={"requests": [{"evaluate": {"log": stored}}]})
     (done,) = ended(client, sent.headers["location"])["requests"]
     assert done["energy"] == alone, done["problem"]
     study = client.post("/studies", json={"name": "log", "threshold": 1.0}).headers["location"]
-    assert client.post(f"{study}/iterations", json={"evaluate": {"log": stored}}).json()["energy"] == alone
+    assert (
+        client.post(f"{study}/iterations", json={"evaluate": {"log": stored}}).json()["energy"]
+        == alone
+    )
     empty = {"name": "empty", "arm": {"payload": None}}
     changed = client.post("/whatif", json={"evaluate": {"log": stored}, "changes": [empty]})
     assert changed.status_code == 200, changed.text
@@ -177,7 +221,9 @@ def test_a_stored_log_in_other_requests(client: TestClient, stored: str) -> None
     ],
     ids=["another robot", "times", "two motions"],
 )
-def test_contradictions_are_refused(client: TestClient, stored: str, body: Any, loc: list[str]) -> None:
+def test_contradictions_are_refused(
+    client: TestClient, stored: str, body: Any, loc: list[str]
+) -> None:
     content = refused(client.post("/evaluate", json={"log": stored, **body}), InvalidRequest)
     assert [error["loc"] for error in content["errors"]] == [loc]
 
@@ -188,7 +234,8 @@ def test_an_absent_log_is_unknown(client: TestClient, id: str) -> None:
 
 
 def test_efforts_that_say_nothing_do_not_stop_it(client: TestClient, recording: Recording) -> None:
-    """To identify anything from them would be wrong; the energy of the motion does not need them."""
+    """To identify anything from them would be wrong; the energy of the motion does not need
+    them."""
     body = table(
         ["t", *(f"q{j}" for j in range(1, 7)), *(f"i{j}" for j in range(1, 7))],
         np.column_stack([recording.time, recording.q, np.ones_like(recording.q)]),
@@ -196,22 +243,36 @@ def test_efforts_that_say_nothing_do_not_stop_it(client: TestClient, recording: 
     )
     refused(client.post("/logs", content=body, headers=CSV), EffortNotUsable)
     found = evaluated(client, body)
-    assert found["total"]["measured"] is None and any("never change" in said for said in found["warnings"])
+    assert found["total"]["measured"] is None and any(
+        "never change" in said for said in found["warnings"]
+    )
 
 
 @pytest.mark.parametrize(
     ("text", "row"),
-    [("a,b\n1,2\n3,4\n", 1), ("", None), ("time,x\n0,1\n", 1), ("t,q1,q2\n0,1,2\n", 1), ("timestamp,actual_q_0\n", 1)],
+    [
+        ("a,b\n1,2\n3,4\n", 1),
+        ("", None),
+        ("time,x\n0,1\n", 1),
+        ("t,q1,q2\n0,1,2\n", 1),
+        ("timestamp,actual_q_0\n", 1),
+    ],
     ids=["no names", "empty", "no positions", "too few joints", "too few joints of RTDE"],
 )
-def test_what_is_neither_says_what_is_missing(client: TestClient, text: str, row: int | None) -> None:
+def test_what_is_neither_says_what_is_missing(
+    client: TestClient, text: str, row: int | None
+) -> None:
     content = refused(client.post("/evaluate", content=text, headers=CSV), InvalidTable)
     assert content["row"] == row
 
 
 def test_the_table_has_the_measured_energies(client: TestClient, recording: Recording) -> None:
-    answer = client.post("/evaluate", content=rtde(recording), headers={**CSV, "Accept": "text/csv"})
+    answer = client.post(
+        "/evaluate", content=rtde(recording), headers={**CSV, "Accept": "text/csv"}
+    )
     head, *rows = answer.text.splitlines()
     column = head.split(",").index("measured.electrical")
     measured = [float(row.split(",")[column]) for row in rows]
-    assert sum(measured[:-1]) == pytest.approx(measured[-1]) and len(rows) == len(recording.moves) + 1
+    assert (
+        sum(measured[:-1]) == pytest.approx(measured[-1]) and len(rows) == len(recording.moves) + 1
+    )

@@ -16,7 +16,10 @@ from tests.selection import long_but
 
 EXAMPLES = ROOT / "examples"
 WITH_DEADLINE = ("optimize", "compare", "pareto", "cycle", "whatif", "replay")
-FILES = {file.relative_to(EXAMPLES).with_suffix("").as_posix(): file for file in sorted(EXAMPLES.rglob("*.json"))}
+FILES = {
+    file.relative_to(EXAMPLES).with_suffix("").as_posix(): file
+    for file in sorted(EXAMPLES.rglob("*.json"))
+}
 FILES = {name: file for name, file in FILES.items() if not name.startswith("openapi/")}
 IN_THE_DOCUMENT = {
     f"{path[1:]}/{name}": example["value"]
@@ -52,7 +55,9 @@ def test_file_is_answered(name: str, client: TestClient) -> None:
 
 
 def test_a_slow_example_names_its_own_deadline() -> None:
-    """What a user sends as it is must be answered within the default deadline, or else bring a longer one."""
+    """What a user sends as it is must be answered within the default deadline, or else bring a
+    longer one.
+    """
     assert all("deadline" in json.loads(FILES[name].read_text()) for name in SLOW)
 
 
@@ -72,13 +77,21 @@ def test_paper_requests_are_up_to_date() -> None:
     assert {name: json.loads((EXAMPLES / "optimize" / name).read_text()) for name in made} == made
     motions = script["motions"]()
     assert len(motions) == 15
-    assert {name: json.loads((EXAMPLES / "evaluate" / name).read_text()) for name in motions} == motions
+    assert {
+        name: json.loads((EXAMPLES / "evaluate" / name).read_text()) for name in motions
+    } == motions
 
 
 def test_csv_example_is_answered(client: TestClient) -> None:
     settings = {"units": "deg", "interpolation": "linear", "time_per_segment": "1.5"}
     content = (EXAMPLES / "evaluate" / "paper_motion_1.csv").read_bytes()
-    by_csv = client.post("/evaluate", content=content, headers={"Content-Type": "text/csv"}, params=settings)
-    by_json = client.post("/evaluate", json=json.loads((EXAMPLES / "evaluate" / "paper_motion_1.json").read_text()))
-    ours, theirs = (answer.json()["total"]["energy"]["electrical"]["total"] for answer in (by_csv, by_json))
+    by_csv = client.post(
+        "/evaluate", content=content, headers={"Content-Type": "text/csv"}, params=settings
+    )
+    by_json = client.post(
+        "/evaluate", json=json.loads((EXAMPLES / "evaluate" / "paper_motion_1.json").read_text())
+    )
+    ours, theirs = (
+        answer.json()["total"]["energy"]["electrical"]["total"] for answer in (by_csv, by_json)
+    )
     assert ours == pytest.approx(theirs, rel=1e-9)

@@ -1,4 +1,6 @@
-"""POST /excitation: a certified motion that the other endpoints take, and problems that say what is in the way."""
+"""POST /excitation: a certified motion that the other endpoints take, and problems that say what is
+in the way.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +51,9 @@ def test_evaluate_takes_its_table_and_agrees(client: TestClient, found: dict[str
     table = client.post("/excitation", json=SHORT, headers={"Accept": "text/csv"})
     assert table.headers["content-type"].startswith("text/csv")
     query = {"payload": '{"mass": 2.0, "com": [0.0, 0.0, 0.05]}'}
-    answer = client.post("/evaluate", content=table.content, params=query, headers={"Content-Type": "text/csv"})
+    answer = client.post(
+        "/evaluate", content=table.content, params=query, headers={"Content-Type": "text/csv"}
+    )
     assert answer.status_code == 200, answer.text
     assert answer.json()["within_limits"] and not answer.json()["collides"]
     # of the samples' splines against the motion's own
@@ -60,9 +64,15 @@ def test_evaluate_takes_its_table_and_agrees(client: TestClient, found: dict[str
 
 def test_no_room(client: TestClient) -> None:
     shape = {"shape": "sphere", "radius": 0.5}
-    ball = {"name": "ball", **shape, "pose": {"position": [0.0, 0.0, 0.3], "rotvec": [0.0, 0.0, 0.0]}}
+    ball = {
+        "name": "ball",
+        **shape,
+        "pose": {"position": [0.0, 0.0, 0.3], "rotvec": [0.0, 0.0, 0.0]},
+    }
     body = SHORT | {"scene": {"obstacles": [ball]}}
-    assert refused(client.post("/excitation", json=body), ExcitationInfeasible)["limit"] == "clearance"
+    assert (
+        refused(client.post("/excitation", json=body), ExcitationInfeasible)["limit"] == "clearance"
+    )
 
 
 WRONG: list[tuple[dict[str, Any], list[str]]] = [
@@ -74,7 +84,10 @@ WRONG: list[tuple[dict[str, Any], list[str]]] = [
     ({"centre": [0.0]}, ["body", "centre"]),
     ({"noise": [1.0]}, ["body", "noise"]),
     ({"sample_period": 1e-4, "period": 60.0}, ["body", "sample_period"]),
-    ({"tool_cone": {"axis": [0, 0, 1], "direction": [0, 0, -1], "half_angle": 0.2}}, ["body", "tool_cone"]),
+    (
+        {"tool_cone": {"axis": [0, 0, 1], "direction": [0, 0, -1], "half_angle": 0.2}},
+        ["body", "tool_cone"],
+    ),
 ]
 
 
@@ -85,6 +98,8 @@ def test_wrong_requests(client: TestClient, wrong: dict[str, Any], loc: list[str
 
 
 def test_a_centre_beyond_the_range_and_too_little_time(client: TestClient) -> None:
-    far = refused(client.post("/excitation", json=SHORT | {"centre": [0.0, 20.0, 0, 0, 0, 0]}), OutsideLimits)
+    far = refused(
+        client.post("/excitation", json=SHORT | {"centre": [0.0, 20.0, 0, 0, 0, 0]}), OutsideLimits
+    )
     assert far["joint"] == "shoulder_lift_joint"
     refused(client.post("/excitation", json=SHORT | {"deadline": 1e-3}), DeadlineExceeded)

@@ -1,4 +1,6 @@
-"""POST /export/{format} of every kind of answer, and what is refused: altered answers, wrong robots, wrong bodies."""
+"""POST /export/{format} of every kind of answer, and what is refused: altered answers, wrong
+robots, wrong bodies.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +52,9 @@ ROUND = {
 
 @pytest.fixture(scope="module")
 def answer(client: TestClient) -> Json:
-    found: Json = client.post("/optimize", json=move(payload=LOAD, scene={"obstacles": [BOX]})).json()
+    found: Json = client.post(
+        "/optimize", json=move(payload=LOAD, scene={"obstacles": [BOX]})
+    ).json()
     return found
 
 
@@ -69,7 +73,9 @@ def altered(answer: Json, *path: Any, value: Any) -> Json:
 
 
 @pytest.mark.parametrize("format", list(FORMATS))
-def test_a_kept_answer_is_exported_as_it_is_when_sent_whole(client: TestClient, answer: Json, format: str) -> None:
+def test_a_kept_answer_is_exported_as_it_is_when_sent_whole(
+    client: TestClient, answer: Json, format: str
+) -> None:
     names = answer["answer"].removeprefix("/answers/"), answer["answer"], answer
     by_id, by_path, whole = (export(client, format, each) for each in names)
     if format in ("franka", "rapid", "krl"):
@@ -92,11 +98,15 @@ def test_the_document_describes_every_format(client: TestClient) -> None:
 
 
 def test_a_slow_run_is_certified_anew_and_says_so(client: TestClient, answer: Json) -> None:
-    fast, slow = (export(client, "urscript", answer["answer"], speed_scale=scale) for scale in (1.0, 0.1))
+    fast, slow = (
+        export(client, "urscript", answer["answer"], speed_scale=scale) for scale in (1.0, 0.1)
+    )
     assert slow.headers["joulepath-speed-scale"] == "0.1"
     assert "speed-0.1" in slow.headers["content-disposition"]
     assert "slowed down to 0.1 of its speed, certified" in slow.text
-    assert float(slow.headers["joulepath-worst-ratio"]) < float(fast.headers["joulepath-worst-ratio"])
+    assert float(slow.headers["joulepath-worst-ratio"]) < float(
+        fast.headers["joulepath-worst-ratio"]
+    )
 
 
 def test_the_program_of_a_cycle_runs_from_stop_to_stop(client: TestClient) -> None:
@@ -105,13 +115,18 @@ def test_the_program_of_a_cycle_runs_from_stop_to_stop(client: TestClient) -> No
     assert exported.status_code == 200, exported.text
     controller = Controller(np.array(HOME))
     controller.run(exported.text)
-    assert [event[1:] for event in controller.events if event[0] == "output"] == [(1, True), (1, False)]
+    assert [event[1:] for event in controller.events if event[0] == "output"] == [
+        (1, True),
+        (1, False),
+    ]
     assert [event[1] for event in controller.events if event[0] == "payload"] == [0.0, 2.0, 0.0]
     assert np.abs(controller.q - HOME).max() < 1e-9
     slow = yaml.safe_load(export(client, "ros2", found, speed_scale=0.5).text)
     end = slow["trajectory"]["points"][-1]["time_from_start"]
     rests = sum(leg["duration"] for leg in found["legs"] if leg["kind"] in ("dwell", "wait"))
-    assert end["sec"] + end["nanosec"] * 1e-9 == pytest.approx(rests + 2 * (found["duration"] - rests), abs=1e-6)
+    assert end["sec"] + end["nanosec"] * 1e-9 == pytest.approx(
+        rests + 2 * (found["duration"] - rests), abs=1e-6
+    )
 
 
 def test_an_evaluated_motion_is_exported_by_its_samples(client: TestClient) -> None:
@@ -121,7 +136,10 @@ def test_an_evaluated_motion_is_exported_by_its_samples(client: TestClient) -> N
     exported = export(client, "ros2", evaluated)
     assert exported.status_code == 200, exported.text
     last = yaml.safe_load(exported.text)["trajectory"]["points"][-1]
-    assert last["positions"] == pytest.approx(NEAR) and last["time_from_start"] == {"sec": 3, "nanosec": 0}
+    assert last["positions"] == pytest.approx(NEAR) and last["time_from_start"] == {
+        "sec": 3,
+        "nanosec": 0,
+    }
     without = client.post("/evaluate", json=body).json()
     assert "sample_period" in refused(export(client, "ros2", without), InvalidRequest)["detail"]
 
@@ -158,7 +176,9 @@ SPLINE = ("trajectory", "spline")
         (("robot",), lambda x: "ur10e"),
     ],
 )
-def test_an_answer_altered_by_hand_is_not_exported(client: TestClient, answer: Json, path: Any, change: Any) -> None:
+def test_an_answer_altered_by_hand_is_not_exported(
+    client: TestClient, answer: Json, path: Any, change: Any
+) -> None:
     before: Any = answer
     for name in path[:-1]:
         before = before[name]
@@ -168,7 +188,9 @@ def test_an_answer_altered_by_hand_is_not_exported(client: TestClient, answer: J
 
 def test_an_obstacle_in_the_way_is_not_driven_through(client: TestClient, answer: Json) -> None:
     in_the_way = {"obstacles": [BOX | {"pose": {"position": [-0.5, -0.15, 0.4], "rpy": [0, 0, 0]}}]}
-    told = refused(export(client, "csv", altered(answer, "arm", "scene", value=in_the_way)), NotCertified)
+    told = refused(
+        export(client, "csv", altered(answer, "arm", "scene", value=in_the_way)), NotCertified
+    )
     assert "box" in told["detail"]
 
 
@@ -187,14 +209,19 @@ def test_an_obstacle_in_the_way_is_not_driven_through(client: TestClient, answer
         (("arm",), {"payload": {"mass": -1}}),
     ],
 )
-def test_an_answer_of_another_form_names_the_field(client: TestClient, answer: Json, path: Any, value: Any) -> None:
+def test_an_answer_of_another_form_names_the_field(
+    client: TestClient, answer: Json, path: Any, value: Any
+) -> None:
     told = refused(export(client, "csv", altered(answer, *path, value=value)), InvalidRequest)
     assert told["errors"][0]["loc"][:2] == ["body", "answer"]
 
 
 def test_nan_in_the_body_is_no_json(client: TestClient) -> None:
     body = b'{"answer": {"robot": "ur5e", "trajectory": {"t": [NaN]}}}'
-    refused(client.post("/export/csv", content=body, headers={"content-type": "application/json"}), InvalidRequest)
+    refused(
+        client.post("/export/csv", content=body, headers={"content-type": "application/json"}),
+        InvalidRequest,
+    )
 
 
 def test_unknown_answers_and_robots(client: TestClient, answer: Json) -> None:
@@ -205,15 +232,22 @@ def test_unknown_answers_and_robots(client: TestClient, answer: Json) -> None:
 
 def test_an_answer_without_its_arm_needs_one(client: TestClient, answer: Json) -> None:
     bare = altered(answer, "arm", value=None)
-    assert refused(export(client, "csv", bare), InvalidRequest)["errors"][0]["loc"] == ["body", "arm"]
+    assert refused(export(client, "csv", bare), InvalidRequest)["errors"][0]["loc"] == [
+        "body",
+        "arm",
+    ]
     assert export(client, "csv", bare, arm=answer["arm"]).status_code == 200
-    refused(export(client, "csv", bare, arm={"payload": {"mass": 3.0, "com": [0, 0, 0]}}), NotCertified)
+    refused(
+        export(client, "csv", bare, arm={"payload": {"mass": 3.0, "com": [0, 0, 0]}}), NotCertified
+    )
     refused(export(client, "csv", bare, arm={**answer["arm"], "robot": "ur3e"}), InvalidRequest)
 
 
 def test_a_robot_of_seven_joints_gets_the_formats_that_remain(client: TestClient) -> None:
     q = [0.0, -0.4, 0.0, -2.0, 0.0, 1.6, 0.8]
-    found = client.post("/optimize", json=move(robot="fr3", start={"q": q}, goal={"q": [0.2, *q[1:]]})).json()
+    found = client.post(
+        "/optimize", json=move(robot="fr3", start={"q": q}, goal={"q": [0.2, *q[1:]]})
+    ).json()
     told = refused(export(client, "urscript", found), FormatUnsuitable)
     assert told["format"] == "urscript" and "use ros2" in told["detail"]
     assert export(client, "ros2", found).status_code == 200
@@ -230,13 +264,17 @@ def test_a_robot_of_seven_joints_gets_the_formats_that_remain(client: TestClient
         ({"colour": "red"}, "colour"),
     ],
 )
-def test_wrong_options_are_named(client: TestClient, answer: Json, fields: Json, field: str) -> None:
+def test_wrong_options_are_named(
+    client: TestClient, answer: Json, fields: Json, field: str
+) -> None:
     told = refused(export(client, "urscript", answer["answer"], **fields), InvalidRequest)
     assert any(field in map(str, error["loc"]) or field in error["msg"] for error in told["errors"])
 
 
 def test_a_controllers_name_cannot_hold_a_command(client: TestClient, answer: Json) -> None:
-    refused(export(client, "ros2", answer["answer"], ros2={"controller": "x; rm -rf /"}), InvalidRequest)
+    refused(
+        export(client, "ros2", answer["answer"], ros2={"controller": "x; rm -rf /"}), InvalidRequest
+    )
 
 
 def test_an_unknown_format_names_the_known_ones(client: TestClient, answer: Json) -> None:
@@ -246,7 +284,9 @@ def test_an_unknown_format_names_the_known_ones(client: TestClient, answer: Json
 
 def test_accept_chooses_json_where_no_option_says(client: TestClient, answer: Json) -> None:
     body, headers = {"answer": answer["answer"]}, {"accept": "application/json"}
-    assert client.post("/export/ros2", json=body, headers=headers).json()["op"] == "send_action_goal"
+    assert (
+        client.post("/export/ros2", json=body, headers=headers).json()["op"] == "send_action_goal"
+    )
     yaml_wanted = body | {"ros2": {"encoding": "yaml"}}
     told = client.post("/export/ros2", json=yaml_wanted, headers=headers)
     assert told.headers["content-type"].startswith("application/yaml")
@@ -254,26 +294,40 @@ def test_accept_chooses_json_where_no_option_says(client: TestClient, answer: Js
 
 def test_arms_of_the_other_makers_get_their_programs(client: TestClient) -> None:
     q = [0.0, -0.4, 0.0, -2.0, 0.0, 1.6, 0.8]
-    franka = client.post("/optimize", json=move(robot="panda", start={"q": q}, goal={"q": [0.2, *q[1:]]})).json()
+    franka = client.post(
+        "/optimize", json=move(robot="panda", start={"q": q}, goal={"q": [0.2, *q[1:]]})
+    ).json()
     table = export(client, "franka", franka)
-    assert table.headers["content-type"].startswith("text/csv") and len(table.text.splitlines()) > 100
+    assert (
+        table.headers["content-type"].startswith("text/csv") and len(table.text.splitlines()) > 100
+    )
     header = export(client, "franka", franka, franka={"form": "cpp"})
-    assert "franka::MotionFinished" in header.text and '.hpp"' in header.headers["content-disposition"]
+    assert (
+        "franka::MotionFinished" in header.text and '.hpp"' in header.headers["content-disposition"]
+    )
     q = [0.0, -1.2, 1.2, 0.0, 0.5, 0.0]
-    kuka = client.post("/optimize", json=move(robot="kr10_r1100", start={"q": q}, goal={"q": [0.4, *q[1:]]})).json()
+    kuka = client.post(
+        "/optimize", json=move(robot="kr10_r1100", start={"q": q}, goal={"q": [0.4, *q[1:]]})
+    ).json()
     program = export(client, "krl", kuka, krl={"tolerance": 0.002, "digital_output": 1})
-    assert program.text.startswith("&ACCESS RVP\r\nDEF joulepath( )") and "PTP_SPLINE" in program.text
+    assert (
+        program.text.startswith("&ACCESS RVP\r\nDEF joulepath( )") and "PTP_SPLINE" in program.text
+    )
     assert "rad of the spline" in program.headers["joulepath-notes"]
 
 
 def test_an_arm_of_a_users_own_gets_programs_of_any_maker(client: TestClient) -> None:
     urdf = urdf_of("irb", load_robot("ur3e").figures)
-    added = client.put("/robots/irb", json={"urdf": urdf, "tip": "flange", "acceleration": 8.0, "payload": 3.0})
+    added = client.put(
+        "/robots/irb", json={"urdf": urdf, "tip": "flange", "acceleration": 8.0, "payload": 3.0}
+    )
     assert added.is_success, added.text
     found = client.post("/optimize", json=move(robot="irb", collisions=False)).json()
     options = {"signs": [1, -1, 1, 1, 1, 1], "offsets": [0.0, 90.0, 0.0, 0.0, 0.0, 0.0]}
     exported = export(client, "rapid", found["answer"], rapid=options)
-    assert exported.status_code == 200 and exported.text.startswith("MODULE Joulepath"), exported.text
+    assert exported.status_code == 200 and exported.text.startswith("MODULE Joulepath"), (
+        exported.text
+    )
     client.delete("/robots/irb")
     refused(export(client, "csv", found), UnknownRobot)
 
@@ -291,7 +345,12 @@ def test_a_slow_table_has_a_bounded_number_of_rows(client: TestClient, answer: J
 
 
 def test_an_arm_too_large_to_be_repeated_is_sent_with_the_export(client: TestClient) -> None:
-    points = {"name": "cloud", "shape": "points", "radius": 0.01, "pose": {"position": [5, 0, 0], "rpy": [0, 0, 0]}}
+    points = {
+        "name": "cloud",
+        "shape": "points",
+        "radius": 0.01,
+        "pose": {"position": [5, 0, 0], "rpy": [0, 0, 0]},
+    }
     cloud = points | {"points": [[0.0, 0.001 * k, 0.0005 * k] for k in range(4000)]}
     arm = {"payload": LOAD, "scene": {"obstacles": [cloud]}}
     found = client.post("/optimize", json=move(**arm)).json()

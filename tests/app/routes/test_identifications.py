@@ -103,7 +103,9 @@ def test_a_log_becomes_figures(client: TestClient, log: str) -> None:
     assert torque is not None and own is not None and max(torque.rmse) < min(own.rmse[:3])
     assert result.validation.coverage is not None
     law = result.document["friction_laws"]["identified"]
-    assert law["coulomb"]["value"][1] == coulomb.value and law["coulomb"]["sd"][1] == pytest.approx(coulomb.sd)
+    assert law["coulomb"]["value"][1] == coulomb.value and law["coulomb"]["sd"][1] == pytest.approx(
+        coulomb.sd
+    )
     assert (law["coulomb"]["trust"], law["coulomb"]["unit"]) == ("B", "N·m")
     names = result.document["covariance"]["names"]
     matrix = np.array(result.document["covariance"]["matrix"])
@@ -112,7 +114,11 @@ def test_a_log_becomes_figures(client: TestClient, log: str) -> None:
     # stored with the end of the job, under the id that its content has on every server
     stored = client.put("/figures", json=result.document)
     assert stored.status_code == 200 and stored.json()["id"] == whole.figures, stored.text
-    motion = {"configurations": [HOME, [0.5, *HOME[1:]]], "time_per_segment": 1.5, "figures": stored.json()["id"]}
+    motion = {
+        "configurations": [HOME, [0.5, *HOME[1:]]],
+        "time_per_segment": 1.5,
+        "figures": stored.json()["id"],
+    }
     answer = client.post("/evaluate", json=motion)
     assert answer.status_code == 200, answer.text
 
@@ -126,7 +132,9 @@ def residuals(client: TestClient, id: str) -> list[ResidualMove]:
     return moves
 
 
-def test_residuals_are_those_of_moves_that_the_fit_has_not_seen(client: TestClient, log: str) -> None:
+def test_residuals_are_those_of_moves_that_the_fit_has_not_seen(
+    client: TestClient, log: str
+) -> None:
     found = ended(client, logs=[log])
     assert found.result is not None and found.result.validation.fitted.torque is not None
     moves = residuals(client, found.id)
@@ -137,14 +145,21 @@ def test_residuals_are_those_of_moves_that_the_fit_has_not_seen(client: TestClie
     for move, rest in zip(sorted(moves, key=lambda each: each.t), rests, strict=True):
         assert rest["start"] <= move.t[0] < move.t[-1] <= rest["end"], "times are those of the log"
         assert move.torque is not None and move.power is not None
-        lists = [*move.torque.measured, *move.torque.modelled, move.power.measured, move.power.modelled]
+        lists = [
+            *move.torque.measured,
+            *move.torque.modelled,
+            move.power.measured,
+            move.power.modelled,
+        ]
         assert len(lists) == 2 * 6 + 2 and {len(each) for each in lists} == {len(move.t)}
     for joint, rmse in enumerate(found.result.validation.fitted.torque.rmse):
         left = [
             measured - modelled
             for move in blind
             if move.torque is not None
-            for measured, modelled in zip(move.torque.measured[joint], move.torque.modelled[joint], strict=True)
+            for measured, modelled in zip(
+                move.torque.measured[joint], move.torque.modelled[joint], strict=True
+            )
             if measured is not None and modelled is not None
         ]
         assert np.sqrt(np.mean(np.square(left))) == pytest.approx(rmse, rel=THINNED)
@@ -155,7 +170,11 @@ def test_residuals_of_other_logs_are_held_out(client: TestClient, log: str) -> N
     motion = add_log(client, moves=4, seed=7, without="i")
     found = ended(client, logs=[log], validate=[other, motion])
     moves = residuals(client, found.id)
-    assert {(move.log, move.held_out) for move in moves} == {(log, False), (other, True), (motion, True)}
+    assert {(move.log, move.held_out) for move in moves} == {
+        (log, False),
+        (other, True),
+        (motion, True),
+    }
     for move in moves:
         assert (move.torque is None) == (move.log != log), "no efforts were logged"
         assert (move.power is None) == (move.log == other)
@@ -165,11 +184,19 @@ def test_identifications_are_listed(client: TestClient, log: str) -> None:
     found = ended(client, logs=[log])
     first = IdentificationList.model_validate_json(client.get("/identifications?limit=1").content)
     assert [each.model_dump() for each in first.identifications] == [
-        {name: getattr(found, name) for name in IdentificationSummary.model_fields} | {"robot": ROBOT.name}
+        {name: getattr(found, name) for name in IdentificationSummary.model_fields}
+        | {"robot": ROBOT.name}
     ]
     assert first.next is not None
-    client.post("/jobs", json={"requests": [{"evaluate": {"configurations": [HOME, HOME], "time_per_segment": 1.0}}]})
-    rest = IdentificationList.model_validate_json(client.get(f"/identifications?after={first.next}").content)
+    client.post(
+        "/jobs",
+        json={
+            "requests": [{"evaluate": {"configurations": [HOME, HOME], "time_per_segment": 1.0}}]
+        },
+    )
+    rest = IdentificationList.model_validate_json(
+        client.get(f"/identifications?after={first.next}").content
+    )
     assert found.id not in {each.id for each in rest.identifications}
     assert client.delete(f"/jobs/{found.id}").status_code == 204
     after = IdentificationList.model_validate_json(client.get("/identifications").content)
@@ -207,13 +234,18 @@ def test_what_logs_do_not_tell_is_a_problem(
 ) -> None:
     found = ended(client, logs=[add_log(client, moves, **options)], **body)
     assert found.state == "failed" and found.result is None and found.problem is not None
-    assert client.get(f"/identifications/{found.id}/residuals").json() == {"id": found.id, "moves": None}
+    assert client.get(f"/identifications/{found.id}/residuals").json() == {
+        "id": found.id,
+        "moves": None,
+    }
     checked(problem, found.problem)
     if "advice" in found.problem:
         assert ExcitationRequest.model_validate(found.problem["advice"]).robot == ROBOT.name
 
 
-@pytest.mark.parametrize("method", ["motor_current", "electrical_power", "essential_parameters", "threshold_velocity"])
+@pytest.mark.parametrize(
+    "method", ["motor_current", "electrical_power", "essential_parameters", "threshold_velocity"]
+)
 def test_methods_are_asked_for_by_name(client: TestClient, log: str, method: str) -> None:
     whole = ended(client, logs=[log], method=method)
     assert whole.result is not None, whole.problem
@@ -226,7 +258,9 @@ def test_methods_are_asked_for_by_name(client: TestClient, log: str, method: str
 
 
 @pytest.mark.parametrize("method", ["periodic", "base_wrench", "temperature"])
-def test_a_method_that_the_log_does_not_fit_is_a_problem(client: TestClient, log: str, method: str) -> None:
+def test_a_method_that_the_log_does_not_fit_is_a_problem(
+    client: TestClient, log: str, method: str
+) -> None:
     found = ended(client, logs=[log], method=method, period=5.0)
     assert found.problem is not None
     assert checked(MethodNotApplicable, found.problem).method == method
@@ -263,7 +297,9 @@ def test_a_payload_is_the_difference_of_two_logs(client: TestClient, log: str) -
     mass = next(each for each in result.parameters if each.figure == "payload_mass")
     assert (mass.value, mass.sd) == (result.payload.mass, result.payload.mass_sd)
     wrong = ended(client, logs=[loaded, log], fit=["payload"])
-    assert wrong.problem is not None and "payload last" in str(checked(InvalidRequest, wrong.problem).errors)
+    assert wrong.problem is not None and "payload last" in str(
+        checked(InvalidRequest, wrong.problem).errors
+    )
 
 
 def test_torque_constants_need_a_payload_that_is_known(client: TestClient) -> None:
@@ -299,7 +335,10 @@ def test_malformed_requests_name_the_field(client: TestClient, body: dict[str, A
 
 def test_other_jobs_are_no_identifications(client: TestClient) -> None:
     job = client.post(
-        "/jobs", json={"requests": [{"evaluate": {"configurations": [HOME, HOME], "time_per_segment": 1.0}}]}
+        "/jobs",
+        json={
+            "requests": [{"evaluate": {"configurations": [HOME, HOME], "time_per_segment": 1.0}}]
+        },
     ).json()
     for path in ("", "/residuals"):
         refused(client.get(f"/identifications/{job['id']}{path}"), UnknownIdentification)

@@ -1,4 +1,6 @@
-"""`POST /ik` with a tool, a load and a scene: what each arm configuration hits, and what is refused."""
+"""`POST /ik` with a tool, a load and a scene: what each arm configuration hits, and what is
+refused.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,11 @@ def test_each_solution_names_what_is_nearest(client: TestClient) -> None:
     for s in found:
         assert s["collides"] == (s["nearest"]["distance"] < 0)
         assert len(s["nearest"]["pair"]) == 2
-    assert any("floor" in s["nearest"]["pair"] or "table" in s["nearest"]["pair"] for s in found if s["collides"])
+    assert any(
+        "floor" in s["nearest"]["pair"] or "table" in s["nearest"]["pair"]
+        for s in found
+        if s["collides"]
+    )
 
 
 def test_windings_change_nothing(client: TestClient) -> None:
@@ -40,8 +46,19 @@ def test_windings_change_nothing(client: TestClient) -> None:
 
 def test_a_larger_load_and_a_margin_come_nearer(client: TestClient) -> None:
     alone = solutions(client, scene={})
-    load = {"shape": {"shape": "sphere", "radius": 0.15, "pose": {"position": [0, 0, 0.2], "rotvec": [0, 0, 0]}}}
+    load = {
+        "shape": {
+            "shape": "sphere",
+            "radius": 0.15,
+            "pose": {"position": [0, 0, 0.2], "rotvec": [0, 0, 0]},
+        }
+    }
     loaded = solutions(client, scene={}, payload=load)
-    assert all(b["nearest"]["distance"] <= a["nearest"]["distance"] + 1e-9 for a, b in zip(alone, loaded, strict=True))
+    assert all(
+        b["nearest"]["distance"] <= a["nearest"]["distance"] + 1e-9
+        for a, b in zip(alone, loaded, strict=True)
+    )
     scene = {"obstacles": [BOX | {"margin": 1.0}]}
-    assert all(s["collides"] and "box" in s["nearest"]["pair"] for s in solutions(client, scene=scene))
+    assert all(
+        s["collides"] and "box" in s["nearest"]["pair"] for s in solutions(client, scene=scene)
+    )

@@ -23,7 +23,8 @@ DOWN = [0.0, 1.0, 0.0, 0.0]
 # of an answer's forward kinematics, computed apart from the search [m]
 ACCURACY = 1e-9
 REQUESTS: dict[str, Any] = {
-    name: example["value"] for name, example in body_examples("/ik/path")["application/json"].items()
+    name: example["value"]
+    for name, example in body_examples("/ik/path")["application/json"].items()
 }
 
 
@@ -96,7 +97,9 @@ def test_leaves_out_what_is_nearly_singular(client: TestClient) -> None:
     assert content["points"][0]["reason"] == "near_singular", content["points"]
     assert content["points"][0]["smallest_singular_value"] < 0.01
     assert content["trajectory"] == {"t": [], "q": []}
-    kept = client.post("/ik/path", json=path([point.tolist()], guess=guess, near_singular=0.0)).json()
+    kept = client.post(
+        "/ik/path", json=path([point.tolist()], guess=guess, near_singular=0.0)
+    ).json()
     assert kept["points"][0]["written"]
 
 
@@ -133,5 +136,7 @@ def test_refuses(request_: dict[str, Any], client: TestClient) -> None:
 
 
 def test_refuses_a_guess_beyond_the_joints(client: TestClient) -> None:
-    answer = client.post("/ik/path", json=path([[0.4, 0.0, 0.3]], guess=[0.0, 0.0, 3.5, 0.0, 0.0, 0.0]))
+    answer = client.post(
+        "/ik/path", json=path([[0.4, 0.0, 0.3]], guess=[0.0, 0.0, 3.5, 0.0, 0.0, 0.0])
+    )
     assert checked(OutsideLimits, answer.content).joint == "elbow_joint"

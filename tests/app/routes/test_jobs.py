@@ -39,8 +39,20 @@ def mixed(client: TestClient) -> tuple[str, dict[str, Any]]:
         evaluation(),
         {"pareto": move(points=2, method="time_scaling")},
         {"compare": move(methods=["time_scaling", "uniform_scaling"])},
-        {"whatif": {"evaluate": evaluation()["evaluate"], "changes": [{"name": "x", "arm": {"link_mass_scale": 0.5}}]}},
-        {"cycle": {"start": start, "stops": [{"target": goal}], "windings": False, "deadline": 100.0}},
+        {
+            "whatif": {
+                "evaluate": evaluation()["evaluate"],
+                "changes": [{"name": "x", "arm": {"link_mass_scale": 0.5}}],
+            }
+        },
+        {
+            "cycle": {
+                "start": start,
+                "stops": [{"target": goal}],
+                "windings": False,
+                "deadline": 100.0,
+            }
+        },
     ]
     path = sent(client, requests, name="Every kind ✓")
     return path, ended(client, path)
@@ -48,7 +60,12 @@ def mixed(client: TestClient) -> tuple[str, dict[str, Any]]:
 
 def test_every_kind_is_answered_as_by_its_endpoint(client: TestClient, mixed: Any) -> None:
     _, job = mixed
-    assert (job["name"], job["state"], job["progress"], job["eta"]) == ("Every kind ✓", "done", 1.0, None)
+    assert (job["name"], job["state"], job["progress"], job["eta"]) == (
+        "Every kind ✓",
+        "done",
+        1.0,
+        None,
+    )
     assert job["counts"] == {"waiting": 0, "running": 0, "done": 6, "failed": 1, "cancelled": 0}
     assert [each["index"] for each in job["requests"]] == list(range(7))
     kinds = ["optimize", "optimize", "evaluate", "pareto", "compare", "whatif", "cycle"]
@@ -64,7 +81,10 @@ def test_every_kind_is_answered_as_by_its_endpoint(client: TestClient, mixed: An
     model_of(OptimizeAnswer).model_validate(answer)
     assert answer["trajectory"] == alone["trajectory"]
     assert job["requests"][0]["energy"] == alone["energy"]["electrical"]["total"]
-    assert (job["requests"][0]["duration"], job["requests"][0]["status"]) == (alone["duration"], alone["status"])
+    assert (job["requests"][0]["duration"], job["requests"][0]["status"]) == (
+        alone["duration"],
+        alone["status"],
+    )
     assert job["requests"][2]["energy"] > 0 and job["requests"][6]["energy"] > 0
     assert job["requests"][3]["energy"] is None, "a front has several"
 
@@ -104,7 +124,9 @@ def test_results_as_lines(client: TestClient, mixed: Any) -> None:
     for line, each in zip(lines, job["requests"], strict=True):
         result = line.pop("result")
         assert line == each
-        assert result == (None if each["answer"] is None else client.get(each["answer"]).json()["answer"])
+        assert result == (
+            None if each["answer"] is None else client.get(each["answer"]).json()["answer"]
+        )
 
 
 def test_results_as_a_table(client: TestClient, mixed: Any) -> None:
@@ -122,13 +144,21 @@ def test_events_tell_the_whole_story_and_resume(client: TestClient, mixed: Any) 
     path, _ = mixed
     found = list(parsed(iter(client.get(f"{path}/events").text.splitlines())))
     assert [event.number for event in found] == list(range(1, len(found) + 1))
-    assert [event.data["state"] for event in found if event.name == "state"] == ["waiting", "running", "done"]
-    assert sorted(event.data["index"] for event in found if event.name == "request") == list(range(7))
+    assert [event.data["state"] for event in found if event.name == "state"] == [
+        "waiting",
+        "running",
+        "done",
+    ]
+    assert sorted(event.data["index"] for event in found if event.name == "request") == list(
+        range(7)
+    )
     assert found[-1].name == "end"
     for after in (0, 3, len(found) - 1, len(found), 10**8):
         rest = client.get(f"{path}/events", headers={"Last-Event-ID": str(after)}).text.splitlines()
         assert list(parsed(iter(rest))) == found[after:]
-    everything = client.get(f"{path}/events", headers={"Last-Event-ID": "no number"}).text.splitlines()
+    everything = client.get(
+        f"{path}/events", headers={"Last-Event-ID": "no number"}
+    ).text.splitlines()
     assert list(parsed(iter(everything))) == found
 
 
@@ -157,8 +187,14 @@ def test_a_malformed_request_refuses_the_whole_job(recorded: TestClient) -> None
         ({"requests": [evaluation(), {}]}, ["requests", 1]),
         ({"requests": [evaluation(), evaluation() | optimization()]}, ["requests", 1]),
         ({"requests": [evaluation(), {"ik": {}}]}, ["requests", 1]),
-        ({"requests": [evaluation(), evaluation(), evaluation(-1.0)]}, ["requests", 2, "evaluate", "time_per_segment"]),
-        ({"requests": [evaluation(), optimization(deadline=3601.0)]}, ["requests", 1, "optimize", "deadline"]),
+        (
+            {"requests": [evaluation(), evaluation(), evaluation(-1.0)]},
+            ["requests", 2, "evaluate", "time_per_segment"],
+        ),
+        (
+            {"requests": [evaluation(), optimization(deadline=3601.0)]},
+            ["requests", 1, "optimize", "deadline"],
+        ),
         ({"requests": [evaluation()], "keep_going": "no"}, ["keep_going"]),
         ({"requests": [evaluation()], "name": "\n"}, ["name"]),
     ]
@@ -169,20 +205,30 @@ def test_a_malformed_request_refuses_the_whole_job(recorded: TestClient) -> None
     for text in (b"", b"{", b"\xff", b"[" * 100_000):
         answer = recorded.post("/jobs", content=text, headers={"Content-Type": "application/json"})
         refused(answer, InvalidRequest)
-    refused(recorded.post("/jobs", content=b"{}", headers={"Content-Type": "text/plain"}), InvalidRequest)
+    refused(
+        recorded.post("/jobs", content=b"{}", headers={"Content-Type": "text/plain"}),
+        InvalidRequest,
+    )
     assert recorded.get("/jobs?limit=1").json() == before, "nothing was stored"
 
 
 def test_a_key_makes_one_job(recorded: TestClient) -> None:
     body = {"requests": [evaluation()], "name": "once"}
-    first, again = (recorded.post("/jobs", json=body, headers={"Idempotency-Key": "jobs-1"}) for _ in range(2))
+    first, again = (
+        recorded.post("/jobs", json=body, headers={"Idempotency-Key": "jobs-1"}) for _ in range(2)
+    )
     assert (first.status_code, again.status_code) == (202, 202)
     assert first.json()["id"] == again.json()["id"]
     assert "idempotency-replayed" not in first.headers
     assert again.headers["idempotency-replayed"] == "true"
     for other in ({"requests": [evaluation(2.0)], "name": "once"}, {"requests": [evaluation()]}):
-        refused(recorded.post("/jobs", json=other, headers={"Idempotency-Key": "jobs-1"}), KeyReused)
-    refused(recorded.post("/optimize", json=move(), headers=LATER | {"Idempotency-Key": "jobs-1"}), KeyReused)
+        refused(
+            recorded.post("/jobs", json=other, headers={"Idempotency-Key": "jobs-1"}), KeyReused
+        )
+    refused(
+        recorded.post("/optimize", json=move(), headers=LATER | {"Idempotency-Key": "jobs-1"}),
+        KeyReused,
+    )
 
 
 def test_unknown_jobs(recorded: TestClient) -> None:
@@ -219,7 +265,10 @@ POSTS: dict[str, Any] = {
     "/compare": move(methods=["time_scaling"]),
     "/pareto": move(points=2, method="time_scaling"),
     "/cycle": {"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], "windings": False},
-    "/whatif": {"evaluate": evaluation()["evaluate"], "changes": [{"name": "x", "arm": {"link_mass_scale": 0.5}}]},
+    "/whatif": {
+        "evaluate": evaluation()["evaluate"],
+        "changes": [{"name": "x", "arm": {"link_mass_scale": 0.5}}],
+    },
     "/evaluate": evaluation()["evaluate"],
 }
 
@@ -254,7 +303,9 @@ def test_other_preferences_have_no_effect(prefer: str, recorded: TestClient) -> 
 
 
 @pytest.mark.parametrize("headers", [{}, LATER])
-def test_settings_beside_a_json_body_are_refused(headers: dict[str, str], recorded: TestClient) -> None:
+def test_settings_beside_a_json_body_are_refused(
+    headers: dict[str, str], recorded: TestClient
+) -> None:
     """They would have no effect."""
     body, query = evaluation()["evaluate"], {"drives": '{"inverter": {"constant": 1.0}}'}
     answer = recorded.post("/evaluate", json=body, params=query, headers=headers)
@@ -265,7 +316,9 @@ def test_settings_beside_a_json_body_are_refused(headers: dict[str, str], record
 def test_a_table_is_evaluated_at_once(recorded: TestClient) -> None:
     table = "q1,q2,q3,q4,q5,q6\n0,-1.57,1.57,-1.57,-1.57,0\n0.3,-1.4,1.4,-1.5,-1.57,0.2\n"
     headers = LATER | {"Content-Type": "text/csv"}
-    answer = recorded.post("/evaluate", params={"time_per_segment": "1.5"}, content=table, headers=headers)
+    answer = recorded.post(
+        "/evaluate", params={"time_per_segment": "1.5"}, content=table, headers=headers
+    )
     assert (answer.status_code, "preference-applied" in answer.headers) == (200, False)
 
 

@@ -51,13 +51,19 @@ def check_kill(url: str) -> None:
             killed.process.wait()
         with serving(workers=1, database_url=url) as restarted:
             for server in (other, restarted):
-                assert [entry["answer"] for entry in shown(Over(server), path)["history"]] == [step["answer"]]
+                assert [entry["answer"] for entry in shown(Over(server), path)["history"]] == [
+                    step["answer"]
+                ]
                 kept = server.get(f"/answers/{step['answer']}").json()["answer"]
                 assert kept["energy"]["electrical"]["total"] == step["energy"]
             # both servers, at once: numbers are counted without gaps and none is given twice
             with ThreadPoolExecutor(6) as pool:
                 servers = [other, restarted] * 3
-                numbers = list(pool.map(lambda server: added(Over(server), path, LINE)["number"], servers))
+                numbers = list(
+                    pool.map(lambda server: added(Over(server), path, LINE)["number"], servers)
+                )
             assert sorted(numbers) == list(range(2, 8))
             for server in (other, restarted):
-                assert [entry["number"] for entry in shown(Over(server), path)["history"]] == list(range(1, 8))
+                assert [entry["number"] for entry in shown(Over(server), path)["history"]] == list(
+                    range(1, 8)
+                )

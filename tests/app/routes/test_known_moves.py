@@ -1,4 +1,6 @@
-"""Cycles in one cell have moves in common: those that were found before are found again, and answers are the same."""
+"""Cycles in one cell have moves in common: those that were found before are found again, and
+answers are the same.
+"""
 
 from __future__ import annotations
 
@@ -28,17 +30,25 @@ def sent(client: TestClient, body: Any, **headers: str) -> Any:
 
 def solves(client: TestClient, answer: Any) -> list[int]:
     """How many nonlinear programs were solved for each move."""
-    moves = [client.get(leg["answer"]).json()["answer"] for leg in answer["legs"] if leg["kind"] == "move"]
+    moves = [
+        client.get(leg["answer"]).json()["answer"]
+        for leg in answer["legs"]
+        if leg["kind"] == "move"
+    ]
     return [move["solver"]["nlp_solves"] for move in moves]
 
 
 def without_times(answer: Any) -> Any:
-    legs = [{name: value for name, value in leg.items() if name != "answer"} for leg in answer["legs"]]
+    legs = [
+        {name: value for name, value in leg.items() if name != "answer"} for leg in answer["legs"]
+    ]
     dropped = ("request", "id", "answer", "search")
     return {name: value for name, value in answer.items() if name not in dropped} | {"legs": legs}
 
 
-def test_a_cycle_of_which_one_stop_changed_solves_only_the_moves_to_and_from_it(client: TestClient) -> None:
+def test_a_cycle_of_which_one_stop_changed_solves_only_the_moves_to_and_from_it(
+    client: TestClient,
+) -> None:
     first = sent(client, a_cycle(0.111, NEAR, FAR))
     assert all(solves(client, first))
     again = sent(client, a_cycle(0.111, NEAR, FAR))

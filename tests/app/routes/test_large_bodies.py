@@ -16,7 +16,12 @@ from joulepath.app.tasks.read_body import HeldBody, ReadBodyTask, held
 from tests.app.requests import AMPLE, HOME, move
 
 POSE = {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}
-SCAN = {"name": "scan", "shape": "points", "points": [[1.5, 0.001 * k, 0.5] for k in range(5000)], "radius": 0.01}
+SCAN = {
+    "name": "scan",
+    "shape": "points",
+    "points": [[1.5, 0.001 * k, 0.5] for k in range(5000)],
+    "radius": 0.01,
+}
 SCENE = {"obstacles": [SCAN]}
 ANSWERED: dict[str, list[dict[str, Any]]] = {
     "/optimize": [move(), move(scene=SCENE)],
@@ -24,7 +29,9 @@ ANSWERED: dict[str, list[dict[str, Any]]] = {
     "/ik/path": [BODY_EXAMPLES["/ik/path"]["application/json"]["positions"]["value"]],
     "/compare": [move(methods=["bspline", "time_scaling"])],
     "/pareto": [move(points=3)],
-    "/cycle": [{"start": {"q": HOME}, "stops": [{"target": {"q": [0.3, *HOME[1:]]}}], "deadline": AMPLE}],
+    "/cycle": [
+        {"start": {"q": HOME}, "stops": [{"target": {"q": [0.3, *HOME[1:]]}}], "deadline": AMPLE}
+    ],
     "/whatif": [
         {
             "optimize": move(scene=SCENE),
@@ -64,7 +71,9 @@ def padded(body: bytes) -> bytes:
 
 
 @pytest.mark.parametrize(
-    ("path", "body"), [(path, body) for path, bodies in ANSWERED.items() for body in bodies], ids=lambda x: str(x)[:30]
+    ("path", "body"),
+    [(path, body) for path, bodies in ANSWERED.items() for body in bodies],
+    ids=lambda x: str(x)[:30],
 )
 def test_is_answered(client: TestClient, path: str, body: dict[str, Any]) -> None:
     small = json.dumps(body).encode()
@@ -85,7 +94,9 @@ GIVEN = {"configurations": [HOME, [0.3, *HOME[1:]]], "time_per_segment": 1.0}
 
 def test_iterations_are_answered_and_refused_as_small_ones(client: TestClient) -> None:
     def answers(pad: Any) -> list[tuple[int, Any]]:
-        study = client.post("/studies", json={"name": "large", "threshold": 1.0}).headers["location"]
+        study = client.post("/studies", json={"name": "large", "threshold": 1.0}).headers[
+            "location"
+        ]
         found = []
         bodies = [
             {"optimize": move(method="time_scaling", candidates="none")},

@@ -1,4 +1,6 @@
-"""Logs of arms over HTTP: added, listed, shown, deleted; broken, too large, too many, and not one's own."""
+"""Logs of arms over HTTP: added, listed, shown, deleted; broken, too large, too many, and not one's
+own.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,14 @@ from tests.app.access.test_key_file import add
 from tests.app.live import CLIENT, Server
 from tests.app.recorded import recorded_service
 from tests.app.routes.test_problems import refused
-from tests.identification_logs import Recording, csv_of, recorded, rigid_torques, truth_of, with_current
+from tests.identification_logs import (
+    Recording,
+    csv_of,
+    recorded,
+    rigid_torques,
+    truth_of,
+    with_current,
+)
 
 ROBOT = load_robot("ur5e")
 TRUTH = truth_of(ROBOT)
@@ -63,7 +72,9 @@ def test_a_log_is_added_listed_shown_and_deleted(client: TestClient, recording: 
 
 
 def test_what_is_stored_is_read_again_as_it_was(recording: Recording) -> None:
-    log = GivenLog("log", {"robot": "ur5e", "tags": [], "effort": "auto"}, gzip.compress(csv_of(recording))).reading.log
+    log = GivenLog(
+        "log", {"robot": "ur5e", "tags": [], "effort": "auto"}, gzip.compress(csv_of(recording))
+    ).reading.log
     assert np.abs(log.q - recording.q).max() < 1e-7 and log.effort_meaning == "current"
 
 
@@ -94,15 +105,23 @@ def test_packed_bodies(client: TestClient, recording: Recording, how: str) -> No
 
 def test_an_own_robot(client: TestClient) -> None:
     assert client.put("/robots/logged", json=ARM).status_code == 201
-    rows = "".join(f"{k / 50},{0.5 * np.sin(k / 20):.6f},{0.3 * np.cos(k / 20):.6f}\n" for k in range(100))
-    answer = client.post("/logs", content="t,q1,q2\n" + rows, params={"robot": "logged"}, headers=CSV)
+    rows = "".join(
+        f"{k / 50},{0.5 * np.sin(k / 20):.6f},{0.3 * np.cos(k / 20):.6f}\n" for k in range(100)
+    )
+    answer = client.post(
+        "/logs", content="t,q1,q2\n" + rows, params={"robot": "logged"}, headers=CSV
+    )
     assert answer.status_code == 201 and answer.json()["robot"] == "logged", answer.text
     client.delete(answer.headers["location"])
     client.delete("/robots/logged")
-    refused(client.post("/logs", content=rows, params={"robot": "logged"}, headers=CSV), UnknownRobot)
+    refused(
+        client.post("/logs", content=rows, params={"robot": "logged"}, headers=CSV), UnknownRobot
+    )
 
 
-def test_broken_logs_name_the_place_and_leave_nothing(client: TestClient, recording: Recording) -> None:
+def test_broken_logs_name_the_place_and_leave_nothing(
+    client: TestClient, recording: Recording
+) -> None:
     before = client.get("/logs").json()
     lines = csv_of(recording, without="vaP").split(b"\n")
     lines[9] = lines[9].replace(b",", b",nan,", 1).rpartition(b",")[0]
@@ -134,14 +153,20 @@ def test_efforts_without_gravity(client: TestClient, recording: Recording) -> No
     rigid = rigid_torques(ROBOT, TRUTH, recording.exact_q, recording.exact_v, recording.a)
     body = csv_of(with_current(recording, recording.current - rigid / TRUTH.torque_constant))
     content = refused(client.post("/logs", content=body, headers=CSV), EffortNotUsable)
-    assert content["meaning"] == "external" and set(content["slope"]) == {"shoulder_lift_joint", "elbow_joint"}
+    assert content["meaning"] == "external" and set(content["slope"]) == {
+        "shoulder_lift_joint",
+        "elbow_joint",
+    }
     answer = client.post("/logs", content=body, params={"effort": "external"}, headers=CSV)
     assert answer.status_code == 201 and answer.json()["effort"]["meaning"] == "external"
     client.delete(answer.headers["location"])
 
 
 def test_other_media_types(client: TestClient) -> None:
-    refused(client.post("/logs", content="{}", headers={"Content-Type": "application/json"}), UnsupportedMediaType)
+    refused(
+        client.post("/logs", content="{}", headers={"Content-Type": "application/json"}),
+        UnsupportedMediaType,
+    )
 
 
 def test_limits_of_size_and_number(recording: Recording, tmp_path: Path) -> None:
@@ -153,7 +178,9 @@ def test_limits_of_size_and_number(recording: Recording, tmp_path: Path) -> None
     settings = {"max_upload_bytes": most, "logs_max_bytes": 10_000, "database_url": database}
     with recorded_service(**settings) as client:
         refused(client.post("/logs", content=body, headers=CSV), BodyTooLarge)
-        refused(client.post("/logs", content=packed, headers={"Content-Encoding": "gzip"}), BodyTooLarge)
+        refused(
+            client.post("/logs", content=packed, headers={"Content-Encoding": "gzip"}), BodyTooLarge
+        )
         # packed without saying so: unpacked by the worker
         content = refused(client.post("/logs", content=packed, headers=CSV), LogTooLarge)
         assert content["limit"] == most
@@ -176,7 +203,9 @@ def test_only_owners_and_admins_delete(tmp_path: Path) -> None:
         ("boss", "admin"),
     )
     keys = {name: add(file, name, role) for name, role in roles}
-    with recorded_service(api_keys_file=file, database_url=f"sqlite:///{tmp_path / 'logs.db'}") as client:
+    with recorded_service(
+        api_keys_file=file, database_url=f"sqlite:///{tmp_path / 'logs.db'}"
+    ) as client:
 
         def as_(name: str) -> dict[str, str]:
             return CSV | {"Authorization": f"Bearer {keys[name]}"}
@@ -184,7 +213,10 @@ def test_only_owners_and_admins_delete(tmp_path: Path) -> None:
         body = LOG_EXAMPLES["positions"]["value"]
         refused(client.post("/logs", content=body, headers=CSV), Unauthenticated)
         refused(client.post("/logs", content=body, headers=as_("reader")), RoleTooLow)
-        paths = [client.post("/logs", content=body, headers=as_("mine")).headers["location"] for _ in range(2)]
+        paths = [
+            client.post("/logs", content=body, headers=as_("mine")).headers["location"]
+            for _ in range(2)
+        ]
         assert client.get(paths[0], headers=as_("reader")).json()["owner"] == "mine"
         assert refused(client.delete(paths[0], headers=as_("other")), NotOwner)["owner"] == "mine"
         assert client.delete(paths[0], headers=as_("mine")).status_code == 204
@@ -199,11 +231,22 @@ def test_unknown_columns_are_not_echoed(client: TestClient, recording: Recording
 
 
 def test_over_a_real_socket(server: Server, recording: Recording) -> None:
-    """Good and broken logs at the same time: each gets its own answer, and a stored one survives."""
+    """Good and broken logs at the same time: each gets its own answer, and a stored one
+    survives."""
     good = csv_of(recording)
-    bodies = [good, good[: len(good) // 2] + b"\0" * 100, gzip.compress(good), b"t,q1\n" * 40_000, good[::-1]]
+    bodies = [
+        good,
+        good[: len(good) // 2] + b"\0" * 100,
+        gzip.compress(good),
+        b"t,q1\n" * 40_000,
+        good[::-1],
+    ]
     with ThreadPoolExecutor(len(bodies)) as pool:
-        answers = [*pool.map(lambda body: CLIENT.post(f"{server.url}/logs", content=body, headers=CSV), bodies)]
+        answers = [
+            *pool.map(
+                lambda body: CLIENT.post(f"{server.url}/logs", content=body, headers=CSV), bodies
+            )
+        ]
     assert [answer.status_code for answer in answers] == [201, 422, 201, 422, 422]
     first, third = answers[0].json(), answers[2].json()
     assert {name: first[name] for name in ("rows", "moves", "channels")} == {

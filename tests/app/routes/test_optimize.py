@@ -24,7 +24,9 @@ QUICK = ("joint_to_pose", "pose_to_pose", "storage_on_the_bus", "over_a_post")
 
 
 @pytest.fixture(scope="module", params=long_but(QUICK, EXAMPLES))
-def asked_and_answered(request: pytest.FixtureRequest, client: TestClient) -> tuple[dict[str, Any], dict[str, Any]]:
+def asked_and_answered(
+    request: pytest.FixtureRequest, client: TestClient
+) -> tuple[dict[str, Any], dict[str, Any]]:
     """Every example of the documentation with its answer, checked against the schema."""
     asked = EXAMPLES[request.param]
     answer = client.post("/optimize", json=asked, headers={"X-Request-ID": request.param})
@@ -37,17 +39,23 @@ def asked_and_answered(request: pytest.FixtureRequest, client: TestClient) -> tu
     return asked, content
 
 
-def test_echoes_the_settings_in_force(asked_and_answered: tuple[dict[str, Any], dict[str, Any]]) -> None:
+def test_echoes_the_settings_in_force(
+    asked_and_answered: tuple[dict[str, Any], dict[str, Any]],
+) -> None:
     asked, answer = asked_and_answered
     assert answer["robot"] == "ur5e"
     assert answer["method"] == asked.get("method", "bspline")
     assert answer["objective"] == asked.get("objective", "electrical")
 
 
-def test_trajectory_joins_the_ends(asked_and_answered: tuple[dict[str, Any], dict[str, Any]]) -> None:
+def test_trajectory_joins_the_ends(
+    asked_and_answered: tuple[dict[str, Any], dict[str, Any]],
+) -> None:
     asked, answer = asked_and_answered
     trajectory = {
-        name: np.array(values) for name, values in answer["trajectory"].items() if name != "spline" and values
+        name: np.array(values)
+        for name, values in answer["trajectory"].items()
+        if name != "spline" and values
     }
     samples = len(trajectory["t"])
     assert {values.shape for values in trajectory.values()} == {(samples,), (samples, 6)}
@@ -69,7 +77,9 @@ def test_energy_adds_up(asked_and_answered: tuple[dict[str, Any], dict[str, Any]
     assert sum(interval["shares"].values()) == pytest.approx(1.0)
     assert sum(electrical.values()) == pytest.approx(total, rel=Certificate.ENERGY_TOLERANCE)
     assert sum(energy["mechanical"]["per_joint"]) == pytest.approx(energy["mechanical"]["total"])
-    assert energy["optimality_gap"] == pytest.approx(1 - energy["lower_bound"] / energy[objective]["total"], abs=EXACT)
+    assert energy["optimality_gap"] == pytest.approx(
+        1 - energy["lower_bound"] / energy[objective]["total"], abs=EXACT
+    )
     drawn = total - electrical["dwell"]  # the mean is over the motion
     assert energy["mean_power"] == pytest.approx(drawn / answer["duration"], rel=1e-3)
 
@@ -80,7 +90,9 @@ def test_compares_and_accounts(asked_and_answered: tuple[dict[str, Any], dict[st
     assert {baseline["name"] for baseline in answer["baselines"]} == names
     ours = answer["energy"][answer["objective"]]["total"]
     for baseline in answer["baselines"]:
-        assert baseline["saving"] == pytest.approx(1 - ours / baseline[answer["objective"]], abs=1e-9)
+        assert baseline["saving"] == pytest.approx(
+            1 - ours / baseline[answer["objective"]], abs=1e-9
+        )
     chosen = (answer["branch"]["start"]["label"], answer["branch"]["goal"]["label"])
     solved = [entry for entry in answer["candidates"] if entry["status"] == "solved"]
     assert chosen in {(entry["start"], entry["goal"]) for entry in solved}
@@ -121,7 +133,10 @@ def test_friction_law_by_name(client: TestClient) -> None:
 
 
 def test_keeps_to_the_branch(client: TestClient) -> None:
-    request = EXAMPLES["joint_to_pose"] | {"branch": {"elbow": "down", "wrist": "flip"}, "candidates": "all"}
+    request = EXAMPLES["joint_to_pose"] | {
+        "branch": {"elbow": "down", "wrist": "flip"},
+        "candidates": "all",
+    }
     answer = client.post("/optimize", json=request).json()
     assert answer["branch"]["goal"]["label"].split("/")[1:] == ["down", "flip"]
     assert {entry["goal"].split("/")[1] for entry in answer["candidates"]} == {"down"}

@@ -39,7 +39,12 @@ def test_a_robot_is_added_shown_and_deleted(client: TestClient) -> None:
     answer = client.post("/robots", json={"name": "new_arm", "title": "New arm", **ARM})
     assert (answer.status_code, answer.headers["location"]) == (201, "/robots/new_arm")
     made = RobotDetail.model_validate_json(answer.content)
-    assert (made.name, made.title, made.joints, made.added) == ("new_arm", "New arm", ["shoulder", "elbow"], True)
+    assert (made.name, made.title, made.joints, made.added) == (
+        "new_arm",
+        "New arm",
+        ["shoulder", "elbow"],
+        True,
+    )
     assert made.default_motion is None and "drives.rotor_inertia" in made.warnings[-1]
     assert client.get("/robots/new_arm").json() == answer.json()
     listed = RobotList.model_validate_json(client.get("/robots").content).robots
@@ -73,7 +78,9 @@ def test_every_endpoint_knows_it(mine: TestClient) -> None:
     assert evaluated.json()["robot"] == "mine"
     table = f"q1,q2\n{START[0]},{START[1]}\n{GOAL[0]},{GOAL[1]}\n"
     query = {"time_per_segment": "1.5", "robot": "mine"}
-    of_csv = mine.post("/evaluate", content=table, params=query, headers={"content-type": "text/csv"})
+    of_csv = mine.post(
+        "/evaluate", content=table, params=query, headers={"content-type": "text/csv"}
+    )
     assert of_csv.json()["total"]["energy"] == evaluated.json()["total"]["energy"]
     pose = {"position": [0.3, 0.0, 0.6], "quaternion": [0.0, 0.0, 0.0, 1.0]}
     (error,) = refused(mine.post("/ik", json={"pose": pose, **MINE}), InvalidRequest)["errors"]
@@ -92,9 +99,15 @@ def test_another_robot_of_the_same_name_is_used_at_once(mine: TestClient) -> Non
     """Twice the friction: by `PUT` the next request has it, in whichever worker."""
     rubbed = ARM | {"drives": {"coulomb": [7.2, 4.8], "viscous": [6.6, 4.4]}}
     motion = {"configurations": [START, GOAL], "time_per_segment": 1.5, **MINE}
-    before = [mine.post("/evaluate", json=motion).json()["total"]["energy"]["electrical"] for _ in range(3)]
+    before = [
+        mine.post("/evaluate", json=motion).json()["total"]["energy"]["electrical"]
+        for _ in range(3)
+    ]
     assert mine.put("/robots/mine", json=rubbed).status_code == 200
-    after = [mine.post("/evaluate", json=motion).json()["total"]["energy"]["electrical"] for _ in range(3)]
+    after = [
+        mine.post("/evaluate", json=motion).json()["total"]["energy"]["electrical"]
+        for _ in range(3)
+    ]
     for old, new in zip(before, after, strict=True):
         # the defaults are 0.06 and 0.055 of 60 and 40 N·m
         assert new["friction"] == pytest.approx(2 * old["friction"], rel=1e-9)
@@ -103,16 +116,26 @@ def test_another_robot_of_the_same_name_is_used_at_once(mine: TestClient) -> Non
 def test_a_name_that_nobody_added(mine: TestClient) -> None:
     known = refused(mine.post("/optimize", json={**MOVE, "robot": "yours"}), UnknownRobot)["known"]
     assert "mine" in known and "ur5e" in known
-    refused(mine.post("/ik", json={"pose": {"position": [0.3, 0, 0.6], "rpy": [0, 0, 0]}, "robot": "yours"}),
-            UnknownRobot)  # fmt: skip
-    refused(mine.post("/studies", json={"name": "s", "threshold": 1.0, "robot": "yours"}), UnknownRobot)
+    refused(
+        mine.post(
+            "/ik", json={"pose": {"position": [0.3, 0, 0.6], "rpy": [0, 0, 0]}, "robot": "yours"}
+        ),
+        UnknownRobot,
+    )
+    refused(
+        mine.post("/studies", json={"name": "s", "threshold": 1.0, "robot": "yours"}), UnknownRobot
+    )
 
 
 @pytest.mark.parametrize(
     ("changes", "place", "words"),
     [
         ({"tip": "nowhere"}, ["body", "tip"], "There is no link 'nowhere'"),
-        ({"urdf": ARM["urdf"].replace('effort="40"', "")}, ["body", "torque"], "Joint 'elbow' has no limit `effort`"),
+        (
+            {"urdf": ARM["urdf"].replace('effort="40"', "")},
+            ["body", "torque"],
+            "Joint 'elbow' has no limit `effort`",
+        ),
         ({"urdf": "<robot>"}, ["body", "urdf"], "not XML"),
         ({"drives": {"copper": [0.1, 0.1, 0.1]}}, ["body", "drives", "copper"], "a list of 2"),
         ({"payload": "heavy"}, ["body", "payload"], "number"),
@@ -120,7 +143,9 @@ def test_a_name_that_nobody_added(mine: TestClient) -> None:
     ],
     ids=lambda value: str(value)[:30],
 )
-def test_what_makes_no_robot(client: TestClient, changes: dict[str, Any], place: list[str], words: str) -> None:
+def test_what_makes_no_robot(
+    client: TestClient, changes: dict[str, Any], place: list[str], words: str
+) -> None:
     for answer in (
         client.put("/robots/wrong", json=ARM | changes),
         client.post("/robots", json=ARM | changes | {"name": "w"}),
@@ -137,7 +162,9 @@ def test_meshes_that_are_no_base64_are_named(client: TestClient) -> None:
 
 
 def test_meshes_come_as_a_zip_in_base64(client: TestClient) -> None:
-    urdf = ARM["urdf"].replace('<cylinder radius="0.05" length="0.3"/>', '<mesh filename="package://cell/arm.obj"/>')
+    urdf = ARM["urdf"].replace(
+        '<cylinder radius="0.05" length="0.3"/>', '<mesh filename="package://cell/arm.obj"/>'
+    )
     corners = [(x, y, z) for x in (-0.04, 0.04) for y in (-0.04, 0.04) for z in (-0.15, 0.15)]
     faces = "".join(f"f {a} {a % 8 + 1} {(a + 2) % 8 + 1}\n" for a in range(1, 9))
     obj = "".join("v {} {} {}\n".format(*corner) for corner in corners) + faces
@@ -147,11 +174,15 @@ def test_meshes_come_as_a_zip_in_base64(client: TestClient) -> None:
     arm = ARM | {"urdf": urdf, "meshes": base64.b64encode(target.getvalue()).decode()}
     made = client.put("/robots/meshed", json=arm).json()
     ((*_, radius),) = made["collision"]["upper_arm"]["value"]
-    assert 0.04 * np.sqrt(2) <= radius < 0.08 and not any("Meshes" in warning for warning in made["warnings"])
+    assert 0.04 * np.sqrt(2) <= radius < 0.08 and not any(
+        "Meshes" in warning for warning in made["warnings"]
+    )
     missing = client.put("/robots/meshed", json=ARM | {"urdf": urdf}).json()
     assert any("package://cell/arm.obj" in warning for warning in missing["warnings"])
     for meshes in ("?", "UEsF"):
-        (error,) = refused(client.put("/robots/meshed", json=arm | {"meshes": meshes}), InvalidRequest)["errors"]
+        (error,) = refused(
+            client.put("/robots/meshed", json=arm | {"meshes": meshes}), InvalidRequest
+        )["errors"]
         assert error["loc"] == ["body", "meshes"]
     client.delete("/robots/meshed")
 
@@ -172,14 +203,32 @@ def test_a_robot_of_seven_joints_keeps_its_shape(client: TestClient) -> None:
     link = (
         '<joint name="j{k}" type="revolute"><parent link="l{k}"/><child link="l{n}"/>'
         '<origin xyz="0 0.05 0.15" rpy="{turn} 0 0"/><axis xyz="0 0 1"/>'
-        '<limit lower="-2" upper="2" velocity="2" effort="{effort}"/></joint><link name="l{n}"><inertial>'
+        '<limit lower="-2" upper="2" velocity="2" effort="{effort}"/></joint><link '
+        'name="l{n}"><inertial>'
         '<origin xyz="0 0 0.05"/><mass value="1"/>'
         '<inertia ixx="0.004" ixy="0" ixz="0" iyy="0.004" iyz="0" izz="0.002"/></inertial></link>'
     )
-    links = "".join(link.format(k=k, n=k + 1, turn=1.2 * (-1) ** k, effort=80 - 9 * k) for k in range(7))
-    arm = {"urdf": f'<robot name="r"><link name="l0"/>{links}</robot>', "tip": "l7", "acceleration": 6.0, "payload": 1}
+    links = "".join(
+        link.format(k=k, n=k + 1, turn=1.2 * (-1) ** k, effort=80 - 9 * k) for k in range(7)
+    )
+    arm = {
+        "urdf": f'<robot name="r"><link name="l0"/>{links}</robot>',
+        "tip": "l7",
+        "acceleration": 6.0,
+        "payload": 1,
+    }
     made = client.put("/robots/seven", json=arm).json()
-    assert np.shape(made["limits"]["torque"]["value"]) == np.shape(made["drives"]["copper"]["value"]) == (7,)
-    move = {"start": {"q": [0.3] * 7}, "goal": {"q": [0.8] * 7}, "collisions": False, "robot": "seven", **PATIENT}
+    assert (
+        np.shape(made["limits"]["torque"]["value"])
+        == np.shape(made["drives"]["copper"]["value"])
+        == (7,)
+    )
+    move = {
+        "start": {"q": [0.3] * 7},
+        "goal": {"q": [0.8] * 7},
+        "collisions": False,
+        "robot": "seven",
+        **PATIENT,
+    }
     assert client.post("/optimize", json=move).json()["status"] == "optimal"
     client.delete("/robots/seven")

@@ -1,4 +1,6 @@
-"""The founding paper's experiment through POST /evaluate, and the page that sets its tables beside ours."""
+"""The founding paper's experiment through POST /evaluate, and the page that sets its tables beside
+ours.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +16,11 @@ from benchmarks import paper
 from joulepath.models.robot import Array
 from tests.app.live import ROOT
 
-PRINTED = np.loadtxt(ROOT / "tests" / "reference" / "paper_table3_power.csv", delimiter=",", skiprows=1)[:, 1]
-# printed figures may differ by rounding in their last digit, optimised ones by what solvers make of another machine
+PRINTED = np.loadtxt(
+    ROOT / "tests" / "reference" / "paper_table3_power.csv", delimiter=",", skiprows=1
+)[:, 1]
+# printed figures may differ by rounding in their last digit, optimised ones by what solvers make of
+# another machine
 LAST_DIGIT = 1.01
 OPTIMISED = 0.005
 
@@ -23,7 +28,9 @@ OPTIMISED = 0.005
 def mean_powers(client: TestClient, **settings: object) -> Array:
     found = []
     for number in range(1, 16):
-        request = json.loads((ROOT / "examples" / "evaluate" / f"paper_motion_{number}.json").read_text())
+        request = json.loads(
+            (ROOT / "examples" / "evaluate" / f"paper_motion_{number}.json").read_text()
+        )
         answer = client.post("/evaluate", json=request | settings).json()
         assert answer["total"]["balance_error"] < 1e-6
         found.append(answer["total"]["mean_mechanical_power"])
@@ -67,4 +74,7 @@ def test_the_page_is_what_the_command_makes() -> None:
         for one, other in zip(number.findall(ours), number.findall(theirs), strict=True):
             digit = 10.0 ** -len(one.partition(".")[2])
             share = OPTIMISED * max(abs(float(other)), 100.0) if optimised else 0.0
-            assert float(one) == pytest.approx(float(other), abs=LAST_DIGIT * digit + share), (ours, theirs)
+            assert float(one) == pytest.approx(float(other), abs=LAST_DIGIT * digit + share), (
+                ours,
+                theirs,
+            )

@@ -1,4 +1,6 @@
-"""POST /pareto: the front as the contract lays it out, its answers by reference, and what is refused."""
+"""POST /pareto: the front as the contract lays it out, its answers by reference, and what is
+refused.
+"""
 
 from __future__ import annotations
 
@@ -27,9 +29,13 @@ SLOW = "branch_switch"
 
 @pytest.fixture(
     scope="module",
-    params=[pytest.param(name, marks=pytest.mark.long) if name == SLOW else name for name in EXAMPLES],
+    params=[
+        pytest.param(name, marks=pytest.mark.long) if name == SLOW else name for name in EXAMPLES
+    ],
 )
-def asked_and_answered(request: pytest.FixtureRequest, client: TestClient) -> tuple[dict[str, Any], dict[str, Any]]:
+def asked_and_answered(
+    request: pytest.FixtureRequest, client: TestClient
+) -> tuple[dict[str, Any], dict[str, Any]]:
     asked: dict[str, Any] = EXAMPLES[request.param]["value"] | {"deadline": TIME}
     answer = client.post("/pareto", json=asked)
     assert answer.status_code == 200, answer.text
@@ -39,7 +45,9 @@ def asked_and_answered(request: pytest.FixtureRequest, client: TestClient) -> tu
 
 def test_the_front_falls(asked_and_answered: tuple[dict[str, Any], dict[str, Any]]) -> None:
     asked, front = asked_and_answered
-    assert 2 <= len(front["points"]) <= len(front["points"]) + len(front["dropped"]) <= asked["points"]
+    assert (
+        2 <= len(front["points"]) <= len(front["points"]) + len(front["dropped"]) <= asked["points"]
+    )
     for earlier, later in pairwise(front["points"]):
         assert earlier["duration"] < later["duration"]
         assert earlier["energy"] > later["energy"]
@@ -53,21 +61,31 @@ def test_every_point_refers_to_its_answer(
     for point in front["points"]:
         kept = client.get(point["answer"]).json()
         assert kept["kind"] == "optimize"
-        answer = model_of(OptimizeAnswer).model_validate(kept["answer"]).model_dump(exclude_unset=True)
+        answer = (
+            model_of(OptimizeAnswer).model_validate(kept["answer"]).model_dump(exclude_unset=True)
+        )
         energy = answer["energy"]
         assert (point["duration"], point["status"]) == (answer["duration"], answer["status"])
         assert point["electrical"] == energy["electrical"]["total"]
         assert point["mechanical"] == energy["mechanical"]["total"]
         assert point["energy"] == energy[asked.get("objective", "electrical")]["total"]
-        assert all(point[name] == energy[name] for name in ("mean_power", "peak_power", "lower_bound"))
-        assert (point["start"], point["goal"]) == tuple(answer["branch"][end]["label"] for end in ("start", "goal"))
-        ratios = [ratio for ratio in answer["certificate"]["worst_ratio"].values() if ratio is not None]
+        assert all(
+            point[name] == energy[name] for name in ("mean_power", "peak_power", "lower_bound")
+        )
+        assert (point["start"], point["goal"]) == tuple(
+            answer["branch"][end]["label"] for end in ("start", "goal")
+        )
+        ratios = [
+            ratio for ratio in answer["certificate"]["worst_ratio"].values() if ratio is not None
+        ]
         assert point["certified"] and point["worst_ratio"] == max(ratios)
 
 
 def test_as_csv(client: TestClient) -> None:
     request = EXAMPLES["lift"]["value"]
-    answer = client.post("/pareto", json=request | {"points": 3, "deadline": TIME}, headers={"Accept": "text/csv"})
+    answer = client.post(
+        "/pareto", json=request | {"points": 3, "deadline": TIME}, headers={"Accept": "text/csv"}
+    )
     assert answer.headers["content-type"].startswith("text/csv")
     rows = list(csv.DictReader(StringIO(answer.text)))
     assert len(rows) >= 2

@@ -52,7 +52,10 @@ def test_an_unknown_robot(client: TestClient, name: str) -> None:
 def test_two_processes_make_one_file(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Were the file written twice, one of them would have seen another inode."""
     monkeypatch.setenv("JOULEPATH_CACHE_DIR", str(tmp_path / "cache"))
-    both = [subprocess.Popen([sys.executable, "-c", MAKE], cwd=ROOT, stdout=subprocess.PIPE) for _ in range(2)]
+    both = [
+        subprocess.Popen([sys.executable, "-c", MAKE], cwd=ROOT, stdout=subprocess.PIPE)
+        for _ in range(2)
+    ]
     told = {process.communicate(timeout=ANSWER)[0] for process in both}
     assert len(told) == 1
     content = kept("ur5e")

@@ -79,7 +79,8 @@ def test_unreachable_pose(client: TestClient) -> None:
 
 
 def problem_of_ik(pose: Any) -> dict[str, Any]:
-    """The problem of a request whose task runs here, where a test can change what the arm can do."""
+    """The problem of a request whose task runs here, where a test can change what the arm can
+    do."""
     with pytest.raises(JoulepathError) as raised:
         IKTask(IKRequest.model_validate({"pose": pose}), "the-id").run(AMPLE)
     return problem_of(raised.value, "the-id")
@@ -96,7 +97,9 @@ def test_singular_pose(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_singular_pose_of_known_form_is_answered(client: TestClient) -> None:
     solutions = client.post("/ik", json={"pose": UPRIGHT, "windings": False}).json()["solutions"]
-    assert solutions and all(each["singular"] == ["shoulder", "elbow", "wrist"] for each in solutions)
+    assert solutions and all(
+        each["singular"] == ["shoulder", "elbow", "wrist"] for each in solutions
+    )
     assert all(each["free"] == [] for each in solutions), "stretched to a point"
     answer = client.post("/optimize", json=move(goal={"pose": UPRIGHT}, windings=False))
     assert answer.status_code == 200, answer.text
@@ -109,7 +112,12 @@ def test_a_stretched_wrist_names_the_joints_that_are_free(client: TestClient) ->
     assert len(members) >= 8
     for each in members:
         assert each["singular"] == ["wrist"]
-        assert each["free"] == ["shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_3_joint"]
+        assert each["free"] == [
+            "shoulder_lift_joint",
+            "elbow_joint",
+            "wrist_1_joint",
+            "wrist_3_joint",
+        ]
 
 
 def test_outside_limits(client: TestClient) -> None:
@@ -149,7 +157,9 @@ def test_deadline_exceeded(client: TestClient) -> None:
     assert sum(content["candidate_counts"].values()) >= len(content["candidates"])
 
 
-@pytest.mark.parametrize("path", ["/nothing", "/optimize/", "/robots/", "/problems/nothing", "/docs/nothing"])
+@pytest.mark.parametrize(
+    "path", ["/nothing", "/optimize/", "/robots/", "/problems/nothing", "/docs/nothing"]
+)
 def test_not_found(client: TestClient, path: str) -> None:
     refused(client.get(path), NotFound)
 

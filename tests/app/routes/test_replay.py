@@ -1,4 +1,6 @@
-"""POST /replay: answers by their id and whole, moves of a cycle, points of a front; what makes no replay."""
+"""POST /replay: answers by their id and whole, moves of a cycle, points of a front; what makes no
+replay.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +38,9 @@ def agrees(motion: dict[str, Any]) -> None:
     run = next(each for each in motion["runs"] if each["control"] == "feed_forward")
     assert max(run["joint_error"]) <= JOINT and not run["collides"]
     assert abs(run["electrical_error"]) <= ELECTRICAL
-    assert run["electrical"] == pytest.approx(motion["planned"]["electrical"] * (1 + run["electrical_error"]))
+    assert run["electrical"] == pytest.approx(
+        motion["planned"]["electrical"] * (1 + run["electrical_error"])
+    )
 
 
 @pytest.fixture(scope="module")
@@ -62,23 +66,30 @@ def test_a_whole_answer_knows_its_arm_too(client: TestClient, loaded: dict[str, 
     content = replayed(client, answer=loaded)
     agrees(content["motions"][0])
     nobodys = loaded | {"arm": None}
-    assert refused(client.post("/replay", json={"answer": nobodys}), InvalidRequest)["errors"][0]["loc"] == [
-        "body", "arm"
-    ]  # fmt: skip
-    given = replayed(client, answer=nobodys, arm={name: LOADED[name] for name in ("payload", "gravity")})
+    assert refused(client.post("/replay", json={"answer": nobodys}), InvalidRequest)["errors"][0][
+        "loc"
+    ] == ["body", "arm"]
+    given = replayed(
+        client, answer=nobodys, arm={name: LOADED[name] for name in ("payload", "gravity")}
+    )
     assert given["motions"] == content["motions"]
 
 
 def test_nothing_is_simulated_on_another_arm(client: TestClient, loaded: dict[str, Any]) -> None:
     for arm in ({}, {"payload": LOADED["payload"]}, loaded["arm"] | {"link_mass_scale": 1.01}):
         refused(client.post("/replay", json={"answer": loaded, "arm": arm}), NotCertified)
-    refusal = refused(client.post("/replay", json={"answer": loaded, "arm": {"robot": "ur10e"}}), InvalidRequest)
+    refusal = refused(
+        client.post("/replay", json={"answer": loaded, "arm": {"robot": "ur10e"}}), InvalidRequest
+    )
     assert refusal["errors"][0]["loc"] == ["body", "arm", "robot"]
 
 
 def test_savings_under_changes(client: TestClient, loaded: dict[str, Any]) -> None:
     content = replayed(
-        client, answer=loaded["answer"], control="feed_forward", perturb={"payload": 0.1, "friction": 0.3}
+        client,
+        answer=loaded["answer"],
+        control="feed_forward",
+        perturb={"payload": 0.1, "friction": 0.3},
     )
     (motion,) = content["motions"]
     assert len(motion["changes"]) == 4
@@ -93,26 +104,49 @@ def test_a_contact_is_reported(client: TestClient) -> None:
     """Under the PD loop alone the arm sags onto a table that it would clear by a millimetre."""
     table = {"name": "table", "shape": "box", "size": [1.0, 1.0, 0.1], "margin": 0.0}
     at = {"pose": {"position": [0.0, 0.6, 0.0], "rpy": [0.0, 0.0, 0.0]}}
-    request = move(goal={"pose": {"position": [-0.1, 0.45, 0.052], "quaternion": [1.0, 0.0, 0.0, 0.0]}})
+    request = move(
+        goal={"pose": {"position": [-0.1, 0.45, 0.052], "quaternion": [1.0, 0.0, 0.0, 0.0]}}
+    )
     request |= {"scene": {"obstacles": [table | at]}, "windings": False}
     request |= {"tcp": {"position": [0.0, 0.0, 0.1], "rpy": [0.0, 0.0, 0.0]}}
-    request |= {"tool": {"capsules": [{"start": [0.0, 0.0, 0.04], "end": [0.0, 0.0, 0.06], "radius": 0.04}]}}
+    request |= {
+        "tool": {"capsules": [{"start": [0.0, 0.0, 0.04], "end": [0.0, 0.0, 0.06], "radius": 0.04}]}
+    }
     answer = client.post("/optimize", json=request).json()
     content = replayed(client, answer=answer["answer"])
     feed_forward, pd = content["motions"][0]["runs"]
     assert not feed_forward["collides"]
     assert pd["collides"] and set(pd["contact"]["pair"]) == {"table", "tool"}
-    assert any("table and tool touch" in words or "tool and table touch" in words for words in content["warnings"])
+    assert any(
+        "table and tool touch" in words or "tool and table touch" in words
+        for words in content["warnings"]
+    )
 
 
 def test_the_moves_of_a_cycle(client: TestClient) -> None:
-    """Each with what the arm carries on it, within the limits and among the obstacles of its stop."""
+    """Each with what the arm carries on it, within the limits and among the obstacles of its
+    stop."""
     stops = [
-        {"name": "pick", "target": {"q": NEAR}, "dwell": 0.1, "payload": {"mass": 2.0, "com": [0.0, 0.0, 0.1]}},
-        {"name": "place", "target": {"q": [0.5, -1.2, 1.2, -1.5, -1.57, 0.2]}, "payload": None,
-         "limits": {"acceleration": 5.0}, "obstacles_ignored": ["ball"]},
-    ]  # fmt: skip
-    ball = {"name": "ball", "shape": "sphere", "radius": 0.02, "pose": {"position": [0, 0, 1.5], "rpy": [0, 0, 0]}}
+        {
+            "name": "pick",
+            "target": {"q": NEAR},
+            "dwell": 0.1,
+            "payload": {"mass": 2.0, "com": [0.0, 0.0, 0.1]},
+        },
+        {
+            "name": "place",
+            "target": {"q": [0.5, -1.2, 1.2, -1.5, -1.57, 0.2]},
+            "payload": None,
+            "limits": {"acceleration": 5.0},
+            "obstacles_ignored": ["ball"],
+        },
+    ]
+    ball = {
+        "name": "ball",
+        "shape": "sphere",
+        "radius": 0.02,
+        "pose": {"position": [0, 0, 1.5], "rpy": [0, 0, 0]},
+    }
     request = {"start": {"q": HOME}, "stops": stops, "scene": {"obstacles": [ball]}, **PATIENT}
     answer = client.post("/cycle", json=request).json()
     content = replayed(client, answer=answer, control="feed_forward")
@@ -128,12 +162,18 @@ def test_points_of_a_front_and_changed_arms(client: TestClient) -> None:
     front = client.post("/pareto", json=LOADED | {"points": 2}).json()
     agrees(replayed(client, answer=front["points"][0]["answer"])["motions"][0])
     changes = [{"name": "light", "arm": {"link_mass_scale": 0.5}}]
-    compared = client.post("/whatif", json={"optimize": LOADED, "changes": changes, **PATIENT}).json()
+    compared = client.post(
+        "/whatif", json={"optimize": LOADED, "changes": changes, **PATIENT}
+    ).json()
     agrees(replayed(client, answer=compared["changes"][0]["reoptimised"]["answer"])["motions"][0])
 
 
 def test_given_motions(client: TestClient) -> None:
-    request = {"configurations": [HOME, NEAR, HOME], "time_per_segment": 1.0, "payload": LOADED["payload"]}
+    request = {
+        "configurations": [HOME, NEAR, HOME],
+        "time_per_segment": 1.0,
+        "payload": LOADED["payload"],
+    }
     without = client.post("/evaluate", json=request).json()
     refused(client.post("/replay", json={"answer": without}), InvalidRequest)
     request |= {"sample_period": 0.01}
@@ -154,7 +194,12 @@ def test_answers_of_a_job(client: TestClient) -> None:
 
 def test_own_robots(client: TestClient) -> None:
     assert client.put("/robots/replayed", json=ARM).status_code == 201
-    request = {"robot": "replayed", "start": {"q": [0.2, 0.4]}, "goal": {"q": [-0.9, 1.3]}, **PATIENT}
+    request = {
+        "robot": "replayed",
+        "start": {"q": [0.2, 0.4]},
+        "goal": {"q": [-0.9, 1.3]},
+        **PATIENT,
+    }
     answer = client.post("/optimize", json=request).json()
     agrees(replayed(client, answer=answer["answer"])["motions"][0])
     agrees(replayed(client, answer=answer)["motions"][0])
@@ -176,7 +221,9 @@ def test_own_robots(client: TestClient) -> None:
         ({"nonsense": 1}, ["nonsense"]),
     ],
 )
-def test_faults_are_located(client: TestClient, loaded: dict[str, Any], change: dict[str, Any], loc: list[str]) -> None:
+def test_faults_are_located(
+    client: TestClient, loaded: dict[str, Any], change: dict[str, Any], loc: list[str]
+) -> None:
     refusal = refused(client.post("/replay", json={"answer": loaded} | change), InvalidRequest)
     assert refusal["errors"][0]["loc"] == ["body", *loc]
 
@@ -187,7 +234,9 @@ def test_edited_answers_are_refused(client: TestClient, loaded: dict[str, Any]) 
         edited = loaded | {"trajectory": loaded["trajectory"] | {"spline": spline | {name: value}}}
         refused(client.post("/replay", json={"answer": edited}), InvalidRequest)
     moved = [[q + 0.01 for q in point] for point in spline["control_points"]]
-    edited = loaded | {"trajectory": loaded["trajectory"] | {"spline": spline | {"control_points": moved}}}
+    edited = loaded | {
+        "trajectory": loaded["trajectory"] | {"spline": spline | {"control_points": moved}}
+    }
     refused(client.post("/replay", json={"answer": edited}), NotCertified)
     edited = {name: value for name, value in loaded.items() if name != "energy"}
     refusal = refused(client.post("/replay", json={"answer": edited}), InvalidRequest)
@@ -197,7 +246,13 @@ def test_edited_answers_are_refused(client: TestClient, loaded: dict[str, Any]) 
 def test_unknown_ids(client: TestClient) -> None:
     for name in ("x", "/answers/5c0a0e0f-8d1f-4f1c-9a43-2f4a3ad0d1b7", "\0"):
         refused(client.post("/replay", json={"answer": name}), UnknownAnswer)
-    leg = {"kind": "move", "start": {"stop": "start"}, "goal": {"stop": "a"}, "duration": 1.0, "answer": "/answers/x"}
+    leg = {
+        "kind": "move",
+        "start": {"stop": "start"},
+        "goal": {"stop": "a"},
+        "duration": 1.0,
+        "answer": "/answers/x",
+    }
     cycle_of_lost_moves = {"robot": "ur5e", "legs": [leg]}
     refused(client.post("/replay", json={"answer": cycle_of_lost_moves}), UnknownAnswer)
 

@@ -29,17 +29,29 @@ def test_robots(client: TestClient) -> None:
     # other tests add robots of their own
     robots = [robot for robot in robots if not robot.added]
     assert [robot.name for robot in robots] == list(robot_names())
-    assert {robot.name for robot in robots if len(robot.joints) == 7} == {"fr3", "gen3", "iiwa14", "panda", "xarm7"}
+    assert {robot.name for robot in robots if len(robot.joints) == 7} == {
+        "fr3",
+        "gen3",
+        "iiwa14",
+        "panda",
+        "xarm7",
+    }
     # copper loss of the one is a rule's, of the other a sister robot's: no reader may miss that
     trust = {robot.name: robot.energy_trust for robot in robots}
     assert "engineering defaults without a source (copper loss" in trust["ur3e"]
     assert "transferred from a sister robot (copper loss" in trust["ur5e"]
-    assert "engineering defaults without a source (torque constants, rotor inertia" in trust["kr10_r1100"]
+    assert (
+        "engineering defaults without a source (torque constants, rotor inertia"
+        in trust["kr10_r1100"]
+    )
 
 
 def test_a_robot_without_a_default_motion_says_so(client: TestClient) -> None:
     assert client.get("/robots/kr10_r1100").json()["default_motion"] is None
-    ends = {"start": {"q": [0.0, -1.57, 1.57, 0.0, 0.9, 0.0]}, "goal": {"q": [0.2, -1.4, 1.4, 0.1, 0.8, 0.2]}}
+    ends = {
+        "start": {"q": [0.0, -1.57, 1.57, 0.0, 0.9, 0.0]},
+        "goal": {"q": [0.2, -1.4, 1.4, 0.1, 0.8, 0.2]},
+    }
     answer = client.post("/optimize", json=ends | PATIENT | {"robot": "kr10_r1100"}).json()
     assert "controller_default" not in {baseline["name"] for baseline in answer["baselines"]}
     assert any("`controller_default` is left out" in warning for warning in answer["warnings"])
@@ -47,7 +59,9 @@ def test_a_robot_without_a_default_motion_says_so(client: TestClient) -> None:
 
 def test_ik_of_a_spherical_wrist(client: TestClient) -> None:
     pose = {"position": [0.6, -0.2, 0.5], "rpy": [3.0, 0.1, 0.4]}
-    answer = IK.model_validate_json(client.post("/ik", json={"robot": "kr10_r1100", "pose": pose}).content)
+    answer = IK.model_validate_json(
+        client.post("/ik", json={"robot": "kr10_r1100", "pose": pose}).content
+    )
     assert answer.complete and {solution.label for solution in answer.solutions} >= {
         "right/up/flip",
         "right/up/no_flip",
@@ -55,13 +69,24 @@ def test_ik_of_a_spherical_wrist(client: TestClient) -> None:
 
 
 def test_another_robot_is_asked_for_by_name(client: TestClient) -> None:
-    """Its kernel is not loaded when the service starts. The same joints give another pose, and cost other joules."""
-    ends = {"start": {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]}, "goal": {"q": [0.4, -1.2, 1.3, -1.7, -1.5, 0.3]}}
-    small, large = (client.post("/optimize", json=ends | PATIENT | {"robot": name}).json() for name in ("ur3e", "ur5e"))
+    """Its kernel is not loaded when the service starts. The same joints give another pose, and cost
+    other joules.
+    """
+    ends = {
+        "start": {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]},
+        "goal": {"q": [0.4, -1.2, 1.3, -1.7, -1.5, 0.3]},
+    }
+    small, large = (
+        client.post("/optimize", json=ends | PATIENT | {"robot": name}).json()
+        for name in ("ur3e", "ur5e")
+    )
     assert (small["robot"], small["status"]) == ("ur3e", "optimal")
     assert small["energy"]["electrical"]["friction"] < large["energy"]["electrical"]["friction"]
     near = {"position": [-0.2, 0.25, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]}
-    reached = [client.post("/ik", json={"robot": name, "pose": near}).json()["solutions"] for name in ("ur3e", "ur5e")]
+    reached = [
+        client.post("/ik", json={"robot": name, "pose": near}).json()["solutions"]
+        for name in ("ur3e", "ur5e")
+    ]
     assert reached[0] and reached[0] != reached[1]
 
 
@@ -69,9 +94,20 @@ def test_robot_shows_every_figure(client: TestClient) -> None:
     answer = client.get("/robots/ur5e")
     robot = RobotDetail.model_validate_json(answer.content)
     figures = load_robot("ur5e").figures
-    for section in ("kinematics", "inertials", "limits", "collision", "drives", "electronics", "default_motion"):
+    for section in (
+        "kinematics",
+        "inertials",
+        "limits",
+        "collision",
+        "drives",
+        "electronics",
+        "default_motion",
+    ):
         assert answer.json()[section] == figures[section]
-    assert [(law.name, law.default) for law in robot.friction.laws] == [("curved", True), ("coulomb_viscous", False)]
+    assert [(law.name, law.default) for law in robot.friction.laws] == [
+        ("curved", True),
+        ("coulomb_viscous", False),
+    ]
     for law in robot.friction.laws:
         assert "asinh" in law.formula
         assert law.coefficients["viscous"].unit == "N·m·s/rad"
@@ -86,11 +122,15 @@ def test_ik_gives_members_of_every_curve_of_a_redundant_arm(client: TestClient) 
     answer = client.post("/ik", json={"robot": "panda", "pose": pose})
     solutions = IK.model_validate_json(answer.content).solutions
     assert len(solutions) > 8
-    assert all(each.free == [f"joint{k}" for k in range(1, 8)] and len(each.q) == 7 for each in solutions)
+    assert all(
+        each.free == [f"joint{k}" for k in range(1, 8)] and len(each.q) == 7 for each in solutions
+    )
 
 
 def test_ik_gives_every_solution(client: TestClient) -> None:
-    answer = client.post("/ik", json={"pose": POSE, "tcp": {"position": [0, 0, 0.1], "rotvec": [0, 0, 0]}})
+    answer = client.post(
+        "/ik", json={"pose": POSE, "tcp": {"position": [0, 0, 0.1], "rotvec": [0, 0, 0]}}
+    )
     assert answer.headers["content-type"] == "application/json"
     solutions = IK.model_validate_json(answer.content).solutions
     robot = load_robot("ur5e")
@@ -99,7 +139,9 @@ def test_ik_gives_every_solution(client: TestClient) -> None:
     T_tcp[2, 3] = 0.1
     expected = inverse_kinematics_for(robot).solve(T, T_tcp, robot.limits, True, "goal")
     assert [solution.q for solution in solutions] == [solution.q.tolist() for solution in expected]
-    assert [solution.label for solution in solutions] == [str(solution.label) for solution in expected]
+    assert [solution.label for solution in solutions] == [
+        str(solution.label) for solution in expected
+    ]
     assert len({solution.label for solution in solutions}) > 1
 
 

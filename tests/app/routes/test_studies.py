@@ -1,4 +1,6 @@
-"""Studies over HTTP: their life, their figures, what is refused, and what is left when the service is killed."""
+"""Studies over HTTP: their life, their figures, what is refused, and what is left when the service
+is killed.
+"""
 
 from __future__ import annotations
 
@@ -70,7 +72,11 @@ def three(client: TestClient) -> tuple[str, list[dict[str, Any]]]:
 def test_a_new_study_is_empty(recorded: TestClient) -> None:
     path = begin(recorded, name="Größe 1 ✓", objective="mechanical")
     study = shown(recorded, path)
-    assert (study["name"], study["objective"], study["robot"]) == ("Größe 1 ✓", "mechanical", "ur5e")
+    assert (study["name"], study["objective"], study["robot"]) == (
+        "Größe 1 ✓",
+        "mechanical",
+        "ur5e",
+    )
     assert (study["iterations"], study["history"], study["threshold_met"]) == (0, [], False)
     assert (study["last"], study["best"], study["threshold_met_by"]) == (None, None, None)
 
@@ -84,18 +90,25 @@ def test_each_iteration_is_held_against_those_before(client: TestClient, three: 
     assert [step["change_from_last"] for step in steps] == [None, free - slow, line - free]
     assert [step["change_from_best"] for step in steps] == [None, free - slow, line - free]
     assert [step["best"]["number"] for step in steps] == [1, 2, 2]
-    assert [step["threshold_met"] for step in steps] == [slow <= 62, free <= 62, line <= 62] == [False, True, True]
+    assert (
+        [step["threshold_met"] for step in steps]
+        == [slow <= 62, free <= 62, line <= 62]
+        == [False, True, True]
+    )
     assert [step["threshold_met_by"] for step in steps] == [None, 2, 2]
     study = shown(client, path)
     assert study["history"] == [
-        {name: value for name, value in step.items() if name in study["history"][0]} for step in steps
+        {name: value for name, value in step.items() if name in study["history"][0]}
+        for step in steps
     ]
     assert study["best"] == {"number": 2, "energy": free}
     assert study["last"] == {"number": 3, "energy": line}
     assert (study["threshold_met"], study["threshold_met_by"], study["iterations"]) == (True, 2, 3)
 
 
-def test_an_iteration_keeps_its_request_and_its_whole_answer(client: TestClient, three: Any) -> None:
+def test_an_iteration_keeps_its_request_and_its_whole_answer(
+    client: TestClient, three: Any
+) -> None:
     path, steps = three
     assert client.get(f"{path}/iterations/2").json() == steps[1]
     kept = client.get(f"/answers/{steps[1]['answer']}").json()
@@ -114,8 +127,14 @@ def test_the_studys_objective_is_the_iterations(client: TestClient) -> None:
     step = added(client, path, {"optimize": move(duration=2.0)})
     assert step["request"]["optimize"]["objective"] == "mechanical"
     assert step["energy"] == step["mechanical"] < step["electrical"]
-    answer = client.post(f"{path}/iterations", json={"optimize": move(duration=2.0, objective="electrical")})
-    assert checked(InvalidRequest, answer.content).errors[0].loc == ["body", "optimize", "objective"]
+    answer = client.post(
+        f"{path}/iterations", json={"optimize": move(duration=2.0, objective="electrical")}
+    )
+    assert checked(InvalidRequest, answer.content).errors[0].loc == [
+        "body",
+        "optimize",
+        "objective",
+    ]
 
 
 def test_the_history_as_a_table(client: TestClient, three: Any) -> None:
@@ -124,11 +143,15 @@ def test_the_history_as_a_table(client: TestClient, three: Any) -> None:
     answer = client.get(path, headers={"accept": "text/csv"})
     assert answer.headers["content-type"].startswith("text/csv")
     rows = list(csv.DictReader(io.StringIO(answer.text)))
-    assert [int(row["iteration"]) for row in rows] == [entry["number"] for entry in study["history"]]
+    assert [int(row["iteration"]) for row in rows] == [
+        entry["number"] for entry in study["history"]
+    ]
     for row, entry in zip(rows, study["history"], strict=True):
         assert float(row["energy_J"]) == entry["energy"]
         assert float(row["duration_s"]) == entry["duration"]
-        assert (float(row["change_from_last_J"]) if row["change_from_last_J"] else None) == entry["change_from_last"]
+        assert (float(row["change_from_last_J"]) if row["change_from_last_J"] else None) == entry[
+            "change_from_last"
+        ]
         assert row["threshold_met"] == str(entry["threshold_met"]).lower()
 
 
@@ -143,10 +166,14 @@ TIMES = {"t": [0.0, 1.0, 1.0, 2.0, 3.0], "q": [HOME, NEAR, NEAR, HOME, NEAR]}
         ({"evaluate": {"trajectory": TIMES}}, InvalidTable),
     ],
 )
-def test_what_either_endpoint_refuses_is_documented(client: TestClient, body: Any, kind: type[DeclaredError]) -> None:
+def test_what_either_endpoint_refuses_is_documented(
+    client: TestClient, body: Any, kind: type[DeclaredError]
+) -> None:
     answer = client.post(f"{begin(client)}/iterations", json=body)
     checked(kind, answer.content)
-    responses = client.get("/openapi.json").json()["paths"]["/studies/{id}/iterations"]["post"]["responses"]
+    responses = client.get("/openapi.json").json()["paths"]["/studies/{id}/iterations"]["post"][
+        "responses"
+    ]
     schema = responses[str(answer.status_code)]["content"]["application/problem+json"]["schema"]
     assert answer.json()["type"] in schema["discriminator"]["mapping"]
 
@@ -204,7 +231,9 @@ def test_a_repeated_request_makes_nothing_new(recorded: TestClient) -> None:
     steps = [added(recorded, path, FREE, headers=key) for _ in range(2)]
     assert steps[0] == steps[1]
     checked(KeyReused, recorded.post(f"{path}/iterations", json=LINE, headers=key).content)
-    assert added(recorded, begin(recorded), LINE, headers=key)["number"] == 1, "a key belongs to one study"
+    assert added(recorded, begin(recorded), LINE, headers=key)["number"] == 1, (
+        "a key belongs to one study"
+    )
     assert shown(recorded, path)["iterations"] == 1
 
 
@@ -237,7 +266,9 @@ def test_a_request_repeated_while_it_runs_makes_one_iteration(recorded: TestClie
         ({f"a {SECRET}": 1}, ["body"]),
     ],
 )
-def test_a_malformed_study_is_refused(recorded: TestClient, body: dict[str, Any], loc: list[str]) -> None:
+def test_a_malformed_study_is_refused(
+    recorded: TestClient, body: dict[str, Any], loc: list[str]
+) -> None:
     sent = body if not body else {"name": "A study", "threshold": 50.0, **body}
     answer = recorded.post("/studies", json=sent)
     assert answer.status_code == 422
@@ -271,13 +302,16 @@ def test_a_malformed_iteration_is_refused(recorded: TestClient, body: Any) -> No
 
 @pytest.mark.parametrize("key", ["", "x" * 129, "two words"])
 def test_a_malformed_key_is_refused(recorded: TestClient, key: str) -> None:
-    answer = recorded.post("/studies", json={"name": "A", "threshold": 1.0}, headers={"Idempotency-Key": key})
+    answer = recorded.post(
+        "/studies", json={"name": "A", "threshold": 1.0}, headers={"Idempotency-Key": key}
+    )
     (error,) = checked(InvalidRequest, answer.content).errors
     assert error.loc == ["header", "Idempotency-Key"]
 
 
 @pytest.mark.parametrize(
-    "query", ["limit=0", "limit=201", "limit=x", "after=x", f"after=1_{'x' * 36}", f"a%20{SECRET}=1"]
+    "query",
+    ["limit=0", "limit=201", "limit=x", "after=x", f"after=1_{'x' * 36}", f"a%20{SECRET}=1"],
 )
 def test_a_malformed_query_is_refused(recorded: TestClient, query: str) -> None:
     answer = recorded.get(f"/studies?{query}")
@@ -297,7 +331,9 @@ def test_unknown_study(recorded: TestClient, id: str) -> None:
         checked(UnknownStudy, answer.content)
 
 
-@pytest.mark.parametrize(("number", "kind"), [("2", UnknownStudy), ("0", InvalidRequest), ("9" * 30, InvalidRequest)])
+@pytest.mark.parametrize(
+    ("number", "kind"), [("2", UnknownStudy), ("0", InvalidRequest), ("9" * 30, InvalidRequest)]
+)
 def test_unknown_iteration(recorded: TestClient, number: str, kind: type[DeclaredError]) -> None:
     path = begin(recorded)
     checked(kind, recorded.get(f"{path}/iterations/{number}").content)

@@ -24,7 +24,9 @@ from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_studies import ABSENT, SECRET, added, begin
 
 SAME = 1e-9
-"""Relative: the optimiser computes the same from the same request; clocks only tell it when to stop."""
+"""Relative: the optimiser computes the same from the same request; clocks only tell it when to
+stop.
+"""
 PAYLOAD = {"mass": 2.0, "com": [0.0, 0.0, 0.2]}
 TOOL = {"position": [0.0, 0.0, 0.15], "quaternion": [0.0, 0.0, 0.0, 1.0]}
 
@@ -94,7 +96,9 @@ def test_other_orientations_are_of_the_same_point(slow: Any) -> None:
     _, content = slow
     robot = load_robot("ur5e")
     T_tcp = to_matrix(QuaternionPose(**TOOL))
-    ((position, _),) = rotated_poses(Arm(robot=robot, T_flange_tcp=T_tcp), np.array(NEAR), [np.zeros(3)])
+    ((position, _),) = rotated_poses(
+        Arm(robot=robot, T_flange_tcp=T_tcp), np.array(NEAR), [np.zeros(3)]
+    )
     goals = [entry["request"]["optimize"]["goal"] for entry in steps(content, "orientation")]
     (free,) = [goal for goal in goals if "pose" in goal]
     assert free["pose"]["orientation"]["free_about"] == [0.0, 0.0, 1.0]
@@ -102,7 +106,11 @@ def test_other_orientations_are_of_the_same_point(slow: Any) -> None:
     assert len(tilted) == 4
     for goal in [free, *tilted]:
         assert goal["pose"]["position"] == pytest.approx(position, abs=1e-12)
-    (branch,) = [entry for entry in steps(content, "branch") if "pose" in entry["request"]["optimize"]["goal"]]
+    (branch,) = [
+        entry
+        for entry in steps(content, "branch")
+        if "pose" in entry["request"]["optimize"]["goal"]
+    ]
     # inverse kinematics, which has forward kinematics of its own, finds the way back
     pose = QuaternionPose(**branch["request"]["optimize"]["goal"]["pose"])
     solutions = inverse_kinematics_for(robot).solve(to_matrix(pose), T_tcp)
@@ -117,8 +125,11 @@ def test_the_best_motion_to_a_pose_is_hard_to_beat(client: TestClient) -> None:
     added(client, path, {"optimize": move(goal=pose)})
     last = suggested(client, path, base="last")
     assert last["base"]["number"] == 2
-    assert suggested(client, path)["base"]["number"] == 1 + (last["base"]["energy"] < suggested_energy(client, path, 1))
-    # all branches and durations were open: neither another branch nor another duration can save more than the gap
+    assert suggested(client, path)["base"]["number"] == 1 + (
+        last["base"]["energy"] < suggested_energy(client, path, 1)
+    )
+    # all branches and durations were open: neither another branch nor another duration can save
+    # more than the gap
     for entry in steps(last, "branch") + steps(last, "duration"):
         assert entry["gain"] < 0.01 * last["base"]["energy"]
     assert len(steps(last, "branch")) == 2
@@ -166,7 +177,9 @@ def test_a_given_motion_is_optimised_between_its_ends(client: TestClient) -> Non
     assert after["change_from_last"] == pytest.approx(-free["gain"], rel=1e-6)
 
 
-@pytest.mark.parametrize("configurations", [[HOME, NEAR, HOME], [HOME, NEAR, [0.5, *NEAR[1:]]], [HOME, HOME]])
+@pytest.mark.parametrize(
+    "configurations", [[HOME, NEAR, HOME], [HOME, NEAR, [0.5, *NEAR[1:]]], [HOME, HOME]]
+)
 def test_a_motion_without_two_ends_gets_none(client: TestClient, configurations: Any) -> None:
     path = begin(client)
     added(client, path, {"evaluate": {"configurations": configurations, "time_per_segment": 1.0}})
@@ -177,7 +190,9 @@ def test_a_motion_without_two_ends_gets_none(client: TestClient, configurations:
 @pytest.mark.long
 def test_a_long_trajectory_is_taken(client: TestClient) -> None:
     t = np.linspace(0.0, 3.0, 2000)
-    q = np.array(HOME) + np.multiply.outer(0.5 - 0.5 * np.cos(np.pi * t / 3.0), np.subtract(NEAR, HOME))
+    q = np.array(HOME) + np.multiply.outer(
+        0.5 - 0.5 * np.cos(np.pi * t / 3.0), np.subtract(NEAR, HOME)
+    )
     path = begin(client, objective="mechanical")
     step = added(client, path, {"evaluate": {"trajectory": {"t": t.tolist(), "q": q.tolist()}}})
     assert step["energy"] == step["mechanical"]
@@ -222,7 +237,9 @@ def test_an_empty_study_has_no_next_step(client: TestClient) -> None:
     checked(EmptyStudy, answer.content)
 
 
-@pytest.mark.parametrize("query", ["base=worst", "deadline=0", "deadline=nan", "deadline=599", f"a%20{SECRET}=1"])
+@pytest.mark.parametrize(
+    "query", ["base=worst", "deadline=0", "deadline=nan", "deadline=599", f"a%20{SECRET}=1"]
+)
 def test_a_malformed_query_is_refused(client: TestClient, query: str) -> None:
     answer = client.get(f"/studies/{ABSENT}/suggest?{query}")
     assert checked(InvalidRequest, answer.content).errors

@@ -60,7 +60,9 @@ ORIENTATIONS: list[Any] = [
 ]
 
 
-@pytest.mark.parametrize("orientation", long_but([ORIENTATIONS[k] for k in (1, 4)], ORIENTATIONS), ids=str)
+@pytest.mark.parametrize(
+    "orientation", long_but([ORIENTATIONS[k] for k in (1, 4)], ORIENTATIONS), ids=str
+)
 def test_chooses_the_orientation(client: TestClient, orientation: Any) -> None:
     answer = client.post("/optimize", json=move(goal=loose(orientation)))
     assert answer.status_code == 200, answer.text
@@ -96,7 +98,10 @@ def test_other_endpoints_want_the_whole_pose(client: TestClient) -> None:
         (loose({}), ["body", "goal", "pose", "orientation"]),
         (loose("free", rpy=[0, 0, 0]), ["body", "goal", "pose"]),
         (loose({"cone": CONE, "free_about": [0, 0, 1]}), ["body", "goal", "pose", "orientation"]),
-        (loose({"cone": {**CONE, "axis": [0, 0, 0]}}), ["body", "goal", "pose", "orientation", "cone", "axis"]),
+        (
+            loose({"cone": {**CONE, "axis": [0, 0, 0]}}),
+            ["body", "goal", "pose", "orientation", "cone", "axis"],
+        ),
         (
             loose({"cone": {**CONE, "half_angle": 3.2}}),
             ["body", "goal", "pose", "orientation", "cone", "half_angle"],
@@ -118,5 +123,7 @@ def test_other_endpoints_want_the_whole_pose(client: TestClient) -> None:
         ({"any_of": [{"q": NEAR}], "all_of": []}, ["body", "goal", "all_of"]),
     ],
 )
-def test_names_what_is_wrong(client: TestClient, goal: dict[str, Any], loc: list[str | int]) -> None:
+def test_names_what_is_wrong(
+    client: TestClient, goal: dict[str, Any], loc: list[str | int]
+) -> None:
     assert loc in [error["loc"] for error in refused(client, move(goal=goal))]

@@ -15,11 +15,18 @@ from tests.app.problems import checked
 from tests.app.requests import HOME, move
 
 SECRET = "caller-secret-7f3a"
-BALL = {"name": "ball", "shape": "sphere", "radius": 0.1, "pose": {"position": [5, 5, 5], "rpy": [0, 0, 0]}}
+BALL = {
+    "name": "ball",
+    "shape": "sphere",
+    "radius": 0.1,
+    "pose": {"position": [5, 5, 5], "rpy": [0, 0, 0]},
+}
 POSE = {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}
 
 
-def refused(client: TestClient, body: bytes | str | dict[str, Any], path: str = "/optimize") -> list[dict[str, Any]]:
+def refused(
+    client: TestClient, body: bytes | str | dict[str, Any], path: str = "/optimize"
+) -> list[dict[str, Any]]:
     """The `errors` of a body that is refused."""
     content = json.dumps(body) if isinstance(body, dict) else body
     answer = client.post(path, content=content, headers={"content-type": "application/json"})
@@ -48,14 +55,32 @@ def refused(client: TestClient, body: bytes | str | dict[str, Any], path: str = 
         (move(start={"q": [0, 0, 10**400, 0, 0, 0]}), ["body", "start", "q", 2]),
         (move(goal={"pose": {"position": [0.4, -0.2, 0.3]}}), ["body", "goal", "pose"]),
         (move(goal={"pose": POSE | {"rpy": [0, 0, 0]}}), ["body", "goal", "pose"]),
-        (move(goal={"pose": POSE | {"position": [0.4, -0.2]}}), ["body", "goal", "pose", "position"]),
-        (move(goal={"pose": POSE | {"position": [1e4, 0, 0]}}), ["body", "goal", "pose", "position", 0]),
-        (move(goal={"pose": POSE | {"quaternion": [0, 0, 0, 0]}}), ["body", "goal", "pose", "quaternion"]),
-        (move(goal={"pose": POSE | {"quaternion": [0, 0.998, 0, 0]}}), ["body", "goal", "pose", "quaternion"]),
+        (
+            move(goal={"pose": POSE | {"position": [0.4, -0.2]}}),
+            ["body", "goal", "pose", "position"],
+        ),
+        (
+            move(goal={"pose": POSE | {"position": [1e4, 0, 0]}}),
+            ["body", "goal", "pose", "position", 0],
+        ),
+        (
+            move(goal={"pose": POSE | {"quaternion": [0, 0, 0, 0]}}),
+            ["body", "goal", "pose", "quaternion"],
+        ),
+        (
+            move(goal={"pose": POSE | {"quaternion": [0, 0.998, 0, 0]}}),
+            ["body", "goal", "pose", "quaternion"],
+        ),
         (move(tcp={"position": [0, 0, 0]}), ["body", "tcp"]),
         (move(payload={"mass": -1, "com": [0, 0, 0]}), ["body", "payload", "mass"]),
-        (move(payload={"mass": 1, "com": [0, 0, 0], "inertia": [1, 0, 0]}), ["body", "payload", "inertia"]),
-        (move(payload={"mass": 1, "com": [0, 0, 0], "inertia": [1, 0, 0, 1, 0, 9]}), ["body", "payload", "inertia"]),
+        (
+            move(payload={"mass": 1, "com": [0, 0, 0], "inertia": [1, 0, 0]}),
+            ["body", "payload", "inertia"],
+        ),
+        (
+            move(payload={"mass": 1, "com": [0, 0, 0], "inertia": [1, 0, 0, 1, 0, 9]}),
+            ["body", "payload", "inertia"],
+        ),
         (move(payload={"mass": 9, "com": [0, 0, 0]}), ["body", "payload", "mass"]),
         (move(gravity=[0, 0]), ["body", "gravity"]),
         (move(method="magic"), ["body", "method"]),
@@ -133,11 +158,17 @@ def test_survives_what_is_no_request(client: TestClient, body: bytes, path: str)
     refused(client, body, path)
 
 
-@pytest.mark.parametrize("content_type", ["application/xml", "multipart/form-data; boundary=x", "text/csv", "x"])
+@pytest.mark.parametrize(
+    "content_type", ["application/xml", "multipart/form-data; boundary=x", "text/csv", "x"]
+)
 @pytest.mark.parametrize("path", ["/optimize", "/studies", "/robots", "/cycle", "/evaluate"])
-def test_what_is_declared_as_something_else_is_told_so(client: TestClient, content_type: str, path: str) -> None:
+def test_what_is_declared_as_something_else_is_told_so(
+    client: TestClient, content_type: str, path: str
+) -> None:
     if (path, content_type) != ("/evaluate", "text/csv"):
-        answer = client.post(path, content=json.dumps(move()), headers={"content-type": content_type})
+        answer = client.post(
+            path, content=json.dumps(move()), headers={"content-type": content_type}
+        )
         assert answer.status_code == 415
         checked(UnsupportedMediaType, answer.content)
 
@@ -154,7 +185,11 @@ def test_names_only_the_first_of_many_errors(client: TestClient) -> None:
         (move(Duration=2), ["Duration"], "duration"),
         (move(samplePeriod=0.1), ["samplePeriod"], "sample_period"),
         (move(limits={"velocties": 1}), ["limits", "velocties"], "velocity"),
-        (move(goal={"pose": POSE | {"quaternions": [0, 1, 0, 0]}}), ["goal", "pose", "quaternions"], "quaternion"),
+        (
+            move(goal={"pose": POSE | {"quaternions": [0, 1, 0, 0]}}),
+            ["goal", "pose", "quaternions"],
+            "quaternion",
+        ),
         (move(goal={"pos": POSE}), ["goal", "pos"], "pose"),
         (move(payload={"mas": 1, "com": [0, 0, 0]}), ["payload", "mas"], "mass"),
         (
@@ -177,8 +212,11 @@ def test_every_unknown_field_is_named(client: TestClient) -> None:
     assert [error["loc"] for error in errors] == [["body", "colour"], ["body", "veloicty"]]
 
 
-def test_thousands_of_unknown_fields_take_no_time(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each comparison with the known names takes some 60 microseconds of the service's own process."""
+def test_thousands_of_unknown_fields_take_no_time(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each comparison with the known names takes some 60 microseconds of the service's own
+    process."""
     compared = []
 
     def count(name: str, *_: Any, **__: Any) -> list[str]:
@@ -232,7 +270,10 @@ def test_a_shape_is_named_by_the_index_of_its_obstacle(
         (b'{"robot": "\\ud800"}', "half of a character"),
         (b'{"robot": "C:\\x"}', "backslash"),
         (b'{"start": {"q": 1, "q": 2}}', "`q` is given twice in one object at line 1, column 24"),
-        (b'{"robot": "ur5e",\n "goal": 1, "robot": "ur3e"}', "`robot` is given twice in one object at line 2"),
+        (
+            b'{"robot": "ur5e",\n "goal": 1, "robot": "ur3e"}',
+            "`robot` is given twice in one object at line 2",
+        ),
     ],
 )
 @pytest.mark.parametrize("path", ["/optimize", "/evaluate", "/studies"])
@@ -243,7 +284,12 @@ def test_where_json_is_wrong(client: TestClient, body: bytes, said: str, path: s
 
 
 def test_a_byte_order_mark_is_no_error(client: TestClient) -> None:
-    assert client.post("/ik", content=b"\xef\xbb\xbf" + json.dumps({"pose": POSE}).encode()).status_code == 200
+    assert (
+        client.post(
+            "/ik", content=b"\xef\xbb\xbf" + json.dumps({"pose": POSE}).encode()
+        ).status_code
+        == 200
+    )
 
 
 @pytest.mark.parametrize("deadline", [1e6, 599])

@@ -1,4 +1,6 @@
-"""POST /whatif: differences against separate requests, zero where nothing differs, physics, and what is refused."""
+"""POST /whatif: differences against separate requests, zero where nothing differs, physics, and
+what is refused.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +23,11 @@ from tests.optimizer.moves import tcp_pose
 
 # the same computation on another route: sums in another order
 SAME = 1e-12
-# two routes to one figure of some 10 J, both rounded at about 1e-15 of the arm's potential energy of some 100 J
+# two routes to one figure of some 10 J, both rounded at about 1e-15 of the arm's potential energy
+# of some 100 J
 ROUNDING = 1e-9
-# a motion found for the changed arm begins, where it must, with the base's: as good as a separate request or better
+# a motion found for the changed arm begins, where it must, with the base's: as good as a separate
+# request or better
 LOCAL = 1e-3
 # enough for every run on a busy machine
 TIME = 60.0
@@ -31,7 +35,11 @@ TIME = 60.0
 LOAD = {"mass": 2.0, "com": [0.0, 0.0, 0.1]}
 HEAVY = {"mass": 4.0, "com": [0.02, 0.0, 0.1], "inertia": [0.01, 0.0, 0.0, 0.01, 0.0, 0.008]}
 LIFT = move(payload=LOAD, start={"q": NEAR}, goal={"q": HOME})
-GIVEN = {"configurations": [HOME, NEAR, [0.5, -1.2, 1.3, -1.7, -1.5, 0.4]], "time_per_segment": 0.7, "payload": LOAD}
+GIVEN = {
+    "configurations": [HOME, NEAR, [0.5, -1.2, 1.3, -1.7, -1.5, 0.4]],
+    "time_per_segment": 0.7,
+    "payload": LOAD,
+}
 
 
 def ask(client: TestClient, base: dict[str, Any], **changes: dict[str, Any]) -> dict[str, Any]:
@@ -49,13 +57,19 @@ def kept(client: TestClient, path: str, kind: str) -> dict[str, Any]:
     answer = client.get(path).json()
     assert answer["kind"] == kind
     content: dict[str, Any] = answer["answer"]
-    (model_of(OptimizeAnswer) if kind == "optimize" else model_of(EvaluateAnswer)).model_validate(content)
+    (model_of(OptimizeAnswer) if kind == "optimize" else model_of(EvaluateAnswer)).model_validate(
+        content
+    )
     return content
 
 
 def figures(energy: dict[str, Any], duration: float) -> dict[str, Any]:
     """The figures of a full answer that a base and its changes are compared by, flat."""
-    parts = {f"electrical.{name}": value for name, value in energy["electrical"].items() if name != "interval"}
+    parts = {
+        f"electrical.{name}": value
+        for name, value in energy["electrical"].items()
+        if name != "interval"
+    }
     powers = {name: energy[name] for name in ("mean_power", "peak_power")}
     return {"duration": duration, "mechanical": energy["mechanical"]["total"], **parts, **powers}
 
@@ -63,10 +77,14 @@ def figures(energy: dict[str, Any], duration: float) -> dict[str, Any]:
 def deltas(outcome: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """The same of a change's outcome: value, difference, relative."""
     parts = {f"electrical.{name}": each for name, each in outcome["electrical"].items()}
-    return {name: outcome[name] for name in ("duration", "mechanical", "mean_power", "peak_power")} | parts
+    return {
+        name: outcome[name] for name in ("duration", "mechanical", "mean_power", "peak_power")
+    } | parts
 
 
-def assert_is(outcome: dict[str, Any], changed: dict[str, Any], base: dict[str, Any], rel: float = SAME) -> None:
+def assert_is(
+    outcome: dict[str, Any], changed: dict[str, Any], base: dict[str, Any], rel: float = SAME
+) -> None:
     """Whether an outcome is the difference of two answers' figures."""
     found = deltas(outcome)
     assert found.keys() == changed.keys() == base.keys()
@@ -74,7 +92,9 @@ def assert_is(outcome: dict[str, Any], changed: dict[str, Any], base: dict[str, 
         assert each["value"] == pytest.approx(changed[name], rel=rel, abs=rel), name
         assert each["difference"] == each["value"] - base[name], name
         if abs(base[name]) > 1e-6:
-            assert each["relative"] == pytest.approx(each["difference"] / abs(base[name]), rel=SAME), name
+            assert each["relative"] == pytest.approx(
+                each["difference"] / abs(base[name]), rel=SAME
+            ), name
         else:
             assert each["relative"] is None, name
 
@@ -82,7 +102,11 @@ def assert_is(outcome: dict[str, Any], changed: dict[str, Any], base: dict[str, 
 CHANGES: dict[str, dict[str, Any]] = {
     "heavier": {"payload": HEAVY},
     "lighter": {"link_mass_scale": 0.5},
-    "several": {"link_mass_scale": [1.0, 0.5, 0.5, 1.0, 1.0, 1.0], "payload": None, "limits": {"velocity": 1.2}},
+    "several": {
+        "link_mass_scale": [1.0, 0.5, 0.5, 1.0, 1.0, 1.0],
+        "payload": None,
+        "limits": {"velocity": 1.2},
+    },
     "hanging": {"gravity": [0.0, 0.0, 9.81], "bus": {"mode": "recuperating", "efficiency": 0.9}},
 }
 
@@ -98,22 +122,31 @@ def evaluated(client: TestClient) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("name", CHANGES)
-def test_is_the_difference_of_two_optimizations(client: TestClient, optimized: dict[str, Any], name: str) -> None:
+def test_is_the_difference_of_two_optimizations(
+    client: TestClient, optimized: dict[str, Any], name: str
+) -> None:
     answers = [client.post("/optimize", json=LIFT | arm).json() for arm in ({}, CHANGES[name])]
     base, alone = (figures(answer["energy"], answer["duration"]) for answer in answers)
     assert (
-        figures(optimized["base"] | {"mechanical": {"total": optimized["base"]["mechanical"]}}, base["duration"])
+        figures(
+            optimized["base"] | {"mechanical": {"total": optimized["base"]["mechanical"]}},
+            base["duration"],
+        )
         == base
     )
     outcome = optimized["changes"][name]["reoptimised"]
     full = kept(client, outcome["answer"], "optimize")
     assert_is(outcome, figures(full["energy"], full["duration"]), base)
     assert outcome["electrical"]["total"]["value"] <= alone["electrical.total"] * (1 + SAME)
-    assert outcome["electrical"]["total"]["value"] == pytest.approx(alone["electrical.total"], rel=LOCAL)
+    assert outcome["electrical"]["total"]["value"] == pytest.approx(
+        alone["electrical.total"], rel=LOCAL
+    )
 
 
 @pytest.mark.parametrize("name", CHANGES)
-def test_same_motion_is_the_bases_on_the_changed_arm(client: TestClient, optimized: dict[str, Any], name: str) -> None:
+def test_same_motion_is_the_bases_on_the_changed_arm(
+    client: TestClient, optimized: dict[str, Any], name: str
+) -> None:
     """Against /evaluate of the base's samples, whose splines are not the motion's own."""
     base = kept(client, optimized["base"]["answer"], "optimize")
     log = {field: base["trajectory"][field] for field in ("t", "q", "v", "a")}
@@ -124,12 +157,18 @@ def test_same_motion_is_the_bases_on_the_changed_arm(client: TestClient, optimiz
     for part, each in same["electrical"].items():
         total = other["total"]["energy"]["electrical"]
         assert each["value"] == pytest.approx(total[part], abs=LOCAL * total["total"]), part
-    # of the base, acceleration and jerk come as near to their limits as a log's splines to the motion
+    # of the base, acceleration and jerk come as near to their limits as a log's splines to the
+    # motion
     held = {report["limit"]: report["held"] for report in other["limits"]}
     assert same["holds"] == all(held[limit] for limit in ("position", "velocity", "torque"))
-    assert same["holds"] == all(ratio <= 1 + 1e-6 for ratio in same["certificate"]["worst_ratio"].values())
+    assert same["holds"] == all(
+        ratio <= 1 + 1e-6 for ratio in same["certificate"]["worst_ratio"].values()
+    )
     if same["holds"]:
-        assert optimized["changes"][name]["reoptimisation"] <= SAME * same["electrical"]["total"]["value"]
+        assert (
+            optimized["changes"][name]["reoptimisation"]
+            <= SAME * same["electrical"]["total"]["value"]
+        )
 
 
 def test_a_tighter_limit_breaks_the_same_motion_only(optimized: dict[str, Any]) -> None:
@@ -139,7 +178,9 @@ def test_a_tighter_limit_breaks_the_same_motion_only(optimized: dict[str, Any]) 
     assert several["reoptimised"]["status"] == "optimal"
 
 
-def test_is_the_difference_of_two_evaluations(client: TestClient, evaluated: dict[str, Any]) -> None:
+def test_is_the_difference_of_two_evaluations(
+    client: TestClient, evaluated: dict[str, Any]
+) -> None:
     base = client.post("/evaluate", json=GIVEN).json()
     before = figures(base["total"]["energy"], base["duration"])
     for name, arm in CHANGES.items():
@@ -148,7 +189,11 @@ def test_is_the_difference_of_two_evaluations(client: TestClient, evaluated: dic
         assert_is(row["same_motion"], figures(alone["total"]["energy"], alone["duration"]), before)
         assert row["same_motion"]["holds"] == alone["within_limits"]
         assert (
-            row["reoptimised"] is row["reoptimisation"] is row["problem"] is row["same_motion"]["certificate"] is None
+            row["reoptimised"]
+            is row["reoptimisation"]
+            is row["problem"]
+            is row["same_motion"]["certificate"]
+            is None
         )
         full = kept(client, row["same_motion"]["answer"], "evaluate")
         assert alone["id"] is None and row["same_motion"]["answer"] == f"/answers/{full['id']}"
@@ -186,11 +231,20 @@ def test_time_that_runs_out_is_told_per_change(client: TestClient) -> None:
 
 
 def body(**fields: Any) -> dict[str, Any]:
-    return {"optimize": LIFT, "changes": [{"name": "lighter", "arm": {"link_mass_scale": 0.5}}], **fields}
+    return {
+        "optimize": LIFT,
+        "changes": [{"name": "lighter", "arm": {"link_mass_scale": 0.5}}],
+        **fields,
+    }
 
 
 def change(**arm: Any) -> dict[str, Any]:
-    return {"changes": [{"name": "first", "arm": {"link_mass_scale": 0.5}}, {"name": "second", "arm": arm}]}
+    return {
+        "changes": [
+            {"name": "first", "arm": {"link_mass_scale": 0.5}},
+            {"name": "second", "arm": arm},
+        ]
+    }
 
 
 @pytest.mark.parametrize(
@@ -198,7 +252,10 @@ def change(**arm: Any) -> dict[str, Any]:
     [
         (change(), ["changes", 1, "arm"]),
         (change(robot="ur5e"), ["changes", 1, "arm"]),
-        (change(payload={"mass": -1.0, "com": [0, 0, 0]}), ["changes", 1, "arm", "payload", "mass"]),
+        (
+            change(payload={"mass": -1.0, "com": [0, 0, 0]}),
+            ["changes", 1, "arm", "payload", "mass"],
+        ),
         (change(link_mass_scale=[1.0, 1.0]), ["changes", 1, "arm", "link_mass_scale"]),
         (change(link_mass_scale=1e9), ["changes", 1, "arm", "link_mass_scale"]),
         (change(limits={"velocity": 1e3}), ["changes", 1, "arm", "limits", "velocity"]),
@@ -207,8 +264,14 @@ def change(**arm: Any) -> dict[str, Any]:
         ({"changes": []}, ["changes"]),
         ({"changes": [{"name": f"{k}", "arm": {"payload": None}} for k in range(17)]}, ["changes"]),
         ({"changes": [{"name": "twice", "arm": {"payload": None}}] * 2}, ["changes"]),
-        ({"changes": [{"name": n, "arm": {"payload": None}} for n in ("twice", "Twice ")]}, ["changes"]),
-        ({"changes": [{"name": "\x7fstored/0\x7f", "arm": {"payload": None}}]}, ["changes", 0, "name"]),
+        (
+            {"changes": [{"name": n, "arm": {"payload": None}} for n in ("twice", "Twice ")]},
+            ["changes"],
+        ),
+        (
+            {"changes": [{"name": "\x7fstored/0\x7f", "arm": {"payload": None}}]},
+            ["changes", 0, "name"],
+        ),
         (
             change(scene={"obstacles": [{"name": "tool", "shape": "half_space"}]}),
             ["changes", 1, "arm", "scene", "obstacles", 0, "name"],
@@ -220,7 +283,9 @@ def change(**arm: Any) -> dict[str, Any]:
         ({"deadline": 1e5}, ["deadline"]),
     ],
 )
-def test_refuses_what_cannot_be_asked(client: TestClient, fields: dict[str, Any], loc: list[Any]) -> None:
+def test_refuses_what_cannot_be_asked(
+    client: TestClient, fields: dict[str, Any], loc: list[Any]
+) -> None:
     answer = client.post("/whatif", json=body(**fields))
     assert answer.status_code == 422, answer.text
     assert answer.json()["type"] == "/problems/invalid-request"
@@ -228,9 +293,13 @@ def test_refuses_what_cannot_be_asked(client: TestClient, fields: dict[str, Any]
     assert "none of these" not in answer.text
 
 
-@pytest.mark.parametrize("text", ["stored/0", "/answers/0", "{0}", "%s", "\\u007fkept/0\\u007f", '","answer":"'])
+@pytest.mark.parametrize(
+    "text", ["stored/0", "/answers/0", "{0}", "%s", "\\u007fkept/0\\u007f", '","answer":"']
+)
 def test_texts_of_the_caller_come_back_as_they_are(client: TestClient, text: str) -> None:
-    """A change's name, and an obstacle's in the problem of a change; paths of answers lead where they say."""
+    """A change's name, and an obstacle's in the problem of a change; paths of answers lead where
+    they say.
+    """
     pose = {"position": tcp_pose(np.array(HOME)).T[:3, 3].tolist(), "rotvec": [0, 0, 0]}
     ball = {"name": text, "shape": "sphere", "radius": 0.15, "pose": pose}
     answer = client.post(

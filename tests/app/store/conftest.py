@@ -21,7 +21,12 @@ def server() -> Iterator[Postgres]:
 
 
 @pytest.fixture(
-    params=["sqlite", pytest.param("postgres", marks=pytest.mark.skipif(MISSING is not None, reason=str(MISSING)))]
+    params=[
+        "sqlite",
+        pytest.param(
+            "postgres", marks=pytest.mark.skipif(MISSING is not None, reason=str(MISSING))
+        ),
+    ]
 )
 def url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     """An empty database."""

@@ -1,4 +1,6 @@
-"""Answers by their requests, in SQLite and PostgreSQL: what takes the place of what, and two at the same time."""
+"""Answers by their requests, in SQLite and PostgreSQL: what takes the place of what, and two at the
+same time.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""A database that is full, read-only, locked, deleted or replaced under a running service: seen, said, and bounded."""
+"""A database that is full, read-only, locked, deleted or replaced under a running service: seen,
+said, and bounded.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,9 @@ async def refused(store: Store, work: Any = put, writes: bool = True) -> StoreFa
 
 @pytest.mark.parametrize("lost", ["joulepath.db", "joulepath.db-wal"])
 @pytest.mark.parametrize("how", ["deleted", "replaced"])
-def test_nothing_is_acknowledged_in_a_file_that_is_gone(database: Path, lost: str, how: str) -> None:
+def test_nothing_is_acknowledged_in_a_file_that_is_gone(
+    database: Path, lost: str, how: str
+) -> None:
     async def test(store: Store) -> None:
         await store.write(put)
         if how == "deleted":
@@ -132,8 +136,12 @@ def test_a_lock_of_another_process_is_waited_for_once(database: Path) -> None:
                 nonlocal tried
                 tried += 1
 
-            assert await refused(store, work) == "locked" and tried == 0, "the next one does not wait"
-            assert (await store.read(partial(answers.get, answer_id=kept)))[1] == b"{}", "reading goes on"
+            assert await refused(store, work) == "locked" and tried == 0, (
+                "the next one does not wait"
+            )
+            assert (await store.read(partial(answers.get, answer_id=kept)))[1] == b"{}", (
+                "reading goes on"
+            )
             other.execute("ROLLBACK")
         now = 102.0
         await store.check()
@@ -165,7 +173,9 @@ def test_faults_of_postgresql_are_told_by_their_codes() -> None:
             with other.connect() as connection:
                 connection.execute(text("LOCK TABLE answers IN SHARE MODE"))
                 assert await refused(store) == "locked"
-                assert (await store.read(partial(answers.get, answer_id=kept)))[1] == b"{}", "reading goes on"
+                assert (await store.read(partial(answers.get, answer_id=kept)))[1] == b"{}", (
+                    "reading goes on"
+                )
             with other.begin() as connection:
                 connection.execute(text("ALTER ROLE tester SET default_transaction_read_only = on"))
 
@@ -185,7 +195,9 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     """A file system of its own, of 24 MiB."""
     disk = tmp_path / "disk"
     disk.mkdir()
-    made = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={NEARLY_FULL}", "tmpfs", disk], capture_output=True)
+    made = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", f"size={NEARLY_FULL}", "tmpfs", disk], capture_output=True
+    )
     if made.returncode:
         pytest.skip("this test mounts a file system, which is not allowed here")
     try:
@@ -204,7 +216,9 @@ def test_a_full_disk_is_freed_by_deleting(small_disk: Path) -> None:
         while count < 10_000:
             try:
                 large = replace(step(50.0), answer=StoredAnswer(new_id(), os.urandom(200_000)))
-                await store.write(partial(studies.add, study_id=study_id, step=large, key=None, client=OPERATOR))
+                await store.write(
+                    partial(studies.add, study_id=study_id, step=large, key=None, client=OPERATOR)
+                )
             except StoreUnavailable as error:
                 causes.append(error.cause)
                 return count
@@ -225,8 +239,12 @@ def test_a_full_disk_is_freed_by_deleting(small_disk: Path) -> None:
             await store.check()
             assert store.fault == "full"
             state = await store.read(partial(studies.state, study_id=study.id))
-            assert state.last is not None and state.last.number == count > 0, "all that was acknowledged is there"
-            await store.write(partial(studies.delete, study_id=study.id, client=OPERATOR), frees=True)
+            assert state.last is not None and state.last.number == count > 0, (
+                "all that was acknowledged is there"
+            )
+            await store.write(
+                partial(studies.delete, study_id=study.id, client=OPERATOR), frees=True
+            )
             await store.check()
             assert store.fault is None
             (small_disk / "other").unlink()

@@ -1,4 +1,6 @@
-"""Iterations of a study: the best so far and the first below the threshold are kept with each, whatever its length."""
+"""Iterations of a study: the best so far and the first below the threshold are kept with each,
+whatever its length.
+"""
 
 from __future__ import annotations
 
@@ -25,14 +27,23 @@ MET_BY = [None, 2, 2, 2, 2, 2]
 
 def step(energy: float) -> Step:
     answer = StoredAnswer(new_id(), b"{}")
-    return Step("optimize", {"energy": energy}, answer, duration=1.0, electrical=energy, mechanical=1000.0 - energy)
+    return Step(
+        "optimize",
+        {"energy": energy},
+        answer,
+        duration=1.0,
+        electrical=energy,
+        mechanical=1000.0 - energy,
+    )
 
 
 async def begun(store: Store, objective: str = "electrical", count: int = len(ENERGIES)) -> Study:
     study = studies.new_study("A study", "ur5e", objective, THRESHOLD, None, None)
     await store.write(partial(studies.create, study=study))
     for energy in ENERGIES[:count]:
-        await store.write(partial(studies.add, study_id=study.id, step=step(energy), key=None, client=OPERATOR))
+        await store.write(
+            partial(studies.add, study_id=study.id, step=step(energy), key=None, client=OPERATOR)
+        )
     return study
 
 
@@ -45,14 +56,17 @@ def test_each_knows_the_best_so_far(tmp_path: Path) -> None:
         ]
         assert [each.best.number for each in found] == BEST
         assert [each.threshold_met_by for each in found] == MET_BY
-        assert [each.request["optimize"] for each in found] == [{"energy": energy} for energy in ENERGIES]
+        assert [each.request["optimize"] for each in found] == [
+            {"energy": energy} for energy in ENERGIES
+        ]
         state = await store.read(partial(studies.state, study_id=study.id))
         assert (state.best.number, state.last.number, state.last.met_by) == (4, 6, 2)  # type: ignore[union-attr]
         # one at a time, or all at once: the same
         history = entries(await store.read(partial(studies.history, study_id=study.id)))
-        assert [entry.items() <= each.model_dump().items() for entry, each in zip(history, found, strict=True)] == [
-            True
-        ] * len(ENERGIES)
+        assert [
+            entry.items() <= each.model_dump().items()
+            for entry, each in zip(history, found, strict=True)
+        ] == [True] * len(ENERGIES)
 
     with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
 

@@ -34,17 +34,25 @@ class Bench:
     def __init__(self, url: str) -> None:
         self.store, self.now = Store(url), START
 
-    async def create(self, count: int = 3, key: str | None = None, keep_going: bool = True, most: int = MUCH) -> str:
+    async def create(
+        self, count: int = 3, key: str | None = None, keep_going: bool = True, most: int = MUCH
+    ) -> str:
         new = NewJob([NewRequest("optimize", BODY, 10.0)] * count, f"{count}", "name", keep_going)
-        job_id, _ = await self.store.write(partial(jobs.create, new=new, key=key, most_waiting=most))
+        job_id, _ = await self.store.write(
+            partial(jobs.create, new=new, key=key, most_waiting=most)
+        )
         return job_id
 
     async def lease(self, holder: str, count: int = 1) -> list[Lease]:
-        work = partial(leases.lease, holder=holder, count=count, now=self.now, until=self.now + SOON)
+        work = partial(
+            leases.lease, holder=holder, count=count, now=self.now, until=self.now + SOON
+        )
         return (await self.store.write(work))[0]
 
     async def settle(self, holder: str, *outcomes: Outcome) -> None:
-        await self.store.write(partial(leases.settle, holder=holder, outcomes=outcomes, now=self.now, most=MUCH))
+        await self.store.write(
+            partial(leases.settle, holder=holder, outcomes=outcomes, now=self.now, most=MUCH)
+        )
 
     async def states(self, job_id: str) -> list[str]:
         found = await self.store.read(partial(jobs.requests, job_id=job_id, limit=MUCH, after=-1))
@@ -58,7 +66,9 @@ class Bench:
         return None if body is None else unpacked(body)
 
     async def events(self, job_id: str) -> list[JobEvent]:
-        found, _ = await self.store.read(partial(job_events.after, job_id=job_id, number=0, limit=MUCH))
+        found, _ = await self.store.read(
+            partial(job_events.after, job_id=job_id, number=0, limit=MUCH)
+        )
         return found
 
 
@@ -85,11 +95,18 @@ def test_a_lease_that_ran_out_is_taken_over_and_the_late_result_dropped(bench: B
         await bench.settle("a", done(first, b'"late"'))
         assert await bench.states(job_id) == ["running"]
         await bench.settle("b", done(second, b'"second"'))
-        await bench.settle("a", done(first, b'"later"'), Outcome(first, "failed", problem={"type": "late"}))
+        await bench.settle(
+            "a", done(first, b'"later"'), Outcome(first, "failed", problem={"type": "late"})
+        )
         await bench.settle("b", done(second, b'"twice"'))
         assert (await bench.states(job_id), await bench.state(job_id)) == (["done"], "done")
         assert await bench.answer(job_id, 0) == b'"second"'
-        assert await bench.store.read(lambda session: session.scalar(select(func.count()).select_from(Answer))) == 1
+        assert (
+            await bench.store.read(
+                lambda session: session.scalar(select(func.count()).select_from(Answer))
+            )
+            == 1
+        )
         assert [event.name for event in await bench.events(job_id)].count("request") == 1
 
     asyncio.run(run())
@@ -109,7 +126,9 @@ def test_a_renewed_lease_is_kept(bench: Bench) -> None:
 
 
 def test_many_holders_never_get_the_same_request(bench: Bench) -> None:
-    """Services that share a database: each request is leased once, and events are numbered without gaps."""
+    """Services that share a database: each request is leased once, and events are numbered without
+    gaps.
+    """
 
     async def work(name: str, got: list[Lease]) -> None:
         while found := await bench.lease(name, 3):
@@ -120,11 +139,15 @@ def test_many_holders_never_get_the_same_request(bench: Bench) -> None:
         job_ids = [await bench.create(20) for _ in range(3)]
         got: list[Lease] = []
         await asyncio.gather(*(work(name, got) for name in "abcd"))
-        assert sorted(lease.key for lease in got) == sorted((job_id, n) for job_id in job_ids for n in range(20))
+        assert sorted(lease.key for lease in got) == sorted(
+            (job_id, n) for job_id in job_ids for n in range(20)
+        )
         for job_id in job_ids:
             events = await bench.events(job_id)
             assert [event.number for event in events] == list(range(1, len(events) + 1))
-            assert sorted(event.data["index"] for event in events if event.name == "request") == list(range(20))
+            assert sorted(
+                event.data["index"] for event in events if event.name == "request"
+            ) == list(range(20))
             assert [event.name for event in events].count("end") == 1 and events[-1].name == "end"
 
     asyncio.run(run())
@@ -149,7 +172,9 @@ def test_cancelling_ends_what_waits_and_then_what_runs(bench: Bench) -> None:
         assert await bench.states(job_id) == ["done", "running", "cancelled", "cancelled"]
         assert await bench.state(job_id) == "cancelling"
         assert await bench.lease("b", 9) == []
-        assert await bench.store.read(partial(leases.kept, holder="a")) == set(), "its holder is to stop it"
+        assert await bench.store.read(partial(leases.kept, holder="a")) == set(), (
+            "its holder is to stop it"
+        )
         await bench.settle("a", Outcome(second, "waiting"))
         assert (await bench.states(job_id), await bench.state(job_id)) == (
             ["done", "cancelled", "cancelled", "cancelled"],
@@ -160,14 +185,18 @@ def test_cancelling_ends_what_waits_and_then_what_runs(bench: Bench) -> None:
         assert (names.count("request"), names.count("end")) == (4, 1)
         assert await bench.answer(job_id, 0) == b"{}", "what was done stays"
 
-        await bench.store.write(partial(jobs.retry, job_id=job_id, client=OPERATOR, most_waiting=MUCH))
+        await bench.store.write(
+            partial(jobs.retry, job_id=job_id, client=OPERATOR, most_waiting=MUCH)
+        )
         again = await bench.lease("a", 9)
         assert [lease.number for lease in again] == [1, 2, 3]
         await bench.settle("a", *map(done, again))
         assert await bench.state(job_id) == "done"
         with pytest.raises(JobNotCancellable):
             await bench.store.write(partial(jobs.cancel, job_id=job_id, client=OPERATOR))
-        await bench.store.write(partial(jobs.retry, job_id=job_id, client=OPERATOR, most_waiting=MUCH))
+        await bench.store.write(
+            partial(jobs.retry, job_id=job_id, client=OPERATOR, most_waiting=MUCH)
+        )
         assert await bench.state(job_id) == "done", "nothing is left to retry"
 
     asyncio.run(run())
@@ -177,7 +206,9 @@ def test_the_first_failure_may_end_a_job(bench: Bench) -> None:
     async def run() -> None:
         job_id = await bench.create(4, keep_going=False)
         first, second = await bench.lease("a", 2)
-        await bench.settle("a", Outcome(first, "failed", problem={"type": "/problems/internal-error"}))
+        await bench.settle(
+            "a", Outcome(first, "failed", problem={"type": "/problems/internal-error"})
+        )
         assert await bench.states(job_id) == ["failed", "running", "cancelled", "cancelled"]
         await bench.settle("a", done(second))
         assert await bench.state(job_id) == "cancelled"
@@ -195,10 +226,16 @@ def test_what_is_given_back_waits_again(bench: Bench) -> None:
         (lease,) = await bench.lease("a")
         await bench.settle("a", Outcome(lease, "waiting", preempted=True))
         (lease,) = await bench.lease("a")
-        assert (lease.attempt, lease.deaths, lease.preempted) == (3, 2, 1), "that attempt does not count"
-        await bench.store.write(partial(leases.take_back_from, is_gone=lambda holder: holder == "b"))
+        assert (lease.attempt, lease.deaths, lease.preempted) == (3, 2, 1), (
+            "that attempt does not count"
+        )
+        await bench.store.write(
+            partial(leases.take_back_from, is_gone=lambda holder: holder == "b")
+        )
         assert await bench.states(job_id) == ["running"]
-        await bench.store.write(partial(leases.take_back_from, is_gone=lambda holder: holder == "a"))
+        await bench.store.write(
+            partial(leases.take_back_from, is_gone=lambda holder: holder == "a")
+        )
         assert await bench.states(job_id) == ["waiting"]
 
     asyncio.run(run())
@@ -206,12 +243,19 @@ def test_what_is_given_back_waits_again(bench: Bench) -> None:
 
 def test_a_key_is_for_one_job(bench: Bench) -> None:
     async def run() -> None:
-        made = await asyncio.gather(*(bench.create(2, key="k") for _ in range(2)), return_exceptions=True)
+        made = await asyncio.gather(
+            *(bench.create(2, key="k") for _ in range(2)), return_exceptions=True
+        )
         first = next(each for each in made if isinstance(each, str))
         assert await bench.create(2, key="k") == first
         with pytest.raises(KeyReused):
             await bench.create(3, key="k")
-        assert await bench.store.read(lambda session: session.scalar(select(func.count()).select_from(JobRequest))) == 2
+        assert (
+            await bench.store.read(
+                lambda session: session.scalar(select(func.count()).select_from(JobRequest))
+            )
+            == 2
+        )
 
     asyncio.run(run())
 
@@ -224,7 +268,9 @@ def test_the_queue_has_a_limit(bench: Bench) -> None:
         await bench.settle("a", *(Outcome(each, "failed") for each in await bench.lease("a", 3)))
         await bench.create(3, most=5)
         with pytest.raises(TooManyWaiting):
-            await bench.store.write(partial(jobs.retry, job_id=job_id, client=OPERATOR, most_waiting=5))
+            await bench.store.write(
+                partial(jobs.retry, job_id=job_id, client=OPERATOR, most_waiting=5)
+            )
         assert await bench.states(job_id) == ["failed"] * 3
 
     asyncio.run(run())
@@ -237,7 +283,13 @@ def test_answers_live_as_long_as_their_job(bench: Bench) -> None:
         part = new_id()
         await bench.settle(
             "a",
-            Outcome(lease, "done", answer=BODY, parts=(StoredAnswer(part, packed(b'"part"')),), parts_kind="optimize"),
+            Outcome(
+                lease,
+                "done",
+                answer=BODY,
+                parts=(StoredAnswer(part, packed(b'"part"')),),
+                parts_kind="optimize",
+            ),
         )
         await bench.store.write(partial(answers.prune, max_bytes=0, max_age=timedelta(0)))
         await bench.store.write(partial(jobs.prune, max_age=timedelta(days=36500)))
@@ -255,7 +307,12 @@ def test_answers_live_as_long_as_their_job(bench: Bench) -> None:
         await bench.store.write(partial(jobs.delete, job_id=job_id, client=OPERATOR))
         with pytest.raises(UnknownAnswer):
             await bench.store.read(partial(answers.get, answer_id=part))
-        assert await bench.store.read(lambda session: session.scalar(select(func.count()).select_from(Answer))) == 0
+        assert (
+            await bench.store.read(
+                lambda session: session.scalar(select(func.count()).select_from(Answer))
+            )
+            == 0
+        )
 
     asyncio.run(run())
 

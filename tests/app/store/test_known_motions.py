@@ -1,4 +1,6 @@
-"""Motions of cells in SQLite and PostgreSQL: those used last are found, and two may keep the same at the same time."""
+"""Motions of cells in SQLite and PostgreSQL: those used last are found, and two may keep the same
+at the same time.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +52,9 @@ def test_two_that_keep_the_same_at_the_same_time(url: str) -> None:
                 both.wait()
             known_motions.keep(session, CELL, dict.fromkeys(keys, b"1"))
 
-        await asyncio.gather(*(store.write(partial(keep_slowly, keys=keys)) for keys in ("abcdefgh", "hgfedcba")))
+        await asyncio.gather(
+            *(store.write(partial(keep_slowly, keys=keys)) for keys in ("abcdefgh", "hgfedcba"))
+        )
         assert set(await found(store, CELL)) == set("abcdefgh")
 
     with_store(url, test)

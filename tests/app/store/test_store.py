@@ -1,4 +1,6 @@
-"""The store: migrations, several processes at once, answers and their limits, a database that is not there."""
+"""The store: migrations, several processes at once, answers and their limits, a database that is
+not there.
+"""
 
 from __future__ import annotations
 
@@ -113,7 +115,10 @@ def test_a_database_of_another_version_is_refused_with_what_to_do(url: str) -> N
 
 
 def test_several_processes_may_migrate_at_once(url: str) -> None:
-    code = "import sys; from joulepath.app.store.database import *; migrate(create_database_engine(sys.argv[1]))"
+    code = (
+        "import sys; from joulepath.app.store.database import *; "
+        "migrate(create_database_engine(sys.argv[1]))"
+    )
     processes = [subprocess.Popen([sys.executable, "-c", code, url], cwd=ROOT) for _ in range(2)]
     assert [process.wait(60) for process in processes] == [0] * 2
     assert tables(url) == []
@@ -134,8 +139,12 @@ def test_a_new_file_that_another_process_makes_is_waited_for(tmp_path: Path) -> 
 
 
 @pytest.mark.skipif(MISSING is not None, reason=str(MISSING))
-def test_a_service_waits_while_another_one_migrates(server: Postgres, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also for longer than PostgreSQL may take for an ordinary answer: the first request is not refused."""
+def test_a_service_waits_while_another_one_migrates(
+    server: Postgres, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also for longer than PostgreSQL may take for an ordinary answer: the first request is not
+    refused.
+    """
     monkeypatch.setattr(database, "_SERVER_TIMEOUT", 0.5)
     with create_database_engine(server.url).begin() as connection:
         connection.execute(text("DROP SCHEMA public CASCADE"))
@@ -144,14 +153,21 @@ def test_a_service_waits_while_another_one_migrates(server: Postgres, monkeypatc
 
     def migrate_slowly() -> None:
         with create_database_engine(server.url).begin() as connection:
-            connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": database._MIGRATION_LOCK})
+            connection.execute(
+                text("SELECT pg_advisory_xact_lock(:key)"), {"key": database._MIGRATION_LOCK}
+            )
             locked.set()
             time.sleep(3 * database._SERVER_TIMEOUT)
 
     async def test(store: Store) -> None:
         await store.open()
         assert store.fault is None
-        assert await store.read(lambda session: session.scalar(select(func.count()).select_from(Answer))) == 0
+        assert (
+            await store.read(
+                lambda session: session.scalar(select(func.count()).select_from(Answer))
+            )
+            == 0
+        )
 
     other = threading.Thread(target=migrate_slowly)
     other.start()
@@ -180,13 +196,21 @@ def test_nothing_is_replaced_in_a_document(tmp_path: Path) -> None:
     """A document repeats texts of the caller: none of them may stand for anything else."""
     kept = [StoredAnswer(new_id(), b'{"k": 0}'), StoredAnswer(new_id(), b'{"k": 1}')]
     texts = [f"\x7f{word}/{k}\x7f" for word in ("kept", "stored") for k in range(2)]
-    result = TaskResult.of_json({"names": texts, "answers": [answer.path for answer in kept]}, tuple(kept))
+    result = TaskResult.of_json(
+        {"names": texts, "answers": [answer.path for answer in kept]}, tuple(kept)
+    )
 
     async def test(store: Store) -> None:
         done = await store_answers(store, Settings(), "optimize", result, None)
-        assert (done.document, done.media_type, done.stored) == (result.document, result.media_type, ())
+        assert (done.document, done.media_type, done.stored) == (
+            result.document,
+            result.media_type,
+            (),
+        )
         for answer in kept:
-            _, body = await store.read(partial(answers.get, answer_id=answer.path.removeprefix("/answers/")))
+            _, body = await store.read(
+                partial(answers.get, answer_id=answer.path.removeprefix("/answers/"))
+            )
             assert body == answer.body
 
     with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
@@ -200,7 +224,9 @@ def test_the_oldest_answers_make_room(url: str) -> None:
         assert await left(store) == set(ids[2:])
         await store.write(
             lambda session: session.execute(
-                update(Answer).where(Answer.id.in_([ids[2], ids[4]])).values(created=now() - 2 * A_DAY)
+                update(Answer)
+                .where(Answer.id.in_([ids[2], ids[4]]))
+                .values(created=now() - 2 * A_DAY)
             )
         )
         await store.write(partial(answers.prune, max_bytes=MUCH, max_age=A_DAY))
@@ -236,14 +262,18 @@ def test_writers_wait_for_each_other(url: str) -> None:
 def test_answers_over_http(client: TestClient) -> None:
     store: Store = client.app.state.store  # type: ignore[attr-defined]
     assert client.portal is not None
-    answer_id = client.portal.call(store.write, partial(put, kind="ik", body=b'{"solutions": [1.5]}'))
+    answer_id = client.portal.call(
+        store.write, partial(put, kind="ik", body=b'{"solutions": [1.5]}')
+    )
     answer = client.get(f"/answers/{answer_id}")
     assert answer.status_code == 200, answer.text
     schemas.StoredAnswer.model_validate_json(answer.content)
     assert answer.json()["answer"] == {"solutions": [1.5]}
 
 
-@pytest.mark.parametrize("id", ["none", "7b5f3a52-3a26-4a3e-8f0e-3c1d0e6f5a11", "x" * 5000, "%00", "%ff", "ü"])
+@pytest.mark.parametrize(
+    "id", ["none", "7b5f3a52-3a26-4a3e-8f0e-3c1d0e6f5a11", "x" * 5000, "%00", "%ff", "ü"]
+)
 def test_unknown_answer(client: TestClient, id: str) -> None:
     answer = client.get(f"/answers/{id}")
     assert answer.status_code == 404
@@ -271,7 +301,9 @@ def test_without_its_database_the_service_goes_on(url: str) -> None:
         errors = [entry for entry in server.logged() if entry["level"] == "error"]
         said = [entry for entry in errors if "the database cannot be used" in entry["message"]]
         assert len(said) == 1, "said once, not with every check"
-        assert all(entry["reason"] for entry in errors if entry["message"] == "database unavailable")
+        assert all(
+            entry["reason"] for entry in errors if entry["message"] == "database unavailable"
+        )
         assert "secret-word" not in str(server.logged())
 
 

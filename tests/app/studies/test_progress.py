@@ -19,7 +19,11 @@ def test_changes() -> None:
 
 
 def test_a_change_from_the_best_is_from_the_best_before() -> None:
-    assert [step.change_from_best for step in progress([50.0, 70.0, 65.0], 1.0)] == [None, 20.0, 15.0]
+    assert [step.change_from_best for step in progress([50.0, 70.0, 65.0], 1.0)] == [
+        None,
+        20.0,
+        15.0,
+    ]
 
 
 def test_nothing_yet() -> None:

@@ -56,11 +56,19 @@ async def some_turns() -> None:
 
 def test_equal_ones_are_computed_once() -> None:
     async def test(bench: Bench) -> None:
-        asked = [bench.ask(), bench.ask(), bench.ask(), bench.ask(Asked("key", 9.0)), bench.ask(Asked("other", 10.0))]
+        asked = [
+            bench.ask(),
+            bench.ask(),
+            bench.ask(),
+            bench.ask(Asked("key", 9.0)),
+            bench.ask(Asked("other", 10.0)),
+        ]
         await some_turns()
         assert bench.begun == 3
         bench.free.set()
-        found = [(result.document, is_anothers) for result, is_anothers in await asyncio.gather(*asked)]
+        found = [
+            (result.document, is_anothers) for result, is_anothers in await asyncio.gather(*asked)
+        ]
         assert found == [(b"1", False), (b"1", True), (b"1", True), (b"2", False), (b"3", False)]
         assert (await bench.ask())[0].document == b"4", "later ones find it in the database"
 

@@ -1,4 +1,6 @@
-"""The process that workers are forked from. It ignores an import that fails, so that only a test sees one."""
+"""The process that workers are forked from. It ignores an import that fails, so that only a test
+sees one.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,9 @@ ROOT = Path(__file__).parents[3]
 
 def test_the_tasks_of_all_endpoints_are_imported() -> None:
     code = "import sys, joulepath.app.tasks.preload; print(*sys.modules)"
-    told = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    told = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
     api = ROOT / "app" / "api"
     tasks = {
         ".".join(("joulepath", "app", "api", *file.relative_to(api).with_suffix("").parts))

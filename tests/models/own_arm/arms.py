@@ -22,8 +22,9 @@ AMPLE = 300.0
 PLAIN = Description(urdf=URDF, tip="tool", acceleration=8.0, payload=2.0)
 
 
-# an arm with all that a URDF may have: axes off z, a joint without end, fixed bodies with mass, a gripper, a link named
-# as ours are, a joint named as its link, a prefix that nobody declared, boxes and spheres
+# an arm with all that a URDF may have: axes off z, a joint without end, fixed bodies with mass, a
+# gripper, a link named as ours are, a joint named as its link, a prefix that nobody declared, boxes
+# and spheres
 RICH = """<robot name="rich">
   <link name="world"/><link name="pedestal"/><link name="elbow"/><link name="hand"/>
   <joint name="fixed_1" type="fixed"><parent link="world"/><child link="pedestal"/>
@@ -59,15 +60,21 @@ RICH = """<robot name="rich">
 HELD = {"finger": 0.03}
 
 
-RICH_ARM = Description(urdf=RICH, tip="hand", base="pedestal", acceleration=5.0, payload=1.0, locked=HELD)
+RICH_ARM = Description(
+    urdf=RICH, tip="hand", base="pedestal", acceleration=5.0, payload=1.0, locked=HELD
+)
 
 
 def robot(description: Description) -> Robot:
     return robot_of("mine", own_figures("mine", description)[0])
 
 
-def whole(urdf: str, held: dict[str, float], joints: tuple[str, ...]) -> tuple[pin.Model, Array, Array]:
-    """Pinocchio's model of all of a URDF, its neutral position with held joints, and the indices of the others."""
+def whole(
+    urdf: str, held: dict[str, float], joints: tuple[str, ...]
+) -> tuple[pin.Model, Array, Array]:
+    """Pinocchio's model of all of a URDF, its neutral position with held joints, and the indices of
+    the others.
+    """
     root = ElementTree.fromstring(urdf.replace("tool:note", "note"))
     for joint in root.findall("joint"):
         joint.set("name", f"joint_{joint.get('name')}")
@@ -80,7 +87,11 @@ def whole(urdf: str, held: dict[str, float], joints: tuple[str, ...]) -> tuple[p
     q = pin.neutral(model)
     for name, position in held.items():
         q[model.joints[model.getJointId(f"joint_{name}")].idx_q] = position
-    return model, q, np.array([model.joints[model.getJointId(f"joint_{name}")].idx_q for name in joints])
+    return (
+        model,
+        q,
+        np.array([model.joints[model.getJointId(f"joint_{name}")].idx_q for name in joints]),
+    )
 
 
 def refused(field: str, words: str, description: Description) -> None:
@@ -98,9 +109,12 @@ BLOCK = np.array([[x, y, z] for x in (0, 180) for y in (0, 60) for z in (0, 40)]
 
 
 def obj(points: Any) -> bytes:
-    """An OBJ with these corners (n, 3), and a face for each three of them that follow one another."""
+    """An OBJ with these corners (n, 3), and a face for each three of them that follow one
+    another."""
     lines = [f"v {x} {y} {z}" for x, y, z in np.asarray(points).tolist()]
-    return "\n".join([*lines, *(f"f {k} {k + 1} {k + 2}" for k in range(1, len(lines) - 1))]).encode()
+    return "\n".join(
+        [*lines, *(f"f {k} {k + 1} {k + 2}" for k in range(1, len(lines) - 1))]
+    ).encode()
 
 
 def changed(**changes: Any) -> Description:

@@ -1,4 +1,5 @@
-"""Meshes of a user's own arm: found by their paths, and held by a capsule, every triangle of them."""
+"""Meshes of a user's own arm: found by their paths, and held by a capsule, every triangle of
+them."""
 
 from __future__ import annotations
 
@@ -26,7 +27,9 @@ from tests.mesh_folders import meshes as arm_folder
 from tests.models.own_arm.arms import RICH, RICH_ARM, robot
 from tests.selection import long_but
 
-NAMED = RICH.replace('"forearm.stl"', '"package://cell/meshes/forearm.stl" scale="0.001 0.001 0.001"')
+NAMED = RICH.replace(
+    '"forearm.stl"', '"package://cell/meshes/forearm.stl" scale="0.001 0.001 0.001"'
+)
 # [mm], as a drawing program writes it
 BLOCK = trimesh.creation.box((180.0, 60.0, 40.0))
 
@@ -70,7 +73,9 @@ def test_a_capsule_is_found_again(seed: int) -> None:
     along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     ring = outward - (outward @ along)[:, None] * along
     ring *= radius / np.linalg.norm(ring, axis=1, keepdims=True)
-    points = np.concatenate([ends[0] + outward, ends[1] + outward, ends[0] + share * (ends[1] - ends[0]) + ring])
+    points = np.concatenate(
+        [ends[0] + outward, ends[1] + outward, ends[0] + share * (ends[1] - ends[0]) + ring]
+    )
     found, reach = capsule_around(points)
     assert volume(found, reach) < 1.02 * volume(ends, radius) + DIGIT * np.pi * radius
 
@@ -80,8 +85,15 @@ def test_a_capsule_is_found_again(seed: int) -> None:
 )
 def test_flat_and_thin_meshes_have_a_capsule(points: Array) -> None:
     axis, radius = capsule_around(points)
-    share = np.clip((points - axis[0]) @ (axis[1] - axis[0]) / max(np.sum((axis[1] - axis[0]) ** 2), 1e-30), 0, 1)
-    assert np.linalg.norm(points - axis[0] - share[:, None] * (axis[1] - axis[0]), axis=1).max() <= radius + 1e-12
+    share = np.clip(
+        (points - axis[0]) @ (axis[1] - axis[0]) / max(np.sum((axis[1] - axis[0]) ** 2), 1e-30),
+        0,
+        1,
+    )
+    assert (
+        np.linalg.norm(points - axis[0] - share[:, None] * (axis[1] - axis[0]), axis=1).max()
+        <= radius + 1e-12
+    )
 
 
 def test_a_mesh_of_the_urdf_is_held_where_it_stands(tmp_path: Path) -> None:
@@ -89,7 +101,9 @@ def test_a_mesh_of_the_urdf_is_held_where_it_stands(tmp_path: Path) -> None:
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes" / "forearm.stl").write_bytes(stl(BLOCK))
     by_folder = in_folder(tmp_path, NAMED)
-    by_zip = in_zip(zipped({"cell/meshes/forearm.stl": stl(BLOCK), "cell/meshes/other.stl": b"", "a.txt": b"?"}))
+    by_zip = in_zip(
+        zipped({"cell/meshes/forearm.stl": stl(BLOCK), "cell/meshes/other.stl": b"", "a.txt": b"?"})
+    )
     for files in (by_folder, by_zip):
         made = robot(dataclasses.replace(RICH_ARM, urdf=NAMED, meshes=files))
         # the cylinder and the mesh
@@ -97,8 +111,11 @@ def test_a_mesh_of_the_urdf_is_held_where_it_stands(tmp_path: Path) -> None:
         assert cylinder.radius == pytest.approx(0.04)
         half = np.array([0.09, 0.03, 0.02])
         assert np.hypot(*half[1:]) <= block.radius < 1.4 * np.hypot(*half[1:])
-        # the mesh's origin is that of the URDF link `forearm`, by the bracket 0.05 and 0.1 m off the joint
-        assert np.linalg.norm(block.axis.mean(axis=0)) == pytest.approx(np.hypot(0.05, 0.1), abs=5e-3)
+        # the mesh's origin is that of the URDF link `forearm`, by the bracket 0.05 and 0.1 m off
+        # the joint
+        assert np.linalg.norm(block.axis.mean(axis=0)) == pytest.approx(
+            np.hypot(0.05, 0.1), abs=5e-3
+        )
 
 
 def test_a_missing_mesh_is_told() -> None:
@@ -114,7 +131,10 @@ def test_a_missing_mesh_is_told() -> None:
         ({"forearm.stl": b"\x00" * 80 + b"\xff\xff\xff\x7f"}, "shorter than its header says"),
         ({"forearm.stl": stl(trimesh.creation.box((9e3, 1.0, 1.0)))}, "larger than 5 m"),
         (
-            {"a/meshes/forearm.stl": stl(BLOCK), "b/meshes/forearm.stl": stl(trimesh.creation.icosphere())},
+            {
+                "a/meshes/forearm.stl": stl(BLOCK),
+                "b/meshes/forearm.stl": stl(trimesh.creation.icosphere()),
+            },
             "Several files",
         ),
     ],
@@ -126,7 +146,10 @@ def test_a_mesh_that_is_none_is_named(files: dict[str, bytes], words: str) -> No
 
 
 def test_the_longest_agreement_of_paths_counts() -> None:
-    files = {"left/arm/link.stl": stl(BLOCK), "right/arm/link.stl": stl(trimesh.creation.icosphere())}
+    files = {
+        "left/arm/link.stl": stl(BLOCK),
+        "right/arm/link.stl": stl(trimesh.creation.icosphere()),
+    }
     found = corners(files, "package://cell/right/arm/link.stl")
     assert found is not None and np.linalg.norm(found, axis=1).max() == pytest.approx(1.0)
     assert corners(files, "package://cell/right/arm/hand.stl") is None
@@ -137,15 +160,21 @@ def test_the_longest_agreement_of_paths_counts() -> None:
 def test_a_zip_that_is_none_or_too_large(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InvalidArm, match="no zip"):
         in_zip(b"PK")
-    monkeypatch.setattr("joulepath.models.own_arm.mesh_files.LIMITS", dataclasses.replace(LIMITS, mesh_bytes=10_000))
+    monkeypatch.setattr(
+        "joulepath.models.own_arm.mesh_files.LIMITS", dataclasses.replace(LIMITS, mesh_bytes=10_000)
+    )
     with pytest.raises(InvalidArm, match="unpacks to more"):
         in_zip(zipped({"a.stl": b"0" * 20_000}))
-    monkeypatch.setattr("joulepath.models.own_arm.mesh_files.LIMITS", dataclasses.replace(LIMITS, mesh_files=1))
+    monkeypatch.setattr(
+        "joulepath.models.own_arm.mesh_files.LIMITS", dataclasses.replace(LIMITS, mesh_files=1)
+    )
     with pytest.raises(InvalidArm, match="2 mesh files"):
         in_zip(zipped({"a.stl": b"0", "b.obj": b"0"}))
 
 
-@pytest.mark.parametrize("method", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+@pytest.mark.parametrize(
+    "method", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA]
+)
 def test_a_broken_zip_is_refused_as_what_it_is(method: int) -> None:
     """Whatever unpacks it: 300 mutants of each method."""
     target, chance, refused = io.BytesIO(), random.Random(method), 0
@@ -165,13 +194,26 @@ def test_a_broken_zip_is_refused_as_what_it_is(method: int) -> None:
 
 @pytest.mark.long
 def test_an_arm_of_others_with_its_meshes(tmp_path: Path) -> None:
-    """The UR5e by its visual meshes: every link is within its capsule, as the bundled robot's are."""
-    text = (arm_folder("ur5e") / "ur5e.urdf").read_text().replace("<collision>", "<!--").replace("</collision>", "-->")
+    """The UR5e by its visual meshes: every link is within its capsule, as the bundled robot's
+    are."""
+    text = (
+        (arm_folder("ur5e") / "ur5e.urdf")
+        .read_text()
+        .replace("<collision>", "<!--")
+        .replace("</collision>", "-->")
+    )
     text = text.replace("<visual>", "<collision>").replace("</visual>", "</collision>")
     text = "\n".join(line for line in text.splitlines() if "<!-- " not in line)
     files = in_folder(arm_folder("ur5e"), text)
     made = robot(
-        Description(urdf=text, tip="tool0", base="base_link_inertia", acceleration=9.0, payload=5.0, meshes=files)
+        Description(
+            urdf=text,
+            tip="tool0",
+            base="base_link_inertia",
+            acceleration=9.0,
+            payload=5.0,
+            meshes=files,
+        )
     )
     assert len(files) >= 7 and {each.link for each in made.capsules} == set(range(7))
     for link in range(1, 7):

@@ -14,7 +14,22 @@ from joulepath.models.own_arm.figures import own_figures
 from tests.models.own_arm.arms import RICH, RICH_ARM
 from tests.selection import long_but
 
-NUMBERS = ("0", "-1", "1e308", "-1e308", "1e-308", "nan", "inf", "", "a", "1 2", "1e5", "9" * 400, "0x10", "1,5")
+NUMBERS = (
+    "0",
+    "-1",
+    "1e308",
+    "-1e308",
+    "1e-308",
+    "nan",
+    "inf",
+    "",
+    "a",
+    "1 2",
+    "1e5",
+    "9" * 400,
+    "0x10",
+    "1,5",
+)
 CHARACTERS = ("\0", "<", ">", '"', "&", "\xff", "\U0001f600")
 
 
@@ -24,7 +39,12 @@ def mutant(text: str, chance: random.Random) -> str:
     if kind == "character":
         at = chance.randrange(len(text))
         return text[:at] + chance.choice(CHARACTERS) + text[at + 1 :]
-    pattern = {"number": r"-?\d+\.?\d*", "attribute": r'\w+="[^"]*"', "element": r"<[^>]+/>", "name": r'"\w+"'}[kind]
+    pattern = {
+        "number": r"-?\d+\.?\d*",
+        "attribute": r'\w+="[^"]*"',
+        "element": r"<[^>]+/>",
+        "name": r'"\w+"',
+    }[kind]
     found = list(re.finditer(pattern, text))
     place, other = chance.choice(found), chance.choice(found)
     new = {
@@ -45,7 +65,12 @@ def test_a_mutant_is_a_robot_or_is_refused(count: int) -> None:
         for _ in range(chance.choice([1, 1, 2, 4])):
             text = mutant(text, chance)
         try:
-            assert robot_of("mutant", own_figures("mutant", dataclasses.replace(RICH_ARM, urdf=text))[0]).nq > 0
+            assert (
+                robot_of(
+                    "mutant", own_figures("mutant", dataclasses.replace(RICH_ARM, urdf=text))[0]
+                ).nq
+                > 0
+            )
         except InvalidArm:
             refused += 1
     assert 0.5 * count < refused < 0.95 * count

@@ -12,7 +12,14 @@ import pytest
 from joulepath import Arm, Problem, optimize
 from joulepath.app.schemas.examples.own_arm import URDF
 from joulepath.models.from_figures import robot_of
-from joulepath.models.own_arm.description import Collision, Description, Drives, Electronics, InvalidArm, Motion
+from joulepath.models.own_arm.description import (
+    Collision,
+    Description,
+    Drives,
+    Electronics,
+    InvalidArm,
+    Motion,
+)
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.registry import load_figures, load_robot
 from joulepath.models.robot import Array
@@ -30,7 +37,9 @@ FREE = 0.6
 
 
 @pytest.mark.parametrize(
-    ("description", "base", "held"), [(PLAIN, "base", {}), (RICH_ARM, "pedestal", HELD)], ids=["plain", "rich"]
+    ("description", "base", "held"),
+    [(PLAIN, "base", {}), (RICH_ARM, "pedestal", HELD)],
+    ids=["plain", "rich"],
 )
 def test_poses_and_torques_are_those_of_the_whole_urdf(
     description: Description, base: str, held: dict[str, float]
@@ -56,9 +65,15 @@ def test_poses_and_torques_are_those_of_the_whole_urdf(
 
 @pytest.mark.parametrize("name", ["ur3e", "ur5e"])
 def test_the_arms_of_another_package(name: str) -> None:
-    """The maker's arm, described by others: attributes with a prefix that nobody declares, rounded angles."""
+    """The maker's arm, described by others: attributes with a prefix that nobody declares, rounded
+    angles.
+    """
     text = (arm_folder(name) / f"{name}.urdf").read_text()
-    made = robot(Description(urdf=text, tip="tool0", base="base_link_inertia", acceleration=10.0, payload=3.0))
+    made = robot(
+        Description(
+            urdf=text, tip="tool0", base="base_link_inertia", acceleration=10.0, payload=3.0
+        )
+    )
     ours = load_robot(name)
     assert made.joint_names == ours.joint_names
     assert made.limits.v_max == pytest.approx(ours.limits.v_max, rel=1e-3)
@@ -72,17 +87,26 @@ def test_the_arms_of_another_package(name: str) -> None:
 
 
 def test_digits_that_a_description_lacks() -> None:
-    """Quarter turns written with five digits are quarter turns: the arm is of the form that its makers gave it."""
+    """Quarter turns written with five digits are quarter turns: the arm is of the form that its
+    makers gave it.
+    """
     text = (arm_folder("ur5e") / "ur5e.urdf").read_text()
     for written in ("1.5707963267948966", "1.570796327", "1.570796326589793"):
         text = text.replace(written, "1.5708")
     text = text.replace("3.141592653589793", "3.14159")
-    made = robot(Description(urdf=text, tip="tool0", base="base_link_inertia", acceleration=10.0, payload=3.0))
+    made = robot(
+        Description(
+            urdf=text, tip="tool0", base="base_link_inertia", acceleration=10.0, payload=3.0
+        )
+    )
     form = URClosedForm.of(made.model)
-    assert form is not None and (form.d1, form.a2, form.d6) == pytest.approx((0.1625, -0.425, 0.0996), abs=EXACT)
+    assert form is not None and (form.d1, form.a2, form.d6) == pytest.approx(
+        (0.1625, -0.425, 0.0996), abs=EXACT
+    )
     off = RICH.replace('rpy="0 1.5707963267948966 0"', 'rpy="0 1.5709 0"')
     kept, exact = (
-        robot(each).model.jointPlacements[3].rotation for each in (dataclasses.replace(RICH_ARM, urdf=off), RICH_ARM)
+        robot(each).model.jointPlacements[3].rotation
+        for each in (dataclasses.replace(RICH_ARM, urdf=off), RICH_ARM)
     )
     assert np.linalg.norm(pin.log3(kept.T @ exact)) == pytest.approx(1.5709 - np.pi / 2, abs=1e-9)
 
@@ -94,14 +118,23 @@ def test_what_is_missing_follows_from_the_rules_and_says_so() -> None:
     assert made.friction.coulomb == pytest.approx(0.06 * made.limits.tau_max)
     assert made.friction.viscous == pytest.approx(0.055 * made.limits.tau_max)
     # copper loss in W/(N·m)²
-    assert made.drives.copper / made.drives.torque_constant**2 == pytest.approx(0.5 / made.limits.tau_max)
+    assert made.drives.copper / made.drives.torque_constant**2 == pytest.approx(
+        0.5 / made.limits.tau_max
+    )
     assert made.electronics.idle_power == 12.0
     assert made.limits.j_max == pytest.approx(160.0)
     assert made.default_motion is None
-    for place in ("drives.rotor_inertia", "friction_laws.coulomb_viscous.coulomb", "electronics.idle_power"):
+    for place in (
+        "drives.rotor_inertia",
+        "friction_laws.coulomb_viscous.coulomb",
+        "electronics.idle_power",
+    ):
         assert place in warnings[-1]
     assert figures["drives"]["rotor_inertia"]["trust"] == "E"
-    assert "engineering defaults without a source (torque constants, rotor inertias, friction" in energy_trust(figures)
+    assert (
+        "engineering defaults without a source (torque constants, rotor inertias, friction"
+        in energy_trust(figures)
+    )
 
 
 def test_what_is_given_is_taken_with_its_source() -> None:
@@ -121,17 +154,25 @@ def test_what_is_given_is_taken_with_its_source() -> None:
     made = robot(given)
     assert made.limits.tau_max.tolist() == [50.0, 30.0] and made.limits.v_max.tolist() == [2.0, 2.0]
     assert made.limits.j_max.tolist() == [100.0, 100.0]
-    assert made.friction.coulomb.tolist() == [2.0, 1.0] and made.drives.rotor_inertia.tolist() == [0.3, 0.3]
+    assert made.friction.coulomb.tolist() == [2.0, 1.0] and made.drives.rotor_inertia.tolist() == [
+        0.3,
+        0.3,
+    ]
     assert made.drives.copper / made.drives.torque_constant**2 == pytest.approx(0.02)
     assert (made.electronics.idle_power, made.electronics.regeneration) == (9.0, 0.25)
     assert made.default_motion is not None and made.default_motion.velocity == 1.0
     assert figures["limits"]["torque"]["source"] == "data sheet"
     assert "electronics" not in warnings[-1] and "coulomb" not in warnings[-1]
-    assert "rotor inertias, friction, copper loss, idle power" in energy_trust(figures).split(" and engineering")[0]
+    assert (
+        "rotor inertias, friction, copper loss, idle power"
+        in energy_trust(figures).split(" and engineering")[0]
+    )
 
 
 def test_links_have_the_shapes_of_the_urdf() -> None:
-    """Each capsule holds its shape: corners of the box, rims of the cylinder, in the link's own frame."""
+    """Each capsule holds its shape: corners of the box, rims of the cylinder, in the link's own
+    frame.
+    """
     made = robot(RICH_ARM)
     by_link = [[each for each in made.capsules if each.link == k] for k in range(4)]
     assert [len(each) for each in by_link] == [1, 1, 1, 1]
@@ -139,7 +180,9 @@ def test_links_have_the_shapes_of_the_urdf() -> None:
     ring = np.stack([0.04 * np.cos(rim), 0.04 * np.sin(rim), np.full(40, 0.1)], axis=1)
     R_bracket, R_shape = pin.rpy.rpyToMatrix(0, np.pi / 2, 0), pin.rpy.rpyToMatrix(0, 1.57, 0)
     forearm = (np.vstack([ring, -ring]) @ R_shape.T + [0.1, 0, 0]) @ R_bracket.T + [0, 0.05, 0.1]
-    corners = np.array([[x, y, z] for x in (-0.05, 0.05) for y in (-0.05, 0.05) for z in (-0.05, 0.25)])
+    corners = np.array(
+        [[x, y, z] for x in (-0.05, 0.05) for y in (-0.05, 0.05) for z in (-0.05, 0.25)]
+    )
     axes = [np.array([0.0, 0.0, -1.0]), np.array([1, 1, 0.5]) / 1.5]
     for (capsule,), points, axis in zip(by_link[1:3], (corners, forearm), axes, strict=True):
         # the link's frame is the URDF's, turned so that z is the joint's axis
@@ -153,7 +196,9 @@ def test_links_have_the_shapes_of_the_urdf() -> None:
 
 
 def capsule_frame(axis: Array) -> Array:
-    """The rotation (3, 3) of least angle from z to an axis, by Rodrigues' formula; half a turn about x for -z."""
+    """The rotation (3, 3) of least angle from z to an axis, by Rodrigues' formula; half a turn
+    about x for -z.
+    """
     if axis[2] < -1 + EXACT:
         return np.diag([1.0, -1.0, -1.0])
     w = np.cross([0, 0, 1.0], axis)
@@ -162,7 +207,9 @@ def capsule_frame(axis: Array) -> Array:
 
 def test_capsules_and_pairs_of_the_user() -> None:
     rows = {"forearm": ((0.0, 0.0, 0.0, 0.2, 0.0, 0.0, 0.03), (0.1, 0.0, 0.0, 0.1, 0.0, 0.0, 0.05))}
-    made = robot(dataclasses.replace(RICH_ARM, collision=Collision(rows, 0.02, (("pedestal", "forearm"),))))
+    made = robot(
+        dataclasses.replace(RICH_ARM, collision=Collision(rows, 0.02, (("pedestal", "forearm"),)))
+    )
     capsules = [each for each in made.capsules if each.link == 2]
     assert [each.radius for each in capsules] == [0.03, 0.05]
     # the bracket's place in the link, and its turn by a right angle about y
@@ -174,46 +221,78 @@ def test_capsules_and_pairs_of_the_user() -> None:
 
 def test_pairs_of_an_srdf() -> None:
     """Of the whole machine: links that are not the arm's, and neighbours, count as nothing."""
-    pairs = (("pedestal", "forearm"), ("pedestal", "flange_arm"), ("wrist", "table"), ("pedestal", "finger"))
-    lines = "".join(f'<disable_collisions link1="{a}" link2="{b}" reason="Never"/>' for a, b in pairs)
+    pairs = (
+        ("pedestal", "forearm"),
+        ("pedestal", "flange_arm"),
+        ("wrist", "table"),
+        ("pedestal", "finger"),
+    )
+    lines = "".join(
+        f'<disable_collisions link1="{a}" link2="{b}" reason="Never"/>' for a, b in pairs
+    )
     srdf = f'<robot name="rich"><group name="arm"/>{lines}</robot>'
     assert robot(dataclasses.replace(RICH_ARM, srdf=srdf)).never_in_collision == {(0, 2), (0, 3)}
-    both = dataclasses.replace(RICH_ARM, srdf=srdf, collision=Collision(never_meet=(("wrist", "flange_arm"),)))
+    both = dataclasses.replace(
+        RICH_ARM, srdf=srdf, collision=Collision(never_meet=(("wrist", "flange_arm"),))
+    )
     assert robot(both).never_in_collision == {(0, 2), (0, 3), (1, 3)}
-    for text, words in (("<robot", "not XML"), ("<srdf/>", "root element"), ("<!DOCTYPE r>" + srdf, "document type")):
+    for text, words in (
+        ("<robot", "not XML"),
+        ("<srdf/>", "root element"),
+        ("<!DOCTYPE r>" + srdf, "document type"),
+    ):
         refused("srdf", words, dataclasses.replace(RICH_ARM, srdf=text))
 
 
 def test_a_motion_of_least_energy() -> None:
-    """From joints to joints, certified, above its bound; without the baseline of a default that nobody knows."""
-    made = robot(dataclasses.replace(RICH_ARM, collision=Collision(never_meet=(("pedestal", "elbow"),))))
+    """From joints to joints, certified, above its bound; without the baseline of a default that
+    nobody knows.
+    """
+    made = robot(
+        dataclasses.replace(RICH_ARM, collision=Collision(never_meet=(("pedestal", "elbow"),)))
+    )
     start, goal = np.array([0.1, 0.4, -0.3]), np.array([1.2, 1.5, 0.8])
     answer = optimize(Problem(arm=Arm(robot=made), start=start, goal=goal, deadline=AMPLE))
     assert answer.status == "optimal" and answer.certificate.valid
     assert 0 < answer.lower_bound <= answer.energy.electrical.total
-    assert [each.name for each in answer.baselines] == ["trapezoid", "quintic", "ruckig", "ruckig_slowed"]
+    assert [each.name for each in answer.baselines] == [
+        "trapezoid",
+        "quintic",
+        "ruckig",
+        "ruckig_slowed",
+    ]
 
 
 def test_names_that_stand_for_the_ends_of_every_robot() -> None:
-    """And those of other figures in the section of the links' shapes: a link may be named as it likes."""
+    """And those of other figures in the section of the links' shapes: a link may be named as it
+    likes.
+    """
     for name in ("elbow", "flange", "base", "never_meet"):
         urdf = RICH.replace('"elbow"', f'"{name}"')
         figures, _ = own_figures("mine", dataclasses.replace(RICH_ARM, urdf=urdf))
-        assert figures["kinematics"]["link_names"]["value"] == ["flange_arm", f"{name}_link", "wrist"]
+        assert figures["kinematics"]["link_names"]["value"] == [
+            "flange_arm",
+            f"{name}_link",
+            "wrist",
+        ]
         assert robot_of("mine", figures).nq == 3
 
 
 def test_a_file_is_read(tmp_path: Path) -> None:
     (tmp_path / "arm.urdf").write_text(URDF)
     file = tmp_path / "my_arm.yaml"
-    file.write_text("urdf: arm.urdf\ntip: tool\nacceleration: [8, 6.5]\npayload: 2\ndrives: {copper: 0.02}\n")
+    file.write_text(
+        "urdf: arm.urdf\ntip: tool\nacceleration: [8, 6.5]\npayload: 2\ndrives: {copper: 0.02}\n"
+    )
     made = load_robot(file)
     assert (made.name, made.limits.a_max.tolist()) == ("my_arm", [8.0, 6.5])
     assert load_robot(str(file)) is made
     file.write_text("urdf: arm.urdf\ntip: tool\nacceleration: 9\npayload: 2\nsrdf: arm.srdf\n")
     with pytest.raises(InvalidArm, match=r"no file .*arm\.srdf"):
         load_robot(file)
-    (tmp_path / "arm.srdf").write_text('<robot><disable_collisions link1="base" link2="tool"/></robot>')
+    (tmp_path / "arm.srdf").write_text(
+        '<robot><disable_collisions link1="base" link2="tool"/></robot>'
+    )
     assert load_robot(file).limits.a_max.tolist() == [9.0, 9.0]
     assert load_robot(file).never_in_collision == {(0, 2)}
     with pytest.raises(OSError, match=r"other\.yaml"):
@@ -221,9 +300,13 @@ def test_a_file_is_read(tmp_path: Path) -> None:
 
 
 def test_guessed_capsules_of_a_wrist_leave_most_configurations_valid() -> None:
-    """Of arms by their kinematics alone: capsules from joint to joint are too thick next to a spherical wrist."""
+    """Of arms by their kinematics alone: capsules from joint to joint are too thick next to a
+    spherical wrist.
+    """
     for name in ("kr10_r1100", "ur10e", "xarm7"):
-        given = Description(urdf=urdf_of(name, load_figures(name)), tip="flange", acceleration=10.0, payload=5.0)
+        given = Description(
+            urdf=urdf_of(name, load_figures(name)), tip="flange", acceleration=10.0, payload=5.0
+        )
         made = robot(given)
         model = collision_model(Arm(robot=made))
         q = np.random.default_rng(3).uniform(made.limits.q_min, made.limits.q_max, (200, made.nq))

@@ -20,11 +20,16 @@ def change(old: str, new: str, urdf: str = RICH) -> dict[str, Any]:
     return {"urdf": urdf.replace(old, new)}
 
 
-WITHOUT_MASS = {"urdf": RICH.replace('<mass value="0.8"/>', '<mass value="0"/>').replace('value="0.1"', 'value="0"')}
+WITHOUT_MASS = {
+    "urdf": RICH.replace('<mass value="0.8"/>', '<mass value="0"/>').replace(
+        'value="0.1"', 'value="0"'
+    )
+}
 
 
 BALL_JOINT = (
-    '<link name="world"/><link name="y"/><joint name="x" type="ball"><parent link="world"/><child link="y"/></joint>'
+    '<link name="world"/><link name="y"/><joint name="x" type="ball"><parent '
+    'link="world"/><child link="y"/></joint>'
 )
 
 
@@ -45,16 +50,28 @@ WRONG: list[tuple[str, str, dict[str, Any]]] = [
     ("locked", "no joint 'thumb'", {"locked": {"thumb": 0.0}}),
     ("locked", "'finger' moves a link beside", {"locked": None}),
     ("urdf", "'finger' is prismatic", {"tip": "finger", "locked": None}),
-    ("urdf", "'twist' mimics", change('<origin xyz="0.25 0 0"/>', '<origin xyz="0.25 0 0"/><mimic joint="pan"/>')),
+    (
+        "urdf",
+        "'twist' mimics",
+        change('<origin xyz="0.25 0 0"/>', '<origin xyz="0.25 0 0"/><mimic joint="pan"/>'),
+    ),
     ("urdf", "'elbow' has no <limit>", change('lower="-2" upper="2.5" ', "")),
     ("urdf", "'elbow' cannot move", change('lower="-2" upper="2.5"', 'lower="1" upper="1"')),
     ("urdf", "`upper` that is no finite number", change('upper="2.5"', 'upper="inf"')),
     ("urdf", "Two links", change('name="wrist"', 'name="hand"')),
     ("urdf", "Two joints", change('"twist"', '"pan"')),
-    ("urdf", "that the URDF does not have", change('<child link="wrist"/>', '<child link="wirst"/>')),
+    (
+        "urdf",
+        "that the URDF does not have",
+        change('<child link="wrist"/>', '<child link="wirst"/>'),
+    ),
     ("urdf", "hangs on two joints", change('<child link="finger"/>', '<child link="wrist"/>')),
     ("urdf", "in a loop: hand, wrist, ", LOOP),
-    ("urdf", "one root link", change('<link name="world"/>', '<link name="world"/><link name="island"/>')),
+    (
+        "urdf",
+        "one root link",
+        change('<link name="world"/>', '<link name="world"/><link name="island"/>'),
+    ),
     ("urdf", "<axis> of no length", change('xyz="0 0 -2"', 'xyz="0 0 0"')),
     ("urdf", "'wrist', with what is fixed to it, has no mass", WITHOUT_MASS),
     ("urdf", "'flange_arm' has an impossible inertia", change('izz="0.015"', 'izz="0.09"')),
@@ -70,19 +87,31 @@ WRONG: list[tuple[str, str, dict[str, Any]]] = [
     ("default_motion", "above 0", {"default_motion": Motion(0.0, 1.0)}),
     ("collision.radius", "between 0.0001 and 1 m", {"collision": Collision(radius=2.0)}),
     ("collision.capsules", "no link 'tail'", {"collision": Collision({"tail": ()})}),
-    ("collision.capsules", "'wrist' must be between", {"collision": Collision({"wrist": ((0.0,) * 7,)})}),
-    ("collision.never_meet", "no link 'tail'", {"collision": Collision(never_meet=(("tail", "wrist"),))}),
+    (
+        "collision.capsules",
+        "'wrist' must be between",
+        {"collision": Collision({"wrist": ((0.0,) * 7,)})},
+    ),
+    (
+        "collision.never_meet",
+        "no link 'tail'",
+        {"collision": Collision(never_meet=(("tail", "wrist"),))},
+    ),
     ("drives.viscous", "0, or from 1e-06", {"drives": Drives(viscous=-1.0)}),
     ("urdf", "are its units SI", change('<mass value="2.5"/>', '<mass value="2.5e300"/>')),
     ("urdf", "are its units SI", change('<origin xyz="0.25 0 0"/>', '<origin xyz="250 0 0"/>')),
     ("urdf", "within 100 rad", change('lower="-2" upper="2.5"', 'lower="-180" upper="180"')),
     ("velocity", "from 1e-06", change('velocity="2.5"', 'velocity="1e30"')),
     ("urdf", "`iyz` that is no finite number", change('iyy="0.01" iyz="0"', 'iyy="0.01"')),
-    ("urdf", "3 finite numbers", change('<origin xyz="0.1 0 0" rpy="0 1.2 0"/>', '<origin xyz="0.1 0"/>')),
+    (
+        "urdf",
+        "3 finite numbers",
+        change('<origin xyz="0.1 0 0" rpy="0 1.2 0"/>', '<origin xyz="0.1 0"/>'),
+    ),
     ("urdf", "Pinocchio does not read", change('<link name="world"/>', BALL_JOINT)),
     ("urdf", "farther than 50 m", change('<origin xyz="0 0 0.1"/>', '<origin xyz="1e308 0 0"/>')),
     ("urdf", "3 finite numbers", change('size="0.1 0.1 0.3"', 'size="0.1 0.1"')),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("field", "words", "changes"), WRONG, ids=[words for _, words, _ in WRONG])
@@ -109,10 +138,16 @@ def test_what_is_hardly_real_is_remarked() -> None:
         ("urdf: arm.urdf\ntip: tool\nacceleration: fast\npayload: 2", "acceleration", "number"),
         ("urdf: arm.urdf\ntip: tool\nacceleration: 8\npayload: .nan", "payload", "finite"),
         ("urdf: arm.urdf\ntip: tool\nacceleration: 8\npayload: 2\nmass: 3", "mass", "Unexpected"),
-        ("urdf: arm.urdf\ntip: tool\nacceleration: 8\npayload: 2\ndrives: {copper: x}", "drives.copper", "number"),
+        (
+            "urdf: arm.urdf\ntip: tool\nacceleration: 8\npayload: 2\ndrives: {copper: x}",
+            "drives.copper",
+            "number",
+        ),
     ],
 )
-def test_what_is_wrong_in_a_file_is_named(tmp_path: Path, text: str, field: str, words: str) -> None:
+def test_what_is_wrong_in_a_file_is_named(
+    tmp_path: Path, text: str, field: str, words: str
+) -> None:
     (tmp_path / "arm.urdf").write_text(URDF)
     (tmp_path / "my_arm.yaml").write_text(text)
     with pytest.raises(InvalidArm, match=words) as found:

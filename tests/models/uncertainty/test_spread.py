@@ -1,4 +1,6 @@
-"""Draws of figures: the ranges of the table, the document's covariance, and the same draws everywhere."""
+"""Draws of figures: the ranges of the table, the document's covariance, and the same draws
+everywhere.
+"""
 
 from __future__ import annotations
 
@@ -39,16 +41,22 @@ def drawn(robot: Robot, name: str, joint: int = 0) -> Array:
 @pytest.mark.parametrize(
     ("name", "joint", "range_of"),
     [
-        (BASE_POWER, 0, "idle_power"), ("copper", 1, "copper_large"), ("copper", 4, "copper_small"),
-        ("torque_constant", 2, "torque_constant"), ("rotor_inertia", 5, "rotor_inertia"), ("load", 0, "load"),
+        (BASE_POWER, 0, "idle_power"),
+        ("copper", 1, "copper_large"),
+        ("copper", 4, "copper_small"),
+        ("torque_constant", 2, "torque_constant"),
+        ("rotor_inertia", 5, "rotor_inertia"),
+        ("load", 0, "load"),
         ("inverter_linear", 3, "inverter_linear"),
     ],
-)  # fmt: skip
+)
 def test_defaults_have_the_ranges_of_the_table(name: str, joint: int, range_of: str) -> None:
     entry, found = default_ranges()[range_of], np.quantile(drawn(UR5E, name, joint), [0.05, 0.95])
     own = 1.0
     if "factor" in entry:
-        own = UR5E.electronics.idle_power if name == BASE_POWER else getattr(UR5E.drives, name)[joint]
+        own = (
+            UR5E.electronics.idle_power if name == BASE_POWER else getattr(UR5E.drives, name)[joint]
+        )
     low, high = entry.get("factor", entry.get("value"))
     assert found[1] == pytest.approx(high * own, rel=STRIP)
     # from zero on, every value is as likely as any other
@@ -60,7 +68,9 @@ def test_joints_share_a_factor_of_friction() -> None:
     one, two = drawn(UR5E, "coulomb", 1), drawn(UR5E, "coulomb", 4)
     correlation = np.corrcoef(one, two)[0, 1]
     assert 0.2 < correlation < 0.6
-    assert np.corrcoef(drawn(UR5E, "copper", 0), drawn(UR5E, "copper", 2))[0, 1] == pytest.approx(1.0)
+    assert np.corrcoef(drawn(UR5E, "copper", 0), drawn(UR5E, "copper", 2))[0, 1] == pytest.approx(
+        1.0
+    )
     assert abs(np.corrcoef(drawn(UR5E, "copper", 0), drawn(UR5E, "copper", 4))[0, 1]) < 0.1
     assert (drawn(UR5E, "load", 3) == 0).all()
 
@@ -70,8 +80,13 @@ def test_the_root_makes_the_covariance() -> None:
         spread = spread_of(robot, robot.friction.name)
         whole = np.sum(list(spread.covariances.values()), axis=0)
         scale = np.sqrt(np.diag(whole))
-        assert np.abs(spread.root @ spread.root.T - whole).max() <= 1e-5 * np.outer(scale, scale).max()
-        assert spread.draws.shape == (DRAWS, count(robot.nq)) and np.abs(spread.draws.mean(axis=0)).max() < 1e-9
+        assert (
+            np.abs(spread.root @ spread.root.T - whole).max() <= 1e-5 * np.outer(scale, scale).max()
+        )
+        assert (
+            spread.draws.shape == (DRAWS, count(robot.nq))
+            and np.abs(spread.draws.mean(axis=0)).max() < 1e-9
+        )
         assert len(spread.mean) == 1 + robot.nq * len(PER_JOINT)
 
 
@@ -100,11 +115,17 @@ def test_an_engineering_default_is_known_less_well() -> None:
     robot = own_robot("ruled", own_figures("ruled", to_description(OwnArm(**ARM)))[0])
     low, high = np.quantile(drawn(robot, BASE_POWER) / robot.electronics.idle_power, [0.05, 0.95])
     assert (low, high) == pytest.approx((0.5, 2.5), rel=10 * STRIP)
-    low, high = np.quantile(drawn(robot, "rotor_inertia") / robot.drives.rotor_inertia[0], [0.05, 0.95])
+    low, high = np.quantile(
+        drawn(robot, "rotor_inertia") / robot.drives.rotor_inertia[0], [0.05, 0.95]
+    )
     assert (low, high) == pytest.approx((0.4, 2.5), rel=10 * STRIP)
 
 
 def test_figures_that_are_given_are_known() -> None:
     spread = spread_of(UR5E, UR5E.friction.name, ("inverter_linear",))
     part = place("inverter_linear", 6)
-    assert not spread.draws[:, part].any() and not spread.mean[part].any() and not spread.root[part].any()
+    assert (
+        not spread.draws[:, part].any()
+        and not spread.mean[part].any()
+        and not spread.root[part].any()
+    )

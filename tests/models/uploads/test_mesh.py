@@ -32,7 +32,9 @@ BALL = trimesh.creation.icosphere(subdivisions=1)
 
 
 def sorted_triangles(triangles: Array) -> list[list[tuple[float, ...]]]:
-    """Triangles (n, 3, 3), whichever corner each begins with, in an order that does not depend on the file's."""
+    """Triangles (n, 3, 3), whichever corner each begins with, in an order that does not depend on
+    the file's.
+    """
     found = []
     for corners in triangles.tolist():
         first = corners.index(min(corners))

@@ -38,7 +38,9 @@ def _from_outside(each: Array) -> Array:
     return np.cumsum(each[:, ::-1], axis=1)[:, ::-1]
 
 
-def grid_points(chain: ChainDerivatives, x: Array, omega: Array, offsets: Array, needed: Mask) -> GridPoints:
+def grid_points(
+    chain: ChainDerivatives, x: Array, omega: Array, offsets: Array, needed: Mask
+) -> GridPoints:
     """As `GridPoints.of`."""
     S, K = len(x) - 1, len(offsets)
     x_rate, omega_rate = np.diff(x, axis=0) * S, np.diff(omega, axis=0) * S
@@ -54,7 +56,9 @@ def grid_points(chain: ChainDerivatives, x: Array, omega: Array, offsets: Array,
     beside = joint_inertia(chain, q + STEP * np.repeat(omega, K, axis=0)[flat])
     M, N = placed(own), placed((beside - own) / STEP)
     momentum = _sides(
-        lambda at: np.einsum("spjk,sk->spj", M[at], omega_rate) + np.einsum("spjk,sk->spj", N[at], x_rate)
+        lambda at: (
+            np.einsum("spjk,sk->spj", M[at], omega_rate) + np.einsum("spjk,sk->spj", N[at], x_rate)
+        )
     )
     kinetic = _sides(
         lambda at: (
@@ -77,7 +81,9 @@ def _sides(term: Callable[[slice], Array]) -> Array:
     return np.stack([term(slice(None, -1)), term(slice(1, None))], axis=1)
 
 
-def deviation(cells: GridCells, value: Array, mean: Array, curvature: Curvature, joints: Sequence[int]) -> Array:
+def deviation(
+    cells: GridCells, value: Array, mean: Array, curvature: Curvature, joints: Sequence[int]
+) -> Array:
     """As `GridCells.deviation`."""
     away = np.abs(value - mean[:, None, None])[..., joints]
     around = _between(cells, curvature.across[..., joints]) + curvature.along[:, None, joints]
@@ -96,7 +102,9 @@ def _of_corners(cells: GridCells, points: Array, reduce: Callable[[Array, Array]
 def _between(cells: GridCells, second: Array) -> Array:
     """Σ h² / 8 · second (S, 2, k) over the sides of each cell (S, cells, k)."""
     first, other = (np.diff(axis) ** 2 / 8 for axis in cells.axes)
-    both = second[:, 0, None, None] * first[:, None, None] + second[:, 1, None, None] * other[:, None]
+    both = (
+        second[:, 0, None, None] * first[:, None, None] + second[:, 1, None, None] * other[:, None]
+    )
     return np.asarray(both.reshape(len(second), cells.count, second.shape[-1]))
 
 
@@ -112,7 +120,10 @@ def least_potential(potential: LeastPotential, weights: Weights, fast: Array, sl
     still = scale * (terms.gravity - (along + np.maximum(excess, 0.0))[:, :, None])
     corner = still + np.minimum(f2 * square, s2 * square)
     b2 = fast[:, None, None] ** 2
-    bend = scale * (terms.gravity_curvature.across + b2 * terms.kinetic_curvature.across) + b2 * hold[grid]
+    bend = (
+        scale * (terms.gravity_curvature.across + b2 * terms.kinetic_curvature.across)
+        + b2 * hold[grid]
+    )
     flat = scale * (terms.gravity_curvature.along + b2[..., 0] * terms.kinetic_curvature.along)
     value = _of_corners(cells, corner[..., None], np.minimum)[..., 0]
     value -= np.stack([_between(cells, each[..., None])[..., 0] for each in bend])[:, :, None]
@@ -125,11 +136,17 @@ def least_potential(potential: LeastPotential, weights: Weights, fast: Array, sl
 def _beside(potential: LeastPotential, weights: Weights, fast: Array, slow: Array) -> Array:
     """What the joints beside the grid's can take from Ψ (B, S, 2, cells) [W]."""
     terms, scale, b2, hold = potential.terms, weights.scale, fast[:, None] ** 2, _hold(weights)
-    taken, cross_terms = np.zeros((len(fast), *terms.steepness.shape[:-1])), potential._cross(weights)
+    taken, cross_terms = (
+        np.zeros((len(fast), *terms.steepness.shape[:-1])),
+        potential._cross(weights),
+    )
     for i, joint in enumerate(terms.others):
         stiffness = hold[joint] * slow[:, None] ** 2 - scale * terms.gravity_others[:, i]
         stiffness = (stiffness - b2 * cross_terms[:, i])[:, :, None, None]
-        more = _excess(fast, slow)[:, None] * np.abs(terms.slope[:, joint]) + b2 * terms.kinetic_others[:, i]
+        more = (
+            _excess(fast, slow)[:, None] * np.abs(terms.slope[:, joint])
+            + b2 * terms.kinetic_others[:, i]
+        )
         s = scale * (terms.steepness[..., i] + more[:, :, None, None])
         stable, half = stiffness > 0, terms.half[:, joint, None, None]
         far = np.where(stable, np.minimum(s / np.where(stable, stiffness, 1.0), half), half)
@@ -137,7 +154,9 @@ def _beside(potential: LeastPotential, weights: Weights, fast: Array, slow: Arra
     return taken
 
 
-def greatest(friction: FrictionConjugate, p: Array, omega: Array, square: Array, most: Array) -> tuple[Array, Array]:
+def greatest(
+    friction: FrictionConjugate, p: Array, omega: Array, square: Array, most: Array
+) -> tuple[Array, Array]:
     """The upper bounds (..., nq) of `greatest` in `speed_conjugate.c`, and where they are."""
     shape = np.broadcast_shapes(p.shape, omega.shape, square.shape, most.shape)
     best, where = np.zeros(shape), np.zeros(shape)
@@ -188,13 +207,16 @@ def speed_conjugate(conjugate: SpeedConjugate, weights: Weights) -> tuple[Array,
 
 
 def _ends(parts: TimeParts, nodes: Array) -> Array:
-    """Values (P, 2, nq) at both ends of each part, of what is linear between nodes (steps + 1, nq)."""
+    """Values (P, 2, nq) at both ends of each part, of what is linear between nodes (steps + 1,
+    nq)."""
     first, last = nodes[parts.step, None], nodes[parts.step + 1, None]
     return np.asarray(first + parts.within[..., None] * (last - first))
 
 
 def _multiplier(conjugate: SpeedConjugate, weights: Weights, which: int) -> Array:
-    """m (nq,) [N·m] for the first or last duration with which the speeds of H cover the displacement."""
+    """m (nq,) [N·m] for the first or last duration with which the speeds of H cover the
+    displacement.
+    """
     terms, duration, costate = conjugate.terms, conjugate.duration[which], conjugate._costate
     scale, friction = weights.scale, conjugate.friction
     b, omega = terms.x_rate / duration, scale * (terms.omega[1:] + terms.omega[:-1]) / 2
@@ -212,9 +234,17 @@ def _multiplier(conjugate: SpeedConjugate, weights: Weights, which: int) -> Arra
 
 
 def _height(
-    conjugate: SpeedConjugate, weights: Weights, p: Array, omega: Array, b: Array, stiffness: Array, most: Array
+    conjugate: SpeedConjugate,
+    weights: Weights,
+    p: Array,
+    omega: Array,
+    b: Array,
+    stiffness: Array,
+    most: Array,
 ) -> tuple[Array, Array]:
-    """H (..., nq) [W] for these p, ω, speeds b of the path, κ + μ + ν and greatest speeds, and where it is."""
+    """H (..., nq) [W] for these p, ω, speeds b of the path, κ + μ + ν and greatest speeds, and
+    where it is.
+    """
     more, slowness = 1 + 2 * weights.work, conjugate._slowness(weights)
     linear = p - stiffness * b + slowness * omega
     square = stiffness / 2 + weights.work * slowness

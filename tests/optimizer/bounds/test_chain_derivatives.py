@@ -14,7 +14,9 @@ from tests.optimizer.moves import CEILING, PAYLOAD, ROBOT, TILTED
 
 ROUNDING = 1e-11  # of sums of some hundred products of order 10
 STEP = 1e-4
-DIFFERENCE = 1e-5  # rounding of 1e-14 over the square of the step, and what central differences miss
+DIFFERENCE = (
+    1e-5  # rounding of 1e-14 over the square of the step, and what central differences miss
+)
 ARMS = {
     "bare": Arm(robot=ROBOT),
     "loaded and tilted": Arm(robot=ROBOT, payload=PAYLOAD, gravity=TILTED),
@@ -34,7 +36,10 @@ def test_torques_and_inertia_are_pinocchios(name: str) -> None:
     inertia = chain.joint_inertia(q)
     for k, each in enumerate(q):
         assert np.abs(torque[k] - pin.computeGeneralizedGravity(model, data, each)).max() < ROUNDING
-        assert np.abs(slope[k] - pin.computeGeneralizedGravityDerivatives(model, data, each)).max() < ROUNDING
+        assert (
+            np.abs(slope[k] - pin.computeGeneralizedGravityDerivatives(model, data, each)).max()
+            < ROUNDING
+        )
         M = np.triu(pin.crba(model, data, each))
         M = M + np.triu(M, 1).T - np.diag(model.armature) + np.diag(arm.drives.rotor_inertia)
         assert np.abs(inertia[k] - M).max() < ROUNDING
@@ -42,8 +47,8 @@ def test_torques_and_inertia_are_pinocchios(name: str) -> None:
 
 @pytest.mark.parametrize("name", list(ARMS))
 def test_no_derivative_exceeds_its_bound(name: str) -> None:
-    """First to third derivatives of the inertia, second and third of the potential energy, by differences; among them
-    some that come near the bound."""
+    """First to third derivatives of the inertia, second and third of the potential energy, by
+    differences; among them some that come near the bound."""
     chain, q = ChainDerivatives.of(ARMS[name]), configurations(2, 300)
     U2, U3 = chain.potential_bound(2), chain.potential_bound(3)
     D1, D2, D3 = (chain.inertia_bound(n) for n in (1, 2, 3))
@@ -57,7 +62,11 @@ def test_no_derivative_exceeds_its_bound(name: str) -> None:
         change = (chain.joint_inertia(ahead) - chain.joint_inertia(behind)) / (2 * STEP)
         assert (np.abs(change).max(axis=0) <= D1[j] + DIFFERENCE).all()
         for k, second in enumerate(np.eye(6)):
-            corners = [chain.joint_inertia(each + s * STEP * second) for each in (ahead, behind) for s in (1, -1)]
+            corners = [
+                chain.joint_inertia(each + s * STEP * second)
+                for each in (ahead, behind)
+                for s in (1, -1)
+            ]
             twice = (corners[0] - corners[1] - corners[2] + corners[3]) / (4 * STEP**2)
             assert (np.abs(twice).max(axis=0) <= D2[j, k] + DIFFERENCE).all()
     rng, coarse = np.random.default_rng(3), 0.02

@@ -1,4 +1,5 @@
-"""The terms of dual bounds by the C library against those by numpy, and against their definitions."""
+"""The terms of dual bounds by the C library against those by numpy, and against their
+definitions."""
 
 from __future__ import annotations
 
@@ -25,12 +26,16 @@ from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED
 
 STEPS = 7
 SAME = 1e-11  # relative; both round
-DIFFERENCE = 1e-8  # relative; the difference quotient of the inertia has a step of 1e-5 of the multipliers
+DIFFERENCE = (
+    1e-8  # relative; the difference quotient of the inertia has a step of 1e-5 of the multipliers
+)
 LOAD = np.array([0.2, 0.1, 0.05, 0.0, 0.3, 0.9])
 ARMS: dict[str, Arm] = {
     "ur5e": Arm(robot=ROBOT),
     "loaded and tilted": Arm(robot=ROBOT, payload=PAYLOAD, gravity=TILTED),
-    "friction with the load": Arm(robot=replace(ROBOT, friction_laws={"load": replace(ROBOT.friction, load=LOAD)})),
+    "friction with the load": Arm(
+        robot=replace(ROBOT, friction_laws={"load": replace(ROBOT.friction, load=LOAD)})
+    ),
     "panda": Arm(robot=load_robot("panda"), payload=Payload(1.0, np.array([0.02, 0.0, 0.1]))),
     "ur20": Arm(robot=load_robot("ur20")),
 }
@@ -55,7 +60,9 @@ class Case:
         first, other = sorted(rng.choice(nq, 2, replace=False).tolist())
         kept = rng.random(nq) < 0.7
         loss = arm.drives.copper / arm.drives.torque_constant**2
-        return cls(arm, ChainDerivatives.of(arm), Reference(x, multipliers * kept), loss, (first, other))
+        return cls(
+            arm, ChainDerivatives.of(arm), Reference(x, multipliers * kept), loss, (first, other)
+        )
 
     def terms(self, longest: float) -> Any:
         half = half_sides(self.reference, self.arm.active_limits, longest)
@@ -111,7 +118,9 @@ def test_least_potential_and_greatest_speed_terms(name: str) -> None:
                 expected = numpy_terms.least_potential(potential, weights, fast, slow)
                 assert_same(potential(weights, fast, slow), expected)
             for durations in (edges, edges[:1]):
-                conjugate = SpeedConjugate(friction, case.arm.active_limits, terms, case.loss, durations)
+                conjugate = SpeedConjugate(
+                    friction, case.arm.active_limits, terms, case.loss, durations
+                )
                 for found, expected in zip(
                     conjugate(weights), numpy_terms.speed_conjugate(conjugate, weights), strict=True
                 ):
@@ -124,7 +133,9 @@ def test_an_arm_of_two_joints_has_none_beside_the_grid() -> None:
     chain = ChainDerivatives(*(each[:2] for each in arrays), whole.gravity)
     reference = Reference(rng.normal(size=(STEPS + 1, 2)), rng.normal(size=(STEPS + 1, 2)) * 10)
     half = rng.uniform(0.1, 1, (STEPS, 2))
-    potential = LeastPotential(path_terms(chain, reference, np.array([0.01, 0.01]), half, (0, 1), Spacing()))
+    potential = LeastPotential(
+        path_terms(chain, reference, np.array([0.01, 0.01]), half, (0, 1), Spacing())
+    )
     weights, beta = Weights(0.5, np.array([1.0, 2.0]), np.array([0.5, 0.5])), np.array([1.0, 0.8])
     found = potential(weights, beta, 0.9 * beta)
     assert_same(found, numpy_terms.least_potential(potential, weights, beta, 0.9 * beta))
@@ -144,7 +155,9 @@ def test_deviation_of_cells() -> None:
     corners = [4 + 1, 4 + 2, 8 + 1, 8 + 2]
     expected = np.abs(value[0, 1, corners][:, joints] - mean[0, list(joints)]).max(axis=0)
     expected += curvature.along[0, list(joints)]
-    expected += (curvature.across[0, 0] * 0.3**2 / 8 + curvature.across[0, 1] * 0.1**2 / 8)[list(joints)]
+    expected += (curvature.across[0, 0] * 0.3**2 / 8 + curvature.across[0, 1] * 0.1**2 / 8)[
+        list(joints)
+    ]
     assert_same(found[0, 1, 3 + 1], expected)
 
 
@@ -153,8 +166,12 @@ def test_points_that_are_needed_are_the_corners_of_cells_within_the_boxes() -> N
     half = np.array([[0.1, 0.1], [1.0, 0.5], [0.4, 0.1], [1e-6, 1e-6]])
     needed, beyond = cells.needed(half), cells.beyond(half)
     positions, reached = cells.points(), np.zeros_like(needed)
-    low = np.stack(np.meshgrid(*(axis[:-1] for axis in cells.axes), indexing="ij"), axis=-1).reshape(-1, 2)
-    high = np.stack(np.meshgrid(*(axis[1:] for axis in cells.axes), indexing="ij"), axis=-1).reshape(-1, 2)
+    low = np.stack(
+        np.meshgrid(*(axis[:-1] for axis in cells.axes), indexing="ij"), axis=-1
+    ).reshape(-1, 2)
+    high = np.stack(
+        np.meshgrid(*(axis[1:] for axis in cells.axes), indexing="ij"), axis=-1
+    ).reshape(-1, 2)
     for step, cell in zip(*np.nonzero(beyond == 0), strict=True):
         corner = ((positions == low[cell]) | (positions == high[cell])).all(axis=1)
         reached[step : step + 2] |= corner

@@ -1,4 +1,6 @@
-"""The dual bound: no motion whose duration is in its interval spends less, whatever it is built around."""
+"""The dual bound: no motion whose duration is in its interval spends less, whatever it is built
+around.
+"""
 
 from __future__ import annotations
 
@@ -34,17 +36,24 @@ from tests.selection import long_but
 Moved = tuple[Array, Array, Array, Array, Array]
 STEPS, FINE = 6, 801
 WIDE = Spacing()
-CHOICE = 1e-3  # relative; a cell has one multiplier of the displacement, found by bisection, and a duration its own
+# relative; a cell has one multiplier of the displacement, found by bisection, and a duration its
+# own
+CHOICE = 1e-3
 MOVES = 2
 NARROW, LOST = 1.015, 0.01  # a cell of durations, and what such a cell may take from the bound
 CLOSELY = 0.02  # relative: how near the bound comes to what it bounds
 USEFUL = 0.3  # of the energy, where nearly all of it is copper loss; elsewhere more
-CHORDS = 0.05  # of a watt and of the value: chords instead of the curve, 13 intervals up to the greatest speed
+# of a watt and of the value: chords instead of the curve, 13 intervals up to the greatest speed
+CHORDS = 0.05
 LEEWAY = 1e-9  # rounding: rad, or W
 
 
 def dual_of(
-    task: PreparedProblem, reference: Reference, longest: float, grid: tuple[int, int], spacing: Spacing = WIDE
+    task: PreparedProblem,
+    reference: Reference,
+    longest: float,
+    grid: tuple[int, int],
+    spacing: Spacing = WIDE,
 ) -> DualBound:
     arm, x = task.arm, reference.x
     loss = (arm.drives.copper + arm.drives.inverter_quadratic) / arm.drives.torque_constant**2
@@ -55,23 +64,44 @@ def dual_of(
     rates = multiplier_rates(reference.multipliers, loss, friction.load)
     base = arm.base_power + float(arm.drives.inverter_constant.sum())
     gain = task.potential(x[-1]) - task.potential(x[0])
-    return DualBound(terms, loss, rates, friction, arm.active_limits, base, gain, longest, arm.drives.rotor_inertia)
+    return DualBound(
+        terms,
+        loss,
+        rates,
+        friction,
+        arm.active_limits,
+        base,
+        gain,
+        longest,
+        arm.drives.rotor_inertia,
+    )
 
 
-def around(task: PreparedProblem, start: Array, goal: Array, rng: np.random.Generator, noise: float = 1.0) -> Reference:
-    """A bent path, and multipliers near what holding it takes, with `noise` of that size, of some of the joints."""
+def around(
+    task: PreparedProblem, start: Array, goal: Array, rng: np.random.Generator, noise: float = 1.0
+) -> Reference:
+    """A bent path, and multipliers near what holding it takes, with `noise` of that size, of some
+    of the joints.
+    """
     share = np.linspace(0, 1, STEPS + 1)[:, None]
     x = start + share * (goal - start) + 0.1 * rng.normal(size=6) * share * (1 - share)
     hold = task.torques(x, 0 * x, 0 * x)
     linear = np.hstack([1 - share, share])
-    fit = linear @ np.linalg.lstsq(linear, hold, rcond=None)[0] + noise * rng.normal(size=6) * [6, 6, 4, 1, 1, 1]
+    fit = linear @ np.linalg.lstsq(linear, hold, rcond=None)[0] + noise * rng.normal(size=6) * [
+        6,
+        6,
+        4,
+        1,
+        1,
+        1,
+    ]
     return Reference(x, fit * (rng.random(6) < 0.6))
 
 
 @pytest.mark.parametrize("name", long_but((list(CONDITIONS)[1], "load, all recovered"), CONDITIONS))
 def test_no_motion_spends_less(name: str) -> None:
-    """Straight and bent motions of every duration from the shortest on, with paths, multipliers and weights at
-    random."""
+    """Straight and bent motions of every duration from the shortest on, with paths, multipliers and
+    weights at random."""
     task = problem(objective="electrical", duration_max=500.0, **CONDITIONS[name])
     torques, rng = Torques(task), np.random.default_rng(len(name))
     seen, useful = 0, 0
@@ -87,7 +117,9 @@ def test_no_motion_spends_less(name: str) -> None:
             own = copper_multiplier(torques.task, goal - start, dual.potential_gain, duration)
             for scale in (0.3, 1.0):
                 work = 0.0 if dual.friction.load is not None else rng.uniform(-0.5, 1.5) * own
-                weights = Weights(scale, rng.uniform(0, 1.5) * stiffness, rng.uniform(0.05, 1) * stiffness, work)
+                weights = Weights(
+                    scale, rng.uniform(0, 1.5) * stiffness, rng.uniform(0.05, 1) * stiffness, work
+                )
                 value = dual.over(np.array([duration / margin, duration * margin]))(weights)[0]
                 total = energy.electrical.total
                 slack = QUADRATURE * (abs(total) + energy.electrical.braking)
@@ -97,13 +129,17 @@ def test_no_motion_spends_less(name: str) -> None:
     assert useful > 0
 
 
-def tangent_energy(torques: Torques, dual: DualBound, moved: Moved, multipliers: Array, weights: Weights) -> float:
-    """Energy of a motion with the copper loss as its tangent at the multipliers, times their factor, which is less than
-    it: what the proof bounds."""
+def tangent_energy(
+    torques: Torques, dual: DualBound, moved: Moved, multipliers: Array, weights: Weights
+) -> float:
+    """Energy of a motion with the copper loss as its tangent at the multipliers, times their
+    factor, which is less than it: what the proof bounds."""
     law, (t, q, v, a, each) = torques.task.arm.friction_law, moved
     dry, at = law.torque(v), np.linspace(0, 1, len(multipliers))
     tau = torques(q, v, a) + dry
-    own = weights.scale * np.column_stack([np.interp(t / t[-1], at, joint) for joint in multipliers.T])
+    own = weights.scale * np.column_stack(
+        [np.interp(t / t[-1], at, joint) for joint in multipliers.T]
+    )
     own += weights.work * v / dual.loss
     tangent = dual.loss * tau**2 - dual.loss * (tau - own) ** 2
     return float(dual.potential_gain + each @ (dual.base + (v * dry + tangent).sum(axis=1)))
@@ -116,26 +152,39 @@ def reference_along(torques: Torques, moved: Moved, steps: int) -> Reference:
     x = np.column_stack([np.interp(at, t / t[-1], each) for each in q.T])
     x[0], x[-1] = q[0], q[-1]
     tau = torques(q, v, a) + torques.task.arm.friction_law.torque(v)
-    return Reference(x, np.column_stack([np.ones_like(at), at]) @ np.linalg.lstsq(basis, tau, rcond=None)[0])
+    return Reference(
+        x, np.column_stack([np.ones_like(at), at]) @ np.linalg.lstsq(basis, tau, rcond=None)[0]
+    )
 
 
 @pytest.mark.parametrize("name", long_but(("as it comes", "much copper"), NAMES))
 def test_any_multipliers_bound_the_linear_energy(name: str) -> None:
-    """Of motions near the path, so that little but the proof's own losses is between them and the bound."""
+    """Of motions near the path, so that little but the proof's own losses is between them and the
+    bound.
+    """
     task, rng = asked(name), np.random.default_rng(len(name))
     torques, seen, near = Torques(task), 0, 0
     for start, goal in zip(*ends(90 + len(name), 2 * MOVES), strict=True):
         gain = torques.task.potential(goal) - torques.task.potential(start)
         for *moved, duration in many_motions(task, start, goal, rng):
             path = reference_along(torques, tuple(moved), STEPS)
-            path = replace(path, multipliers=path.multipliers * rng.uniform(-1.5, 1.5, 6) * (rng.random(6) < 0.8))
-            edges = duration * np.array([rng.uniform(0.7, 0.95), 1.0, rng.uniform(1, 1.2), rng.uniform(1.2, 1.5)])
+            path = replace(
+                path,
+                multipliers=path.multipliers * rng.uniform(-1.5, 1.5, 6) * (rng.random(6) < 0.8),
+            )
+            edges = duration * np.array(
+                [rng.uniform(0.7, 0.95), 1.0, rng.uniform(1, 1.2), rng.uniform(1.2, 1.5)]
+            )
             dual = dual_of(torques.task, path, float(edges[-1]), (1, 2))
             stiffness = dual.friction.stiffness(task.arm.friction_law)
             for scale in (0.05, 0.3, 1.0):
-                work = rng.uniform(0, 1) * copper_multiplier(torques.task, goal - start, gain, duration)
+                work = rng.uniform(0, 1) * copper_multiplier(
+                    torques.task, goal - start, gain, duration
+                )
                 light = 10 ** rng.uniform(-1.5, 0)
-                weights = Weights(scale, light * stiffness, rng.uniform(0.05, 0.5) * light * stiffness, work)
+                weights = Weights(
+                    scale, light * stiffness, rng.uniform(0.05, 0.5) * light * stiffness, work
+                )
                 values = dual.over(edges)(weights)
                 linear = tangent_energy(torques, dual, tuple(moved), path.multipliers, weights)
                 # the motion's duration is an edge: it is in both cells
@@ -146,7 +195,9 @@ def test_any_multipliers_bound_the_linear_energy(name: str) -> None:
 
 
 def test_nor_do_the_best_motions_break_it() -> None:
-    """With multipliers along their torques and against them, where momentum is worth as much as all other losses."""
+    """With multipliers along their torques and against them, where momentum is worth as much as all
+    other losses.
+    """
     torques, closest = Torques(problem()), np.inf
     for start, goal in ((START, START + 0.8 * np.eye(6)[0]), (START, GOAL), (GOAL, START)):
         spline = optimize(problem(start, goal, collisions=False)).trajectory.spline
@@ -165,15 +216,21 @@ def test_nor_do_the_best_motions_break_it() -> None:
     assert closest < CLOSELY
 
 
-@pytest.mark.parametrize("name", long_but(("as it comes",), ("as it comes", "loaded and tilted", "slow limits")))
+@pytest.mark.parametrize(
+    "name", long_but(("as it comes",), ("as it comes", "loaded and tilted", "slow limits"))
+)
 def test_many_cells_hold_what_their_durations_spend(name: str) -> None:
-    """Cells that share boxes, path and multipliers, narrow and wide, around motions of durations in any of them."""
+    """Cells that share boxes, path and multipliers, narrow and wide, around motions of durations in
+    any of them.
+    """
     task = problem(objective="electrical", duration_max=500.0, **CONDITIONS[name])
     torques, rng = Torques(task), np.random.default_rng(6)
     seen, useful = 0, 0
     for k, (start, goal) in enumerate(zip(*ends(80 + len(name), 2 * MOVES), strict=True)):
         reference = around(torques.task, start, goal, rng, noise=k / 2)
-        spent = [(T, each.electrical) for T, each in motions(task, start, goal, torques, k) if T < 6]
+        spent = [
+            (T, each.electrical) for T, each in motions(task, start, goal, torques, k) if T < 6
+        ]
         ratio = (1.04, 1.15, 1.5, 2.0)[k % 4]
         shortest, longest = min(T for T, _ in spent), max(T for T, _ in spent)
         count = int(np.ceil(np.log(longest / shortest) / np.log(ratio))) + 1
@@ -182,19 +239,24 @@ def test_many_cells_hold_what_their_durations_spend(name: str) -> None:
         stiffness = dual.friction.stiffness(task.arm.friction_law)
         own = copper_multiplier(torques.task, goal - start, dual.potential_gain, shortest)
         for scale in (0.2, 0.7, 1.2):
-            weights = Weights(scale, rng.uniform(0, 1) * stiffness, rng.uniform(0.05, 0.5) * stiffness, own)
+            weights = Weights(
+                scale, rng.uniform(0, 1) * stiffness, rng.uniform(0.05, 0.5) * stiffness, own
+            )
             values = dual.over(edges)(weights)
             for duration, electrical in spent:
                 value = values[np.searchsorted(edges, duration) - 1]
-                assert value <= electrical.total + QUADRATURE * (abs(electrical.total) + electrical.braking)
+                assert value <= electrical.total + QUADRATURE * (
+                    abs(electrical.total) + electrical.braking
+                )
                 seen, useful = seen + 1, useful + (value > USEFUL * electrical.total)
     assert seen > 20 * MOVES
     assert useful > 0
 
 
 def test_a_cell_of_durations_is_below_each_of_them() -> None:
-    """The bound of an interval of durations is hardly above those of single durations in it: it is for all of them.
-    Nor is that of a narrow one far below. Multipliers of either sign grow and fall."""
+    """The bound of an interval of durations is hardly above those of single durations in it: it is
+    for all of them. Nor is that of a narrow one far below. Multipliers of either sign grow and
+    fall."""
     task = PreparedProblem.of(problem())
     rng = np.random.default_rng(7)
     for k, (start, goal) in enumerate(zip(*ends(3, 6), strict=True)):
@@ -214,7 +276,9 @@ def test_a_cell_of_durations_is_below_each_of_them() -> None:
 
 
 def test_the_conjugate_is_the_greatest_value() -> None:
-    """Against a search over the speed, for multipliers of both signs, limits on the speed, and stiffness to spare."""
+    """Against a search over the speed, for multipliers of both signs, limits on the speed, and
+    stiffness to spare.
+    """
     law, rng = ROBOT.friction, np.random.default_rng(2)
     friction = FrictionConjugate.of(law, ROBOT.limits.v_max)
     assert friction is not None
@@ -222,7 +286,9 @@ def test_the_conjugate_is_the_greatest_value() -> None:
         p, omega = rng.normal(size=6) * 20, rng.normal(size=6) * 0.3
         square, most = rng.uniform(-0.5, 1.5, 6), rng.uniform(0.01, 3.0, 6)
         value, _ = greatest(friction, p, omega, square, most)
-        v = np.concatenate([np.linspace(-1, 1, 4001), np.geomspace(1e-6, 1, 400), -np.geomspace(1e-6, 1, 400)])[:, None]
+        v = np.concatenate(
+            [np.linspace(-1, 1, 4001), np.geomspace(1e-6, 1, 400), -np.geomspace(1e-6, 1, 400)]
+        )[:, None]
         v = v * most
         exact = (p * v - (v + omega) * law.torque(v) + square * v * v).max(axis=0)
         assert (value >= exact - LEEWAY).all()
@@ -241,13 +307,15 @@ def test_the_conjugate_allows_for_the_load() -> None:
         value, _ = greatest(friction, p, omega, square, most)
         for shift in (omega / (1 + load), omega, omega / (1 - load)):
             at = v * most
-            exact = (p * at - (at + shift) * ROBOT.friction.torque(at) + square * at * at).max(axis=0)
+            exact = (p * at - (at + shift) * ROBOT.friction.torque(at) + square * at * at).max(
+                axis=0
+            )
             assert (value >= exact - LEEWAY).all()
 
 
 def test_shaft_and_copper_are_above_their_linear_bound_under_load() -> None:
-    """The inequality of `dual_bound` under **Load** at random states, whichever way friction acts on the motor; that of
-    unloaded joints alone would be broken."""
+    """The inequality of `dual_bound` under **Load** at random states, whichever way friction acts
+    on the motor; that of unloaded joints alone would be broken."""
     rng, count = np.random.default_rng(4), 20_000
     law, limits, rotor = ROBOT.friction, ROBOT.limits, ROBOT.drives.rotor_inertia
     loss = ROBOT.drives.copper / ROBOT.drives.torque_constant**2
@@ -267,7 +335,12 @@ def test_shaft_and_copper_are_above_their_linear_bound_under_load() -> None:
 
 
 def test_laws_that_are_not_concave_have_no_bound() -> None:
-    assert FrictionConjugate.of(replace(ROBOT.friction, viscous=-ROBOT.friction.viscous), ROBOT.limits.v_max) is None
+    assert (
+        FrictionConjugate.of(
+            replace(ROBOT.friction, viscous=-ROBOT.friction.viscous), ROBOT.limits.v_max
+        )
+        is None
+    )
 
 
 def test_boxes_hold_motions() -> None:
@@ -284,6 +357,8 @@ def test_boxes_hold_motions() -> None:
         half = half_sides(reference, own, motion.duration)
         at = motion.t / motion.duration
         step = np.minimum((at * STEPS).astype(int), STEPS - 1)
-        assert (np.abs(motion.q - (start + at[:, None] * (goal - start))) <= half[step] + LEEWAY).all()
+        assert (
+            np.abs(motion.q - (start + at[:, None] * (goal - start))) <= half[step] + LEEWAY
+        ).all()
         seen += 1
     assert seen > 4

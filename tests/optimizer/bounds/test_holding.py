@@ -1,4 +1,6 @@
-"""The closed-form bound with the copper loss of holding: no motion spends less, whatever the multipliers and boxes."""
+"""The closed-form bound with the copper loss of holding: no motion spends less, whatever the
+multipliers and boxes.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,14 @@ from joulepath.optimizer.trajectories import bspline
 from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 from joulepath.optimizer.trajectories.spline import peak_rates, sample, spline_of
 from tests.optimizer.moves import limits, problem
-from tests.optimizer.search.test_lower_bound import CONDITIONS, QUADRATURE, Torques, bound, ends, motions
+from tests.optimizer.search.test_lower_bound import (
+    CONDITIONS,
+    QUADRATURE,
+    Torques,
+    bound,
+    ends,
+    motions,
+)
 from tests.selection import long_but
 
 MOVES = 6
@@ -43,9 +52,13 @@ def box_about(goal: Array, size: float, rng: np.random.Generator) -> tuple[Array
     return low, low + side
 
 
-@pytest.mark.parametrize("name", long_but(("as it comes", "loaded and tilted", "much copper"), NAMES))
+@pytest.mark.parametrize(
+    "name", long_but(("as it comes", "loaded and tilted", "much copper"), NAMES)
+)
 def test_no_motion_spends_less(name: str) -> None:
-    """Straight and bent motions of every duration into boxes around their goals, none of them and small and large."""
+    """Straight and bent motions of every duration into boxes around their goals, none of them and
+    small and large.
+    """
     task, rng = asked(name), np.random.default_rng(len(name))
     torques = Torques(task)
     holding = HoldingCells.of(torques.task)
@@ -62,7 +75,9 @@ def test_no_motion_spends_less(name: str) -> None:
             value = group.at(np.array([0]), goal[k][None], np.zeros((1, 6)), gain)[0]
             raised += value > plain[k]
             for electrical in energies:
-                assert value <= electrical.total + QUADRATURE * (abs(electrical.total) + electrical.braking)
+                assert value <= electrical.total + QUADRATURE * (
+                    abs(electrical.total) + electrical.braking
+                )
                 seen += 1
     assert seen > 3 * MOVES
     assert raised > 0 or name in ("weightless", "slow limits", "wide reversal")
@@ -72,8 +87,12 @@ def test_no_motion_spends_less(name: str) -> None:
 Sampled = tuple[Array, Array, Array, Array, Array, float]
 
 
-def many_motions(task: Problem, start: Array, goal: Array, rng: np.random.Generator) -> Iterator[Sampled]:
-    """Motions within the limits: the fastest, slowed a little and much, and some that leave the line by half waves."""
+def many_motions(
+    task: Problem, start: Array, goal: Array, rng: np.random.Generator
+) -> Iterator[Sampled]:
+    """Motions within the limits: the fastest, slowed a little and much, and some that leave the
+    line by half waves.
+    """
     least = max(float(shortest_duration(goal - start, task.arm.active_limits)), LEAST_DURATION)
     for stretch in (1.0, 1.1, 1.5, 4.0):
         motion = guesses(task, start, goal, max(stretch * least, LEAST_DURATION))["ruckig_slowed"]
@@ -83,20 +102,27 @@ def many_motions(task: Problem, start: Array, goal: Array, rng: np.random.Genera
     share = np.linspace(0, 1, space.n)[:, None]
     for size in (0.02, 0.1, 0.3):
         for waves in (1, 2):
-            points = line + size * np.sin(waves * np.pi * share) * rng.normal(size=6) * (rng.random(6) < 0.5)
+            points = line + size * np.sin(waves * np.pi * share) * rng.normal(size=6) * (
+                rng.random(6) < 0.5
+            )
             points[:3], points[-3:] = start, goal
             peaks = peak_rates(spline_of(space, points, 1.0)) / task.arm.active_limits.rates
-            duration = max(float((peaks.max(axis=1) ** (1 / np.arange(1, 4))).max()) * (1 + 1e-9), LEAST_DURATION)
+            duration = max(
+                float((peaks.max(axis=1) ** (1 / np.arange(1, 4))).max()) * (1 + 1e-9),
+                LEAST_DURATION,
+            )
             duration *= rng.choice([1.0, 1.5, 4.0])
             t = np.linspace(0, duration, SAMPLES)
             q, v, a = sample(spline_of(space, points, duration), t)
             yield t, q, v, a, simpson(np.eye(SAMPLES), dx=duration / (SAMPLES - 1)), duration
 
 
-@pytest.mark.parametrize("name", long_but(("plain friction", "much copper", "uneven copper"), NAMES))
+@pytest.mark.parametrize(
+    "name", long_but(("plain friction", "much copper", "uneven copper"), NAMES)
+)
 def test_any_multipliers_bound_the_linear_energy(name: str) -> None:
-    """With the copper loss as its tangent at the multipliers, which is less than it: what the proof says. Some of the
-    multipliers are those of holding, and some motions are near the best."""
+    """With the copper loss as its tangent at the multipliers, which is less than it: what the proof
+    says. Some of the multipliers are those of holding, and some motions are near the best."""
     task, rng = asked(name), np.random.default_rng(len(name))
     torques = Torques(task)
     seen, near = 0, 0
@@ -109,8 +135,8 @@ def test_any_multipliers_bound_the_linear_energy(name: str) -> None:
 
 
 def test_a_free_joint_comes_near_the_linear_energy() -> None:
-    """The first joint alone, without gravity, as fast as limits on its speed let it: nothing is lost but at rest, where
-    friction may help to hold."""
+    """The first joint alone, without gravity, as fast as limits on its speed let it: nothing is
+    lost but at rest, where friction may help to hold."""
     rng, first, ratios = np.random.default_rng(5), np.eye(6)[0], list[float]()
     for speed in (0.8, 1.5, 3.0):
         torques = Torques(problem(gravity=[0, 0, 0], limits=limits(v_max=speed)))
@@ -124,8 +150,8 @@ def test_a_free_joint_comes_near_the_linear_energy() -> None:
 def linear_ratios(
     torques: Torques, start: Array, goal: Array, joints: Array, rng: np.random.Generator
 ) -> Iterator[float]:
-    """Bounds with multipliers of some joints (nq,), over the energies of motions, of which the copper loss is taken as
-    its tangent."""
+    """Bounds with multipliers of some joints (nq,), over the energies of motions, of which the
+    copper loss is taken as its tangent."""
     prepared = torques.task
     task, law, holding = prepared.problem, prepared.arm.friction_law, HoldingCells.of(prepared)
     assert holding is not None
@@ -150,11 +176,17 @@ def linear_ratios(
             if rng.random() < 0.5:
                 omega = scale * joints * cells.model[0, 0]
             planes = cells.planes(omega[None, None], side[None], net.deficit)
-            value = planes.at(np.array([0]), (goal - nearest)[None], np.zeros((1, 6)), np.array([gain]))[0]
+            value = planes.at(
+                np.array([0]), (goal - nearest)[None], np.zeros((1, 6)), np.array([gain])
+            )[0]
             multiplier = omega / (2 * loss) + eta[0] * v / loss
             power = base + (v * dry + loss * tau**2 - loss * (tau - multiplier) ** 2).sum(axis=1)
             linear = gain + weights @ power
-            yield float((value + SHIFT) / (linear + SHIFT)) if linear > -SHIFT / 2 else float(value <= linear)
+            yield (
+                float((value + SHIFT) / (linear + SHIFT))
+                if linear > -SHIFT / 2
+                else float(value <= linear)
+            )
 
 
 @pytest.mark.parametrize("name", LOADED)

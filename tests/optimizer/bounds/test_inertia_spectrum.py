@@ -1,4 +1,6 @@
-"""The inertia as a trigonometric polynomial: its terms add up to it, and its derivatives stay below their bounds."""
+"""The inertia as a trigonometric polynomial: its terms add up to it, and its derivatives stay below
+their bounds.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ from tests.optimizer.moves import PAYLOAD
 
 STEP = 1e-4
 DIFFERENCE = 1e-6  # what central differences of such a step miss, and their rounding
-NEAR = 0.7  # of the bound on an arm of three parallel axes; axes that are across each other lose more
+NEAR = (
+    0.7  # of the bound on an arm of three parallel axes; axes that are across each other lose more
+)
 CROSSED = 0.3
 
 

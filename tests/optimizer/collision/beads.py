@@ -1,4 +1,6 @@
-"""Lower bounds on distances by numpy: beads that cover one body, against the box or cylinder of the other."""
+"""Lower bounds on distances by numpy: beads that cover one body, against the box or cylinder of the
+other.
+"""
 
 from __future__ import annotations
 
@@ -20,10 +22,11 @@ class Beads:
         self._half_sizes = arrays.form_sizes.T.copy()
 
     def distances(self, frames: Array, configuration: Indices, pair: Indices) -> Array:
-        """Lower bounds (k,) [m] on the distances of the cores of pairs (k,) at configurations (k,), but for radii.
+        """Lower bounds (k,) [m] on the distances of the cores of pairs (k,) at configurations (k,),
+        but for radii.
 
-        The radius of the cores and the margins are not subtracted. Pairs without a box or a cylinder get -inf, and so
-        do those whose cores may overlap.
+        The radius of the cores and the margins are not subtracted. Pairs without a box or a
+        cylinder get -inf, and so do those whose cores may overlap.
         """
         arrays, result = self._arrays, np.full(len(pair), -np.inf)
         bounded = np.flatnonzero(arrays.formed[pair] >= 0)
@@ -32,7 +35,9 @@ class Beads:
         configuration, pair = configuration[bounded], pair[bounded]
         formed, beaded = arrays.formed[pair], arrays.beaded[pair]
         T, links = pose_columns(frames), frames.shape[1]
-        points = placed(picked(T, configuration * links + arrays.links[beaded]), picked(self._centres, beaded))
+        points = placed(
+            picked(T, configuration * links + arrays.links[beaded]), picked(self._centres, beaded)
+        )
         # obstacles are in the frame of the base, which most pairs need no step into
         moving = np.flatnonzero(arrays.links[formed] > 0)
         if moving.size:

@@ -1,7 +1,7 @@
 """Many points in other frames.
 
-Components come first and cases last, as in (3, k): numpy runs along the cases, several times as fast as along three
-components.
+Components come first and cases last, as in (3, k): numpy runs along the cases, several times as
+fast as along three components.
 """
 
 from __future__ import annotations

@@ -9,19 +9,21 @@ from joulepath.optimizer.kinematics.vectors import cross
 
 # two cores nearer than this [m] touch: the direction from one to the other is only rounding
 TOUCHING = 1e-10
-# squared sine of the angle between two segments below which they count as parallel: if they nearly touch, the nearest
-# points may then be off by a ten-millionth of their lengths
+# squared sine of the angle between two segments below which they count as parallel: if they nearly
+# touch, the nearest points may then be off by a ten-millionth of their lengths
 PARALLEL = 1e-15
 # squared length [m²] below which a vector has no direction
 NONE = 1e-24
 
 
 def segment_segment(a: Array, b: Array) -> tuple[Array, Array, Array, Array]:
-    """Distance (k,) [m], normal (k, 3) from a to b, and witness points (k, 3) [m] of segments a, b (k, 2, 3) [m].
+    """Distance (k,) [m], normal (k, 3) from a to b, and witness points (k, 3) [m] of segments a, b
+    (k, 2, 3) [m].
 
-    The point of a that is nearest to the line of b, clamped, then the point of b nearest to it, clamped, and the point
-    of a nearest to that: exact, also for parallel segments, but for those that are nearly so (see PARALLEL). If the
-    segments cross, the distance is 0 and the normal is the common perpendicular.
+    The point of a that is nearest to the line of b, clamped, then the point of b nearest to it,
+    clamped, and the point of a nearest to that: exact, also for parallel segments, but for those
+    that are nearly so (see PARALLEL). If the segments cross, the distance is 0 and the normal is
+    the common perpendicular.
     """
     # (3, k): numpy runs along k
     a0, a1, b0, b1 = (np.ascontiguousarray(x.T) for x in (a[:, 0], a[:, 1], b[:, 0], b[:, 1]))
@@ -43,10 +45,12 @@ def segment_segment(a: Array, b: Array) -> tuple[Array, Array, Array, Array]:
 
 
 def box_segment(half_size: Array, b: Array) -> tuple[Array, Array, Array]:
-    """Signed distance (k,) [m], normal (k, 3) from box to segment, and the witness point (k, 3) [m] of the segment.
+    """Signed distance (k,) [m], normal (k, 3) from box to segment, and the witness point (k, 3) [m]
+    of the segment.
 
-    half_size (k, 3) [m]: half of the edges of boxes about the origin; b (k, 2, 3) [m]: segments in the boxes' frames.
-    The derivative of half the squared distance along the segment is piecewise linear and increasing: its root is exact.
+    half_size (k, 3) [m]: half of the edges of boxes about the origin; b (k, 2, 3) [m]: segments in
+    the boxes' frames. The derivative of half the squared distance along the segment is piecewise
+    linear and increasing: its root is exact.
     """
     # (3, k): numpy runs along k
     p0, p1, high = (np.ascontiguousarray(x.T) for x in (b[:, 0], b[:, 1], half_size))
@@ -69,13 +73,15 @@ def box_segment(half_size: Array, b: Array) -> tuple[Array, Array, Array]:
     touching = distance < TOUCHING
     normal, point = (across / np.where(touching, 1.0, distance)).T, point.T
     if touching.any():
-        distance[touching], normal[touching], point[touching] = _penetration(half_size[touching], b[touching])
+        distance[touching], normal[touching], point[touching] = _penetration(
+            half_size[touching], b[touching]
+        )
     return distance, normal, point
 
 
 def _slope(p0: Array, u: Array, high: Array, s: Array) -> Array:
-    """Derivative (m, k) of half the squared distance of p0 + s u (3, k) from boxes of half sizes `high` (3, k), by s
-    (m, k)."""
+    """Derivative (m, k) of half the squared distance of p0 + s u (3, k) from boxes of half sizes
+    `high` (3, k), by s (m, k)."""
     slope = np.zeros_like(s)
     for i in range(3):
         x = p0[i] + s * u[i]
@@ -100,13 +106,16 @@ def _penetration(half_size: Array, b: Array) -> tuple[Array, Array, Array]:
     best, rows = depth.argmax(axis=1), np.arange(len(b))
     normal = directions[rows, best]
     point = b[rows, ends[rows, best].argmin(axis=1)]
-    # at an edge of the box, the witness point is where segment and edge cross, seen along the normal
+    # at an edge of the box, the witness point is where segment and edge cross, seen along the
+    # normal
     edge = best % 6 - 3
     crossed = edge >= 0
     across = cross(normal[crossed], np.eye(3)[edge[crossed]])
     start, along = b[crossed, 0], u[crossed]
     slope = _dot(along, across)
-    fraction = _dot(np.sign(normal[crossed]) * half_size[crossed] - start, across) / np.where(slope == 0, 1.0, slope)
+    fraction = _dot(np.sign(normal[crossed]) * half_size[crossed] - start, across) / np.where(
+        slope == 0, 1.0, slope
+    )
     point[crossed] = start + np.clip(fraction, 0, 1)[:, None] * along
     return depth[rows, best], normal, point
 
@@ -121,7 +130,9 @@ def _dot(x: Array, y: Array) -> Array:
 
 
 def _perpendicular(u: Array, v: Array) -> Array:
-    """Unit vectors (k, 3) perpendicular to u and v (k, 3); if these are parallel, any vector perpendicular to u."""
+    """Unit vectors (k, 3) perpendicular to u and v (k, 3); if these are parallel, any vector
+    perpendicular to u.
+    """
     across = cross(u, v)
     flat = _dot(across, across) < NONE
     across[flat] = cross(u[flat], np.eye(3)[np.argmin(np.abs(u[flat]), axis=1)])

@@ -20,7 +20,9 @@ WITHIN = (0.0, 0.03, 0.3)  # m
 
 
 def samples(kind: str, seed: int, count: int) -> Array:
-    """Samples q (count, nq) [rad] of a slow motion, of leaps from anywhere to anywhere, or of one that stands still."""
+    """Samples q (count, nq) [rad] of a slow motion, of leaps from anywhere to anywhere, or of one
+    that stands still.
+    """
     rng = np.random.default_rng(seed)
     if kind == "leaps":
         return rng.uniform(-3, 3, (count, 6))
@@ -30,7 +32,9 @@ def samples(kind: str, seed: int, count: int) -> Array:
 
 
 @pytest.mark.parametrize("kind", ["motion", "leaps", "still"])
-@pytest.mark.parametrize("count", [1, 2 * STRIDE, 2 * STRIDE + 1, 3 * STRIDE + 1, 5 * STRIDE - 1, 97])
+@pytest.mark.parametrize(
+    "count", [1, 2 * STRIDE, 2 * STRIDE + 1, 3 * STRIDE + 1, 5 * STRIDE - 1, 97]
+)
 def test_distances_along_a_motion(kind: str, count: int) -> None:
     model = CollisionModel(arm_in_cell(LOADS[1]))
     q = samples(kind, count, count)
@@ -44,7 +48,9 @@ def test_distances_along_a_motion(kind: str, count: int) -> None:
         assert found[is_near] == pytest.approx(exact[is_near], abs=ROUNDING)
         assert (found[~is_near] > within).all()
         some = model.along(q, within, pairs)
-        assert (some <= exact[:, pairs] + ROUNDING).all() and ((some <= within) == is_near[:, pairs]).all()
+        assert (some <= exact[:, pairs] + ROUNDING).all() and (
+            (some <= within) == is_near[:, pairs]
+        ).all()
 
 
 def test_what_is_proven_clear_is_certified() -> None:
@@ -52,15 +58,22 @@ def test_what_is_proven_clear_is_certified() -> None:
     clear = 0
     for seed in range(60):
         model = CollisionModel(arm_in_cell(LOADS[0], cell(seed)))
-        proof, is_clear = proven_clearance(model, wander(seed)), is_proven_clear(model, wander(seed))
+        proof, is_clear = (
+            proven_clearance(model, wander(seed)),
+            is_proven_clear(model, wander(seed)),
+        )
         assert proof is not None
         clear += is_clear
         assert proof.min_clearance >= 0 if is_clear else proof.min_clearance < 2 * GAP
     assert 3 < clear < 57
 
 
-def test_what_is_proven_clear_is_certified_even_if_its_proof_takes_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The bound near to the least distance takes more checks than the limit, that the margins hold takes fewer."""
+def test_what_is_proven_clear_is_certified_even_if_its_proof_takes_too_long(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The bound near to the least distance takes more checks than the limit, that the margins hold
+    takes fewer.
+    """
     points = np.random.default_rng(0).uniform(-1.2, 1.2, (35, 400, 3))[4]
     around = Points(points[np.linalg.norm(points, axis=1) > 0.55], 0.002)
     scene = Scene([Obstacle("cloud", around, np.eye(4), margin=0.0)])

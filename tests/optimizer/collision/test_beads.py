@@ -1,4 +1,6 @@
-"""Lower bounds on distances, by beads and by earlier distances, against exact distances of random scenes."""
+"""Lower bounds on distances, by beads and by earlier distances, against exact distances of random
+scenes.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ ITERATED = 1e-5  # m
 
 @pytest.mark.parametrize("seed", range(4))
 def test_beads_bound_the_distances_from_below(seed: int) -> None:
-    """Boxes, spheres, cylinders, capsules, meshes and half-spaces. Most bounds are better than those of balls."""
+    """Boxes, spheres, cylinders, capsules, meshes and half-spaces. Most bounds are better than
+    those of balls.
+    """
     arm = arm_in_cell(LOADS[seed], cell(seed))
     model, limits = CollisionModel(arm), arm.active_limits
     q = np.random.default_rng(seed).uniform(limits.q_min, limits.q_max, (200, arm.robot.nq))
@@ -26,7 +30,11 @@ def test_beads_bound_the_distances_from_below(seed: int) -> None:
     exact = model.pair_distances(frames).distance.ravel()
     bound = model.geometry.bead_bounds(frames, configuration, pair)
     assert (bound <= exact + ITERATED).all()
-    balls = NumpyDistances(PairArrays.of(model.bodies, model.pairs)).ball_distances(frames, pairs).ravel()
+    balls = (
+        NumpyDistances(PairArrays.of(model.bodies, model.pairs))
+        .ball_distances(frames, pairs)
+        .ravel()
+    )
     has_bound = np.isfinite(bound) & np.isfinite(balls)
     assert has_bound.any()
     assert np.median(bound[has_bound] - balls[has_bound]) > 0
@@ -34,7 +42,9 @@ def test_beads_bound_the_distances_from_below(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_distances_bounded_by_earlier_ones_are_those_that_count(seed: int) -> None:
-    """Whatever was computed before, all distances up to COUNTED are exact, and the others are lower bounds."""
+    """Whatever was computed before, all distances up to COUNTED are exact, and the others are lower
+    bounds.
+    """
     arm = arm_in_cell(LOADS[seed], cell(seed))
     model, limits = CollisionModel(arm), arm.active_limits
     rng = np.random.default_rng(seed)
@@ -44,7 +54,9 @@ def test_distances_bounded_by_earlier_ones_are_those_that_count(seed: int) -> No
         near = q + step * rng.uniform(-1, 1, q.shape)
         frames = model.frames(near)
         found = constraint.linearised(frames, near, np.zeros_like(near))
-        fresh = ClearanceConstraint(model, np.arange(len(model.pairs))).linearised(frames, near, np.zeros_like(near))
+        fresh = ClearanceConstraint(model, np.arange(len(model.pairs))).linearised(
+            frames, near, np.zeros_like(near)
+        )
         exact = model.pair_distances(frames).distance
         counted = exact <= COUNTED
         np.testing.assert_array_equal(found.value[counted], fresh.value[counted])

@@ -1,4 +1,6 @@
-"""The proof over continuous time, against replays on a grid of 0.1 ms and motions whose clearance is known."""
+"""The proof over continuous time, against replays on a grid of 0.1 ms and motions whose clearance
+is known.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +49,9 @@ OBSTACLES: list[Shape] = [
 
 
 def replayed(model: CollisionModel, spline: Spline, within: float) -> float:
-    """Least distance on a grid of 0.1 ms; what is further than `within` only counts by its bounding balls."""
+    """Least distance on a grid of 0.1 ms; what is further than `within` only counts by its bounding
+    balls.
+    """
     t = np.linspace(0, spline.duration, round(spline.duration / REPLAY) + 1)
     parts = np.array_split(positions(spline, t), 40)
     return min(float(model.signed_distances(q, within)[0].min()) for q in parts)
@@ -86,11 +90,15 @@ def test_named_pair_has_that_distance_at_that_time(seed: int) -> None:
 @pytest.mark.parametrize("carried", [None, *LOADS], ids=lambda shape: type(shape).__name__)
 @pytest.mark.parametrize("shape", OBSTACLES, ids=lambda shape: type(shape).__name__)
 def test_the_nearest_points_are_on_the_two_bodies(shape: Shape, carried: Shape | None) -> None:
-    """A pea at the point of the first body is as far from the second body as the first is; one at the other touches."""
+    """A pea at the point of the first body is as far from the second body as the first is; one at
+    the other touches.
+    """
     hand = replace(ROBOT, capsules=ROBOT.capsules[-1:])
     load = None if carried is None else Attachment(carried, at([0.0, 0, 0.2], [0.1, 0.2, 0.3]))
     payload = Payload(1.0, shape=load)
-    below = at([0.3, 0.2, -0.3] if isinstance(shape, HalfSpace) else [0.1, -0.3, 0.4], [0.3, 0.1, 0.2])
+    below = at(
+        [0.3, 0.2, -0.3] if isinstance(shape, HalfSpace) else [0.1, -0.3, 0.4], [0.3, 0.1, 0.2]
+    )
     scene = Scene([Obstacle("thing", shape, below, margin=0.02)])
     proof = proven_clearance(CollisionModel(Arm(robot=hand, payload=payload, scene=scene)), STILL)
     assert proof is not None and proof.points is not None and proof.pair[0] == "thing"
@@ -102,19 +110,24 @@ def test_the_nearest_points_are_on_the_two_bodies(shape: Shape, carried: Shape |
         model = CollisionModel(Arm(robot=hand, payload=payload, scene=pea))
         distances = model.signed_distances(positions(STILL, np.zeros(1)))[0][0]
         pairs = [model.names(k) for k in range(len(distances))]
-        distance = min(d for d, pair in zip(distances, pairs, strict=True) if pair == ("pea", proof.pair[1]))
+        distance = min(
+            d for d, pair in zip(distances, pairs, strict=True) if pair == ("pea", proof.pair[1])
+        )
         assert distance + PEA == pytest.approx(expected, abs=ON_SURFACE)
 
 
 def test_a_touch_between_samples_is_found() -> None:
-    """A small ball on the path of the wrist, passed in a few milliseconds: no coarse sampling may miss it."""
+    """A small ball on the path of the wrist, passed in a few milliseconds: no coarse sampling may
+    miss it.
+    """
     spline = wander(3, duration=0.4, spread=0.0)
     model = CollisionModel(Arm(robot=ROBOT))
     # in the middle of one of the 32 intervals that the proof starts from
     middle = positions(spline, np.array([0.4 * 16.5 / 32]))
     wrist = model.frames(middle)[0, 5, :3, 3]
     proof = proven_clearance(
-        CollisionModel(Arm(robot=ROBOT, scene=Scene([Obstacle("pea", Sphere(0.002), at(wrist))]))), spline
+        CollisionModel(Arm(robot=ROBOT, scene=Scene([Obstacle("pea", Sphere(0.002), at(wrist))]))),
+        spline,
     )
     assert proof is not None
     assert proof.min_clearance < proof.sampled < -0.02
@@ -122,7 +135,9 @@ def test_a_touch_between_samples_is_found() -> None:
 
 
 def test_turning_above_a_floor_costs_little_though_nothing_changes() -> None:
-    """The pan joint alone: the distance to the floor is constant, and halving every interval would never end."""
+    """The pan joint alone: the distance to the floor is constant, and halving every interval would
+    never end.
+    """
     q_start = np.array([-2.5, -1.2, 1.5, -1.9, -1.57, 0.0])
     q_goal = q_start + np.array([5.0, 0, 0, 0, 0, 0])
     spline = Spline(5, np.array([0.0] * 6 + [2.5] * 6), np.array([q_start] * 3 + [q_goal] * 3))
@@ -136,14 +151,18 @@ def test_turning_above_a_floor_costs_little_though_nothing_changes() -> None:
     ends = capsule.axis @ height[:3, :3].T + height[:3, 3]
     expected = ends[:, 2].min() - capsule.radius - (height[2, 3] - 0.2)
     assert proof.sampled == pytest.approx(expected, abs=1e-12)
-    assert expected - RELATIVE_GAP * expected - ROUNDING <= proof.min_clearance <= expected + ROUNDING
+    assert (
+        expected - RELATIVE_GAP * expected - ROUNDING <= proof.min_clearance <= expected + ROUNDING
+    )
 
 
 def test_margin_is_taken_off() -> None:
     spline = wander(1)
     post = Obstacle("post", Sphere(0.1), at([0.3, 0.3, 0.6]))
     near = proven_clearance(CollisionModel(Arm(robot=ROBOT, scene=Scene([post]))), spline)
-    kept = proven_clearance(CollisionModel(Arm(robot=ROBOT, scene=Scene([replace(post, margin=0.5)]))), spline)
+    kept = proven_clearance(
+        CollisionModel(Arm(robot=ROBOT, scene=Scene([replace(post, margin=0.5)]))), spline
+    )
     assert near is not None and kept is not None
     assert "post" in kept.pair
     assert kept.sampled < near.sampled

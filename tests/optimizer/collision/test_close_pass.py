@@ -1,4 +1,6 @@
-"""Close passes: a ball at a known distance from the arm, with and without margins; the arm near itself."""
+"""Close passes: a ball at a known distance from the arm, with and without margins; the arm near
+itself.
+"""
 
 from __future__ import annotations
 
@@ -73,7 +75,9 @@ def test_distances_are_those_without_margins(margin: float) -> None:
 
 
 def test_a_margin_hides_no_other_pass() -> None:
-    """One ball touches its margin of 5 mm, another is 1 mm away and asks for nothing: the second one is named."""
+    """One ball touches its margin of 5 mm, another is 1 mm away and asks for nothing: the second
+    one is named.
+    """
     kept, free = on_the_axis(5e-3, 5e-3), on_the_axis(1e-3, 0.0)
     (wide,), (bare,) = kept.scene.obstacles, free.scene.obstacles
     both = replace(kept, scene=Scene([wide, replace(bare, name="bare")]))
@@ -113,7 +117,9 @@ def test_nothing_is_compared_without_collisions() -> None:
     assert close_pass(on_the_axis(1e-3, 0.0), MOTION, None) is None
 
 
-@pytest.mark.parametrize(("distance", "margin", "is_close"), [(1e-3, 0.0, True), (1e-3, 5e-3, False), (3e-3, 0, False)])
+@pytest.mark.parametrize(
+    ("distance", "margin", "is_close"), [(1e-3, 0.0, True), (1e-3, 5e-3, False), (3e-3, 0, False)]
+)
 def test_a_given_motion_is_sampled(distance: float, margin: float, is_close: bool) -> None:
     """Of an obstacle with a margin it is `nearest` that says whether the margin is kept."""
     motion = Waypoints(np.array([START, GOAL]), np.array([1.0]), "quintic", 0)

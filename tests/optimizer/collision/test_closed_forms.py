@@ -1,4 +1,5 @@
-"""Distances of segments and boxes against slow ways to the same, above all where they degenerate."""
+"""Distances of segments and boxes against slow ways to the same, above all where they
+degenerate."""
 
 from __future__ import annotations
 
@@ -11,7 +12,16 @@ from joulepath.optimizer.collision.closed_form_distance import box_segment, segm
 COUNT = 2000
 EXACT = 1e-13  # m; lengths are of the order of 1 m, rounding 1e-16
 NEARLY_PARALLEL = 2e-7  # m; see PARALLEL
-KINDS = ("any", "parallel", "nearly parallel", "on one line", "points", "short", "crossing", "on a grid")
+KINDS = (
+    "any",
+    "parallel",
+    "nearly parallel",
+    "on one line",
+    "points",
+    "short",
+    "crossing",
+    "on a grid",
+)
 
 
 def segments(kind: str, seed: int) -> tuple[Array, Array]:
@@ -32,14 +42,19 @@ def segments(kind: str, seed: int) -> tuple[Array, Array]:
         case "short":
             b[:, 1] = b[:, 0] + tiny
         case "crossing":
-            b = a.mean(axis=1, keepdims=True) + np.array([-1, 1])[:, None] * (b[:, 1] - b[:, 0])[:, None]
+            b = (
+                a.mean(axis=1, keepdims=True)
+                + np.array([-1, 1])[:, None] * (b[:, 1] - b[:, 0])[:, None]
+            )
         case "on a grid":
             a, b = rng.integers(-1, 2, (2, COUNT, 2, 3)).astype(float)
     return a, b
 
 
 def nearest_of_candidates(a: Array, b: Array) -> Array:
-    """The least distance (k,) [m] between ends and segments, and between the lines where that is inside of both."""
+    """The least distance (k,) [m] between ends and segments, and between the lines where that is
+    inside of both.
+    """
     found = [to_segment(p, s) for p, s in ((a[:, 0], b), (a[:, 1], b), (b[:, 0], a), (b[:, 1], a))]
     u, v, w = a[:, 1] - a[:, 0], b[:, 1] - b[:, 0], a[:, 0] - b[:, 0]
     A = np.stack([u, -v], axis=2)
@@ -76,10 +91,16 @@ def test_segments(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_box_and_segment(kind: str) -> None:
-    """The distance from a box is convex along a segment: thirds of it are cut away until the least is left."""
+    """The distance from a box is convex along a segment: thirds of it are cut away until the least
+    is left.
+    """
     _, b = segments(kind, seed=4)
     rng = np.random.default_rng(5)
-    half = rng.integers(1, 3, (COUNT, 3)) / 2 if kind == "on a grid" else np.abs(rng.normal(size=(COUNT, 3))) * 0.5
+    half = (
+        rng.integers(1, 3, (COUNT, 3)) / 2
+        if kind == "on a grid"
+        else np.abs(rng.normal(size=(COUNT, 3))) * 0.5
+    )
     low, high = np.zeros(COUNT), np.ones(COUNT)
     for _ in range(100):
         thirds = low + (high - low) / 3, high - (high - low) / 3

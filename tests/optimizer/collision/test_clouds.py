@@ -1,4 +1,6 @@
-"""Obstacles of many parts: their distances, proofs and checks are those of their parts as obstacles of their own."""
+"""Obstacles of many parts: their distances, proofs and checks are those of their parts as obstacles
+of their own.
+"""
 
 from __future__ import annotations
 
@@ -28,9 +30,11 @@ from tests.optimizer.cells import LOADS, arm_in_cell, at, wander
 from tests.optimizer.moves import GOAL, START, problem_with
 from tests.selection import long_but
 
-# two exact computations of one distance [m] differ by rounding; by Coal's tolerance where it takes part
+# two exact computations of one distance [m] differ by rounding; by Coal's tolerance where it takes
+# part
 ROUNDING, COAL = 1e-9, 1e-7
-# a gradient by central differences of STEP [rad]: curvature of distances of centimetres, and rounding over the step
+# a gradient by central differences of STEP [rad]: curvature of distances of centimetres, and
+# rounding over the step
 STEP, GRADIENT = 1e-6, 1e-4
 POSE = at([0.1, -0.05, 0.2], [0.3, -0.2, 0.5])
 MARGIN = 0.02
@@ -58,7 +62,9 @@ def box_triangles(size: Array) -> Array:
     return np.array(found) * size / 2
 
 
-def torus(around_axis: int = 24, around_tube: int = 12, ring: float = 0.3, tube: float = 0.08) -> Array:
+def torus(
+    around_axis: int = 24, around_tube: int = 12, ring: float = 0.3, tube: float = 0.08
+) -> Array:
     """Triangles of a torus about z, counterclockwise as seen from outside."""
     turns = [np.arange(count) * 2 * np.pi / count for count in (around_axis, around_tube)]
     a, b = np.meshgrid(*turns, indexing="ij")
@@ -76,10 +82,19 @@ def shapes() -> dict[str, tuple[Shape, list[Obstacle]]]:
     triangles = around(30, 9)[:, None] + rng(10).normal(size=(30, 3, 3)) * 0.04
     voxels = Voxels(0.06, cells)
     return {
-        "points": (Points(points, 0.015), [part(k, Sphere(0.015), p) for k, p in enumerate(points)]),
-        "voxels": (voxels, [part(k, Box(np.full(3, 0.06)), (c + 0.5) * 0.06) for k, c in enumerate(voxels.cells)]),
+        "points": (
+            Points(points, 0.015),
+            [part(k, Sphere(0.015), p) for k, p in enumerate(points)],
+        ),
+        "voxels": (
+            voxels,
+            [part(k, Box(np.full(3, 0.06)), (c + 0.5) * 0.06) for k, c in enumerate(voxels.cells)],
+        ),
         # a triangle as a mesh of hardly any thickness
-        "triangles": (TriangleMesh(triangles), [part(k, thin(t), np.zeros(3)) for k, t in enumerate(triangles)]),
+        "triangles": (
+            TriangleMesh(triangles),
+            [part(k, thin(t), np.zeros(3)) for k, t in enumerate(triangles)],
+        ),
     }
 
 
@@ -102,11 +117,16 @@ def model_of(obstacles: list[Obstacle], load: int = 0) -> CollisionModel:
 
 def by_body(model: CollisionModel, q: Array) -> Array:
     """Least distances (n, bodies) to the scene of every moving body."""
-    distance, of_scene = model.signed_distances(q)[0], [model.bodies[i].link == 0 for i in model.pairs[:, 0]]
+    distance, of_scene = (
+        model.signed_distances(q)[0],
+        [model.bodies[i].link == 0 for i in model.pairs[:, 0]],
+    )
     names = [model.bodies[i].name for i in model.pairs[:, 0]]
     of_scene = [scene and name != "base" for scene, name in zip(of_scene, names, strict=True)]
     seconds = np.unique(model.pairs[of_scene, 1])
-    return np.stack([distance[:, of_scene & (model.pairs[:, 1] == k)].min(axis=1) for k in seconds], axis=1)
+    return np.stack(
+        [distance[:, of_scene & (model.pairs[:, 1] == k)].min(axis=1) for k in seconds], axis=1
+    )
 
 
 @pytest.mark.parametrize("load", range(len(LOADS)))
@@ -153,11 +173,15 @@ def test_the_tree_finds_what_a_loop_over_all_parts_finds(count: int) -> None:
     tree = BoundingTree(centres, radii)
     segments = rng(2).uniform(-1, 1, (40, 2, 3))
     reach, within = np.full(40, 0.03), np.full(40, 0.1)
-    distance = np.stack([point_segment(centres, np.repeat(s[None], count, axis=0)) for s in segments])
+    distance = np.stack(
+        [point_segment(centres, np.repeat(s[None], count, axis=0)) for s in segments]
+    )
     roots = np.zeros(40, dtype=np.intp)
     query, found = tree.near(segments, reach, within, roots)
     expected = np.argwhere(distance - radii - 0.03 <= 0.1)
-    assert sorted(zip(query.tolist(), found.tolist(), strict=True)) == [tuple(each) for each in expected.tolist()]
+    assert sorted(zip(query.tolist(), found.tolist(), strict=True)) == [
+        tuple(each) for each in expected.tolist()
+    ]
     query, found = tree.near(segments, np.zeros(40), np.full(40, np.inf), roots, nearest=True)
     nearest = (distance - radii).argmin(axis=1)
     assert all(best in found[query == k] for k, best in enumerate(nearest))
@@ -166,7 +190,10 @@ def test_the_tree_finds_what_a_loop_over_all_parts_finds(count: int) -> None:
 
 
 def test_triangle_and_segment_by_coal() -> None:
-    triangles, segments = rng(1).normal(size=(400, 3, 3)) * 0.3, rng(2).normal(size=(400, 2, 3)) * 0.3
+    triangles, segments = (
+        rng(1).normal(size=(400, 3, 3)) * 0.3,
+        rng(2).normal(size=(400, 2, 3)) * 0.3,
+    )
     distance, normal, point = triangle_segment(triangles, segments)
     request, crossings = coal.DistanceRequest(True, True), 0
     request.gjk_tolerance = request.epa_tolerance = 1e-10
@@ -188,7 +215,8 @@ def test_triangle_and_segment_by_coal() -> None:
             assert distance[k] - SKIN == pytest.approx(theirs, abs=COAL)
         else:
             crossings += 1
-        # the separation along the normal attains the distance, and along no other direction it is greater
+        # the separation along the normal attains the distance, and along no other direction it is
+        # greater
         directions = np.vstack([normal[k], rng(k).normal(size=(200, 3))])
         directions /= np.linalg.norm(directions, axis=1)[:, None]
         separation = (segment @ directions.T).min(axis=0) - (triangle @ directions.T).max(axis=0)
@@ -212,8 +240,14 @@ def test_divided_triangles_cover_the_same_surface() -> None:
     # distances do not change
     segments = rng(5).normal(size=(len(pieces), 2, 3)) * 0.3
     for segment in segments[:20]:
-        before = triangle_segment(triangles, np.repeat(segment[None], len(triangles), axis=0))[0].clip(0).min()
-        after = triangle_segment(pieces, np.repeat(segment[None], len(pieces), axis=0))[0].clip(0).min()
+        before = (
+            triangle_segment(triangles, np.repeat(segment[None], len(triangles), axis=0))[0]
+            .clip(0)
+            .min()
+        )
+        after = (
+            triangle_segment(pieces, np.repeat(segment[None], len(pieces), axis=0))[0].clip(0).min()
+        )
         assert after == pytest.approx(before, abs=ROUNDING)
 
 
@@ -226,8 +260,13 @@ def test_a_closed_box_is_the_box() -> None:
     ours = by_body(model_of([Obstacle("cloud", mesh, POSE @ at([0.5, 0.2, 0.2]))]), q)
     theirs = by_body(model_of([Obstacle("box", Box(size), POSE @ at([0.5, 0.2, 0.2]))]), q)
     outside = theirs > 0
-    # the proof and the certificate need the sign within: skins of capsules hold where cores are apart
-    assert np.abs(ours - theirs)[outside].max() < COAL and (ours[~outside] < 0).all() and (~outside).any()
+    # the proof and the certificate need the sign within: skins of capsules hold where cores are
+    # apart
+    assert (
+        np.abs(ours - theirs)[outside].max() < COAL
+        and (ours[~outside] < 0).all()
+        and (~outside).any()
+    )
 
 
 def test_the_inside_of_a_torus() -> None:
@@ -244,7 +283,8 @@ def test_the_inside_of_a_torus() -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "seed"), long_but([("triangles", 0)], product(("points", "voxels", "triangles"), range(3)))
+    ("kind", "seed"),
+    long_but([("triangles", 0)], product(("points", "voxels", "triangles"), range(3))),
 )
 def test_the_proof_is_that_of_the_parts(kind: str, seed: int) -> None:
     shape, parts = shapes()[kind]
@@ -259,7 +299,9 @@ def test_the_proof_is_that_of_the_parts(kind: str, seed: int) -> None:
     assert ours.min_clearance <= least + ROUNDING
     if ours.sampled > -MARGIN:
         # both are proven to within their gap of the same true clearance
-        assert ours.min_clearance == pytest.approx(theirs.min_clearance, abs=slack + THICKNESS + COAL)
+        assert ours.min_clearance == pytest.approx(
+            theirs.min_clearance, abs=slack + THICKNESS + COAL
+        )
 
 
 @pytest.mark.parametrize("kind", long_but(("points",), ("points", "voxels", "triangles")))
@@ -279,7 +321,9 @@ def test_the_planner_rejects_what_collides(kind: str) -> None:
 def test_two_obstacles_of_one_content_at_two_places() -> None:
     points, q = Points(around(40), 0.01), rng().uniform(-3, 3, (10, 6))
     there = POSE @ at([0.3, 0.1, -0.1], [0.0, 0.4, 0.0])
-    both = by_body(model_of([Obstacle("one", points, POSE), Obstacle("two", points, there, MARGIN)]), q)
+    both = by_body(
+        model_of([Obstacle("one", points, POSE), Obstacle("two", points, there, MARGIN)]), q
+    )
     one = by_body(model_of([Obstacle("one", points, POSE)]), q)
     two = by_body(model_of([Obstacle("two", points, there, MARGIN)]), q)
     assert np.array_equal(both, np.minimum(one, two))
@@ -317,7 +361,9 @@ NAN = np.array([[0.0, np.nan, 0.0]])
         (lambda: TriangleMesh(np.array([NAN.repeat(3, axis=0)])), "data"),
         (lambda: Attachment(Points(np.zeros((1, 3)), 0.1)), "shape"),
         (
-            lambda: Scene([Obstacle(f"{k}", Points(np.zeros((MOST_POINTS, 3)), 0.1)) for k in range(3)]),
+            lambda: Scene(
+                [Obstacle(f"{k}", Points(np.zeros((MOST_POINTS, 3)), 0.1)) for k in range(3)]
+            ),
             "scene.obstacles",
         ),
     ],
@@ -333,7 +379,9 @@ def test_the_margin_and_the_radius_are_kept() -> None:
     """A margin moves every distance by as much, and so does the radius of points."""
     points, q = around(40), rng().uniform(-3, 3, (10, 6))
     plain = by_body(model_of([Obstacle("cloud", Points(points, 0.01), POSE, 0.0)]), q)
-    wide = by_body(model_of([replace(Obstacle("cloud", Points(points, 0.015), POSE, 0.0), margin=0.02)]), q)
+    wide = by_body(
+        model_of([replace(Obstacle("cloud", Points(points, 0.015), POSE, 0.0), margin=0.02)]), q
+    )
     assert np.abs(plain - wide - 0.025).max() < ROUNDING
 
 
@@ -341,7 +389,9 @@ def test_the_margin_and_the_radius_are_kept() -> None:
 def test_an_arm_that_starts_within_a_closed_mesh_collides() -> None:
     """No surface is near: only the inside tells."""
     room = np.array([6.0, 6.0, 6.0])
-    within = problem_with(START, GOAL, scene=Scene([Obstacle("rock", TriangleMesh(box_triangles(room)))]))
+    within = problem_with(
+        START, GOAL, scene=Scene([Obstacle("rock", TriangleMesh(box_triangles(room)))])
+    )
     with pytest.raises(StartInCollision) as caught:
         optimize(within)
     assert "rock" in caught.value.pair and caught.value.depth > 1.0

@@ -1,4 +1,6 @@
-"""The C library's distances against those of numpy: in random cells, and where segments and boxes degenerate."""
+"""The C library's distances against those of numpy: in random cells, and where segments and boxes
+degenerate.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,8 @@ from tests.optimizer.collision.test_closed_forms import COUNT, KINDS, NEARLY_PAR
 
 SAME = 1e-13  # m; both round
 ON_DISC = 1e-8  # m; the root of the rounding of a squared cosine
-# normals of bodies nearer than this [m] are rounding, and of overlapping ones a choice among several
+# normals of bodies nearer than this [m] are rounding, and of overlapping ones a choice among
+# several
 APART = 1e-6
 
 
@@ -43,17 +46,25 @@ def standing(core: Core) -> Body:
 
 
 def assert_same(compiled: PairGeometry, by_numpy: PairGeometry, tolerance: float) -> None:
-    """Distances are the same; normals may differ where several are as good, but attain the distance."""
+    """Distances are the same; normals may differ where several are as good, but attain the
+    distance.
+    """
     k = len(compiled.is_cloud)
     frames, none, pair = np.tile(np.eye(4), (1, 2, 1, 1)), np.zeros(k, dtype=np.intp), np.arange(k)
     found, expected = (each.witness_points(frames, none, pair) for each in (compiled, by_numpy))
     assert np.abs(found.distance - expected.distance).max() < tolerance
-    attained = compiled.separations(frames, none, none, pair, (found.normal, found.normal), np.full(k, -1))
+    attained = compiled.separations(
+        frames, none, none, pair, (found.normal, found.normal), np.full(k, -1)
+    )
     # a normal is as wrong as its points are, over their distance
     apart = found.distance > APART
-    assert (np.abs(attained - found.distance) * np.minimum(found.distance, 1.0))[apart].max(initial=0.0) < tolerance
+    assert (np.abs(attained - found.distance) * np.minimum(found.distance, 1.0))[apart].max(
+        initial=0.0
+    ) < tolerance
     # what touches is left to numpy
-    np.testing.assert_array_equal(found.normal[found.distance <= 0], expected.normal[found.distance <= 0])
+    np.testing.assert_array_equal(
+        found.normal[found.distance <= 0], expected.normal[found.distance <= 0]
+    )
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -68,7 +79,11 @@ def test_segments(kind: str) -> None:
 def test_boxes_and_segments(kind: str, box_first: bool) -> None:
     _, b = segments(kind, seed=4)
     rng = np.random.default_rng(5)
-    half = rng.integers(1, 3, (COUNT, 3)) / 2 if kind == "on a grid" else np.abs(rng.normal(size=(COUNT, 3))) * 0.5
+    half = (
+        rng.integers(1, 3, (COUNT, 3)) / 2
+        if kind == "on a grid"
+        else np.abs(rng.normal(size=(COUNT, 3))) * 0.5
+    )
     boxes = [standing(Core(box_corners(-size, size), half_size=size)) for size in half]
     moving = [standing(Core(x)) for x in b]
     assert_same(*(of_pairs(boxes, moving) if box_first else of_pairs(moving, boxes)), SAME)
@@ -87,9 +102,13 @@ def test_random_cells(seed: int) -> None:
     """Of every shape: distances, gradients and separations."""
     model, by_numpy, frames = in_cell(seed)
     configuration, pair = (each.ravel() for each in np.indices((len(frames), len(model.pairs))))
-    found, expected = (each.witness_points(frames, configuration, pair) for each in (model.geometry, by_numpy))
+    found, expected = (
+        each.witness_points(frames, configuration, pair) for each in (model.geometry, by_numpy)
+    )
     assert np.abs(found.distance - expected.distance).max() < SAME
-    gradients = [each.gradients(frames, configuration, pair, expected) for each in (model.geometry, by_numpy)]
+    gradients = [
+        each.gradients(frames, configuration, pair, expected) for each in (model.geometry, by_numpy)
+    ]
     assert np.abs(gradients[0] - gradients[1]).max() < SAME
     end, normal = np.roll(configuration, 1), np.roll(expected.normal, 5, axis=0)
     whole = np.full(len(pair), -1)
@@ -103,12 +122,16 @@ def test_random_cells(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("within", [-np.inf, 0.0, 0.1, np.inf])
 def test_bounds(seed: int, within: float) -> None:
-    """From nothing, and from bounds known before: the same pairs are left, and where they are, the same bounds."""
+    """From nothing, and from bounds known before: the same pairs are left, and where they are, the
+    same bounds.
+    """
     model, by_numpy, frames = in_cell(seed)
     pairs = np.arange(len(model.pairs))[::2]
     known = np.random.default_rng(seed).normal(0.0, 0.3, (len(frames), len(pairs)))
     for before in (None, known):
-        found, expected = (each.bounds(frames, pairs, within, before) for each in (model.geometry, by_numpy))
+        found, expected = (
+            each.bounds(frames, pairs, within, before) for each in (model.geometry, by_numpy)
+        )
         for one, other in zip(found[1:], expected[1:], strict=True):
             np.testing.assert_array_equal(one, other)
         np.testing.assert_allclose(found[0], expected[0], rtol=0, atol=SAME)
@@ -119,8 +142,8 @@ def test_bounds(seed: int, within: float) -> None:
 
 @pytest.mark.parametrize("within", [0.1, np.inf])
 def test_a_configuration_that_is_no_number_is_never_clear(within: float) -> None:
-    """Its distances are no numbers, as by numpy, and the others are what they are without it; nor is there an error
-    without any configuration."""
+    """Its distances are no numbers, as by numpy, and the others are what they are without it; nor
+    is there an error without any configuration."""
     model, by_numpy, frames = in_cell(1)
     found = model.pair_distances(frames[:3], within=within).distance
     lost = frames[:3].copy()
@@ -128,7 +151,10 @@ def test_a_configuration_that_is_no_number_is_never_clear(within: float) -> None
     distances = []
     for geometry in (model.geometry, by_numpy):
         model.geometry = geometry
-        assert model.pair_distances(frames[:0], within=within).distance.shape == (0, len(model.pairs))
+        assert model.pair_distances(frames[:0], within=within).distance.shape == (
+            0,
+            len(model.pairs),
+        )
         distances.append(model.pair_distances(lost, within=within).distance)
         assert np.isnan(distances[-1][1]).any()
         np.testing.assert_allclose(distances[-1][[0, 2]], found[[0, 2]], rtol=0, atol=SAME)

@@ -25,7 +25,9 @@ SUPPORTS: list[tuple[Shape, Array]] = [
 ]
 
 
-@pytest.mark.parametrize(("shape", "expected"), SUPPORTS, ids=[type(shape).__name__ for shape, _ in SUPPORTS])
+@pytest.mark.parametrize(
+    ("shape", "expected"), SUPPORTS, ids=[type(shape).__name__ for shape, _ in SUPPORTS]
+)
 def test_core_has_the_support_of_its_shape(shape: Shape, expected: Array) -> None:
     core = core_of(shape)
     support = (DIRECTIONS @ core.points.T).max(axis=1) + core.disc_radius * SINE + core.radius

@@ -1,4 +1,5 @@
-"""Distances against Coal, their gradients against finite differences, and which pairs are compared."""
+"""Distances against Coal, their gradients against finite differences, and which pairs are
+compared."""
 
 from __future__ import annotations
 
@@ -61,7 +62,9 @@ def by_coal(model: CollisionModel, q: Array) -> Array:
     for p, (i, k) in enumerate(model.pairs):
         for n in range(len(q)):
             (a, grown_a, T_a), (b, grown_b, T_b) = standing(i, n), standing(k, n)
-            result[n, p] = coal.distance(a, T_a, b, T_b, request, coal.DistanceResult()) - grown_a - grown_b
+            result[n, p] = (
+                coal.distance(a, T_a, b, T_b, request, coal.DistanceResult()) - grown_a - grown_b
+            )
     return result
 
 
@@ -94,7 +97,10 @@ def test_gradients(load: Shape) -> None:
         closed = smooth & model.geometry.is_closed_form
         assert closed.mean() > 0.5
         assert error[closed].max() < GRADIENT
-        assert error[smooth & ~model.geometry.is_closed_form & (distance > -0.05)].max(initial=0) < ITERATED_GRADIENT
+        assert (
+            error[smooth & ~model.geometry.is_closed_form & (distance > -0.05)].max(initial=0)
+            < ITERATED_GRADIENT
+        )
 
 
 def test_far_pairs_are_bounded_from_below() -> None:
@@ -145,14 +151,20 @@ def test_what_is_compared() -> None:
     assert ("base", "wrist_3") in pairs and ("shoulder", "forearm") in pairs
     assert ("forearm", "wrist_2") not in pairs
     for part in ("tool", "payload"):
-        assert {a for a, b in pairs if b == part} & set(links) == set(links[:-1]), "all but the link that carries it"
+        assert {a for a, b in pairs if b == part} & set(links) == set(links[:-1]), (
+            "all but the link that carries it"
+        )
     assert ("tool", "payload") not in pairs
-    assert {b for a, b in pairs if a == "floor"} == {*links[1:], "tool", "payload"}, "the base does not move"
+    assert {b for a, b in pairs if a == "floor"} == {*links[1:], "tool", "payload"}, (
+        "the base does not move"
+    )
 
 
 @pytest.mark.parametrize("touches", [(), ("wrist_3",), ("wrist_2", "wrist_3"), ("forearm",)])
 def test_what_touches_by_design_is_not_compared(touches: tuple[str, ...]) -> None:
-    """Declared for each body: another capsule of the tool touches the last link, as it does unless told otherwise."""
+    """Declared for each body: another capsule of the tool touches the last link, as it does unless
+    told otherwise.
+    """
     ends = np.zeros(3), np.array([0, 0, 0.1])
     loaded = Arm(
         robot=ROBOT,
@@ -162,7 +174,10 @@ def test_what_touches_by_design_is_not_compared(touches: tuple[str, ...]) -> Non
     model = CollisionModel(loaded)
     links = load_robot("ur5e").link_names
     first = len(ROBOT.capsules)
-    compared = [{model.names(p)[0] for p in np.flatnonzero(model.pairs[:, 1] == first + k)} for k in range(3)]
+    compared = [
+        {model.names(p)[0] for p in np.flatnonzero(model.pairs[:, 1] == first + k)}
+        for k in range(3)
+    ]
     assert compared == [set(links) - set(touches), set(links[:-1]), set(links) - set(touches)]
 
 
@@ -186,7 +201,9 @@ def test_nothing_to_compare(capsules: int) -> None:
 
 def test_a_contact_known_by_hand() -> None:
     """The elbow folded flat: forearm on upper arm."""
-    folded, stretched = np.array([[0.0, -1.57, 3.1, 0.0, 0.0, 0.0], [0.0, -1.57, 0.0, -1.57, 0.5, 0.0]])
+    folded, stretched = np.array(
+        [[0.0, -1.57, 3.1, 0.0, 0.0, 0.0], [0.0, -1.57, 0.0, -1.57, 0.5, 0.0]]
+    )
     contact, apart = CollisionModel(Arm(robot=ROBOT)).closest_pairs([folded, stretched])
     assert contact.distance < -0.01
     assert set(contact.pair) <= set(load_robot("ur5e").link_names)
@@ -195,7 +212,9 @@ def test_a_contact_known_by_hand() -> None:
 
 @pytest.mark.parametrize("size", [4e-4, 0.3, 90.0])
 def test_any_depth_has_a_distance_and_a_normal(size: float) -> None:
-    """Deep inside round bodies Coal's search may end nowhere: what is given instead is no more than the distance."""
+    """Deep inside round bodies Coal's search may end nowhere: what is given instead is no more than
+    the distance.
+    """
     corners = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T * size / 2
     shapes: list[Shape] = [
         Cylinder(size / 2, size),
@@ -219,7 +238,10 @@ def test_a_rough_distance_is_no_more_than_the_distance() -> None:
         first, second = (model.bodies[k] for k in model.pairs[p])
         grown = first.core.radius + second.core.radius + first.margin + second.margin
         for n in range(20):
-            at = frames[n, first.link] @ first.T_link_core, frames[n, second.link] @ second.T_link_core
+            at = (
+                frames[n, first.link] @ first.T_link_core,
+                frames[n, second.link] @ second.T_link_core,
+            )
             rough, normal, _ = _lower_bound(first.core, at[0], second.core, at[1])
             assert np.linalg.norm(normal) == pytest.approx(1)
             if exact[n, p] > -0.1:

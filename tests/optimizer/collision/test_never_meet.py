@@ -1,14 +1,17 @@
-"""Pairs of links that are not compared because they never meet: proven over every angle of the joints between.
+"""Pairs of links that are not compared because they never meet: proven over every angle of the
+joints between.
 
-Forearm and wrist 2, wrist 1 and wrist 3: for the convex hulls of both of the maker's meshes, which hold the links. The
-distance of two hulls changes by no more than Σ lever_j |Δq_j|, where lever_j is the largest distance of a point of the
-second hull from the axis of joint j, at any angle. A cell of angles is proven by the distance in its middle, or cut.
+Forearm and wrist 2, wrist 1 and wrist 3: for the convex hulls of both of the maker's meshes, which
+hold the links. The distance of two hulls changes by no more than Σ lever_j |Δq_j|, where lever_j is
+the largest distance of a point of the second hull from the axis of joint j, at any angle. A cell of
+angles is proven by the distance in its middle, or cut.
 
-Forearm and wrist 2 of a UR3e, a UR10e or a UR16e: in the same way, for the visual meshes. Their hulls overlap by 3 mm
-and 12 mm.
+Forearm and wrist 2 of a UR3e, a UR10e or a UR16e: in the same way, for the visual meshes. Their
+hulls overlap by 3 mm and 12 mm.
 
-Base and upper arm: for the surface of the upper arm as the visual mesh has it, which is not convex, and a cylinder that
-holds the base. The collision mesh of the upper arm, its convex hull, fills the hollow in which the base stands.
+Base and upper arm: for the surface of the upper arm as the visual mesh has it, which is not convex,
+and a cylinder that holds the base. The collision mesh of the upper arm, its convex hull, fills the
+hollow in which the base stands.
 
 Arms without meshes that may be used: by their capsules, in the same way as by hulls.
 """
@@ -44,9 +47,16 @@ BY_HULLS = {
     ("ur16e", 4, 6): 0.020,
 }
 BY_MESHES = {("ur3e", 3, 5): 0.005, ("ur10e", 3, 5): 0.005, ("ur16e", 3, 5): 0.005}
-BY_SURFACE = {("ur5e", 0, 2): 0.005, ("ur3e", 0, 2): 0.005, ("ur10e", 0, 2): 0.005, ("ur16e", 0, 2): 0.005}
+BY_SURFACE = {
+    ("ur5e", 0, 2): 0.005,
+    ("ur3e", 0, 2): 0.005,
+    ("ur10e", 0, 2): 0.005,
+    ("ur16e", 0, 2): 0.005,
+}
 # the same of capsules: pairs that are compared, and the comparison refuses nothing
-BY_CAPSULES = {(name, *pair): 0.005 for name in ("ur15", "ur20", "ur30") for pair in ((0, 2), (4, 6))}
+BY_CAPSULES = {
+    (name, *pair): 0.005 for name in ("ur15", "ur20", "ur30") for pair in ((0, 2), (4, 6))
+}
 # arms of the same kinematics and capsules as another
 TWINS = {"ur7e": "ur5e", "ur12e": "ur10e"}
 # largest edge of a piece of a surface [m], and range of an angle that is looked at first [rad]
@@ -87,7 +97,9 @@ def surface(robot: Robot, link: int) -> coal.CollisionGeometry:
 
 
 def distances(robot: Robot, first: int, second: int, angles: Array, by_meshes: bool) -> Array:
-    """Distances (k,) [m] of two links at angles (k, 2) [rad] of the two joints between them: of hulls or of meshes."""
+    """Distances (k,) [m] of two links at angles (k, 2) [rad] of the two joints between them: of
+    hulls or of meshes.
+    """
     q = np.zeros((len(angles), robot.nq))
     q[:, first:second] = angles
     frames = link_frames(joint_placements(robot.model), q)
@@ -104,8 +116,12 @@ def distances(robot: Robot, first: int, second: int, angles: Array, by_meshes: b
     return np.array(result)
 
 
-def capsule_distances(robot: Robot, capsules: tuple[LinkCapsule, LinkCapsule], angles: Array) -> Array:
-    """Distances (k,) [m] of two capsules at angles (k, 2) [rad] of the two joints between their links."""
+def capsule_distances(
+    robot: Robot, capsules: tuple[LinkCapsule, LinkCapsule], angles: Array
+) -> Array:
+    """Distances (k,) [m] of two capsules at angles (k, 2) [rad] of the two joints between their
+    links.
+    """
     links = [capsule.link for capsule in capsules]
     q = np.zeros((len(angles), robot.nq))
     q[:, links[0] : links[1]] = angles
@@ -114,14 +130,23 @@ def capsule_distances(robot: Robot, capsules: tuple[LinkCapsule, LinkCapsule], a
     (one, own, T_one), (other, others, T_other) = parts
     request, result = coal.DistanceRequest(True, True), []
     for T in frames[:, links]:
-        first, second = (coal.Transform3s(np.ascontiguousarray(P[:3, :3]), np.ascontiguousarray(P[:3, 3])) for P in T)
-        result.append(coal.distance(one, first * T_one, other, second * T_other, request, coal.DistanceResult()))
+        first, second = (
+            coal.Transform3s(np.ascontiguousarray(P[:3, :3]), np.ascontiguousarray(P[:3, 3]))
+            for P in T
+        )
+        result.append(
+            coal.distance(
+                one, first * T_one, other, second * T_other, request, coal.DistanceResult()
+            )
+        )
     # of the axes, which coal grows a little, less both radii
     return np.array(result) + own + others - sum(capsule.radius for capsule in capsules)
 
 
 def levers(robot: Robot, second: int, points: Array) -> tuple[float, float]:
-    """Bounds [m] on how far points (k, 3) [m] of the second link are from the axes of the last two joints."""
+    """Bounds [m] on how far points (k, 3) [m] of the second link are from the axes of the last two
+    joints.
+    """
     T = joint_placements(robot.model)[second - 1]
     own = float(np.linalg.norm(points[:, :2], axis=1).max())
     # at any angle of the last joint, a point stays on a circle about its axis
@@ -143,12 +168,15 @@ def test_links_that_never_meet(pair: tuple[str, int, int]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "first", "second"), long_but([pair for pair in BY_CAPSULES if pair[0] == "ur20"], BY_CAPSULES)
+    ("name", "first", "second"),
+    long_but([pair for pair in BY_CAPSULES if pair[0] == "ur20"], BY_CAPSULES),
 )
 def test_capsules_that_never_meet(name: str, first: int, second: int) -> None:
     robot = load_robot(name)
     assert (first, second) not in robot.never_in_collision
-    sides = [[capsule for capsule in robot.capsules if capsule.link == link] for link in (first, second)]
+    sides = [
+        [capsule for capsule in robot.capsules if capsule.link == link] for link in (first, second)
+    ]
     for one, other in product(*sides):
         # by that of their axes: the radii do not turn
         assert_apart(
@@ -159,7 +187,9 @@ def test_capsules_that_never_meet(name: str, first: int, second: int) -> None:
 
 
 def assert_apart(distance: Callable[[Array], Array], reach: float, kept: float) -> None:
-    """Distances (k,) [m] at angles (k, 2) [rad] exceed `kept` at every angle; `reach` [m] bounds both slopes' sum."""
+    """Distances (k,) [m] at angles (k, 2) [rad] exceed `kept` at every angle; `reach` [m] bounds
+    both slopes' sum.
+    """
     half = np.pi / 24
     grid = np.arange(-np.pi + half, np.pi, 2 * half)
     cells = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
@@ -168,12 +198,15 @@ def assert_apart(distance: Callable[[Array], Array], reach: float, kept: float) 
         assert found.min() > kept
         cells = cells[found - reach * half < kept]
         half /= 2
-        cells = (cells[:, None] + half * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])).reshape(-1, 2)
+        cells = (cells[:, None] + half * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])).reshape(
+            -1, 2
+        )
 
 
 @pytest.mark.parametrize("pair", first_quick(here(BY_SURFACE)), ids=str)
 def test_base_and_upper_arm_never_meet(pair: tuple[str, int, int]) -> None:
-    """The pan joint turns about the axis of the cylinder: only the lift joint changes the distance."""
+    """The pan joint turns about the axis of the cylinder: only the lift joint changes the
+    distance."""
     name, foot = pair[0], FOOT[pair[0]]
     robot = load_robot(name)
     base = link_surfaces(meshes(name), name, 0)["visual"]
@@ -190,12 +223,15 @@ def test_base_and_upper_arm_never_meet(pair: tuple[str, int, int]) -> None:
         is_long = edges.max(axis=1) > EDGE
         pieces = cut(pieces[is_long], edges[is_long].argmax(axis=1))
     points = np.unique(np.round(np.concatenate(small).reshape(-1, 3), 3), axis=0)
-    # no point of the surface is farther from a corner of its piece than this, nor a corner from where it is rounded to
+    # no point of the surface is farther from a corner of its piece than this, nor a corner from
+    # where it is rounded to
     spacing = EDGE / np.sqrt(3) + np.sqrt(3) / 2 * 1e-3
     lever = np.linalg.norm(points[:, :2], axis=1)
     half, placements = FIRST_STEP / 2, joint_placements(robot.model)
     # of every range of angles, the points that are not yet proven to keep away
-    open_ranges = [(angle, np.arange(len(points))) for angle in np.arange(-np.pi + half, np.pi, FIRST_STEP)]
+    open_ranges = [
+        (angle, np.arange(len(points))) for angle in np.arange(-np.pi + half, np.pi, FIRST_STEP)
+    ]
     while open_ranges:
         halved = []
         for angle, which in open_ranges:
@@ -217,19 +253,26 @@ def test_base_and_upper_arm_never_meet(pair: tuple[str, int, int]) -> None:
 
 @pytest.mark.parametrize("name", robot_names())
 def test_all_pairs_that_are_left_out_are_proven(name: str) -> None:
-    """By meshes that are not always here for some: `tests.mesh_folders`. Or the figure says that they are others'."""
+    """By meshes that are not always here for some: `tests.mesh_folders`. Or the figure says that
+    they are others'.
+    """
     known = (*BY_HULLS, *BY_MESHES, *BY_SURFACE)
     proven = {(first, second) for robot, first, second in known if robot == TWINS.get(name, name)}
     robot = load_robot(name)
     figure = robot.figures["collision"]["never_meet"]
-    assert robot.never_in_collision == proven or (figure["trust"] == "C" and "Not proven" in figure["note"])
+    assert robot.never_in_collision == proven or (
+        figure["trust"] == "C" and "Not proven" in figure["note"]
+    )
 
 
 @pytest.mark.parametrize("name", TWINS)
 def test_a_twin_has_the_same_shape(name: str) -> None:
     """So what is proven of the one holds for the other."""
     robot, twin = load_robot(name), load_robot(TWINS[name])
-    own, same = (np.array([[*each.axis.ravel(), each.radius, each.link] for each in r.capsules]) for r in (robot, twin))
+    own, same = (
+        np.array([[*each.axis.ravel(), each.radius, each.link] for each in r.capsules])
+        for r in (robot, twin)
+    )
     assert (own == same).all()
     placements = zip(robot.model.jointPlacements, twin.model.jointPlacements, strict=True)
     assert all((one.homogeneous == other.homogeneous).all() for one, other in placements)

@@ -1,4 +1,5 @@
-"""State validity against the collision model, and planned paths against distances at dense samples."""
+"""State validity against the collision model, and planned paths against distances at dense
+samples."""
 
 from __future__ import annotations
 
@@ -33,7 +34,14 @@ from joulepath.optimizer.methods.planned_paths import FROM_PLANNED_PATH
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.scene import Box, HalfSpace, Obstacle, Scene, Shape, capsule_between
+from joulepath.optimizer.problem.scene import (
+    Box,
+    HalfSpace,
+    Obstacle,
+    Scene,
+    Shape,
+    capsule_between,
+)
 from joulepath.optimizer.problem.tool_cone import ToolCone
 from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory
 from joulepath.optimizer.trajectories.spline import sample
@@ -63,7 +71,10 @@ def at(x: float, y: float, z: float, R: Array | None = None) -> Array:
 def walls(**boxes: tuple[tuple[float, float, float], tuple[float, float, float]]) -> Scene:
     """A table, and boxes by name, size and middle."""
     table: Shape = HalfSpace()
-    around = [Obstacle(name, Box(np.array(size)), at(*middle), 0.01) for name, (size, middle) in boxes.items()]
+    around = [
+        Obstacle(name, Box(np.array(size)), at(*middle), 0.01)
+        for name, (size, middle) in boxes.items()
+    ]
     return Scene([Obstacle("table", table, at(0, 0, -0.02)), *around])
 
 
@@ -88,7 +99,9 @@ TRAP = walls(
 
 
 def cage() -> Scene:
-    """Twelve bars along the edges of a cube of 0.4 m: the arm reaches in from the other side of itself."""
+    """Twelve bars along the edges of a cube of 0.4 m: the arm reaches in from the other side of
+    itself.
+    """
     size, thick, middle = 0.4, 0.04, np.array([0.55, 0.0, 0.45])
     bars = {}
     for axis in range(3):
@@ -121,10 +134,13 @@ def task(name: str) -> tuple[Arm, Array, Array]:
     kinematics, model = inverse_kinematics_for(arm.robot), CollisionModel(arm)
     ends = []
     for T in (T_start, T_goal):
-        found = kinematics.solve(T, arm.T_flange_tcp, arm.active_limits, windings=False, target="start")
+        found = kinematics.solve(
+            T, arm.T_flange_tcp, arm.active_limits, windings=False, target="start"
+        )
         ends.append([s.q for s in found if model.signed_distances(s.q[None])[0].min() > 0])
     q_start, q_goal = min(
-        ((a, b) for a in ends[0] for b in ends[1]), key=lambda both: float(np.abs(both[1] - both[0]).max())
+        ((a, b) for a in ends[0] for b in ends[1]),
+        key=lambda both: float(np.abs(both[1] - both[0]).max()),
     )
     return arm, q_start, q_goal
 
@@ -177,7 +193,9 @@ def test_planned_paths_are_collision_free(name: str) -> None:
 
 def test_the_same_seed_gives_the_same_paths() -> None:
     arm, q_start, q_goal = task("post")
-    first, again, other = (plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), seed=s).paths for s in (3, 3, 4))
+    first, again, other = (
+        plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), seed=s).paths for s in (3, 3, 4)
+    )
     assert [path.tolist() for path in first] == [path.tolist() for path in again]
     assert [path.tolist() for path in first] != [path.tolist() for path in other]
 
@@ -198,9 +216,16 @@ def test_a_free_straight_line_is_the_only_path() -> None:
 
 def test_no_path_to_a_goal_in_collision() -> None:
     arm, q_start, q_goal = task("post")
-    through = Scene([*arm.scene.obstacles, Obstacle("plate", Box(np.array([0.2, 0.2, 0.02])), at(0.5, 0.3, 0.2))])
+    through = Scene(
+        [
+            *arm.scene.obstacles,
+            Obstacle("plate", Box(np.array([0.2, 0.2, 0.02])), at(0.5, 0.3, 0.2)),
+        ]
+    )
     blocked = Arm(robot=ROBOT, scene=through, tool=arm.tool, T_flange_tcp=arm.T_flange_tcp)
-    assert plan_paths(blocked, q_start, q_goal, Deadline.after(AMPLE)) == PlannedPaths(PlanningEnd.INVALID_END)
+    assert plan_paths(blocked, q_start, q_goal, Deadline.after(AMPLE)) == PlannedPaths(
+        PlanningEnd.INVALID_END
+    )
 
 
 def walled_in() -> tuple[Arm, Array, Array]:
@@ -213,7 +238,11 @@ def walled_in() -> tuple[Arm, Array, Array]:
     behind = Obstacle("behind", Box(np.array([3.0, 0.02, 3.0])), at(-1.58, 0.0, 1.0))
     over = Obstacle("over", Box(np.array([0.6, 0.02, 2.0])), at(0.0, 0.0, 1.7))
     limits, margin = arm.active_limits, 0.3
-    tight = replace(limits, q_min=np.minimum(q_start, q_goal) - margin, q_max=np.maximum(q_start, q_goal) + margin)
+    tight = replace(
+        limits,
+        q_min=np.minimum(q_start, q_goal) - margin,
+        q_max=np.maximum(q_start, q_goal) + margin,
+    )
     closed = replace(arm, scene=Scene([*arm.scene.obstacles, wall, behind, over]), limits=tight)
     return closed, q_start, q_goal
 
@@ -228,7 +257,12 @@ def test_no_path_to_a_walled_in_goal_and_an_answer_by_the_deadline() -> None:
 
 
 def problem(arm: Arm, q_start: Array, q_goal: Array) -> Problem:
-    given = {"scene": arm.scene, "tool": arm.tool, "T_flange_tcp": arm.T_flange_tcp, "limits": arm.limits}
+    given = {
+        "scene": arm.scene,
+        "tool": arm.tool,
+        "T_flange_tcp": arm.T_flange_tcp,
+        "limits": arm.limits,
+    }
     return problem_with(q_start, q_goal, windings=False, **given)  # type: ignore[arg-type]
 
 
@@ -247,7 +281,8 @@ def test_a_motion_into_a_cage_starts_from_a_planned_path() -> None:
 
 
 @pytest.mark.parametrize(
-    ("best_known", "was_postponed", "planned"), [(np.inf, False, False), (1e6, False, True), (np.inf, True, True)]
+    ("best_known", "was_postponed", "planned"),
+    [(np.inf, False, False), (1e6, False, True), (np.inf, True, True)],
 )
 def test_a_motion_deep_inside_an_obstacle_is_left_for_a_planned_path_once_one_is_known(
     best_known: float, was_postponed: bool, planned: bool, monkeypatch: pytest.MonkeyPatch
@@ -263,13 +298,19 @@ def test_a_motion_deep_inside_an_obstacle_is_left_for_a_planned_path_once_one_is
 
 
 def test_a_request_among_obstacles_has_the_same_answer_whatever_time_it_takes() -> None:
-    """The clock stands still, or ticks at each reading as on a busy machine: the deadline is far either way."""
+    """The clock stands still, or ticks at each reading as on a busy machine: the deadline is far
+    either way.
+    """
     asked = problem(*task("cage"))
     calm, busy = optimize(asked, clock=still), optimize(asked, clock=CountingClock(tick=1e-4))
-    np.testing.assert_array_equal(calm.trajectory.spline.control_points, busy.trajectory.spline.control_points)
+    np.testing.assert_array_equal(
+        calm.trajectory.spline.control_points, busy.trajectory.spline.control_points
+    )
 
 
-def test_a_failed_candidate_says_whether_the_deadline_ended_the_planning(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failed_candidate_says_whether_the_deadline_ended_the_planning(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     asked = problem(*walled_in())
     monkeypatch.setattr(planned_paths, "MOST_STATES", 2_000)
     with pytest.raises(NoTrajectory) as exhausted:
@@ -282,13 +323,17 @@ def test_a_failed_candidate_says_whether_the_deadline_ended_the_planning(monkeyp
     with pytest.raises(NoTrajectory) as cut_short:
         optimize(replace(asked, deadline=10.0), clock=CountingClock(tick=2e-3))
     (candidate,) = cut_short.value.candidates
-    assert candidate.status == "failed" and "the deadline ended the path planner" in candidate.reason
+    assert (
+        candidate.status == "failed" and "the deadline ended the path planner" in candidate.reason
+    )
     assert isinstance(cut_short.value, NoCollisionFreeTrajectory) and cut_short.value.cut_short
     assert "allow a longer deadline" in str(cut_short.value)
 
 
 @pytest.mark.parametrize("states", long_but((2_000,), (2_000, planned_paths.MOST_STATES)))
-def test_a_failed_candidate_names_the_colliding_bodies(states: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failed_candidate_names_the_colliding_bodies(
+    states: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(planned_paths, "MOST_STATES", states)
     with pytest.raises(NoTrajectory) as raised:
         optimize(problem(*walled_in()))
@@ -316,7 +361,9 @@ def test_limits_tightened_are_kept() -> None:
         q_min=np.maximum(limits.q_min, np.minimum(q_start, q_goal) - margin),
         q_max=np.minimum(limits.q_max, np.maximum(q_start, q_goal) + margin),
     )
-    for path in plan_paths(replace(arm, limits=tight), q_start, q_goal, Deadline.after(AMPLE)).paths:
+    for path in plan_paths(
+        replace(arm, limits=tight), q_start, q_goal, Deadline.after(AMPLE)
+    ).paths:
         assert (path >= tight.q_min).all() and (path <= tight.q_max).all()
 
 
@@ -329,7 +376,9 @@ def test_planned_paths_keep_the_tool_within_its_cone() -> None:
     def widest(paths: list[Array]) -> float:
         return max(float(tilt.ratios(q := between(path), np.zeros_like(q)).max()) for path in paths)
 
-    free, within = (plan_paths(a, q_start, q_goal, Deadline.after(AMPLE)).paths for a in (arm, held))
+    free, within = (
+        plan_paths(a, q_start, q_goal, Deadline.after(AMPLE)).paths for a in (arm, held)
+    )
     assert within
     assert widest(within) <= 1 + STEP / cone.half_angle
     assert widest(free) > 1.2

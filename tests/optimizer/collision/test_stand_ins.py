@@ -1,4 +1,6 @@
-"""What stands in for a tool and a payload without a shape: its size, its depth in obstacles, and where nothing does."""
+"""What stands in for a tool and a payload without a shape: its size, its depth in obstacles, and
+where nothing does.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,16 @@ from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.scene import Attachment, Box, HalfSpace, Mesh, Obstacle, Scene, Sphere, capsule_between
+from joulepath.optimizer.problem.scene import (
+    Attachment,
+    Box,
+    HalfSpace,
+    Mesh,
+    Obstacle,
+    Scene,
+    Sphere,
+    capsule_between,
+)
 from joulepath.optimizer.result.certificate import Clearance
 from tests.optimizer.cells import at
 from tests.optimizer.moves import AMPLE, HOME, ROBOT
@@ -49,7 +60,9 @@ def contacts(asked: Arm, *q: Array) -> dict[str, Clearance]:
     """Contacts at configurations a second apart, by what is carried."""
     found = StandIns.of(asked)
     assert found is not None
-    return {each.pair[1]: each for each in found.contacts(np.arange(len(q), dtype=float), np.array(q))}
+    return {
+        each.pair[1]: each for each in found.contacts(np.arange(len(q), dtype=float), np.array(q))
+    }
 
 
 def test_the_rod_ends_at_the_tcp_and_the_ball_has_the_mass() -> None:
@@ -58,7 +71,9 @@ def test_the_rod_ends_at_the_tcp_and_the_ball_has_the_mass() -> None:
     assert tcp_pose(arm(Scene()), DOWN)[2, 2] == pytest.approx(-1.0), "straight down"
     assert -found["tool"].sampled == pytest.approx(depth, abs=ROUNDED)
     assert -found["payload"].sampled == pytest.approx(depth + BALL, abs=ROUNDED)
-    assert {each.time for each in found.values()} == {1.0} and {each.pair[0] for each in found.values()} == {"floor"}
+    assert {each.time for each in found.values()} == {1.0} and {
+        each.pair[0] for each in found.values()
+    } == {"floor"}
     assert 4 / 3 * np.pi * BALL**3 * SETTINGS.payload_density == pytest.approx(MASS)
 
 
@@ -85,14 +100,18 @@ def test_the_deepest_obstacle_is_named() -> None:
     """A box beside the TCP, a ball in which the payload is, and a floor that nothing reaches."""
     T = tcp_pose(arm(Scene()), DOWN)
     beside = T[:3, 3] + [SETTINGS.tool_radius + 0.1 - 0.004, 0.0, SETTINGS.tool_radius]
-    scene = Scene([
-        *floor(-2.0).obstacles,
-        Obstacle("box", Box(np.array([0.2, 0.2, 0.01])), at(beside)),
-        Obstacle("ball", Sphere(0.1), at(T[:3, 3])),
-    ])  # fmt: skip
+    scene = Scene(
+        [
+            *floor(-2.0).obstacles,
+            Obstacle("box", Box(np.array([0.2, 0.2, 0.01])), at(beside)),
+            Obstacle("ball", Sphere(0.1), at(T[:3, 3])),
+        ]
+    )
     found = contacts(arm(scene), DOWN)
     assert found["payload"].pair == ("ball", "payload")
-    assert -found["payload"].sampled == pytest.approx(BALL + 0.1, abs=ROUNDED), "the centres are at the same place"
+    assert -found["payload"].sampled == pytest.approx(BALL + 0.1, abs=ROUNDED), (
+        "the centres are at the same place"
+    )
     assert found["tool"].pair == ("ball", "tool")
     alone = contacts(arm(Scene(scene.obstacles[:2]), payload=Payload()), DOWN)
     assert alone["tool"].pair == ("box", "tool")
@@ -116,7 +135,10 @@ def test_nothing_stands_in_for_what_has_a_shape() -> None:
         {"collisions": False},
         {"T_flange_tcp": np.eye(4), "payload": Payload()},
         {"T_flange_tcp": at([0.0, 0.0, 1e-5]), "payload": Payload(1e-15)},
-        {"T_flange_tcp": at([0.0, 0.0, 150.0]), "payload": Payload(1.0, np.array([0.0, 0.0, 500.0]))},
+        {
+            "T_flange_tcp": at([0.0, 0.0, 150.0]),
+            "payload": Payload(1.0, np.array([0.0, 0.0, 500.0])),
+        },
     ],
     ids=["no obstacles", "not checked", "nothing carried", "too small for a body", "too far away"],
 )

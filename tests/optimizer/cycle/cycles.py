@@ -24,12 +24,16 @@ def poses(seed: int, count: int) -> list[Pose]:
         position = rng.uniform([-0.6, -0.6, 0.05], [0.6, 0.6, 0.4])
         if 0.35 < np.hypot(*position[:2]) < 0.7:
             tilt = rng.uniform([-0.2, -0.2, -np.pi], [0.2, 0.2, np.pi])
-            found.append(Pose.from_rotation(position, pin.rpy.rpyToMatrix(np.pi + tilt[0], tilt[1], tilt[2])))
+            found.append(
+                Pose.from_rotation(position, pin.rpy.rpyToMatrix(np.pi + tilt[0], tilt[1], tilt[2]))
+            )
     return found
 
 
 def pick_and_place(seed: int, count: int, **given: Any) -> Cycle:
-    """A cycle of `count` stops, at which the part is taken up and put down in turn; nothing hits anything."""
+    """A cycle of `count` stops, at which the part is taken up and put down in turn; nothing hits
+    anything.
+    """
     arm = given.pop("arm", Arm(robot=ROBOT, collisions=False))
     stops = [
         Stop(name=f"stop {k}", target=pose, dwell=0.3, payload=PART if k % 2 == 0 else Payload())

@@ -16,7 +16,9 @@ def least_of_all(costs: list[Array], closed: bool) -> float:
     best = np.inf
     for nodes in product(*(range(cost.shape[0]) for cost in costs), range(costs[-1].shape[1])):
         if not closed or nodes[0] == nodes[-1]:
-            best = min(best, sum(cost[a, b] for cost, a, b in zip(costs, nodes, nodes[1:], strict=False)))
+            best = min(
+                best, sum(cost[a, b] for cost, a, b in zip(costs, nodes, nodes[1:], strict=False))
+            )
     return float(best)
 
 

@@ -29,16 +29,25 @@ from tests.optimizer.cycle.test_optimize_cycle import assert_true
 from tests.optimizer.cycle.test_paths import FREE, a_cycle, down
 from tests.optimizer.moves import ROBOT
 
-# the first joint may turn by no more than 3.3 rad to either side: on the left it comes to its end on the way
+# the first joint may turn by no more than 3.3 rad to either side: on the left it comes to its end
+# on the way
 OWN = ROBOT.limits
 NARROW = replace(
-    FREE, limits=OWN.tightened(q_min=np.array([-3.3, *OWN.q_min[1:]]), q_max=np.array([3.3, *OWN.q_max[1:]]))
+    FREE,
+    limits=OWN.tightened(
+        q_min=np.array([-3.3, *OWN.q_min[1:]]), q_max=np.array([3.3, *OWN.q_max[1:]])
+    ),
 )
 BEAD = StopPath(goal=down(0.2, 0.5, 0.2), split=True)
 
 
 def glue(**given: Any) -> Stop:
-    task = {"name": "glue", "target": down(0.45, -0.1, 0.2), "path": BEAD, "branch": BranchFilter("left", "up")}
+    task = {
+        "name": "glue",
+        "target": down(0.45, -0.1, 0.2),
+        "path": BEAD,
+        "branch": BranchFilter("left", "up"),
+    }
     return Stop(**task | given)
 
 
@@ -49,22 +58,40 @@ def divided(*stops: Stop, **given: Any) -> Cycle:
 def test_a_path_is_divided_where_a_joint_comes_to_its_end() -> None:
     asked = a_cycle(glue(dwell=0.1, payload=PART), arm=NARROW)
     with pytest.raises(PathInfeasible) as refusal:
-        plan_cycle(replace(asked, stops=[replace(each, path=replace(BEAD, split=False)) for each in asked.stops]))
-    assert all(0 < each.followed < 1 and each.reason == "outside_limits" for each in refusal.value.attempts)
+        plan_cycle(
+            replace(
+                asked,
+                stops=[replace(each, path=replace(BEAD, split=False)) for each in asked.stops],
+            )
+        )
+    assert all(
+        0 < each.followed < 1 and each.reason == "outside_limits" for each in refusal.value.attempts
+    )
     found = plan_cycle(asked)
     parts = with_divided_paths(asked)
     assert_true(parts, found)
     assert found.order == ["glue/1", "glue"] and found.status == "feasible"
     assert [move.planned.kind for move in found.moves] == ["move", "path", "move", "path", "move"]
     first, between, second = found.moves[1:4]
-    ends = [pose_of(NARROW, move.solution.trajectory.spline.control_points[[0, -1]]) for move in (first, second)]
+    ends = [
+        pose_of(NARROW, move.solution.trajectory.spline.control_points[[0, -1]])
+        for move in (first, second)
+    ]
     assert np.abs(ends[0][1] - ends[1][0]).max() < 1e-6, "it goes on where it left off"
-    assert np.abs(ends[0][0] - down(0.45, -0.1, 0.2).T).max() < 1e-6 and np.abs(ends[1][1] - BEAD.goal.T).max() < 1e-6
+    assert (
+        np.abs(ends[0][0] - down(0.45, -0.1, 0.2).T).max() < 1e-6
+        and np.abs(ends[1][1] - BEAD.goal.T).max() < 1e-6
+    )
     assert np.abs(between.solution.goal.q - between.solution.start.q).max() > 1.0
     course = ToolCourse.of(ToolPath(), down(0.45, -0.1, 0.2).T, BEAD.goal.T)
-    q = np.vstack([_samples(first.solution.trajectory.spline), _samples(second.solution.trajectory.spline)])
+    q = np.vstack(
+        [_samples(first.solution.trajectory.spline), _samples(second.solution.trajectory.spline)]
+    )
     position, rotation = course.deviation(pose_of(NARROW, q))
-    assert position.max() < ToolPath().position_tolerance and rotation.max() < ToolPath().rotation_tolerance
+    assert (
+        position.max() < ToolPath().position_tolerance
+        and rotation.max() < ToolPath().rotation_tolerance
+    )
     assert [move.planned.arm.payload.mass for move in found.moves] == [0.0, 0.0, 0.0, 0.0, 2.0]
     assert first.dwell_energy == 0 < second.dwell_energy
 
@@ -86,8 +113,12 @@ def test_every_part_has_the_lines_of_the_stop_and_the_names_of_its_parts() -> No
     asked = divided(glue(), other, order=order)
     assert [stop.name for stop in asked.stops] == ["glue/1", "glue", "away"]
     assert asked.order == FreeOrder(before=[("glue", "away")], together=[["glue/1", "glue"]])
-    turned = divided(glue(), other, order=FreeOrder(before=[("away", "glue")], together=[["away", "glue"]]))
-    assert turned.order == FreeOrder(before=[("away", "glue/1")], together=[["away", "glue/1", "glue"]])
+    turned = divided(
+        glue(), other, order=FreeOrder(before=[("away", "glue")], together=[["away", "glue"]])
+    )
+    assert turned.order == FreeOrder(
+        before=[("away", "glue/1")], together=[["away", "glue/1", "glue"]]
+    )
 
 
 def test_it_is_divided_where_the_reconfiguration_has_the_least_bound() -> None:
@@ -97,7 +128,9 @@ def test_it_is_divided_where_the_reconfiguration_has_the_least_bound() -> None:
     on, cost = _costs(free, [free], strands)
     for at, strand in zip(on.T, strands, strict=True):
         T, wanted = pose_of(NARROW, strand.configurations(PLACES[at])), course.poses(PLACES[at])
-        assert np.abs(T[:, :3, 3] - wanted[:, :3, 3]).max() < 2e-3, "its points are joined by straight lines"
+        assert np.abs(T[:, :3, 3] - wanted[:, :3, 3]).max() < 2e-3, (
+            "its points are joined by straight lines"
+        )
     places = _cheapest(strands, on, cost)
     assert places is not None and len(places) == 1
     pairs = [(a, b) for a, b in np.ndindex(cost.shape[1:]) if on[0, a] and on[-1, b]]
@@ -114,7 +147,9 @@ def test_the_parts_are_as_few_and_as_cheap_as_can_be(seed: int) -> None:
     strands = [Strand(PLACES[[a, b]], np.zeros((2, 6))) for a, b in ends]
     on = np.stack([each.covers(PLACES) for each in strands], axis=1)
     cost = np.where(
-        on[:, :, None] & on[:, None, :] & ~np.eye(6, dtype=bool), rng.uniform(1, 2, (len(PLACES), 6, 6)), np.inf
+        on[:, :, None] & on[:, None, :] & ~np.eye(6, dtype=bool),
+        rng.uniform(1, 2, (len(PLACES), 6, 6)),
+        np.inf,
     )
     best, counts = _brute(on, cost)
     places = _cheapest(strands, on, cost)
@@ -125,7 +160,9 @@ def test_the_parts_are_as_few_and_as_cheap_as_can_be(seed: int) -> None:
     at = [int(np.abs(PLACES - place).argmin()) for place in places]
     edges, totals = [0, *at, len(PLACES) - 1], list[float]()
     for way in product(range(6), repeat=len(at) + 1):
-        if all(on[a : b + 1, strand].all() for (a, b), strand in zip(pairwise(edges), way, strict=True)):
+        if all(
+            on[a : b + 1, strand].all() for (a, b), strand in zip(pairwise(edges), way, strict=True)
+        ):
             totals.append(sum(cost[p, a, b] for p, (a, b) in zip(at, pairwise(way), strict=True)))
     assert min(totals) == pytest.approx(best)
 

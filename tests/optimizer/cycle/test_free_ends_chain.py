@@ -1,4 +1,6 @@
-"""The bound of a cycle over all angles of the tool at the ends of a path: no chain of configurations has less."""
+"""The bound of a cycle over all angles of the tool at the ends of a path: no chain of
+configurations has less.
+"""
 
 from __future__ import annotations
 
@@ -48,12 +50,21 @@ def _cycle(seed: int, robot: str = "ur5e") -> Cycle:
     arm = Arm(robot=load_robot(robot), collisions=False, T_flange_tcp=nozzle)
     x, y, z = rng.uniform([0.4, -0.3, 0.15], [0.6, -0.1, 0.3])
     start, goal, after = (
-        Pose.from_quaternion(at, [0.0, 1.0, 0.0, 0.0]) for at in ((x, y, z), (x, y + 0.3, z), (0.1, 0.5, 0.2))
+        Pose.from_quaternion(at, [0.0, 1.0, 0.0, 0.0])
+        for at in ((x, y, z), (x, y + 0.3, z), (0.1, 0.5, 0.2))
     )
     free_start, free_goal = (ConeOrientedPose.about(each, AXIS) for each in (start, goal))
-    path = StopPath(goal=goal if seed % 3 == 1 else free_goal, path=ToolPath(about=(0.0, 0.0, 1.0)), speed=0.3)
+    path = StopPath(
+        goal=goal if seed % 3 == 1 else free_goal, path=ToolPath(about=(0.0, 0.0, 1.0)), speed=0.3
+    )
     seam = Stop(name="seam", target=start if seed % 3 == 2 else free_start, path=path)
-    return Cycle(arm=arm, start=HOME, stops=[seam, Stop(name="after", target=after)], windings=False, deadline=AMPLE)
+    return Cycle(
+        arm=arm,
+        start=HOME,
+        stops=[seam, Stop(name="after", target=after)],
+        windings=False,
+        deadline=AMPLE,
+    )
 
 
 @pytest.fixture(autouse=True)
@@ -63,7 +74,11 @@ def few_angles(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _chain(asked: Cycle) -> FreeEndsChain:
-    tried = {stop.name: free_orientations._all_around(stop) for stop in asked.stops if any(stop.free_ends)}
+    tried = {
+        stop.name: free_orientations._all_around(stop)
+        for stop in asked.stops
+        if any(stop.free_ends)
+    }
     first = free_orientations._at(asked, tried, bounded=True)
     chain = FreeEndsChain.of(first, CycleSearch(first, time.perf_counter).legs)
     assert chain is not None
@@ -72,7 +87,11 @@ def _chain(asked: Cycle) -> FreeEndsChain:
 
 def _reaching(arm: Arm, end: Pose | ConeOrientedPose, rng: np.random.Generator) -> Array:
     """Configurations (n, 6) [rad] of a pose, at random angles if it is free."""
-    given = Pose.from_quaternion(end.position, [0.0, 1.0, 0.0, 0.0]) if isinstance(end, ConeOrientedPose) else end
+    given = (
+        Pose.from_quaternion(end.position, [0.0, 1.0, 0.0, 0.0])
+        if isinstance(end, ConeOrientedPose)
+        else end
+    )
     angles = rng.uniform(-np.pi, np.pi, ANGLES) if isinstance(end, ConeOrientedPose) else [0.0]
     form, found = URClosedForm.of(arm.robot.model), []
     assert form is not None
@@ -84,7 +103,9 @@ def _reaching(arm: Arm, end: Pose | ConeOrientedPose, rng: np.random.Generator) 
 
 
 def _least_of_some(asked: Cycle, chain: FreeEndsChain, rng: np.random.Generator) -> float:
-    """The least bound [J] of chains of configurations at random angles: those near each other on the path."""
+    """The least bound [J] of chains of configurations at random angles: those near each other on
+    the path.
+    """
     path, legs = asked.stops[0].path, chain.legs
     assert path is not None
     entry, exit_ = (_reaching(asked.arm, end, rng) for end in (asked.stops[0].target, path.goal))
@@ -135,10 +156,13 @@ def test_fewer_cycles_give_a_weaker_bound(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_the_quick_bound_is_no_more_than_the_bound() -> None:
     rng, arm = np.random.default_rng(0), Arm(robot=load_robot("ur5e"))
-    bound = LeastBound(PreparedProblem.of(Problem(arm=arm, start=HOME, goal=HOME + 0.1, duration_min=1.0)))
+    bound = LeastBound(
+        PreparedProblem.of(Problem(arm=arm, start=HOME, goal=HOME + 0.1, duration_min=1.0))
+    )
     quick = SingleJointBound(bound, -30.0, 40.0)
     a, b = (
-        Boxes(rng.uniform(-6, 6, (30, 6)), rng.uniform(0, 0.3, (30, 6)), rng.random((30, 6)) < 0.5) for _ in range(2)
+        Boxes(rng.uniform(-6, 6, (30, 6)), rng.uniform(0, 0.3, (30, 6)), rng.random((30, 6)) < 0.5)
+        for _ in range(2)
     )
     gain = rng.uniform(-30.0, 60.0, (30, 30))
     found = quick.between(a, b, gain)
@@ -155,9 +179,14 @@ def test_no_way_within_the_tolerance_is_shorter_than_the_least(shape: str) -> No
     """A motion that cuts every corner by the tolerance still goes the least way."""
     rng = np.random.default_rng(0)
     poses = [
-        Pose.from_quaternion(at, [0.0, 1.0, 0.0, 0.0]) for at in ([0.5, -0.2, 0.2], [0.6, 0.0, 0.25], [0.5, 0.2, 0.2])
+        Pose.from_quaternion(at, [0.0, 1.0, 0.0, 0.0])
+        for at in ([0.5, -0.2, 0.2], [0.6, 0.0, 0.25], [0.5, 0.2, 0.2])
     ]
-    kinds = {"line": {}, "corner": {"via": poses[1:2], "blend": 0.03}, "arc": {"via": poses[1:2], "shape": "arc"}}
+    kinds = {
+        "line": {},
+        "corner": {"via": poses[1:2], "blend": 0.03},
+        "arc": {"via": poses[1:2], "shape": "arc"},
+    }
     for tolerance in (1e-4, 5e-3):
         path = ToolPath(**kinds[shape], position_tolerance=tolerance)
         course = ToolCourse.of(path, poses[0].T, poses[2].T)
@@ -165,19 +194,25 @@ def test_no_way_within_the_tolerance_is_shorter_than_the_least(shape: str) -> No
         for _ in range(2):
             at = np.unique(np.concatenate([[0.0, 1.0], rng.random(rng.integers(1, 40))]))
             points = course.poses(at)[:, :3, 3]
-            way = np.linalg.norm(np.diff(course.poses(np.linspace(0, 1, 2000))[:, :3, 3], axis=0), axis=1).sum()
+            way = np.linalg.norm(
+                np.diff(course.poses(np.linspace(0, 1, 2000))[:, :3, 3], axis=0), axis=1
+            ).sum()
             assert least <= way + 1e-9
             # straight from one to the next, as near to the inside as the tolerance allows
             moved = points + rng.normal(size=points.shape) * tolerance / 4
             moved[[0, -1]] = points[[0, -1]]
             if (
-                course.deviation(np.array([Pose.from_quaternion(p, [0, 1, 0, 0]).T for p in _dense(moved)]))[0].max()
+                course.deviation(
+                    np.array([Pose.from_quaternion(p, [0, 1, 0, 0]).T for p in _dense(moved)])
+                )[0].max()
                 <= tolerance
             ):
                 assert np.linalg.norm(np.diff(moved, axis=0), axis=1).sum() >= least
     arm = Arm(robot=load_robot("ur5e"))
     assert least_time(arm, course) == 0.0
-    assert least_time(replace(arm, tcp_speed=0.1), course) == pytest.approx(least_way(course) / 0.1, rel=1e-5)
+    assert least_time(replace(arm, tcp_speed=0.1), course) == pytest.approx(
+        least_way(course) / 0.1, rel=1e-5
+    )
 
 
 def _dense(points: Array) -> Array:
@@ -188,22 +223,31 @@ def _dense(points: Array) -> Array:
 
 @pytest.mark.parametrize("seed", long_but([0, 1], range(8)))
 def test_no_chain_through_free_stops_has_less(seed: int) -> None:
-    """Two stops that leave the angle free, with a payload between them: all configurations at many angles, with any
-    full turns."""
+    """Two stops that leave the angle free, with a payload between them: all configurations at many
+    angles, with any full turns."""
     rng = np.random.default_rng(seed)
     arm = Arm(robot=load_robot("ur5e"), collisions=False)
     ends = [
         ConeOrientedPose.about(Pose.from_quaternion(at, [0.0, 1.0, 0.0, 0.0]), AXIS)
         for at in rng.uniform([0.3, -0.4, 0.15], [0.55, 0.4, 0.4], (2, 3))
     ]
-    stops = [Stop(name=str(k), target=end, payload=(PART, Payload())[k]) for k, end in enumerate(ends)]
+    stops = [
+        Stop(name=str(k), target=end, payload=(PART, Payload())[k]) for k, end in enumerate(ends)
+    ]
     chain = _chain(Cycle(arm=arm, start=HOME, stops=stops, deadline=AMPLE))
     places = [HOME[None], *(_reaching(arm, end, rng) for end in ends), HOME[None]]
     least = np.zeros(1)
     for leg, (a, b) in zip(chain.legs, pairwise(places), strict=True):
         U = [np.array([leg.prepared.potential(each) for each in q]) for q in (a, b)]
-        apart, gain = wrapped(b[None] - a[:, None]).reshape(-1, 6), (U[1][None] - U[0][:, None]).ravel()
-        between = LeastBound(PreparedProblem.of(leg.prepared.freed())).of(apart, gain).reshape(len(a), len(b))
+        apart, gain = (
+            wrapped(b[None] - a[:, None]).reshape(-1, 6),
+            (U[1][None] - U[0][:, None]).ravel(),
+        )
+        between = (
+            LeastBound(PreparedProblem.of(leg.prepared.freed()))
+            .of(apart, gain)
+            .reshape(len(a), len(b))
+        )
         least = (least[:, None] + between).min(axis=0)
     bound = chain.least(NEVER)
     assert 0 < bound <= float(least[0]) + ROUNDING

@@ -26,7 +26,8 @@ from tests.selection import long_but
 ROUNDING = 1e-9
 # relative: optima that are reached in searches of their own
 CONVERGED = 2e-3
-# readings of the clock after the deadline, as a share of it: those that find it passed, and what is certified by then
+# readings of the clock after the deadline, as a share of it: those that find it passed, and what is
+# certified by then
 OVERRUN = 0.05
 
 
@@ -48,7 +49,8 @@ def energies(asked: Cycle) -> dict[tuple[str, ...], float]:
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("seed", "count", "closed"), long_but([(1, 3, True)], [(1, 3, True), (0, 4, True), (2, 4, False)])
+    ("seed", "count", "closed"),
+    long_but([(1, 3, True)], [(1, 3, True), (0, 4, True), (2, 4, False)]),
 )
 def test_it_is_the_best_of_all_orders(seed: int, count: int, closed: bool) -> None:
     asked = inspection(seed, count, closed=closed)
@@ -61,7 +63,8 @@ def test_it_is_the_best_of_all_orders(seed: int, count: int, closed: bool) -> No
     first = tuple(stop.name for stop in asked.stops)
     assert bool(given) == (tuple(found.order) != first)
     assert all(
-        each.electrical == pytest.approx(all_[first], rel=CONVERGED) and each.saving > -CONVERGED for each in given
+        each.electrical == pytest.approx(all_[first], rel=CONVERGED) and each.saving > -CONVERGED
+        for each in given
     )
 
 
@@ -78,7 +81,9 @@ def test_what_comes_before_and_together_is_kept() -> None:
     found = plan_cycle(asked)
     assert found.order.index(first) < found.order.index(last)
     assert found.order.index(free[0]) == found.order.index(free[2]) + 1
-    assert found.energy.electrical.total >= plan_cycle(inspection(0, 4)).energy.electrical.total * (1 - CONVERGED)
+    assert found.energy.electrical.total >= plan_cycle(inspection(0, 4)).energy.electrical.total * (
+        1 - CONVERGED
+    )
 
 
 @pytest.mark.parametrize("lines", long_but([False], [False, True]))
@@ -100,7 +105,9 @@ def test_twelve_stops(windings: bool) -> None:
     order = FreeOrder(before=[("stop 3", "stop 1")])
     found = plan_cycle(replace(inspection(3, 12, order=order), windings=windings))
     assert len(set(found.order)) == 12 and found.order.index("stop 3") < found.order.index("stop 1")
-    assert found.status == "optimal" and all(move.solution.certificate.valid for move in found.moves)
+    assert found.status == "optimal" and all(
+        move.solution.certificate.valid for move in found.moves
+    )
 
 
 @pytest.mark.parametrize("readings", long_but([2000], [200, 2000, 5000, 10_000, 20_000]))
@@ -134,23 +141,37 @@ def test_a_malformed_order_names_its_field(order: dict[str, Any], field: str, wo
 @pytest.mark.parametrize(
     ("order", "names", "word"),
     [
-        ({"before": [("stop 1", "stop 0")], "together": [("stop 0", "stop 1")]}, ["stop 0", "stop 1"], "together"),
         (
-            {"before": [("stop 0", "stop 2"), ("stop 2", "stop 1")], "together": [("stop 0", "stop 1")]},
+            {"before": [("stop 1", "stop 0")], "together": [("stop 0", "stop 1")]},
+            ["stop 0", "stop 1"],
+            "together",
+        ),
+        (
+            {
+                "before": [("stop 0", "stop 2"), ("stop 2", "stop 1")],
+                "together": [("stop 0", "stop 1")],
+            },
             ["stop 0", "stop 1", "stop 2"],
             "'stop 2'",
         ),
     ],
     ids=str,
 )
-def test_a_contradictory_order_names_its_stops(order: dict[str, Any], names: list[str], word: str) -> None:
+def test_a_contradictory_order_names_its_stops(
+    order: dict[str, Any], names: list[str], word: str
+) -> None:
     with pytest.raises(ContradictoryOrder) as refusal:
         inspection(0, 3, order=FreeOrder(**order))
     assert sorted(refusal.value.names) == names and word in str(refusal.value)
 
 
 def test_stops_that_come_before_each_other_are_all_named() -> None:
-    before = [("stop 0", "stop 1"), ("stop 1", "stop 2"), ("stop 2", "stop 0"), ("stop 0", "stop 3")]
+    before = [
+        ("stop 0", "stop 1"),
+        ("stop 1", "stop 2"),
+        ("stop 2", "stop 0"),
+        ("stop 0", "stop 3"),
+    ]
     with pytest.raises(ContradictoryOrder) as refusal:
         inspection(0, 4, order=FreeOrder(before=before))
     names = refusal.value.names
@@ -173,12 +194,16 @@ def test_thirteen_stops_are_too_many() -> None:
 @pytest.mark.parametrize("closed", [True, False])
 @pytest.mark.parametrize("seed", range(20))
 def test_the_least_tour_is_that_of_all_tours(seed: int, closed: bool) -> None:
-    """Random costs, some of them infinite, some groups before others; every tour through every node as the peer."""
+    """Random costs, some of them infinite, some groups before others; every tour through every node
+    as the peer.
+    """
     rng = np.random.default_rng(seed)
     ends: dict[Any, Any] = {each: _some_ends(rng) for each in (None, 0, 1, 2, 3)}
     sizes = {each: len(nodes) for each, nodes in ends.items()}
     blocks: dict[Any, Array] = {
-        (a, b): np.where(rng.random((sizes[a], sizes[b])) < 0.2, np.inf, rng.uniform(-2, 9, (sizes[a], sizes[b])))
+        (a, b): np.where(
+            rng.random((sizes[a], sizes[b])) < 0.2, np.inf, rng.uniform(-2, 9, (sizes[a], sizes[b]))
+        )
         for a in sizes
         for b in sizes
         if a != b
@@ -201,18 +226,29 @@ def _some_ends(rng: np.random.Generator) -> Any:
 
 
 def assert_least(
-    value: float, groups: list[int], nodes: list[int], blocks: dict[Any, Array], earlier: list[set[int]], closed: bool
+    value: float,
+    groups: list[int],
+    nodes: list[int],
+    blocks: dict[Any, Array],
+    earlier: list[set[int]],
+    closed: bool,
 ) -> None:
     """A tour is one of these costs, and no other one has less."""
     least = np.inf
     for order in permutations(range(4)):
-        if any(order.index(first) > order.index(k) for k, before in enumerate(earlier) for first in before):
+        if any(
+            order.index(first) > order.index(k)
+            for k, before in enumerate(earlier)
+            for first in before
+        ):
             continue
         for start in range(len(blocks[None, 0])):
             total = np.where(np.arange(len(blocks[None, 0])) == start, 0.0, np.inf)
             for a, b in pairwise([None, *order]):
                 total = (total[:, None] + blocks[a, b]).min(axis=0)
-            least = min(least, float((total + (blocks[order[-1], None][:, start] if closed else 0.0)).min()))
+            least = min(
+                least, float((total + (blocks[order[-1], None][:, start] if closed else 0.0)).min())
+            )
     assert value == pytest.approx(least)
     if np.isfinite(value):
         places = [None, *groups, *([None] if closed else [])]

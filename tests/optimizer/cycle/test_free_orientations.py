@@ -31,7 +31,9 @@ from tests.optimizer.moves import AMPLE, ROBOT, tcp_pose
 from tests.selection import long_but
 
 # a nozzle beside the flange: turning it moves the wrist
-NOZZLE = Arm(robot=ROBOT, collisions=False, T_flange_tcp=Pose.from_quaternion([0.15, 0, 0.1], [0, 0, 0, 1]).T)
+NOZZLE = Arm(
+    robot=ROBOT, collisions=False, T_flange_tcp=Pose.from_quaternion([0.15, 0, 0.1], [0, 0, 0, 1]).T
+)
 DOWN, AXIS = np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 1.0])
 TURNING = ToolPath(about=(0.0, 0.0, 1.0))
 FROM, TO = (0.7, -0.2, 0.2), (0.7, 0.2, 0.2)
@@ -39,9 +41,11 @@ FROM, TO = (0.7, -0.2, 0.2), (0.7, 0.2, 0.2)
 NEAR = 2e-3
 # of the deadline: what is certified after it has passed
 OVERRUN = 0.1
-# rad: a cone at a stop; m, rad: what a configuration on the manifold, or at a given pose, may miss it by; rad: rounding
+# rad: a cone at a stop; m, rad: what a configuration on the manifold, or at a given pose, may miss
+# it by; rad: rounding
 TILT, ON_MANIFOLD, EXACT = 0.3, 1e-8, 1e-9
-# relative: by so much a cycle at given orientations may be better than one at chosen ones, which are local optima
+# relative: by so much a cycle at given orientations may be better than one at chosen ones, which
+# are local optima
 CHOSEN = 1e-3
 # s: less than any motion takes
 FAR_TOO_SHORT = 1e-3
@@ -74,7 +78,8 @@ def few_angles(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("few_angles")
 @pytest.mark.parametrize(
-    ("free_start", "free_goal"), long_but([(False, True)], [(False, True), (True, False), (True, True)])
+    ("free_start", "free_goal"),
+    long_but([(False, True)], [(False, True), (True, False), (True, True)]),
 )
 def test_the_angles_are_chosen_for_the_whole_cycle(free_start: bool, free_goal: bool) -> None:
     start, goal = free(FROM) if free_start else down(FROM), free(TO) if free_goal else down(TO)
@@ -85,7 +90,10 @@ def test_the_angles_are_chosen_for_the_whole_cycle(free_start: bool, free_goal: 
     # a bound over all angles holds for these, too
     assert 0 < found.lower_bound <= given.energy.electrical.total
     path = found.moves[1]
-    assert path.planned.kind == "path" and (path.solution.start.target, path.solution.goal.target) == (0, 0)
+    assert path.planned.kind == "path" and (
+        path.solution.start.target,
+        path.solution.goal.target,
+    ) == (0, 0)
     turned = []
     for end, at, pose in ((path.solution.start, FROM, start), (path.solution.goal, TO, goal)):
         T = tcp_pose(end.q, NOZZLE.T_flange_tcp).T
@@ -118,8 +126,20 @@ def test_a_start_out_of_reach_at_every_angle_is_one_pose() -> None:
     ("start", "goal", "path", "field", "word"),
     [
         (free(FROM), free(TO), {"path": ToolPath()}, "stops.0.path.points.0.orientation", "about"),
-        (down(FROM), free(TO, np.array([1.0, 0, 0])), {}, "stops.0.path.points.1.orientation", "same axis"),
-        (ConeOrientedPose(np.array(FROM)), down(TO), {}, "stops.0.path.points.0.orientation", "in full"),
+        (
+            down(FROM),
+            free(TO, np.array([1.0, 0, 0])),
+            {},
+            "stops.0.path.points.1.orientation",
+            "same axis",
+        ),
+        (
+            ConeOrientedPose(np.array(FROM)),
+            down(TO),
+            {},
+            "stops.0.path.points.0.orientation",
+            "in full",
+        ),
         (free(FROM), down(TO), {"split": True}, "stops.0.path.points.0.orientation", "split"),
     ],
 )
@@ -137,7 +157,11 @@ def free_stops(**changes: Any) -> Cycle:
     cone = ConeOrientedPose(np.array([0.3, 0.4, 0.3]), AXIS, DOWN, TILT)
     place = Stop(name="place", target=cone, branch=BranchFilter(shoulder="right"))
     asked = Cycle(
-        arm=Arm(robot=ROBOT, collisions=False), start=HOME, stops=[pick, place], windings=False, deadline=AMPLE
+        arm=Arm(robot=ROBOT, collisions=False),
+        start=HOME,
+        stops=[pick, place],
+        windings=False,
+        deadline=AMPLE,
     )
     return replace(asked, **changes)
 
@@ -147,7 +171,9 @@ def assert_reached(found: CycleSolution, arm: Arm, name: str, at: Any, tilt: flo
     (goal,) = [move.solution.goal for move in found.moves if move.planned.goal == name]
     T = tcp_pose(goal.q, arm.T_flange_tcp).T
     assert goal.target == 0
-    assert np.abs(T[:3, 3] - at).max() < ON_MANIFOLD and T[:3, 2] @ DOWN >= np.cos(tilt) - ON_MANIFOLD
+    assert (
+        np.abs(T[:3, 3] - at).max() < ON_MANIFOLD and T[:3, 2] @ DOWN >= np.cos(tilt) - ON_MANIFOLD
+    )
 
 
 @pytest.mark.usefixtures("few_angles")
@@ -159,13 +185,19 @@ def test_orientations_at_stops_are_chosen_for_the_whole_cycle(windings: bool) ->
     assert found.status == "feasible" and found.complete
     assert_reached(found, asked.arm, "pick", (0.5, -0.2, 0.1))
     assert_reached(found, asked.arm, "place", (0.3, 0.4, 0.3), TILT)
-    # cycles at orientations that are given, the attack: none is below the bound, and the answer is no worse
+    # cycles at orientations that are given, the attack: none is below the bound, and the answer is
+    # no worse
     rng = np.random.default_rng(3)
     for _ in range(2):
         turns = rng.uniform([-np.pi, -TILT / 2, -TILT / 2], [np.pi, TILT / 2, TILT / 2])
         pick, place = (
-            Pose.from_rotation(at, down((0, 0, 0)).T[:3, :3] @ Rotation.from_rotvec(turn).as_matrix())
-            for at, turn in (((0.5, -0.2, 0.1), [0, 0, turns[0]]), ((0.3, 0.4, 0.3), [*turns[1:], turns[0]]))
+            Pose.from_rotation(
+                at, down((0, 0, 0)).T[:3, :3] @ Rotation.from_rotvec(turn).as_matrix()
+            )
+            for at, turn in (
+                ((0.5, -0.2, 0.1), [0, 0, turns[0]]),
+                ((0.3, 0.4, 0.3), [*turns[1:], turns[0]]),
+            )
         )
         stops = [replace(asked.stops[0], target=pick), replace(asked.stops[1], target=place)]
         given = plan_cycle(replace(asked, stops=stops))
@@ -176,11 +208,19 @@ def test_orientations_at_stops_are_chosen_for_the_whole_cycle(windings: bool) ->
 @pytest.mark.long
 @pytest.mark.usefixtures("few_angles")
 def test_a_free_stop_has_lines_and_is_passed() -> None:
-    """Along the free axis, so that the outer end is a pose of the same kind; and a stop that the arm passes."""
+    """Along the free axis, so that the outer end is a pose of the same kind; and a stop that the
+    arm passes.
+    """
     asked = free_stops(closed=False)
     lift = Line(direction=np.array([0.0, 0.0, 1.0]), distance=0.05)
-    passed = Stop(name="over", target=ConeOrientedPose.about(down((0.45, 0.1, 0.35)), AXIS), via=True)
-    stops = [replace(asked.stops[0], approach=lift), passed, replace(asked.stops[1], target=down((0.3, 0.4, 0.3)))]
+    passed = Stop(
+        name="over", target=ConeOrientedPose.about(down((0.45, 0.1, 0.35)), AXIS), via=True
+    )
+    stops = [
+        replace(asked.stops[0], approach=lift),
+        passed,
+        replace(asked.stops[1], target=down((0.3, 0.4, 0.3))),
+    ]
     asked = replace(asked, stops=stops)
     found = plan_cycle(asked)
     assert found.joins < EXACT and all(move.solution.certificate.valid for move in found.moves)
@@ -196,7 +236,11 @@ def test_the_poses_at_the_end_of_a_line_are_known_where_they_are_one() -> None:
     pose = ConeOrientedPose.about(down((0.5, -0.2, 0.1)), AXIS)
     up, across = np.array([0.0, 0.0, 2.0]), np.array([1.0, 0.0, 0.0])
     above = ways._shifted(pose, Line(direction=up, distance=0.05), -1.0)
-    assert above is not None and above.position == pytest.approx([0.5, -0.2, 0.15]) and (above.axis == pose.axis).all()
+    assert (
+        above is not None
+        and above.position == pytest.approx([0.5, -0.2, 0.15])
+        and (above.axis == pose.axis).all()
+    )
     beside = ways._shifted(pose, Line(direction=across, distance=0.05, frame="base"), 1.0)
     assert beside is not None and beside.position == pytest.approx([0.55, -0.2, 0.1])
     # where the direction turns with the tool, the outer end is anywhere on a circle

@@ -24,7 +24,11 @@ from tests.selection import long_but
 STEP, AGREED = 0.1, 2e-3
 POSTURES = {
     # the fifth joint is stretched at both stops
-    "ur5e": [[0.4, -1.4, 1.6, -1.2, -1.5, 0.3], [1.1, -1.0, 1.3, -0.8, 0.0, 0.6], [-0.5, -1.6, 1.9, -1.1, 0.0, -0.4]],
+    "ur5e": [
+        [0.4, -1.4, 1.6, -1.2, -1.5, 0.3],
+        [1.1, -1.0, 1.3, -0.8, 0.0, 0.6],
+        [-0.5, -1.6, 1.9, -1.1, 0.0, -0.4],
+    ],
     "panda": [
         [0.27, -0.36, 0.18, -1.8, 0.09, 1.62, 0.45],
         [0.9, 0.3, -0.4, -1.6, 0.5, 2.1, -0.3],
@@ -56,8 +60,13 @@ def test_no_posture_beside_those_of_a_cycle_needs_less(robot: str) -> None:
             if beside is None:
                 continue
             targets = [beside if other == k else each for other, each in enumerate(at)]
-            stops = [replace(stop, target=each) for stop, each in zip(asked.stops, targets, strict=True)]
-            assert plan_cycle(replace(asked, stops=stops)).energy.electrical.total > (1 - AGREED) * least
+            stops = [
+                replace(stop, target=each) for stop, each in zip(asked.stops, targets, strict=True)
+            ]
+            assert (
+                plan_cycle(replace(asked, stops=stops)).energy.electrical.total
+                > (1 - AGREED) * least
+            )
 
 
 @pytest.mark.parametrize("robot", ["ur5e", "panda"])

@@ -42,7 +42,11 @@ def solves(found: CycleSolution) -> int:
 
 
 def assert_same(found: CycleSolution, other: CycleSolution) -> None:
-    assert (found.status, found.duration, found.lower_bound) == (other.status, other.duration, other.lower_bound)
+    assert (found.status, found.duration, found.lower_bound) == (
+        other.status,
+        other.duration,
+        other.lower_bound,
+    )
     for own, its in zip(found.moves, other.moves, strict=True):
         assert own.solution.status == its.solution.status
         assert own.solution.solver.stationarity == its.solution.solver.stationarity
@@ -50,7 +54,9 @@ def assert_same(found: CycleSolution, other: CycleSolution) -> None:
             np.testing.assert_array_equal(
                 getattr(own.solution.trajectory, name), getattr(its.solution.trajectory, name)
             )
-    assert [each.electrical for each in found.baselines] == [each.electrical for each in other.baselines]
+    assert [each.electrical for each in found.baselines] == [
+        each.electrical for each in other.baselines
+    ]
 
 
 def test_the_same_cycle_solves_nothing_again_and_has_the_same_answer() -> None:
@@ -75,7 +81,9 @@ def test_of_an_edited_cycle_only_the_moves_that_changed_are_solved() -> None:
     assert of_before
     # the move home carries something else now
     assert fresh.used.keys() - of_before
-    assert found.moves[0].solution.solver.nlp_solves == 0 < found.moves[-1].solution.solver.nlp_solves
+    assert (
+        found.moves[0].solution.solver.nlp_solves == 0 < found.moves[-1].solution.solver.nlp_solves
+    )
 
 
 @pytest.mark.long
@@ -106,7 +114,10 @@ def _twice_as_fast(motion: KnownMotion) -> Spline:
         replace(PROBLEM, method="time_scaling"),
         replace(PROBLEM, arm=replace(PROBLEM.arm, payload=Payload(mass=1.0))),
         replace(PROBLEM, arm=replace(PROBLEM.arm, tcp_speed=0.5)),
-        replace(PROBLEM, arm=replace(PROBLEM.arm, limits=ROBOT.limits.tightened(v_max=ROBOT.limits.v_max * 0.9))),
+        replace(
+            PROBLEM,
+            arm=replace(PROBLEM.arm, limits=ROBOT.limits.tightened(v_max=ROBOT.limits.v_max * 0.9)),
+        ),
         replace(PROBLEM, arm=replace(PROBLEM.arm, scene=Scene([Obstacle("box", Box(np.ones(3)))]))),
         replace(PROBLEM, arm=replace(PROBLEM.arm, robot=replace(ROBOT, torque_side="link"))),
     ],
@@ -114,14 +125,24 @@ def _twice_as_fast(motion: KnownMotion) -> Spline:
 def test_another_question_has_another_key(other: Problem) -> None:
     keys = KnownMotions().key
     assert keys("tried", PROBLEM) != keys("tried", other)
-    assert keys("tried", PROBLEM) == keys("tried", replace(PROBLEM, arm=replace(PROBLEM.arm), deadline=1.0))
-    assert len({keys("tried", PROBLEM), keys("finished", PROBLEM), keys("tried", PROBLEM, 1.0)}) == 3
+    assert keys("tried", PROBLEM) == keys(
+        "tried", replace(PROBLEM, arm=replace(PROBLEM.arm), deadline=1.0)
+    )
+    assert (
+        len({keys("tried", PROBLEM), keys("finished", PROBLEM), keys("tried", PROBLEM, 1.0)}) == 3
+    )
 
 
 def test_numbers_out_of_arrays_are_numbers() -> None:
     arm = Arm(robot=ROBOT, payload=Payload(mass=1.0), tcp_speed=0.5)
-    from_arrays = replace(arm, payload=Payload(mass=np.arange(3)[1]), tcp_speed=np.full(1, 0.5, dtype=np.float32)[0])
-    asked = Cycle(arm=from_arrays, start=HOME, stops=[Stop(name="near", target=HOME + 0.1)], windings=False)
+    from_arrays = replace(
+        arm, payload=Payload(mass=np.arange(3)[1]), tcp_speed=np.full(1, 0.5, dtype=np.float32)[0]
+    )
+    asked = Cycle(
+        arm=from_arrays, start=HOME, stops=[Stop(name="near", target=HOME + 0.1)], windings=False
+    )
     assert_true(asked, plan_cycle(asked))
     keys = KnownMotions().key
-    assert keys("tried", replace(PROBLEM, arm=from_arrays)) == keys("tried", replace(PROBLEM, arm=arm))
+    assert keys("tried", replace(PROBLEM, arm=from_arrays)) == keys(
+        "tried", replace(PROBLEM, arm=arm)
+    )

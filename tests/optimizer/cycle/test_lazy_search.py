@@ -1,4 +1,6 @@
-"""The lazy search on legs of made-up costs: the least chain of all, and honest words where it could not look."""
+"""The lazy search on legs of made-up costs: the least chain of all, and honest words where it could
+not look.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ def layer(count: int) -> Any:
 
 
 def leg(kind: Array, bound: Array) -> Leg:
-    """A leg of given kinds (s, g), whose first pair is the one farthest from the limits, with bounds (k,) [J]."""
+    """A leg of given kinds (s, g), whose first pair is the one farthest from the limits, with
+    bounds (k,) [J].
+    """
     limits = SimpleNamespace(q_min=np.array([-RANGE]), q_max=np.array([RANGE]))
     prepared: Any = SimpleNamespace(arm=SimpleNamespace(active_limits=limits))
     pair = np.array([np.argwhere(kind == each)[0] for each in range(int(kind.max()) + 1)])
@@ -47,7 +51,9 @@ def leg(kind: Array, bound: Array) -> Leg:
 
 
 class Known(LazySearch):
-    """A search whose pairs need the `energies` [J] of each leg (s, g); those `near` a limit (s, g) come to it."""
+    """A search whose pairs need the `energies` [J] of each leg (s, g); those `near` a limit (s, g)
+    come to it.
+    """
 
     def __init__(self, legs: list[Leg], energies: list[Array], near: list[Array]) -> None:
         super().__init__(legs, False, NEVER)
@@ -79,7 +85,9 @@ class Late(Known):
 @pytest.mark.parametrize("share", [0.0, 0.4])
 @pytest.mark.parametrize("seed", range(25))
 def test_the_least_chain_is_that_of_all_pairs_solved(seed: int, share: float) -> None:
-    """Bounds below what every kind needs; this share of the pairs needs more, for a joint's range is in the way."""
+    """Bounds below what every kind needs; this share of the pairs needs more, for a joint's range
+    is in the way.
+    """
     rng = np.random.default_rng(seed)
     legs, energies, near, own = list[Leg](), list[Array](), list[Array](), list[Array]()
     sizes = rng.integers(1, 6, 4)
@@ -93,7 +101,8 @@ def test_the_least_chain_is_that_of_all_pairs_solved(seed: int, share: float) ->
         energies.append(own[-1] + np.where(near[-1], rng.uniform(0, 5, kind.shape), 0.0))
     search = Known(legs, energies, near)
     found = search.cost(search.explore())
-    # a pair near a limit that was not tried weighs what its kind does: `CycleSearch` finishes it, and looks again
+    # a pair near a limit that was not tried weighs what its kind does: `CycleSearch` finishes it,
+    # and looks again
     assert least_of_all(own) - ROUNDING <= found <= least_of_all(energies) + ROUNDING
 
 
@@ -101,7 +110,10 @@ def least_of_all(costs: list[Array]) -> float:
     """The least sum of one cost of each matrix over all chains."""
     sizes = [costs[0].shape[0], *(cost.shape[1] for cost in costs)]
     chains = product(*(range(size) for size in sizes))
-    return min(sum(float(cost[pair]) for cost, pair in zip(costs, pairwise(chain), strict=True)) for chain in chains)
+    return min(
+        sum(float(cost[pair]) for cost, pair in zip(costs, pairwise(chain), strict=True))
+        for chain in chains
+    )
 
 
 def _first(kind: Array) -> Array:
@@ -113,7 +125,9 @@ def _first(kind: Array) -> Array:
 
 def test_a_range_in_the_way_of_one_pair_is_not_in_that_of_its_kind() -> None:
     kind = np.array([[0, 0]])
-    search = Known([leg(kind, np.array([1.0]))], [np.array([[5.0, 9.0]])], [np.array([[False, True]])])
+    search = Known(
+        [leg(kind, np.array([1.0]))], [np.array([[5.0, 9.0]])], [np.array([[False, True]])]
+    )
     search.try_kind(0, 0, 1)
     assert search.legs[0].cost.tolist() == [[5.0, 9.0]]
 

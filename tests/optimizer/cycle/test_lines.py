@@ -44,7 +44,11 @@ def test_the_tool_comes_and_leaves_straight() -> None:
     asked = with_lines(pick_and_place(1, 2, windings=False))
     found = plan_cycle(asked)
     assert_true(asked, found)
-    assert [move.planned.tool_path is not None for move in found.moves] == [False, True, True] * 2 + [False]
+    assert [move.planned.tool_path is not None for move in found.moves] == [
+        False,
+        True,
+        True,
+    ] * 2 + [False]
     for move in found.moves:
         if move.planned.tool_path is None:
             continue
@@ -55,11 +59,18 @@ def test_the_tool_comes_and_leaves_straight() -> None:
         along = at_stop[:3, 2] if into else np.array([0.0, 0.0, 1.0])
         ways = (T[:, :3, 3] - T[0, :3, 3]) @ along
         assert ways[-1] == pytest.approx(INTO.distance if into else OUT.distance, abs=1e-6)
-        assert np.linalg.norm(T[:, :3, 3] - T[0, :3, 3] - ways[:, None] * along, axis=1).max() < 1e-4
+        assert (
+            np.linalg.norm(T[:, :3, 3] - T[0, :3, 3] - ways[:, None] * along, axis=1).max() < 1e-4
+        )
         assert np.abs(T[:, :3, :3] - at_stop[:3, :3]).max() < 2e-3
         if not into:
-            assert np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1).max() < 0.3 * spline.duration / 499 * 1.001
-    (carried,) = {move.planned.arm.payload.mass for move in found.moves if move.planned.start == "stop 0"}
+            assert (
+                np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1).max()
+                < 0.3 * spline.duration / 499 * 1.001
+            )
+    (carried,) = {
+        move.planned.arm.payload.mass for move in found.moves if move.planned.start == "stop 0"
+    }
     assert carried == 2.0, "what is taken up is lifted along the line"
 
 
@@ -79,11 +90,20 @@ def test_it_is_the_least_over_all_configurations_of_the_stop() -> None:
         total = 0.0
         for move, q_start, q_goal in zip(asked.moves, ends, ends[1:], strict=False):
             path = move.tool_path
-            task = Problem(arm=move.arm, start=q_start, goal=q_goal, tool_path=path, windings=False, deadline=AMPLE)
+            task = Problem(
+                arm=move.arm,
+                start=q_start,
+                goal=q_goal,
+                tool_path=path,
+                windings=False,
+                deadline=AMPLE,
+            )
             total += optimize(task).energy.electrical.total
         energies.append(total)
     least = min(energies) + sum(move.dwell_energy for move in found.moves)
-    assert found.status == "optimal" and found.energy.electrical.total == pytest.approx(least, rel=CONVERGED)
+    assert found.status == "optimal" and found.energy.electrical.total == pytest.approx(
+        least, rel=CONVERGED
+    )
 
 
 @pytest.mark.long
@@ -101,7 +121,11 @@ def test_what_is_grasped_is_no_obstacle_on_the_lines() -> None:
     """A box around the stop: nothing gets there but along the lines, on which it does not count."""
     (stop,) = pick_and_place(1, 1).stops
     assert isinstance(stop.target, Pose)
-    box = Obstacle("part", Box(np.array([0.04, 0.04, 0.04])), Pose.from_rotation(stop.target.T[:3, 3], np.eye(3)).T)
+    box = Obstacle(
+        "part",
+        Box(np.array([0.04, 0.04, 0.04])),
+        Pose.from_rotation(stop.target.T[:3, 3], np.eye(3)).T,
+    )
     arm = Arm(robot=ROBOT, scene=Scene([box]))
     lines = {"approach": INTO, "retreat": OUT}
     held = replace(stop, dwell=0.1, payload=None, obstacles_ignored=["part"], **lines)

@@ -1,4 +1,6 @@
-"""Cycles of many stops: the same cycle for fewer motions, told on the way, and the best one so far at a deadline."""
+"""Cycles of many stops: the same cycle for fewer motions, told on the way, and the best one so far
+at a deadline.
+"""
 
 from __future__ import annotations
 
@@ -22,13 +24,16 @@ from tests.optimizer.cycle.cycles import PART, pick_and_place
 
 # a counting clock never comes to it
 ENDLESS = 1e9
-# share of the readings of a whole search after which the cycle has been found, and the search goes on
+# share of the readings of a whole search after which the cycle has been found, and the search goes
+# on
 ENOUGH = 0.75
 
 
 def long_cycle(deadline: float) -> Cycle:
     """One stop more than a cycle of which it is proven that no chain is better."""
-    asked = pick_and_place(1, MANY_STOPS + 1, windings=False, method="time_scaling", deadline=deadline)
+    asked = pick_and_place(
+        1, MANY_STOPS + 1, windings=False, method="time_scaling", deadline=deadline
+    )
     only = BranchFilter(elbow="up", wrist="no_flip")
     return replace(asked, stops=[replace(stop, branch=only) for stop in asked.stops])
 
@@ -38,7 +43,8 @@ Whole = tuple[CycleSolution, list[Event], float]
 
 @pytest.fixture(scope="module")
 def whole() -> Whole:
-    """The long cycle without a deadline, what it told, and the readings of the clock that it took."""
+    """The long cycle without a deadline, what it told, and the readings of the clock that it
+    took."""
     events, clock = list[Event](), CountingClock()
     found = plan_cycle(long_cycle(ENDLESS), clock, events.append)
     return found, events, clock.now
@@ -73,7 +79,9 @@ def test_the_proof_alone_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (proven.status, found.status) == ("optimal", "feasible")
 
 
-def test_too_many_pairs_of_all_moves_are_refused_before_any_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_many_pairs_of_all_moves_are_refused_before_any_is_bounded(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(legs, "MOST_PAIRS_OF_ROUND", 100)
     with pytest.raises(InvalidProblem, match="fewer stops") as refusal:
         plan_cycle(pick_and_place(1, 3, windings=False))

@@ -1,4 +1,6 @@
-"""Cycles of least mechanical work: true, within their time, with a bound that no other round gets below."""
+"""Cycles of least mechanical work: true, within their time, with a bound that no other round gets
+below.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,9 @@ def test_the_cycle_is_true(time: float) -> None:
     assert all(move.solution.certificate.valid for move in round_.moves)
     assert round_.duration == pytest.approx(time) and round_.joins < ROUNDING
     work = round_.energy.mechanical.total
-    assert work == pytest.approx(sum(move.solution.energy.mechanical.total for move in round_.moves), rel=ROUNDING)
+    assert work == pytest.approx(
+        sum(move.solution.energy.mechanical.total for move in round_.moves), rel=ROUNDING
+    )
     assert 0 < round_.lower_bound <= work and round_.price_of_time >= 0
     # dwells and waits are in the electrical energy, though they are no work
     resting = sum(move.dwell_energy + move.wait_energy for move in round_.moves)
@@ -54,7 +58,10 @@ def test_the_cycle_is_true(time: float) -> None:
     names = {each.name: each for each in round_.baselines}
     assert {"same_factor", "fastest_then_wait"} <= set(names)
     for each in names.values():
-        assert each.saving == pytest.approx(1 - work / each.mechanical) and each.saving_interval is None
+        assert (
+            each.saving == pytest.approx(1 - work / each.mechanical)
+            and each.saving_interval is None
+        )
         if each.within_limits and each.duration == pytest.approx(time):
             assert each.saving >= -CONVERGED
 
@@ -69,7 +76,9 @@ def test_more_time_needs_no_more_work() -> None:
 @pytest.mark.long
 def test_it_works_less_than_the_cycle_of_least_electrical_energy() -> None:
     """In the same time, over configurations that either chooses."""
-    electrical = plan_cycle(replace(ASKED, objective="electrical", duration_max=TIME, duration_min=TIME))
+    electrical = plan_cycle(
+        replace(ASKED, objective="electrical", duration_max=TIME, duration_min=TIME)
+    )
     ours = found(TIME)
     assert ours.energy.mechanical.total < electrical.energy.mechanical.total
     assert ours.lower_bound <= electrical.energy.mechanical.total
@@ -78,26 +87,40 @@ def test_it_works_less_than_the_cycle_of_least_electrical_energy() -> None:
 
 def test_no_random_cycle_gets_below_the_bound() -> None:
     """Random chains, every move at an even pace in its random share of the time."""
-    rng, layers, bound = np.random.default_rng(0), list(layers_of(ASKED).values()), found(TIME).lower_bound
-    plants = [PreparedProblem.of(Problem(arm=move.arm, start=HOME, goal=HOME)) for move in ASKED.moves]
+    rng, layers, bound = (
+        np.random.default_rng(0),
+        list(layers_of(ASKED).values()),
+        found(TIME).lower_bound,
+    )
+    plants = [
+        PreparedProblem.of(Problem(arm=move.arm, start=HOME, goal=HOME)) for move in ASKED.moves
+    ]
     for _ in range(40):
         chain = [HOME, *(layer.q[rng.integers(len(layer.q))] for layer in layers[1:]), HOME]
         shares = rng.dirichlet(np.full(3, 3.0)) * (TIME - ASKED.dwelling)
-        motions = [quintic_spline(a, b, t) for (a, b), t in zip(pairwise(chain), shares, strict=True)]
-        work = sum(plant.energy(each).mechanical.total for plant, each in zip(plants, motions, strict=True))
+        motions = [
+            quintic_spline(a, b, t) for (a, b), t in zip(pairwise(chain), shares, strict=True)
+        ]
+        work = sum(
+            plant.energy(each).mechanical.total for plant, each in zip(plants, motions, strict=True)
+        )
         assert bound <= work
 
 
 @pytest.mark.long
 def test_what_the_price_bounds_holds_for_every_duration() -> None:
-    """Against motions from end to end in many durations; without a price it is that of the longest motion."""
+    """Against motions from end to end in many durations; without a price it is that of the longest
+    motion.
+    """
     rng, own = np.random.default_rng(1), ROBOT.limits
     prepared = PreparedProblem.of(
         Problem(arm=ASKED.arm, start=HOME, goal=HOME, objective="mechanical", duration_max=5.0)
     )
     start = rng.uniform(own.q_min / 2, own.q_max / 2, (30, 6))
     goal = start + rng.uniform(-3.0, 3.0, (30, 6))
-    levels = np.array([[prepared.potential(q) for q in both] for both in zip(start, goal, strict=True)])
+    levels = np.array(
+        [[prepared.potential(q) for q in both] for both in zip(start, goal, strict=True)]
+    )
     free = priced_work_bounds(prepared, start, goal, levels, 0.0, 5.0)
     exact = mechanical_bounds(prepared, start, goal, levels)
     assert (free <= exact * (1 + ROUNDING)).all()
@@ -118,7 +141,9 @@ def test_a_free_order_does_no_more_work() -> None:
     free = replace(ASKED, order=FreeOrder(together=[[stop.name for stop in ASKED.stops]]))
     ours = plan_cycle(free)
     assert ours.lower_bound <= found(TIME).energy.mechanical.total * (1 + ROUNDING)
-    assert ours.energy.mechanical.total == pytest.approx(found(TIME).energy.mechanical.total, rel=CONVERGED)
+    assert ours.energy.mechanical.total == pytest.approx(
+        found(TIME).energy.mechanical.total, rel=CONVERGED
+    )
 
 
 def test_it_needs_a_time_and_rests() -> None:

@@ -15,7 +15,12 @@ from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.cycle.errors import NoSequence
 from joulepath.optimizer.cycle.ways import layers_of
 from joulepath.optimizer.energy.dwell import holding_power
-from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, OutsideLimits, UnreachablePose
+from joulepath.optimizer.exceptions import (
+    DeadlineExceeded,
+    InvalidProblem,
+    OutsideLimits,
+    UnreachablePose,
+)
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.plan_cycle import plan_cycle
@@ -46,13 +51,20 @@ def assert_true(asked: Cycle, found: CycleSolution) -> None:
     assert all(move.solution.certificate.valid for move in found.moves)
     assert found.joins < 1e-9
     electrical = found.energy.electrical
-    own = sum(move.solution.energy.electrical.total + move.dwell_energy + move.wait_energy for move in found.moves)
+    own = sum(
+        move.solution.energy.electrical.total + move.dwell_energy + move.wait_energy
+        for move in found.moves
+    )
     assert electrical.total == pytest.approx(own, rel=ROUNDING)
     assert electrical.parts_sum == pytest.approx(electrical.total, rel=1e-3)
     assert found.lower_bound <= electrical.total
     assert found.duration == pytest.approx(found.moves[-1].t0 + found.moves[-1].duration)
     places = [(move.planned.start, move.planned.goal) for move in found.moves]
-    names = ["start", *(place for stop in asked.stops for place in stop.places), *(["start"] if asked.closed else [])]
+    names = [
+        "start",
+        *(place for stop in asked.stops for place in stop.places),
+        *(["start"] if asked.closed else []),
+    ]
     assert places == list(pairwise(names))
     if asked.closed:
         assert (found.moves[-1].solution.goal.q == found.moves[0].solution.start.q).all()
@@ -83,7 +95,10 @@ def test_it_is_the_least_of_all_chains(seed: int) -> None:
         for a, b in product(range(len(layers[k])), range(len(goals[k])))
     }
     best = min(
-        sum(known[k, a, b] for k, (a, b) in enumerate(zip(chain, [*chain[1:], chain[0]], strict=True)))
+        sum(
+            known[k, a, b]
+            for k, (a, b) in enumerate(zip(chain, [*chain[1:], chain[0]], strict=True))
+        )
         for chain in product(*(range(len(layer)) for layer in layers))
     )
     assert found.status == "optimal"
@@ -91,7 +106,9 @@ def test_it_is_the_least_of_all_chains(seed: int) -> None:
     assert found.lower_bound <= best
 
 
-@pytest.mark.parametrize(("seed", "count"), long_but([(1, 3)], [(1, 3), *((seed, 6) for seed in range(20))]))
+@pytest.mark.parametrize(
+    ("seed", "count"), long_but([(1, 3)], [(1, 3), *((seed, 6) for seed in range(20))])
+)
 def test_cycles_are_true_and_not_above_move_by_move(seed: int, count: int) -> None:
     asked = pick_and_place(seed, count)
     found = plan_cycle(asked)
@@ -103,7 +120,8 @@ def test_cycles_are_true_and_not_above_move_by_move(seed: int, count: int) -> No
 
 @pytest.mark.parametrize("start", [HOME, poses(1, 4)[3]], ids=["joint positions", "pose"])
 def test_move_by_move_is_what_successive_calls_of_optimize_give(start: Array | Pose) -> None:
-    """From a pose, the first of them takes the configuration at the start that is best for itself."""
+    """From a pose, the first of them takes the configuration at the start that is best for
+    itself."""
     asked = pick_and_place(1, 3, start=start)
     found = plan_cycle(asked)
     q, total, visited = start, 0.0, list[Array]()
@@ -114,8 +132,12 @@ def test_move_by_move_is_what_successive_calls_of_optimize_give(start: Array | P
     total += energy_of(asked, len(asked.stops), visited[-1], visited[0])
     total += sum(move.dwell_energy for move in found.moves)
     (greedy,) = (each for each in found.baselines if each.name == "move_by_move")
-    assert greedy.electrical == pytest.approx(total, rel=0.01)  # either may take the other of two equal moves
-    assert greedy.saving == pytest.approx(1 - found.energy.electrical.total / greedy.electrical, abs=ROUNDING)
+    assert greedy.electrical == pytest.approx(
+        total, rel=0.01
+    )  # either may take the other of two equal moves
+    assert greedy.saving == pytest.approx(
+        1 - found.energy.electrical.total / greedy.electrical, abs=ROUNDING
+    )
 
 
 def test_the_part_is_carried_where_it_is_and_held_while_the_arm_dwells() -> None:
@@ -129,14 +151,19 @@ def test_the_part_is_carried_where_it_is_and_held_while_the_arm_dwells() -> None
         assert move.dwell_energy == pytest.approx(0.3 * hold, rel=ROUNDING)
     braked = plan_cycle(replace(asked, hold="brakes", brake_delay=0.1, brake_power=5.0))
     for with_motors, with_brakes in zip(found.moves[:-1], braked.moves[:-1], strict=True):
-        assert with_brakes.dwell_energy == pytest.approx(with_motors.dwell_energy / 3 + 5.0 * 0.2, rel=ROUNDING)
+        assert with_brakes.dwell_energy == pytest.approx(
+            with_motors.dwell_energy / 3 + 5.0 * 0.2, rel=ROUNDING
+        )
 
 
 def test_a_heavier_part_costs_more_and_an_open_cycle_less() -> None:
     asked = pick_and_place(3, 2, windings=False)
-    heavy = replace(asked, stops=[replace(asked.stops[0], payload=replace(PART, mass=4.0)), asked.stops[1]])
+    heavy = replace(
+        asked, stops=[replace(asked.stops[0], payload=replace(PART, mass=4.0)), asked.stops[1]]
+    )
     least, more, open_ = (
-        plan_cycle(each).energy.electrical.total for each in (asked, heavy, replace(asked, closed=False))
+        plan_cycle(each).energy.electrical.total
+        for each in (asked, heavy, replace(asked, closed=False))
     )
     assert open_ < least < more
 
@@ -145,7 +172,13 @@ def test_a_heavier_part_costs_more_and_an_open_cycle_less() -> None:
 def test_a_start_that_is_a_pose_is_come_back_to_in_the_same_configuration() -> None:
     first, *others = poses(4, 3)
     stops = [Stop(name=str(k), target=pose) for k, pose in enumerate(others)]
-    asked = Cycle(arm=Arm(robot=ROBOT, collisions=False), start=first, stops=stops, windings=False, deadline=AMPLE)
+    asked = Cycle(
+        arm=Arm(robot=ROBOT, collisions=False),
+        start=first,
+        stops=stops,
+        windings=False,
+        deadline=AMPLE,
+    )
     found = plan_cycle(asked)
     assert_true(asked, found)
     for start in layers_of(asked)["start"].q:
@@ -157,11 +190,19 @@ def test_a_start_that_is_a_pose_is_come_back_to_in_the_same_configuration() -> N
 def test_one_of_several_targets_is_chosen_for_the_whole_cycle() -> None:
     near, far = poses(5, 2)
     stops = [Stop(name="either", target=AnyOf((near, far))), Stop(name="then", target=far)]
-    asked = Cycle(arm=Arm(robot=ROBOT, collisions=False), start=HOME, stops=stops, windings=False, deadline=AMPLE)
+    asked = Cycle(
+        arm=Arm(robot=ROBOT, collisions=False),
+        start=HOME,
+        stops=stops,
+        windings=False,
+        deadline=AMPLE,
+    )
     found = plan_cycle(asked)
     assert_true(asked, found)
     singles = [
-        plan_cycle(replace(asked, stops=[replace(stops[0], target=target), stops[1]])).energy.electrical.total
+        plan_cycle(
+            replace(asked, stops=[replace(stops[0], target=target), stops[1]])
+        ).energy.electrical.total
         for target in (near, far)
     ]
     assert found.energy.electrical.total == pytest.approx(min(singles), rel=CONVERGED)
@@ -173,11 +214,16 @@ def test_one_of_several_targets_is_chosen_for_the_whole_cycle() -> None:
 
 @pytest.mark.parametrize("others", [pytest.param(8, marks=pytest.mark.long), 0])
 def test_a_redundant_arm_goes_round_with_a_bound_that_covers_all_postures(others: int) -> None:
-    """Its configurations are samples: never `optimal`, and what fixed postures need is above the bound."""
+    """Its configurations are samples: never `optimal`, and what fixed postures need is above the
+    bound.
+    """
     robot = load_robot("panda")
     q = np.array([[0.3, -0.4, 0.2, -2.0, 0.1, 1.8, 0.5], [-0.6, 0.2, 0.1, -1.7, -0.2, 2.0, 0.9]])
     arm = Arm(robot=robot, collisions=False)
-    stops = [Stop(name="a", target=Pose(tcp_pose(arm, q[0]))), Stop(name="b", target=Pose(tcp_pose(arm, q[1])))]
+    stops = [
+        Stop(name="a", target=Pose(tcp_pose(arm, q[0]))),
+        Stop(name="b", target=Pose(tcp_pose(arm, q[1]))),
+    ]
     asked = Cycle(arm=arm, start=q[0] * 0.9, stops=stops, deadline=AMPLE)
     found = plan_cycle(asked)
     assert_true(asked, found)
@@ -186,7 +232,10 @@ def test_a_redundant_arm_goes_round_with_a_bound_that_covers_all_postures(others
     rng, layers = np.random.default_rng(5), list(layers_of(asked).values())[1:]
     postures = [q, *([_member(layer.ends, rng) for layer in layers] for _ in range(others))]
     for chosen in postures:
-        given = replace(asked, stops=[replace(stop, target=each) for stop, each in zip(stops, chosen, strict=True)])
+        given = replace(
+            asked,
+            stops=[replace(stop, target=each) for stop, each in zip(stops, chosen, strict=True)],
+        )
         assert found.lower_bound <= plan_cycle(given).energy.electrical.total
 
 
@@ -204,7 +253,9 @@ def _member(ends: list[EndConfiguration], rng: np.random.Generator) -> Array:
 
 @pytest.mark.parametrize("readings", long_but([40, 1000], [40, 200, 1000, 4000]))
 def test_a_deadline_gives_the_best_cycle_so_far_or_says_so(readings: int) -> None:
-    """A clock that counts its readings passes the deadline anywhere; what comes out is certified all the same."""
+    """A clock that counts its readings passes the deadline anywhere; what comes out is certified
+    all the same.
+    """
     asked = replace(pick_and_place(1, 3, windings=False), deadline=float(readings))
     try:
         found = plan_cycle(asked, clock=CountingClock())
@@ -226,11 +277,15 @@ def test_what_is_wrong_names_the_stop() -> None:
     blocked = replace(arm, scene=Scene((wall,)))
     with pytest.raises(StopInCollision) as collision:
         plan_cycle(replace(asked, arm=blocked))
-    assert collision.value.target == "stops/stop 0" and "stops/stop 0 is in collision" in str(collision.value)
+    assert collision.value.target == "stops/stop 0" and "stops/stop 0 is in collision" in str(
+        collision.value
+    )
 
 
 def test_stops_that_no_chain_connects_are_named() -> None:
-    """Between two ranges of a joint that full turns would have to bridge there is no way without windings."""
+    """Between two ranges of a joint that full turns would have to bridge there is no way without
+    windings.
+    """
     narrow = replace(ROBOT.limits, v_max=np.full(6, 1e-2))
     arm = Arm(robot=ROBOT, collisions=False, limits=narrow)
     stops = [Stop(name="away", target=HOME + np.array([6.1, 0, 0, 0, 0, 0]))]
@@ -242,17 +297,27 @@ def test_stops_that_no_chain_connects_are_named() -> None:
 WRONG: dict[str, tuple[str, dict[str, Any]]] = {
     "no stops": ("stops", {"stops": []}),
     "too many stops": ("stops", {"stops": [Stop(name=str(k), target=HOME) for k in range(257)]}),
-    "name twice": ("stops.1.name", {"stops": [Stop(name="a", target=HOME), Stop(name="A ", target=HOME)]}),
+    "name twice": (
+        "stops.1.name",
+        {"stops": [Stop(name="a", target=HOME), Stop(name="A ", target=HOME)]},
+    ),
     "name of the start": ("stops.0.name", {"stops": [Stop(name="start", target=HOME)]}),
     "no name": ("stops.0.name", {"stops": [Stop(name="", target=HOME)]}),
     "dwell": ("stops.0.dwell", {"stops": [Stop(name="a", target=HOME, dwell=-1.0)]}),
     "dwell nan": ("stops.0.dwell", {"stops": [Stop(name="a", target=HOME, dwell=np.nan)]}),
-    "heavy": ("stops.0.payload.mass", {"stops": [Stop(name="a", target=HOME, payload=Payload(mass=6.0))]}),
+    "heavy": (
+        "stops.0.payload.mass",
+        {"stops": [Stop(name="a", target=HOME, payload=Payload(mass=6.0))]},
+    ),
     "joints": ("stops.0.target.q", {"stops": [Stop(name="a", target=np.zeros(5))]}),
     "free start": ("start", {"start": ConeOrientedPose(np.array([0.4, 0.0, 0.3]))}),
     "free among several": (
         "stops.0.target",
-        {"stops": [Stop(name="a", target=AnyOf((ConeOrientedPose(np.array([0.4, 0.0, 0.3])), HOME)))]},
+        {
+            "stops": [
+                Stop(name="a", target=AnyOf((ConeOrientedPose(np.array([0.4, 0.0, 0.3])), HOME)))
+            ]
+        },
     ),
     "hold": ("hold.brake_delay", {"brake_delay": -1.0}),
     "deadline": ("deadline", {"deadline": 0.0}),
@@ -288,7 +353,10 @@ def test_moves_into_a_stop_keep_its_limits() -> None:
 @pytest.mark.parametrize(
     ("given", "field"),
     [
-        ({"limits": replace(ROBOT.limits, v_max=10 * ROBOT.limits.v_max)}, "stops.0.limits.velocity"),
+        (
+            {"limits": replace(ROBOT.limits, v_max=10 * ROBOT.limits.v_max)},
+            "stops.0.limits.velocity",
+        ),
         ({"tcp_speed": -1.0}, "stops.0.limits.tcp_speed"),
         ({"elbow_speed": np.nan}, "stops.0.limits.elbow_speed"),
     ],

@@ -1,4 +1,6 @@
-"""Cycles that pass through stops: never worse than stopping there, at every pass, above a bound that holds."""
+"""Cycles that pass through stops: never worse than stopping there, at every pass, above a bound
+that holds.
+"""
 
 from __future__ import annotations
 
@@ -39,23 +41,35 @@ ROUNDING = 1e-9
 QUADRATURE = 2e-5
 # relative; two solves that end where a step promises less than this
 PROGRESS = 5e-5
-# relative; two solves of one motion from different guesses, which may end in optima that differ by as much
+# relative; two solves of one motion from different guesses, which may end in optima that differ by
+# as much
 GUESSES = 5e-4
 ARM = Arm(robot=ROBOT, collisions=False)
 Q = [
     HOME + np.array(each)
-    for each in ([0.5, 0.2, -0.2, 0, 0.1, 0], [0.9, 0.1, -0.1, 0.2, 0, 0.3], [1.3, 0.3, -0.3, 0, 0, 0])
+    for each in (
+        [0.5, 0.2, -0.2, 0, 0.1, 0],
+        [0.9, 0.1, -0.1, 0.2, 0, 0.3],
+        [1.3, 0.3, -0.3, 0, 0, 0],
+    )
 ]
 
 
 def passing_cycle(seed: int, count: int, **given: Any) -> Cycle:
     """A cycle over poses, of which all but the last are passed."""
-    stops = [Stop(name=f"{k}", target=pose, via=k < count - 1) for k, pose in enumerate(poses(seed, count))]
-    return Cycle(**{"arm": ARM, "start": HOME, "stops": stops, "windings": False, "deadline": AMPLE} | given)
+    stops = [
+        Stop(name=f"{k}", target=pose, via=k < count - 1)
+        for k, pose in enumerate(poses(seed, count))
+    ]
+    return Cycle(
+        **{"arm": ARM, "start": HOME, "stops": stops, "windings": False, "deadline": AMPLE} | given
+    )
 
 
 def of(*stops: Stop, **given: Any) -> Cycle:
-    return Cycle(**{"arm": ARM, "start": HOME, "stops": stops, "windings": False, "deadline": AMPLE} | given)
+    return Cycle(
+        **{"arm": ARM, "start": HOME, "stops": stops, "windings": False, "deadline": AMPLE} | given
+    )
 
 
 def against(found: CycleSolution) -> dict[str, float]:
@@ -70,7 +84,9 @@ def test_passing_is_never_worse_than_the_best_cycle_that_stops(seed: int) -> Non
     own = found.energy.electrical.total
     (stopping,) = (each for each in found.baselines if each.name == "stopping")
     assert stopping.electrical == pytest.approx(theirs.energy.electrical.total, rel=QUADRATURE)
-    assert own <= stopping.electrical and stopping.saving == pytest.approx(1 - own / stopping.electrical)
+    assert own <= stopping.electrical and stopping.saving == pytest.approx(
+        1 - own / stopping.electrical
+    )
     assert found.lower_bound <= own and found.lower_bound <= theirs.lower_bound + ROUNDING
     assert found.order == ["0", "1", "2"] and found.joins < ROUNDING
     assert all(move.solution.certificate.valid for move in found.moves)
@@ -94,14 +110,24 @@ def test_every_pass_is_where_its_target_says_and_when_the_answer_says() -> None:
 def test_the_best_of_all_configurations_is_found() -> None:
     """Two targets at each of two passes: every combination is solved by itself."""
     targets = [[q, q + np.array([0.3, -0.3, 0.3, 0, 0, 0])] for q in Q[:2]]
-    stops = [Stop(name=f"{k}", target=AnyOf(tuple(each)), via=True) for k, each in enumerate(targets)]
+    stops = [
+        Stop(name=f"{k}", target=AnyOf(tuple(each)), via=True) for k, each in enumerate(targets)
+    ]
     found = plan_cycle(of(*stops, Stop(name="last", target=Q[2]), closed=False))
     energies = {
         (a, b): Run(
-            Problem(arm=ARM, start=HOME, goal=Q[2], passes=[targets[0][a], targets[1][b]], deadline=AMPLE)
-        ).solution().energy.electrical.total
+            Problem(
+                arm=ARM,
+                start=HOME,
+                goal=Q[2],
+                passes=[targets[0][a], targets[1][b]],
+                deadline=AMPLE,
+            )
+        )
+        .solution()
+        .energy.electrical.total
         for a, b in product(range(2), repeat=2)
-    }  # fmt: skip
+    }
     chosen = tuple(each.target for each in found.moves[0].passes)
     assert energies[chosen] <= min(energies.values()) * (1 + 1e-3)
     assert found.energy.electrical.total <= min(energies.values()) * (1 + 1e-3)
@@ -152,7 +178,9 @@ def test_in_a_given_time_it_is_not_worse_either(factor: float) -> None:
 
 def test_a_time_that_even_passing_does_not_keep_is_too_short() -> None:
     with pytest.raises(CycleTooShort) as caught:
-        plan_cycle(of(*(Stop(name=f"{k}", target=q, via=True) for k, q in enumerate(Q)), duration_max=0.5))
+        plan_cycle(
+            of(*(Stop(name=f"{k}", target=q, via=True) for k, q in enumerate(Q)), duration_max=0.5)
+        )
     assert 0.5 < caught.value.shortest < 4
 
 
@@ -166,12 +194,18 @@ def test_motions_that_stop_become_motions_that_pass_and_need_no_more() -> None:
     motions, waits = as_passed(search, rested)
     assert len(motions) == 2 and not waits and len(theirs.moves) == 4
     first = sum(move.solution.duration for move in theirs.moves[:3])
-    assert motions[0].duration == pytest.approx(first) and motions[0].certificate.pass_error < ROUNDING
-    assert motions[0].energy.electrical.total <= sum(move.energy for move in theirs.moves[:3]) * (1 + QUADRATURE)
+    assert (
+        motions[0].duration == pytest.approx(first) and motions[0].certificate.pass_error < ROUNDING
+    )
+    assert motions[0].energy.electrical.total <= sum(move.energy for move in theirs.moves[:3]) * (
+        1 + QUADRATURE
+    )
     assert motions[1] is theirs.moves[3].solution
 
 
-def test_what_stops_is_the_answer_where_the_search_ends_too_early(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_stops_is_the_answer_where_the_search_ends_too_early(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Its motions are certified as those of a cycle that passes, and it saves nothing."""
 
     def ended(search: CycleSearch) -> Any:
@@ -186,15 +220,22 @@ def test_what_stops_is_the_answer_where_the_search_ends_too_early(monkeypatch: p
     assert [len(move.passes) for move in found.moves] == [2, 0]
     assert all(move.solution.certificate.valid for move in found.moves)
     assert found.lower_bound <= found.energy.electrical.total
-    assert [each.t for each in found.moves[0].passes] == sorted(each.t for each in found.moves[0].passes)
+    assert [each.t for each in found.moves[0].passes] == sorted(
+        each.t for each in found.moves[0].passes
+    )
 
 
 def test_limits_of_a_pass_hold_for_the_whole_motion_and_nothing_else() -> None:
     slow = replace(ROBOT.limits, v_max=np.full(6, 0.5))
-    stops = [Stop(name="slowly", target=Q[0], via=True, limits=slow), Stop(name="last", target=Q[1])]
+    stops = [
+        Stop(name="slowly", target=Q[0], via=True, limits=slow),
+        Stop(name="last", target=Q[1]),
+    ]
     asked = of(*stops)
     first, back = asked.moves
-    assert (first.arm.active_limits.v_max == 0.5).all() and (back.arm.active_limits.v_max > 0.5).all()
+    assert (first.arm.active_limits.v_max == 0.5).all() and (
+        back.arm.active_limits.v_max > 0.5
+    ).all()
     stopping = replace(asked, stopping=True).moves
     assert [(move.start, move.goal) for move in stopping] == [
         ("start", "slowly"),
@@ -203,7 +244,10 @@ def test_limits_of_a_pass_hold_for_the_whole_motion_and_nothing_else() -> None:
     ]
     assert all((move.arm.active_limits.v_max == 0.5).all() for move in stopping[:2])
     found = plan_cycle(asked)
-    assert np.abs(found.moves[0].solution.trajectory.v).max() <= 0.5 and against(found)["stopping"] >= 0
+    assert (
+        np.abs(found.moves[0].solution.trajectory.v).max() <= 0.5
+        and against(found)["stopping"] >= 0
+    )
 
 
 LINE = Line(direction=np.array([0.0, 0.0, 1.0]), distance=0.05)
@@ -222,8 +266,13 @@ LINE = Line(direction=np.array([0.0, 0.0, 1.0]), distance=0.05)
         ("wait", {}, {"wait": "0", "duration_min": 20.0}),
     ],
 )
-def test_what_does_not_fit_a_pass_is_refused(field: str, given: dict[str, Any], round_: dict[str, Any]) -> None:
-    stops = [Stop(**{"name": "0", "target": Q[0], "via": True} | given), Stop(name="1", target=Q[1], via=True)]
+def test_what_does_not_fit_a_pass_is_refused(
+    field: str, given: dict[str, Any], round_: dict[str, Any]
+) -> None:
+    stops = [
+        Stop(**{"name": "0", "target": Q[0], "via": True} | given),
+        Stop(name="1", target=Q[1], via=True),
+    ]
     with pytest.raises(InvalidProblem) as caught:
         of(*stops, **round_)
     assert caught.value.field == field
@@ -231,7 +280,11 @@ def test_what_does_not_fit_a_pass_is_refused(field: str, given: dict[str, Any], 
 
 def test_a_motion_has_a_dozen_passes_at_most() -> None:
     many = [Stop(name=f"{k}", target=Q[k % 3], via=True) for k in range(MOST_PASSES)]
-    of(*many, Stop(name="rest", target=Q[0]), *(replace(stop, name=f"again {stop.name}") for stop in many))
+    of(
+        *many,
+        Stop(name="rest", target=Q[0]),
+        *(replace(stop, name=f"again {stop.name}") for stop in many),
+    )
     with pytest.raises(InvalidProblem) as caught:
         of(*many, Stop(name="one more", target=Q[0], via=True))
     assert caught.value.field == f"stops.{MOST_PASSES}.via"
@@ -244,14 +297,22 @@ def test_passes_at_the_same_place_are_one() -> None:
     found = plan_cycle(of(*stops, Stop(name="rest", target=Q[1]), closed=False))
     assert [each.stop for each in found.moves[0].passes] == ["0", "1", "2", "3"]
     assert found.status == "optimal" and found.moves[0].solution.certificate.valid
-    plain = plan_cycle(of(Stop(name="1", target=Q[0], via=True), Stop(name="rest", target=Q[1]), closed=False))
-    assert found.energy.electrical.total == pytest.approx(plain.energy.electrical.total, rel=GUESSES)
+    plain = plan_cycle(
+        of(Stop(name="1", target=Q[0], via=True), Stop(name="rest", target=Q[1]), closed=False)
+    )
+    assert found.energy.electrical.total == pytest.approx(
+        plain.energy.electrical.total, rel=GUESSES
+    )
 
 
 def test_waiting_is_not_at_a_stop_that_is_passed() -> None:
-    """In much more time than the cycle takes: neither ours nor the one that stops rests there for long."""
+    """In much more time than the cycle takes: neither ours nor the one that stops rests there for
+    long.
+    """
     stops = [Stop(name=f"{k}", target=q, via=k == 0) for k, q in enumerate(Q[:2])]
-    found = plan_cycle(of(*stops, duration_min=12.0, duration_max=12.0, hold="brakes", brake_power=5.0))
+    found = plan_cycle(
+        of(*stops, duration_min=12.0, duration_max=12.0, hold="brakes", brake_power=5.0)
+    )
     assert found.duration == pytest.approx(12.0) and sum(move.wait for move in found.moves) > 1
     assert against(found)["stopping"] >= -ROUNDING
 

@@ -24,14 +24,18 @@ def motion(duration: float, energy: float) -> PricedMotion:
     return PricedMotion(quintic_spline(Q, Q + 0.1, duration), energy)
 
 
-def move(monkeypatch: pytest.MonkeyPatch, known: list[PricedMotion], *solved: PricedMotion | None) -> MoveOfALeg:
+def move(
+    monkeypatch: pytest.MonkeyPatch, known: list[PricedMotion], *solved: PricedMotion | None
+) -> MoveOfALeg:
     """A move whose solves have these results, one after the other."""
     results = iter(solved)
     monkeypatch.setattr(priced_search, "priced_motion", lambda *_: next(results))
     return MoveOfALeg(cast(Leg, None), 0, 0, LONGEST, NEVER, known)
 
 
-def test_a_solve_that_ends_in_a_worse_motion_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_solve_that_ends_in_a_worse_motion_changes_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     own, worse, best = motion(1.0, 10.0), motion(3.0, 60.0), motion(2.0, 15.0)
     found = move(monkeypatch, [own], worse, best, worse)
     assert found.at(-8.0) is own
@@ -40,16 +44,22 @@ def test_a_solve_that_ends_in_a_worse_motion_changes_nothing(monkeypatch: pytest
     assert found.at(20.0) is own
 
 
-def test_a_motion_that_lasts_longer_than_allowed_is_only_where_a_solve_begins(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_motion_that_lasts_longer_than_allowed_is_only_where_a_solve_begins(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     begun: list[Any] = []
     long, solved = motion(2 * LONGEST, 1.0), motion(LONGEST, 30.0)
     found = move(monkeypatch, [long])
-    monkeypatch.setattr(priced_search, "priced_motion", lambda *given: begun.append(given[-1]) or solved)
+    monkeypatch.setattr(
+        priced_search, "priced_motion", lambda *given: begun.append(given[-1]) or solved
+    )
     assert found.at(-10.0) is solved
     assert begun == [long.spline]
 
 
-def test_where_a_solve_from_a_motion_fails_one_from_none_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_a_solve_from_a_motion_fails_one_from_none_is_tried(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     own, other = motion(1.0, 10.0), motion(2.0, 1.0)
     assert move(monkeypatch, [own], None, other).at(0.0) is other
     with pytest.raises(NoTrajectory):

@@ -1,4 +1,6 @@
-"""Cycles with an energy storage on the bus: valued as one, no worse than move by move, and above their bound."""
+"""Cycles with an energy storage on the bus: valued as one, no worse than move by move, and above
+their bound.
+"""
 
 from __future__ import annotations
 
@@ -23,10 +25,16 @@ from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.moves import AMPLE, ROBOT
 
 ROUNDING = 1e-9
-# relative: the reported energy by quadrature, and the charge by the same intervals summed in another order
+# relative: the reported energy by quadrature, and the charge by the same intervals summed in
+# another order
 QUADRATURE = 1e-6
-HIGH, LOW = np.array([0.0, -1.4, 0.3, -1.57, -1.57, 0.0]), np.array([0.6, -0.5, 1.2, -1.57, -1.57, 0.0])
-LOADED = Arm(robot=ROBOT, collisions=False, payload=Payload(mass=5.0, com=np.array([0.0, 0.0, 0.05])))
+HIGH, LOW = (
+    np.array([0.0, -1.4, 0.3, -1.57, -1.57, 0.0]),
+    np.array([0.6, -0.5, 1.2, -1.57, -1.57, 0.0]),
+)
+LOADED = Arm(
+    robot=ROBOT, collisions=False, payload=Payload(mass=5.0, com=np.array([0.0, 0.0, 0.05]))
+)
 STOPS = [Stop(name="low", target=LOW, dwell=0.1), Stop(name="high", target=HIGH + 0.3)]
 ASKED = Cycle(arm=LOADED, start=HIGH, stops=STOPS, deadline=AMPLE)
 LARGE, SMALL = Bus("storage", 0.9, 30.0, 500.0), Bus("storage", 0.9, 3.0, 100.0)
@@ -55,7 +63,11 @@ def test_the_cycle_is_true(bus: Bus) -> None:
     assert electrical.parts_sum == pytest.approx(electrical.total, rel=ROUNDING)
     assert round_.lower_bound <= electrical.total
     # the charge runs on from leg to leg, and a closed round ends with that with which it begins
-    assert use is not None and use.charged > 1.0 and use.final == pytest.approx(use.initial, abs=QUADRATURE)
+    assert (
+        use is not None
+        and use.charged > 1.0
+        and use.final == pytest.approx(use.initial, abs=QUADRATURE)
+    )
     stored = [move.solution.energy.storage for move in round_.moves]
     for move, own in zip(round_.moves, stored, strict=True):
         assert own is not None and len(move.charges) == 4
@@ -84,25 +96,33 @@ def test_without_room_it_is_the_shared_bus_and_without_limits_the_recuperating_o
     assert none == pytest.approx(plan_cycle(HURRIED).energy.electrical.total, rel=QUADRATURE)
     boundless = found(Bus("storage", 0.9, 1e6))
     other = plan_cycle(with_bus(HURRIED, Bus("recuperating", 0.9)))
-    assert boundless.energy.electrical.total == pytest.approx(other.energy.electrical.total, rel=QUADRATURE)
+    assert boundless.energy.electrical.total == pytest.approx(
+        other.energy.electrical.total, rel=QUADRATURE
+    )
     assert boundless.status == other.status
 
 
 def test_it_is_never_above_choosing_move_by_move() -> None:
     own = plan_cycle(with_bus(ASKED, LARGE))
     names = {each.name: each for each in own.baselines}
-    assert names["move_by_move"].saving >= -ROUNDING and names["without_storage"].saving >= -ROUNDING
+    assert (
+        names["move_by_move"].saving >= -ROUNDING and names["without_storage"].saving >= -ROUNDING
+    )
 
 
 @pytest.mark.long
 def test_no_motions_with_the_storage_get_below_the_bound() -> None:
-    """Even paces in random shares of the time, valued with the storage from the charge that they end with."""
+    """Even paces in random shares of the time, valued with the storage from the charge that they
+    end with.
+    """
     asked, rng = with_bus(HURRIED, LARGE), np.random.default_rng(0)
     bound, plant = found(LARGE).lower_bound, Plant(asked.arm)
     path = [HIGH, LOW, HIGH + 0.3, HIGH]
     for _ in range(20):
         shares = rng.dirichlet(np.full(3, 5.0)) * (TIME - asked.dwelling)
-        motions = [quintic_spline(a, b, t) for (a, b), t in zip(pairwise(path), shares, strict=True)]
+        motions = [
+            quintic_spline(a, b, t) for (a, b), t in zip(pairwise(path), shares, strict=True)
+        ]
         demands = [Demand.of_motion(plant, motion) for motion in motions]
         demands.append(Demand.of_rest(asked, asked.moves[0], 0.0, asked.dwelling, LOW))
         assert bound <= drawn(asked.arm, demands, charges_of(asked.arm.bus, demands, True))
@@ -116,7 +136,9 @@ def test_a_repeated_cycle_ends_with_the_charge_with_which_it_begins(seed: int) -
     demands = [Demand(rng.normal(0.3 * rng.normal(), 3.0, 12), np.full(12, 0.05)) for _ in range(3)]
     steady = charges_of(bus, demands, True)
     assert steady[-1] == pytest.approx(steady[0], abs=ROUNDING)
-    net, lengths = (np.concatenate([getattr(each, name) for each in demands]) for name in ("net", "lengths"))
+    net, lengths = (
+        np.concatenate([getattr(each, name) for each in demands]) for name in ("net", "lengths")
+    )
     charge = float(rng.uniform(0.0, bus.capacity))
     for _ in range(10_000):
         charge, last = float(charges(bus, net, lengths, charge)[-1]), charge

@@ -1,4 +1,6 @@
-"""The sharing of time among moves whose energy is a function of duration, so that the optimum is known."""
+"""The sharing of time among moves whose energy is a function of duration, so that the optimum is
+known.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +15,16 @@ from joulepath.optimizer.plan_cycle import WELL_SHARED
 
 # W: what a wait draws
 WAITING = 5.0
-# energies above the optimum, relative: what is promised, and a wait of which a little could have been a slower move
+# energies above the optimum, relative: what is promised, and a wait of which a little could have
+# been a slower move
 ENERGY = SHARED + WORTH_SLOWING**2
 
 
 @dataclass(frozen=True)
 class Move:
-    """A move of energy swing / T² + drawn T - gained [J], for durations T from `shortest` to `longest` [s]."""
+    """A move of energy swing / T² + drawn T - gained [J], for durations T from `shortest` to
+    `longest` [s].
+    """
 
     swing: float
     drawn: float
@@ -46,12 +51,17 @@ def moves_of(seed: int) -> list[Move]:
     swings, drawn = rng.uniform(1, 100, 6), rng.uniform(2, 30, 6)
     shortest, longest = rng.uniform(0.2, 1, 6), rng.uniform(2, 12, 6)
     return [
-        Move(*each) for each in zip(swings.tolist(), drawn.tolist(), shortest.tolist(), longest.tolist(), strict=True)
+        Move(*each)
+        for each in zip(
+            swings.tolist(), drawn.tolist(), shortest.tolist(), longest.tolist(), strict=True
+        )
     ]
 
 
 def least(moves: list[Move], time: float, waiting: float) -> float:
-    """A lower bound [J] on what the moves and a wait need in a time [s]: a linear programme over tangents."""
+    """A lower bound [J] on what the moves and a wait need in a time [s]: a linear programme over
+    tangents.
+    """
     n = len(moves)
     rows, limits = [], []
     for k, move in enumerate(moves):
@@ -80,12 +90,17 @@ class TestFilling:
         time = factor * sum(move.shortest for move in moves)
         found = TimeSharing(moves).fill(time, WAITING, fastest(moves))
         assert sum(found.lengths) + found.waited == pytest.approx(time, rel=1e-12)
-        shared = [replace(move, duration=length) for move, length in zip(moves, found.lengths, strict=True)]
+        shared = [
+            replace(move, duration=length)
+            for move, length in zip(moves, found.lengths, strict=True)
+        ]
         assert all(each.shortest <= each.duration <= each.longest for each in shared)
         needed = sum(each.energy for each in shared) + WAITING * found.waited
         if factor > 1.01:
             # a little below, by the price of a wait; of moves as fast as they can be, less is known
-            assert found.least == pytest.approx(needed - WORTH_SLOWING * WAITING * found.waited, rel=ENERGY)
+            assert found.least == pytest.approx(
+                needed - WORTH_SLOWING * WAITING * found.waited, rel=ENERGY
+            )
         # the tangents are below the energies by less than 1e-5 of them
         assert needed == pytest.approx(least(moves, time, WAITING), rel=ENERGY + 1e-5)
 
@@ -94,7 +109,9 @@ class TestFilling:
         moves = moves_of(seed)
         time = factor * sum(move.shortest for move in moves)
         step = 1e-3 * time
-        saved = (least(moves, time - step, WAITING) - least(moves, time + step, WAITING)) / (2 * step)
+        saved = (least(moves, time - step, WAITING) - least(moves, time + step, WAITING)) / (
+            2 * step
+        )
         found = TimeSharing(moves).fill(time, WAITING, fastest(moves))
         # the price changes over the step, and the tangents are not smooth
         assert found.price == pytest.approx(saved, rel=0.03, abs=0.2)
@@ -111,7 +128,9 @@ def test_moves_that_gain_more_than_they_need(seed: int) -> None:
 
 
 def test_where_every_share_of_the_time_needs_the_same_any_is_the_best() -> None:
-    """Energies in proportion to durations: at the one price that counts, the durations jump from end to end."""
+    """Energies in proportion to durations: at the one price that counts, the durations jump from
+    end to end.
+    """
     moves = [Move(0.0, drawn, 1.0, 5.0) for drawn in (3.0, 3.0)]
     found = TimeSharing(moves).fill(7.0, WAITING, fastest(moves))
     assert found.moving == pytest.approx(7.0)
@@ -122,7 +141,9 @@ def test_where_every_share_of_the_time_needs_the_same_any_is_the_best() -> None:
 
 def test_one_move_and_moves_of_one_duration() -> None:
     alone, rigid = Move(10.0, 4.0, 0.5, 9.0), Move(10.0, 4.0, 0.5, 0.5)
-    assert TimeSharing([alone]).fill(2.0, WAITING, fastest([alone])).lengths == pytest.approx([2.0], rel=SHARED)
+    assert TimeSharing([alone]).fill(2.0, WAITING, fastest([alone])).lengths == pytest.approx(
+        [2.0], rel=SHARED
+    )
     found = TimeSharing([rigid, rigid]).fill(2.0, WAITING, fastest([rigid, rigid]))
     assert (found.lengths, found.waited) == ([0.5, 0.5], pytest.approx(1.0))
 

@@ -1,4 +1,6 @@
-"""Cycles in a given time: the time is met, shared at one price, and never dearer than sharing it in simple ways."""
+"""Cycles in a given time: the time is met, shared at one price, and never dearer than sharing it in
+simple ways.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,12 @@ from joulepath.optimizer.cycle.time_sharing import duration_of as duration_of_al
 from joulepath.optimizer.cycle.timed_cycle import TimedSearch
 from joulepath.optimizer.cycle.ways import layers_of
 from joulepath.optimizer.energy.dwell import holding_power
-from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, JoulepathError, NoTrajectory
+from joulepath.optimizer.exceptions import (
+    DeadlineExceeded,
+    InvalidProblem,
+    JoulepathError,
+    NoTrajectory,
+)
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.branches import BranchFilter
@@ -60,8 +67,14 @@ def in_time(asked: Cycle, duration: float) -> Cycle:
 
 
 def duration_of(factor: float) -> float:
-    """`factor` times the cycle's own duration [s]; below 1, this share of the way to it from the shortest one."""
-    return factor * free().duration if factor >= 1 else shortest() + factor * (free().duration - shortest())
+    """`factor` times the cycle's own duration [s]; below 1, this share of the way to it from the
+    shortest one.
+    """
+    return (
+        factor * free().duration
+        if factor >= 1
+        else shortest() + factor * (free().duration - shortest())
+    )
 
 
 @cache
@@ -94,7 +107,9 @@ def test_it_is_not_dearer_than_simple_ways_to_share_the_time(factor: float) -> N
 
 
 def test_no_other_way_to_share_the_time_is_cheaper() -> None:
-    """Every move in every share of the time, on the same chain: a grid of durations, each by `optimize`."""
+    """Every move in every share of the time, on the same chain: a grid of durations, each by
+    `optimize`.
+    """
     found = timed(1.3)
     total = sum(move.solution.duration + move.wait for move in found.moves)
     ends = [(move.planned.arm, move.solution.start.q, move.solution.goal.q) for move in found.moves]
@@ -104,7 +119,9 @@ def test_no_other_way_to_share_the_time_is_cheaper() -> None:
     @cache
     def energy(k: int, duration: float) -> float:
         arm, q_start, q_goal = ends[k]
-        task = Problem(arm=arm, start=q_start, goal=q_goal, windings=False, deadline=AMPLE, **fixed(duration))
+        task = Problem(
+            arm=arm, start=q_start, goal=q_goal, windings=False, deadline=AMPLE, **fixed(duration)
+        )
         return optimize(task).energy.electrical.total
 
     shares = [0.92, 1.0, 1.08]
@@ -120,20 +137,27 @@ def test_no_other_way_to_share_the_time_is_cheaper() -> None:
 def test_the_price_is_what_a_second_more_would_save() -> None:
     step = 0.02
     before, after = (timed(1.3 + side * step) for side in (-1, 1))
-    slope = (before.energy.electrical.total - after.energy.electrical.total) / (after.duration - before.duration)
+    slope = (before.energy.electrical.total - after.energy.electrical.total) / (
+        after.duration - before.duration
+    )
     assert timed(1.3).price_of_time == pytest.approx(slope, rel=0.1)
     assert timed(1.3).price_of_time < 0
 
 
 @pytest.mark.long
 def test_brakes_make_waiting_cheap() -> None:
-    """Of a brake power below what the electronics draw, next to nothing is saved by slower moves."""
-    asked = in_time(replace(ASKED, hold="brakes", brake_delay=0.1, brake_power=1.0), 3.0 * free().duration)
+    """Of a brake power below what the electronics draw, next to nothing is saved by slower
+    moves."""
+    asked = in_time(
+        replace(ASKED, hold="brakes", brake_delay=0.1, brake_power=1.0), 3.0 * free().duration
+    )
     braked = plan_cycle(asked)
     assert_true(asked, braked)
     (waiting,) = (move for move in braked.moves if move.wait > 0)
     # where it dwells on its brakes already, a wait draws nothing but their power
-    assert waiting.planned.dwell > 0.1 and waiting.wait_energy == pytest.approx(1.0 * waiting.wait, rel=ROUNDING)
+    assert waiting.planned.dwell > 0.1 and waiting.wait_energy == pytest.approx(
+        1.0 * waiting.wait, rel=ROUNDING
+    )
     assert braked.energy.electrical.total < 1.1 * free().energy.electrical.total
     assert braked.price_of_time == pytest.approx(-1.0)
 
@@ -141,14 +165,18 @@ def test_brakes_make_waiting_cheap() -> None:
 def test_bounds_on_the_time_leave_a_cycle_alone_that_keeps_them() -> None:
     own = free().duration
     wide = plan_cycle(replace(ASKED, duration_min=0.9 * own, duration_max=1.1 * own))
-    assert wide.energy.electrical.total == free().energy.electrical.total and wide.price_of_time == 0
+    assert (
+        wide.energy.electrical.total == free().energy.electrical.total and wide.price_of_time == 0
+    )
 
 
 @pytest.mark.long
 def test_a_greatest_time_is_as_good_as_this_time_where_it_is_short() -> None:
     hurried = plan_cycle(replace(ASKED, duration_max=duration_of(0.4)))
     assert hurried.duration == pytest.approx(duration_of(0.4))
-    assert hurried.energy.electrical.total == pytest.approx(timed(0.4).energy.electrical.total, rel=CONVERGED)
+    assert hurried.energy.electrical.total == pytest.approx(
+        timed(0.4).energy.electrical.total, rel=CONVERGED
+    )
 
 
 @pytest.mark.parametrize("factor", long_but([0.5], [0.05, 0.5]))
@@ -161,7 +189,9 @@ def test_too_little_time_says_how_much_the_fastest_cycle_takes(factor: float) ->
 
 @pytest.mark.long
 def test_a_time_just_above_the_shortest_is_met() -> None:
-    assert plan_cycle(in_time(ASKED, 1.001 * shortest())).duration == pytest.approx(1.001 * shortest())
+    assert plan_cycle(in_time(ASKED, 1.001 * shortest())).duration == pytest.approx(
+        1.001 * shortest()
+    )
 
 
 @pytest.mark.long
@@ -181,7 +211,9 @@ def test_the_bound_holds_for_every_chain_and_share(seed: int) -> None:
         for k, share in enumerate(shares):
             given = {"windings": False, "deadline": AMPLE, **fixed(share)}
             try:
-                move = optimize(Problem(arm=asked.arms[k], start=chain[k], goal=chain[k + 1], **given))
+                move = optimize(
+                    Problem(arm=asked.arms[k], start=chain[k], goal=chain[k + 1], **given)
+                )
             except JoulepathError:  # this share is too short: no cycle of this kind
                 break
             total += move.energy.electrical.total
@@ -191,18 +223,37 @@ def test_the_bound_holds_for_every_chain_and_share(seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "hold", [pytest.param({}, marks=pytest.mark.long), {"hold": "brakes", "brake_power": 1.0}], ids=str
+    "hold",
+    [pytest.param({}, marks=pytest.mark.long), {"hold": "brakes", "brake_power": 1.0}],
+    ids=str,
 )
-def test_a_least_time_is_bounded_for_longer_cycles_and_longer_moves_too(hold: dict[str, Any]) -> None:
-    """Of a least time alone, the bound holds for cycles that take longer, and for moves that take longer than it."""
-    asked = Cycle(arm=ASKED.arm, start=HOME, stops=[Stop(name="turned", target=HOME + TURN)], deadline=AMPLE, **hold)
+def test_a_least_time_is_bounded_for_longer_cycles_and_longer_moves_too(
+    hold: dict[str, Any],
+) -> None:
+    """Of a least time alone, the bound holds for cycles that take longer, and for moves that take
+    longer than it.
+    """
+    asked = Cycle(
+        arm=ASKED.arm,
+        start=HOME,
+        stops=[Stop(name="turned", target=HOME + TURN)],
+        deadline=AMPLE,
+        **hold,
+    )
     least = 1.5 * plan_cycle(asked).duration
     bound = plan_cycle(replace(asked, duration_min=least)).lower_bound
 
     @cache
     def moving(k: int, duration: float) -> float:
         ends = [HOME, HOME + TURN][:: 1 - 2 * k]
-        task = Problem(arm=asked.arm, start=ends[0], goal=ends[1], windings=False, deadline=AMPLE, **fixed(duration))
+        task = Problem(
+            arm=asked.arm,
+            start=ends[0],
+            goal=ends[1],
+            windings=False,
+            deadline=AMPLE,
+            **fixed(duration),
+        )
         return optimize(task).energy.electrical.total
 
     ends, still = np.array([HOME, HOME + TURN]), np.zeros((2, 6))
@@ -242,7 +293,9 @@ def test_a_wrong_time_names_its_field(given: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("place", long_but(["start"], ["start", "stop 1"]))
 def test_it_waits_where_it_is_told_to(place: str) -> None:
-    asked = in_time(replace(ASKED, hold="brakes", brake_power=1.0, wait=place), 2.0 * free().duration)
+    asked = in_time(
+        replace(ASKED, hold="brakes", brake_power=1.0, wait=place), 2.0 * free().duration
+    )
     found = plan_cycle(asked)
     assert_true(asked, found)
     assert [move.planned.goal for move in found.moves if move.wait > 0] == [place]
@@ -269,13 +322,16 @@ REFUSALS = {"no time": DeadlineExceeded([]), "no motion": NoTrajectory([])}
 
 @pytest.mark.parametrize(
     ("where", "problem"),
-    long_but([("sharing", "no time"), ("motions", "no motion")], product(["sharing", "motions"], REFUSALS)),
+    long_but(
+        [("sharing", "no time"), ("motions", "no motion")],
+        product(["sharing", "motions"], REFUSALS),
+    ),
 )
 def test_time_that_cannot_be_shared_leaves_simpler_cycles(
     where: str, problem: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Among obstacles, what shares the time may end by the deadline, or miss a motion: the moves slowed alike, and the
-    fastest ones with a wait, are known by then."""
+    """Among obstacles, what shares the time may end by the deadline, or miss a motion: the moves
+    slowed alike, and the fastest ones with a wait, are known by then."""
 
     def fails(*_: Any) -> Any:
         raise REFUSALS[problem]

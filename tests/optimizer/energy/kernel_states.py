@@ -16,7 +16,8 @@ from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, problem
 NODES = 40
 TORQUE = 1e-9  # N·m, as symbolic inverse dynamics against Pinocchio
 
-LOSSY = replace(  # the UR5e's inverter loss is unknown and zero: give it one, so that its terms are seen
+# the UR5e's inverter loss is unknown and zero: give it one, so that its terms are seen
+LOSSY = replace(
     ROBOT.drives,
     inverter_constant=np.full(6, 0.7),
     inverter_linear=np.array([0.3, 0.3, 0.3, 0.5, 0.5, 0.5]),
@@ -25,7 +26,9 @@ LOSSY = replace(  # the UR5e's inverter loss is unknown and zero: give it one, s
 TASK = PreparedProblem.of(
     problem(
         robot=replace(
-            ROBOT, drives=LOSSY, electronics=replace(ROBOT.electronics, controller_power=9, regeneration=0.3)
+            ROBOT,
+            drives=LOSSY,
+            electronics=replace(ROBOT.electronics, controller_power=9, regeneration=0.3),
         ),
         payload=PAYLOAD,
         gravity=TILTED,
@@ -48,10 +51,11 @@ def places(name: str, nq: int = 6) -> Array:
 
 
 def left_out(kernel: Kernel, y: Array, weight: Array, p: Array, dry: Array) -> Array:
-    """What the kernel's Hessians (N, 18, 18) leave out, with dry friction (N, 6) or (6,) [N·m] of full size.
+    """What the kernel's Hessians (N, 18, 18) leave out, with dry friction (N, 6) or (6,) [N·m] of
+    full size.
 
-    The second derivative by v of dry · v / sqrt(v² + KNEE²), times what friction costs, where it is concave. The cost's
-    slope by the parameter `coulomb` tells what friction costs.
+    The second derivative by v of dry · v / sqrt(v² + KNEE²), times what friction costs, where it is
+    concave. The cost's slope by the parameter `coulomb` tells what friction costs.
     """
     v, step = y[:, 6:12], 1e-6
     size = np.sqrt(v**2 + KNEE**2)

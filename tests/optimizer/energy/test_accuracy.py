@@ -1,4 +1,6 @@
-"""How accurate energies are: against a quadrature of 20,000 panels. docs/optimize.md names the figures."""
+"""How accurate energies are: against a quadrature of 20,000 panels. docs/optimize.md names the
+figures.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ def error(prepared: PreparedProblem, spline: Spline) -> float:
     """Relative difference of a motion's electrical energy from that of a fine quadrature."""
     t, weights = quadrature(spline.knots, 5, spline.duration / PANELS)
     q, v, a = sample(spline, t)
-    gain = prepared.potential(spline.control_points[-1]) - prepared.potential(spline.control_points[0])
+    gain = prepared.potential(spline.control_points[-1]) - prepared.potential(
+        spline.control_points[0]
+    )
     fine = breakdown(weights, v, a, prepared.torques(q, v, a), gain, prepared.arm)
     return abs(fine.electrical.total / prepared.energy(spline).electrical.total - 1)
 
@@ -38,7 +42,9 @@ def errors_of(robot: str, count: int) -> list[float]:
     loaded, rng, errors = load_robot(robot), np.random.default_rng(ROBOTS[robot]), list[float]()
     middle = (np.maximum(loaded.limits.q_min, -3) + np.minimum(loaded.limits.q_max, 3)) / 2
     for k in range(count):
-        arm = Arm(robot=loaded, payload=Payload(float(k % 3), np.array([0, 0, 0.05])), collisions=False)
+        arm = Arm(
+            robot=loaded, payload=Payload(float(k % 3), np.array([0, 0, 0.05])), collisions=False
+        )
         start, goal = middle + rng.uniform(-1, 1, (2, loaded.nq))
         task = Problem(arm=arm, start=start, goal=goal, deadline=AMPLE)
         errors.append(error(PreparedProblem.of(task), optimize(task).trajectory.spline))

@@ -1,4 +1,6 @@
-"""Bus modes: the store's law, the balance in every mode, and what is found on one bus against another."""
+"""Bus modes: the store's law, the balance in every mode, and what is found on one bus against
+another.
+"""
 
 from __future__ import annotations
 
@@ -28,15 +30,27 @@ from tests.selection import long_but
 
 ROUNDING = 1e-9  # relative; sums of some thousand terms
 PROGRAMME = 1e-7  # relative; the linear programme's own tolerance
-SEARCH = 5e-3  # relative; two searches end in optima that their stopping rules and smoothing tell apart by that much
-SAME_OPTIMUM = 2e-2  # relative; optima with net power near zero for long stretches are flat and smoothed
+# relative; two searches end in optima that their stopping rules and smoothing tell apart by that
+# much
+SEARCH = 5e-3
+SAME_OPTIMUM = (
+    2e-2  # relative; optima with net power near zero for long stretches are flat and smoothed
+)
 KERNEL_SMOOTHING = 0.5  # W; the width over which the kernel rounds corners
 DIFFERENCE = 1e-5  # of central differences, relative to their scale
 
 HEAVY = Payload(mass=5.0, com=np.array([0.0, 0.0, 0.1]))
 # a heavy payload going down quickly, a big motion of the whole arm, and the first one back up
-DOWN = {"start": [0, -1.6, 0.3, -1, -1.57, 0], "goal": [0.8, -0.5, 0.4, -1.5, -1.57, 0], "duration_max": 1.0}
-SWING = {"start": [-1.5, -1.9, 0.6, -1, -1.2, 0], "goal": [1.6, -0.4, 0.9, -2, 1.0, 2], "duration_max": 1.5}
+DOWN = {
+    "start": [0, -1.6, 0.3, -1, -1.57, 0],
+    "goal": [0.8, -0.5, 0.4, -1.5, -1.57, 0],
+    "duration_max": 1.0,
+}
+SWING = {
+    "start": [-1.5, -1.9, 0.6, -1, -1.2, 0],
+    "goal": [1.6, -0.4, 0.9, -2, 1.0, 2],
+    "duration_max": 1.5,
+}
 UP = {"start": DOWN["goal"], "goal": DOWN["start"], "duration_max": 1.1}
 MOVES: dict[str, dict[str, Any]] = {"down": DOWN, "swing": SWING, "up": UP}
 STORE = Bus("storage", efficiency=0.9, capacity=5.0, power=200.0)
@@ -75,7 +89,11 @@ def test_energy_is_conserved_on_every_bus(bus: Bus, regeneration: float) -> None
     """Net demand = drawn - burnt - lost in the store + fall of its charge, whatever flows."""
     for seed in range(20):
         joints, weights = course(seed)
-        back = bus.efficiency if bus.mode == "recuperating" else regeneration * (bus.mode != "isolated")
+        back = (
+            bus.efficiency
+            if bus.mode == "recuperating"
+            else regeneration * (bus.mode != "isolated")
+        )
         flow = exchange(bus, back, 20.0, joints, weights)
         net = float(weights @ (20.0 + joints.sum(axis=1)))
         spent = flow.charge[0] - flow.charge[-1]
@@ -84,7 +102,9 @@ def test_energy_is_conserved_on_every_bus(bus: Bus, regeneration: float) -> None
         assert flow.drawn.sum() + spent == pytest.approx(drawn, rel=ROUNDING, abs=1e-9)
 
 
-@pytest.mark.parametrize("bus", [bus for bus in BUSES if bus.mode == "storage"], ids=lambda bus: str(bus.capacity))
+@pytest.mark.parametrize(
+    "bus", [bus for bus in BUSES if bus.mode == "storage"], ids=lambda bus: str(bus.capacity)
+)
 def test_the_store_keeps_its_limits(bus: Bus) -> None:
     for seed in range(20):
         joints, weights = course(seed)
@@ -108,11 +128,16 @@ def test_no_other_law_draws_less(seed: int) -> None:
     charge = np.tril(np.ones((k, k)))  # charge after each interval, by what was moved until then
     rows = np.hstack([bus.efficiency * charge, -charge])
     best = linprog(
-        np.concatenate([np.full(k, -bus.efficiency), np.zeros(k)]),  # charge left over counts in full
+        np.concatenate(
+            [np.full(k, -bus.efficiency), np.zeros(k)]
+        ),  # charge left over counts in full
         A_ub=np.vstack([rows, -rows]),
         b_ub=np.concatenate([np.full(k, bus.capacity - bus.initial), np.full(k, bus.initial)]),
         bounds=np.column_stack(
-            [np.zeros(2 * k), np.concatenate([np.minimum(np.maximum(s * net, 0), most) for s in (-1, 1)])]
+            [
+                np.zeros(2 * k),
+                np.concatenate([np.minimum(np.maximum(s * net, 0), most) for s in (-1, 1)]),
+            ]
         ),
     )
     assert best.success
@@ -135,7 +160,9 @@ def test_the_store_by_hand() -> None:
 
 
 def test_an_initial_charge_is_no_gift() -> None:
-    """What is used of it counts as drawn: a full store is worth no more than an empty one, but for its lack of room."""
+    """What is used of it counts as drawn: a full store is worth no more than an empty one, but for
+    its lack of room.
+    """
     for seed in range(10):
         joints, weights = course(seed)
         totals = []
@@ -147,15 +174,21 @@ def test_an_initial_charge_is_no_gift() -> None:
 
 
 @pytest.mark.parametrize("name", long_but(("down",), MOVES))
-@pytest.mark.parametrize("bus", [Bus(), Bus("isolated"), Bus("recuperating", efficiency=0.5), STORE], ids=str)
+@pytest.mark.parametrize(
+    "bus", [Bus(), Bus("isolated"), Bus("recuperating", efficiency=0.5), STORE], ids=str
+)
 def test_parts_add_up(name: str, bus: Bus) -> None:
     """In the answer and in its certificate, and the answer is above its proven bound."""
     found = solved(name, bus)
     electrical = found.energy.electrical
-    assert electrical.parts_sum == pytest.approx(electrical.total, rel=1e-4)  # quadrature of the corners
+    assert electrical.parts_sum == pytest.approx(
+        electrical.total, rel=1e-4
+    )  # quadrature of the corners
     assert found.certificate.valid
     assert found.lower_bound <= electrical.total
-    assert (electrical.storage_loss > 0) == (found.energy.storage is not None and found.energy.storage.charged > 0)
+    assert (electrical.storage_loss > 0) == (
+        found.energy.storage is not None and found.energy.storage.charged > 0
+    )
     if bus.mode != "storage":
         assert found.energy.storage is None
         assert found.trajectory.charge is None
@@ -164,16 +197,22 @@ def test_parts_add_up(name: str, bus: Bus) -> None:
 @pytest.mark.parametrize("name", long_but(("down",), MOVES))
 def test_what_shares_more_draws_less(name: str) -> None:
     shared = total(name, Bus())
-    assert total(name, STORE) <= shared * (1 + ROUNDING)  # by construction: the shared bus' motion is one it may take
+    assert total(name, STORE) <= shared * (
+        1 + ROUNDING
+    )  # by construction: the shared bus' motion is one it may take
     assert shared <= total(name, Bus("isolated")) * (1 + SEARCH)
-    falling = [total(name, Bus("recuperating", efficiency=efficiency)) for efficiency in (0.0, 0.5, 1.0)]
+    falling = [
+        total(name, Bus("recuperating", efficiency=efficiency)) for efficiency in (0.0, 0.5, 1.0)
+    ]
     assert falling[0] == pytest.approx(shared, rel=ROUNDING)  # the very same parameters
     assert falling[2] <= falling[1] * (1 + SEARCH)
     assert falling[1] <= falling[0] * (1 + SEARCH)
 
 
 def test_buses_make_a_difference() -> None:
-    """The moves above do have net power below zero: without it all modes would agree and the tests see nothing."""
+    """The moves above do have net power below zero: without it all modes would agree and the tests
+    see nothing.
+    """
     assert total("down", Bus("isolated")) > 1.5 * total("down", Bus())
     assert total("down", Bus("recuperating", efficiency=1.0)) < 0.9 * total("down", Bus())
     assert total("down", STORE) < 0.97 * total("down", Bus())
@@ -181,7 +220,8 @@ def test_buses_make_a_difference() -> None:
 
 @pytest.mark.parametrize("name", ["down", pytest.param("swing", marks=pytest.mark.long)])
 def test_a_store_lies_between_none_and_all(name: str) -> None:
-    """Without capacity it is the shared bus; without a limit it is recuperation at its efficiency."""
+    """Without capacity it is the shared bus; without a limit it is recuperation at its
+    efficiency."""
     nothing = total(name, Bus("storage", efficiency=1.0, capacity=0.0))
     assert nothing <= total(name, Bus()) * (1 + ROUNDING)
     assert nothing == pytest.approx(total(name, Bus()), rel=SAME_OPTIMUM)
@@ -201,7 +241,9 @@ def test_the_charge_is_in_the_answer() -> None:
     assert use is not None
     assert (charge[0], charge[-1]) == pytest.approx((use.initial, use.final), abs=1e-9)
     assert 0 <= charge.min() < charge.max() <= STORE.capacity
-    assert use.final - use.initial == pytest.approx(STORE.efficiency * use.charged - use.discharged, rel=1e-6)
+    assert use.final - use.initial == pytest.approx(
+        STORE.efficiency * use.charged - use.discharged, rel=1e-6
+    )
     t = found.trajectory.t
     assert (np.abs(np.diff(charge)) <= STORE.power * np.diff(t) * (1 + 1e-6)).all()
     task = PreparedProblem.of(problem(**MOVES["down"], payload=HEAVY, bus=STORE))
@@ -224,7 +266,9 @@ def test_the_kernel_knows_the_mode(mode: Any) -> None:
     """Its cost is the exact draw but for the corners, and its gradient is that of its cost."""
     compile_kernel(ROBOT)
     inverter = Inverter(constant=1.2, linear=np.linspace(0.1, 0.6, 6), quadratic=0.02)
-    task = PreparedProblem.of(problem(bus=Bus(mode, efficiency=0.6), inverter=inverter, payload=HEAVY))
+    task = PreparedProblem.of(
+        problem(bus=Bus(mode, efficiency=0.6), inverter=inverter, payload=HEAVY)
+    )
     rng = np.random.default_rng(3)
     y = rng.normal(size=(50, 18)) * np.repeat([1.0, 1.5, 6.0], 6)
     p = task.objective_parameters
@@ -242,17 +286,23 @@ def test_the_kernel_knows_the_mode(mode: Any) -> None:
     for k in range(18):
         step = np.zeros(18)
         step[k] = h
-        slope = (task.kernel.value(y + step, p)[0].copy() - task.kernel.value(y - step, p)[0].copy()) / (2 * h)
+        slope = (
+            task.kernel.value(y + step, p)[0].copy() - task.kernel.value(y - step, p)[0].copy()
+        ) / (2 * h)
         assert np.abs(slope - gradient[:, k]).max() < DIFFERENCE * (1 + np.abs(gradient).max())
         bend = task.kernel.node(y + step, none, weight, p)[2].copy()
         bend -= task.kernel.node(y - step, none, weight, p)[2]
-        assert np.abs(bend / (2 * h) - hessian[:, k]).max() < DIFFERENCE * (1 + np.abs(hessian).max())
+        assert np.abs(bend / (2 * h) - hessian[:, k]).max() < DIFFERENCE * (
+            1 + np.abs(hessian).max()
+        )
 
 
 @pytest.mark.parametrize("name", long_but(("up", "down"), MOVES))
 @pytest.mark.parametrize("bus", BUSES, ids=lambda bus: f"{bus.mode} {bus.efficiency} {bus.initial}")
 def test_bounds_hold_on_every_bus(name: str, bus: Bus) -> None:
-    """The energies of optimised motions over other buses, too: every motion is one that each bus allows."""
+    """The energies of optimised motions over other buses, too: every motion is one that each bus
+    allows.
+    """
     move = MOVES[name]
     task = PreparedProblem.of(problem(**move, payload=HEAVY, bus=bus))
     start, goal = np.array(move["start"], dtype=float), np.array(move["goal"], dtype=float)
@@ -263,11 +313,15 @@ def test_bounds_hold_on_every_bus(name: str, bus: Bus) -> None:
         assert energy.parts_sum == pytest.approx(energy.total, rel=1e-3)
         assert bound <= energy.total
     if bus.mode == "isolated":
-        assert bound >= ROBOT.electronics.idle_power * 0.3  # the electronics' share of 0.3 s and more
+        assert (
+            bound >= ROBOT.electronics.idle_power * 0.3
+        )  # the electronics' share of 0.3 s and more
 
 
 def test_inverter_figures_replace_the_robots() -> None:
-    """By hand: what is added is constant · T + linear ∫|i| + quadratic ∫i², and the bound pays the constant."""
+    """By hand: what is added is constant · T + linear ∫|i| + quadratic ∫i², and the bound pays the
+    constant.
+    """
     compile_kernel(ROBOT)
     plain, lossy = (
         PreparedProblem.of(problem(payload=HEAVY, inverter=inverter))

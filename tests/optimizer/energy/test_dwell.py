@@ -1,4 +1,6 @@
-"""Waiting at the goal, on motors or brakes: by hand, against a scan of durations, in bound, certificate, baselines."""
+"""Waiting at the goal, on motors or brakes: by hand, against a scan of durations, in bound,
+certificate, baselines.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,10 @@ from tests.selection import long_but
 BY_HAND = 1e-12  # relative; a few operations
 SCAN = 5e-3  # relative; neighbouring durations of the scan, and where each search stops
 
-START, GOAL = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]), np.array([1.2, -0.6, 0.9, -1.9, -1.57, 0.4])
+START, GOAL = (
+    np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]),
+    np.array([1.2, -0.6, 0.9, -1.9, -1.57, 0.4]),
+)
 HEAVY = Payload(mass=4.0, com=np.array([0.0, 0.0, 0.08]))
 # motors at the goal draw some 85 W
 DWELLS = {
@@ -42,11 +47,15 @@ DWELLS = {
 def solved(dwell: Dwell | None, duration: float | None = None, bus: Bus | None = None) -> Solution:
     compile_kernel(ROBOT)
     given: dict[str, Any] = {} if duration is None else fixed(duration)
-    return optimize(problem(START, GOAL, payload=HEAVY, dwell=dwell, bus=bus or Bus(), deadline=60.0, **given))
+    return optimize(
+        problem(START, GOAL, payload=HEAVY, dwell=dwell, bus=bus or Bus(), deadline=60.0, **given)
+    )
 
 
 def hold() -> float:
-    """Power [W] to hold the goal, by Pinocchio and the formula written out; the UR5e's inverter loss is zero."""
+    """Power [W] to hold the goal, by Pinocchio and the formula written out; the UR5e's inverter
+    loss is zero.
+    """
     model = ROBOT.loaded_model(HEAVY.mass, HEAVY.com, HEAVY.inertia, np.array([0, 0, -9.81]))
     tau = pin.computeGeneralizedGravity(model, model.createData(), GOAL)
     i = tau / ROBOT.drives.torque_constant
@@ -55,7 +64,9 @@ def hold() -> float:
 
 def test_holding_power_by_hand() -> None:
     task = PreparedProblem.of(problem(START, GOAL, payload=HEAVY))
-    assert float(task.holding_power(GOAL)) == pytest.approx(hold(), rel=1e-9)  # the kernel's torques
+    assert float(task.holding_power(GOAL)) == pytest.approx(
+        hold(), rel=1e-9
+    )  # the kernel's torques
     assert hold() > 1.3 * ROBOT.electronics.idle_power
     assert float(holding_power(task.arm, np.zeros(6))) == ROBOT.electronics.idle_power
 
@@ -63,11 +74,21 @@ def test_holding_power_by_hand() -> None:
 def test_dwell_by_hand() -> None:
     arm = problem(START, GOAL).arm
     assert dwell_energy(Dwell(5.0), arm, 50.0, 2.0) == pytest.approx(150.0, rel=BY_HAND)
-    assert dwell_energy(Dwell(5.0, "brakes", 0.5, 10.0), arm, 50.0, 2.0) == pytest.approx(25 + 25, rel=BY_HAND)
-    assert dwell_energy(Dwell(5.0, "brakes", 0.5, 10.0), arm, 50.0, 4.8) == pytest.approx(0.2 * 50, rel=BY_HAND)
-    assert dwell_energy(Dwell(5.0, "brakes", 0.5), arm, 50.0, 2.0) == pytest.approx(25 + 2.5 * 36.7, rel=BY_HAND)
+    assert dwell_energy(Dwell(5.0, "brakes", 0.5, 10.0), arm, 50.0, 2.0) == pytest.approx(
+        25 + 25, rel=BY_HAND
+    )
+    assert dwell_energy(Dwell(5.0, "brakes", 0.5, 10.0), arm, 50.0, 4.8) == pytest.approx(
+        0.2 * 50, rel=BY_HAND
+    )
+    assert dwell_energy(Dwell(5.0, "brakes", 0.5), arm, 50.0, 2.0) == pytest.approx(
+        25 + 2.5 * 36.7, rel=BY_HAND
+    )
     for dwell in DWELLS.values():
-        assert dwell_energy(dwell, arm, 50.0, dwell.time) == dwell_energy(dwell, arm, 50.0, dwell.time + 1) == 0
+        assert (
+            dwell_energy(dwell, arm, 50.0, dwell.time)
+            == dwell_energy(dwell, arm, 50.0, dwell.time + 1)
+            == 0
+        )
 
 
 @pytest.mark.parametrize("dwell", DWELLS.values(), ids=DWELLS.keys())
@@ -77,14 +98,22 @@ def test_its_pieces_are_its_value(dwell: Dwell) -> None:
     assert pieces[0].t_min == 0
     assert pieces[-1].t_max == dwell.time
     for T in np.linspace(0, dwell.time, 101):
-        values = [float((p.constant - p.power * T)[0]) for p in pieces if p.t_min - 1e-12 <= T <= p.t_max + 1e-12]
-        assert values == pytest.approx([dwell_energy(dwell, arm, 50.0, float(T))] * len(values), rel=1e-9, abs=1e-9)
+        values = [
+            float((p.constant - p.power * T)[0])
+            for p in pieces
+            if p.t_min - 1e-12 <= T <= p.t_max + 1e-12
+        ]
+        assert values == pytest.approx(
+            [dwell_energy(dwell, arm, 50.0, float(T))] * len(values), rel=1e-9, abs=1e-9
+        )
         assert values
 
 
 @pytest.mark.parametrize("name", long_but(("late brakes",), DWELLS))
 def test_no_duration_is_better(name: str) -> None:
-    """Brute force: motions optimised for fixed durations, each with its wait by hand; certified, above the bound."""
+    """Brute force: motions optimised for fixed durations, each with its wait by hand; certified,
+    above the bound.
+    """
     dwell = DWELLS[name]
     found = solved(dwell)
     energy = found.energy.electrical
@@ -104,7 +133,9 @@ def test_no_duration_is_better(name: str) -> None:
 
 
 def test_braking_early_pays_where_holding_is_dear() -> None:
-    """With motors on, the wait costs as much as moving slowly; with brakes at 5 W it is worth getting there."""
+    """With motors on, the wait costs as much as moving slowly; with brakes at 5 W it is worth
+    getting there.
+    """
     motors, brakes = solved(DWELLS["motors"]), solved(DWELLS["cheap brakes"])
     assert brakes.duration < 0.7 * motors.duration
     assert brakes.duration < solved(None).duration * 1.2
@@ -137,9 +168,14 @@ def test_baselines_wait_too() -> None:
 
 @pytest.mark.long
 def test_the_mechanical_objective_knows_no_wait() -> None:
-    """The dwell's end is the longest duration, and the wait shows in the electrical energy alone."""
+    """The dwell's end is the longest duration, and the wait shows in the electrical energy
+    alone."""
     compile_kernel(ROBOT)
-    found = optimize(problem(START, GOAL, objective="mechanical", dwell=Dwell(1.5, brake_delay=0.2), **fixed(1.0)))
+    found = optimize(
+        problem(
+            START, GOAL, objective="mechanical", dwell=Dwell(1.5, brake_delay=0.2), **fixed(1.0)
+        )
+    )
     plain = optimize(problem(START, GOAL, objective="mechanical", **fixed(1.0)))
     assert found.energy.mechanical.total == pytest.approx(plain.energy.mechanical.total, rel=1e-9)
     assert found.energy.electrical.dwell > 0.5 * 36.7 * 0.99
@@ -150,7 +186,9 @@ def test_a_cycle_and_a_store_go_together() -> None:
     store = Bus("storage", efficiency=0.9, capacity=10.0)
     found = solved(DWELLS["cheap brakes"], None, store)
     assert found.certificate.valid
-    assert found.energy.electrical.total <= solved(DWELLS["cheap brakes"]).energy.electrical.total * (1 + 1e-9)
+    assert found.energy.electrical.total <= solved(
+        DWELLS["cheap brakes"]
+    ).energy.electrical.total * (1 + 1e-9)
     assert found.energy.electrical.dwell > 0
 
 

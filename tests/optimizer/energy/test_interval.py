@@ -1,4 +1,6 @@
-"""Intervals of energies: against evaluations of the same motion with other figures, and against synthetic truth."""
+"""Intervals of energies: against evaluations of the same motion with other figures, and against
+synthetic truth.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,8 @@ from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, problem, torques
 from tests.optimizer.test_load_friction import loaded
 
-# relative to the largest derivative: central differences over 1e-4 of a figure, corners of the power between samples
+# relative to the largest derivative: central differences over 1e-4 of a figure, corners of the
+# power between samples
 DIFFERENCE, STEP = 2e-3, 1e-4
 # of the interval's half-width: energy is not quite linear in the figures, and both sides are drawn
 ENDS = 0.12
@@ -51,7 +54,13 @@ def with_values(robot: Robot, law: FrictionLaw, vector: Array) -> Robot:
     model = robot.model.copy()
     model.armature = drives.rotor_inertia
     electronics = replace(robot.electronics, idle_power=float(vector[0]), controller_power=0.0)
-    return replace(robot, model=model, drives=drives, friction_laws={law.name: friction}, electronics=electronics)
+    return replace(
+        robot,
+        model=model,
+        drives=drives,
+        friction_laws={law.name: friction},
+        electronics=electronics,
+    )
 
 
 def nominal(task: Problem) -> Array:
@@ -59,7 +68,9 @@ def nominal(task: Problem) -> Array:
 
 
 class Reevaluated:
-    """Energies of one motion with other figures, by the report's own formulas and Pinocchio's torques."""
+    """Energies of one motion with other figures, by the report's own formulas and Pinocchio's
+    torques.
+    """
 
     def __init__(self, task: Problem, spline: Spline) -> None:
         self.task, self.duration = task, spline.duration
@@ -77,12 +88,18 @@ class Reevaluated:
         dwell = self.task.dwell
         if dwell is None:
             return energy
-        return energy + dwell_energy(dwell, arm, float(holding_power(arm, self.held)), self.duration)
+        return energy + dwell_energy(
+            dwell, arm, float(holding_power(arm, self.held)), self.duration
+        )
 
 
 CONDITIONS: dict[str, dict[str, Any]] = {
     "shared": {"payload": PAYLOAD},
-    "load": {"robot": loaded(), "payload": PAYLOAD, "inverter": Inverter(constant=0.7, linear=0.3, quadratic=0.02)},
+    "load": {
+        "robot": loaded(),
+        "payload": PAYLOAD,
+        "inverter": Inverter(constant=0.7, linear=0.3, quadratic=0.02),
+    },
     "isolated": {"bus": Bus("isolated"), "payload": PAYLOAD},
     "recuperating": {"bus": Bus("recuperating", efficiency=0.8), "payload": PAYLOAD},
     "storage": {"bus": Bus("storage", efficiency=0.9, capacity=50.0), "payload": PAYLOAD},
@@ -105,11 +122,15 @@ def test_the_gradient_is_the_slope(name: str, monkeypatch: pytest.MonkeyPatch) -
     task = problem(**given)
     if inverter is not None:
         drives = replace(
-            task.arm.robot.drives, **{f"inverter_{n}": np.full(6, v) for n, v in vars(inverter).items()}
-        )  # fmt: skip
+            task.arm.robot.drives,
+            **{f"inverter_{n}": np.full(6, v) for n, v in vars(inverter).items()},
+        )
         task = problem(**given | {"robot": replace(task.arm.robot, drives=drives)})
     spline = quintic_spline(START, GOAL, 0.9)
-    monkeypatch.setattr("joulepath.optimizer.energy.interval.spread_of", lambda *_: certain(spread_of(ROBOT, "curved")))
+    monkeypatch.setattr(
+        "joulepath.optimizer.energy.interval.spread_of",
+        lambda *_: certain(spread_of(ROBOT, "curved")),
+    )
     found = PreparedProblem.of(task).sensitivity(spline)
     assert abs(found.shift) < 1e-6
     found = found.gradient
@@ -145,24 +166,34 @@ def with_link_errors(robot: Robot) -> Robot:
     """The robot with masses of links that are known to 5 %."""
     names = [f"inertials.m.{joint}" for joint in range(6)]
     matrix = np.diag([(0.05 * mass) ** 2 for mass in masses(robot)]).tolist()
-    return replace(robot, figures=robot.figures | {"covariance": {"names": names, "matrix": matrix}})
+    return replace(
+        robot, figures=robot.figures | {"covariance": {"names": names, "matrix": matrix}}
+    )
 
 
 @pytest.mark.parametrize("name", ["shared", "load", "isolated", "dwell by motors"])
 def test_the_gradient_by_the_links_is_the_slope(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Under a tilted gravity, with links of another weight, which multiplies that of the figures."""
+    """Under a tilted gravity, with links of another weight, which multiplies that of the
+    figures."""
     given = dict(CONDITIONS[name]) | {"gravity": TILTED}
     given.pop("inverter", None)
     robot, spline = with_link_errors(given.pop("robot", ROBOT)), quintic_spline(START, GOAL, 0.9)
     scale = np.array([1.0, 0.8, 1.2, 1.0, 1.0, 1.0])
     task = problem(**given, robot=robot, link_mass_scale=scale)
-    monkeypatch.setattr("joulepath.optimizer.energy.interval.spread_of", lambda *given: certain(spread_of(*given)))
+    monkeypatch.setattr(
+        "joulepath.optimizer.energy.interval.spread_of", lambda *given: certain(spread_of(*given))
+    )
     found = PreparedProblem.of(task).sensitivity(spline).gradient
     assert found.shape == (count(6, links=True),)
     for part, joint in (("m", 1), ("mx", 1), ("mz", 2), ("Izz", 1), ("my", 3), ("Ixz", 4)):
-        changed = [problem(**given, robot=with_link(robot, part, joint, by), link_mass_scale=scale) for by in (H, -H)]
+        changed = [
+            problem(**given, robot=with_link(robot, part, joint, by), link_mass_scale=scale)
+            for by in (H, -H)
+        ]
         up, down = (Reevaluated(each, spline)(nominal(each)) for each in changed)
-        assert found[index(part, joint, 6)] == pytest.approx((up - down) / (2 * H), rel=DIFFERENCE, abs=2e-3), part
+        assert found[index(part, joint, 6)] == pytest.approx(
+            (up - down) / (2 * H), rel=DIFFERENCE, abs=2e-3
+        ), part
 
 
 def test_errors_of_the_links_widen_the_interval() -> None:
@@ -170,17 +201,21 @@ def test_errors_of_the_links_widen_the_interval() -> None:
     robot, spline = with_link_errors(ROBOT), quintic_spline(START, GOAL, 0.9)
     plain, task = (problem(payload=PAYLOAD, robot=each) for each in (ROBOT, robot))
     before, after = (
-        interval_of(Known(60.0, PreparedProblem.of(each).sensitivity(spline), 0.9), each.arm) for each in (plain, task)
+        interval_of(Known(60.0, PreparedProblem.of(each).sensitivity(spline), 0.9), each.arm)
+        for each in (plain, task)
     )
 
     def energy(task: Problem) -> float:
         return Reevaluated(task, spline)(nominal(task))
 
     apart = [
-        energy(problem(payload=PAYLOAD, robot=with_link(ROBOT, "m", joint, 0.05 * mass))) - energy(plain)
+        energy(problem(payload=PAYLOAD, robot=with_link(ROBOT, "m", joint, 0.05 * mass)))
+        - energy(plain)
         for joint, mass in enumerate(masses(ROBOT))
     ]
-    assert np.sqrt(after.sd**2 - before.sd**2) == pytest.approx(float(np.linalg.norm(apart)), rel=0.05)
+    assert np.sqrt(after.sd**2 - before.sd**2) == pytest.approx(
+        float(np.linalg.norm(apart)), rel=0.05
+    )
     assert after.shares["inertials"] > 0 and sum(after.shares.values()) == pytest.approx(1.0)
 
 
@@ -217,9 +252,17 @@ def test_shares_add_up_and_the_same_motion_has_the_same_interval() -> None:
     assert interval is not None and interval == two.energy.electrical.interval
     assert sum(interval.shares.values()) == pytest.approx(1.0)
     assert set(interval.shares) == {
-        "idle_power", "friction", "load", "copper", "torque_constant", "rotor_inertia", "inverter_linear",
-    }  # fmt: skip
-    assert [each.saving_interval for each in one.baselines] == [each.saving_interval for each in two.baselines]
+        "idle_power",
+        "friction",
+        "load",
+        "copper",
+        "torque_constant",
+        "rotor_inertia",
+        "inverter_linear",
+    }
+    assert [each.saving_interval for each in one.baselines] == [
+        each.saving_interval for each in two.baselines
+    ]
     # a motion that takes longer hangs more on the electronics
     slow = optimize(problem(duration_min=4.0, duration_max=4.0)).energy.electrical.interval
     assert slow is not None and slow.shares["idle_power"] > interval.shares["idle_power"]
@@ -243,12 +286,17 @@ def test_a_replayed_motion_has_the_interval_of_its_answer() -> None:
     assert interval is not None
     log = RecordedRows(path.t, path.q, path.v, path.a)
     halves = [
-        RecordedRows(*(x[part] for x in (log.t, log.q, log.v, log.a))) for part in (slice(0, 300), slice(300, None))
+        RecordedRows(*(x[part] for x in (log.t, log.q, log.v, log.a)))
+        for part in (slice(0, 300), slice(300, None))
     ]
     for blocks in ([log], halves):
-        again = evaluate(problem(payload=PAYLOAD).arm, Recording(blocks)).total.energy.electrical.interval
+        again = evaluate(
+            problem(payload=PAYLOAD).arm, Recording(blocks)
+        ).total.energy.electrical.interval
         assert again is not None
-        assert [again.p5, again.p95, again.sd] == pytest.approx([interval.p5, interval.p95, interval.sd], rel=2e-3)
+        assert [again.p5, again.p95, again.sd] == pytest.approx(
+            [interval.p5, interval.p95, interval.sd], rel=2e-3
+        )
 
 
 def test_every_default_has_its_source() -> None:
@@ -262,18 +310,26 @@ MOVE_SD, SESSION_SD = 1.5, 0.03
 
 
 def identified(move_sd: float = MOVE_SD, session_sd: float = SESSION_SD) -> Robot:
-    """A UR5e whose friction, idle power, copper and torque constants were identified, with correlated errors."""
+    """A UR5e whose friction, idle power, copper and torque constants were identified, with
+    correlated errors.
+    """
     figures = load_figures("ur5e")
     made = {"unit": "1", "source": "logs", "trust": "B"}
     own = figures["friction_laws"]["coulomb_viscous"]
-    law = {part: made | {"value": own[part]["value"]} for part in ("coulomb", "curved", "speed", "viscous")}
+    law = {
+        part: made | {"value": own[part]["value"]}
+        for part in ("coulomb", "curved", "speed", "viscous")
+    }
     law["load"] = made | {"value": [0.0, 0.07, 0.06, 0.0, 0.0, 0.0]}
     names, sd = [], []
     for part, share in (("coulomb", 0.02), ("viscous", 0.03), ("load", 0.1)):
         for j in range(6):
             names.append(f"friction_laws.identified.{part}.{j}")
             sd.append(share * law[part]["value"][j])
-    names += ["electronics.idle_power", *(f"drives.{n}.{j}" for n in ("copper", "torque_constant") for j in range(6))]
+    names += [
+        "electronics.idle_power",
+        *(f"drives.{n}.{j}" for n in ("copper", "torque_constant") for j in range(6)),
+    ]
     sd += [0.3, *(0.05 * x for x in figures["drives"]["copper"]["value"]), *6 * [0.05]]
     correlation = 0.4 * np.ones((len(sd), len(sd))) + 0.6 * np.eye(len(sd))
     matrix = correlation * np.outer(sd, sd)
@@ -290,8 +346,9 @@ def identified(move_sd: float = MOVE_SD, session_sd: float = SESSION_SD) -> Robo
 
 
 def test_identified_figures_cover_the_truth() -> None:
-    """Arms drawn from what the document says of itself, on other days, with what no model expresses: P5 to P95 holds
-    about 90 % of their energies. Without the last two parts it holds far less."""
+    """Arms drawn from what the document says of itself, on other days, with what no model
+    expresses: P5 to P95 holds about 90 % of their energies. Without the last two parts it holds far
+    less."""
     robot = identified()
     arm = problem(robot=robot, payload=PAYLOAD).arm
     names = robot.figures["covariance"]["names"]
@@ -303,7 +360,11 @@ def test_identified_figures_cover_the_truth() -> None:
     task = problem(robot=robot, payload=PAYLOAD)
     splines = [quintic_spline(START, START + x * (GOAL - START), 0.6 + x) for x in (0.3, 0.6, 1.0)]
     known = [
-        Known(PreparedProblem.of(task).energy(s).electrical.total, PreparedProblem.of(task).sensitivity(s), s.duration)
+        Known(
+            PreparedProblem.of(task).energy(s).electrical.total,
+            PreparedProblem.of(task).sensitivity(s),
+            s.duration,
+        )
         for s in splines
     ]
     intervals = [interval_of(each, arm) for each in known]
@@ -323,7 +384,9 @@ def test_identified_figures_cover_the_truth() -> None:
         for name in ("coulomb", "viscous", "load"):
             vector[place(name, 6)] *= session
         i = k % len(splines)
-        measured = energies[i](np.maximum(vector, 0.0)) + known[i].duration * MOVE_SD * truth.normal()
+        measured = (
+            energies[i](np.maximum(vector, 0.0)) + known[i].duration * MOVE_SD * truth.normal()
+        )
         covered += intervals[i].p5 <= measured <= intervals[i].p95
         narrow += small[i].p5 <= measured <= small[i].p95
     assert 0.86 <= covered / count_ <= 0.94
@@ -338,7 +401,9 @@ def test_a_saving_keeps_what_each_motion_has_of_its_own() -> None:
     one = Known(100.0, Sensitivity(np.zeros(count(6)), 0.0), 2.0)
     saving = saving_interval(one, one, arm)
     assert saving.sd == pytest.approx(np.sqrt(2) * 2.0 * MOVE_SD / 100, rel=0.05)
-    assert saving.p5 == pytest.approx(-1.645 * saving.sd, rel=0.1) and saving.p95 == pytest.approx(-saving.p5, rel=0.1)
+    assert saving.p5 == pytest.approx(-1.645 * saving.sd, rel=0.1) and saving.p95 == pytest.approx(
+        -saving.p5, rel=0.1
+    )
 
 
 def test_the_guess_has_no_effect_on_another_law() -> None:

@@ -15,7 +15,8 @@ from joulepath.optimizer.energy.inverse_dynamics import SymbolicPayload, inverse
 
 STATES = 1000
 TORQUE_TOLERANCE = 1e-9  # N·m; both recursions round at about 1e-13 of torques of some 500 N·m
-DERIVATIVE_TOLERANCE = 1e-7  # N·m per unit; derivatives reach some 1e3, and the two routes order their sums differently
+# N·m per unit; derivatives reach some 1e3, and the two routes order their sums differently
+DERIVATIVE_TOLERANCE = 1e-7
 
 Load = tuple[float, Array, Array]  # mass, com, inertia
 
@@ -23,10 +24,11 @@ ROBOT = load_robot("ur5e")
 
 
 def random_payload(rng: np.random.Generator) -> Load:
-    """Mass to 5 kg, com within 0.2 m of the flange, and the inertia (3, 3) of a body that can exist.
+    """Mass to 5 kg, com within 0.2 m of the flange, and the inertia (3, 3) of a body that can
+    exist.
 
-    The second moments of a mass distribution are any positive semidefinite S; its inertia is tr(S) 1 - S, which keeps
-    the triangle inequality by construction.
+    The second moments of a mass distribution are any positive semidefinite S; its inertia is tr(S)
+    1 - S, which keeps the triangle inequality by construction.
     """
     mass = rng.uniform(0.0, 5.0)
     axes = np.linalg.qr(rng.normal(size=(3, 3)))[0]
@@ -45,7 +47,9 @@ def fresh_payload() -> SymbolicPayload:
 
 
 def build(model: pin.Model) -> ca.Function:
-    """(q, v, a, payload's mass, com, inertia, gravity, rotor) → torques and their Jacobians by q, v and a."""
+    """(q, v, a, payload's mass, com, inertia, gravity, rotor) → torques and their Jacobians by q, v
+    and a.
+    """
     nq = model.nq
     q, v, a, rotor = (ca.SX.sym(name, nq) for name in ("q", "v", "a", "rotor"))
     gravity, payload = ca.SX.sym("g", 3), fresh_payload()
@@ -62,7 +66,9 @@ def symbolic() -> ca.Function:
     return build(ROBOT.model)
 
 
-def evaluate(symbolic: ca.Function, q: Array, v: Array, a: Array, load: Load, gravity: Array) -> list[Array]:
+def evaluate(
+    symbolic: ca.Function, q: Array, v: Array, a: Array, load: Load, gravity: Array
+) -> list[Array]:
     """The function's outputs as arrays for one state."""
     mass, com, inertia = load
     six = inertia[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
@@ -71,7 +77,9 @@ def evaluate(symbolic: ca.Function, q: Array, v: Array, a: Array, load: Load, gr
 
 
 def test_torques_and_derivatives_agree_with_pinocchio(symbolic: ca.Function) -> None:
-    """Over random states, payloads and gravities; Pinocchio's armature is the reflected rotor inertia."""
+    """Over random states, payloads and gravities; Pinocchio's armature is the reflected rotor
+    inertia.
+    """
     rng = np.random.default_rng(1)
     limits = ROBOT.limits
     worst_torque, worst_derivative = 0.0, 0.0
@@ -85,7 +93,9 @@ def test_torques_and_derivatives_agree_with_pinocchio(symbolic: ca.Function) -> 
         tau, dq, dv, da = evaluate(symbolic, q, v, a, load, gravity)
         worst_torque = max(worst_torque, np.abs(tau[:, 0] - pin.rnea(model, data, q, v, a)).max())
         pin.computeRNEADerivatives(model, data, q, v, a)
-        M = np.triu(data.M) + np.triu(data.M, 1).T  # Pinocchio fills the upper triangle only, armature included
+        M = (
+            np.triu(data.M) + np.triu(data.M, 1).T
+        )  # Pinocchio fills the upper triangle only, armature included
         for ours, theirs in ((dq, data.dtau_dq), (dv, data.dtau_dv), (da, M)):
             worst_derivative = max(worst_derivative, np.abs(ours - theirs).max())
     assert worst_torque < TORQUE_TOLERANCE
@@ -93,7 +103,9 @@ def test_torques_and_derivatives_agree_with_pinocchio(symbolic: ca.Function) -> 
 
 
 def test_payload_hangs_from_the_flange(symbolic: ca.Function) -> None:
-    """Holding a point mass costs the moment of its weight: m (p - o_j) × (-g) along joint j's axis, by hand from FK."""
+    """Holding a point mass costs the moment of its weight: m (p - o_j) × (-g) along joint j's axis,
+    by hand from FK.
+    """
     rng = np.random.default_rng(2)
     q, z = rng.uniform(-3.0, 3.0, ROBOT.nq), np.zeros(ROBOT.nq)
     mass, com, gravity = 3.0, np.array([0.1, -0.05, 0.2]), random_gravity(rng)
@@ -111,7 +123,9 @@ def test_payload_hangs_from_the_flange(symbolic: ca.Function) -> None:
 
 
 def test_the_flange_may_be_turned() -> None:
-    """The UR5e's flange is parallel to its last link; on an arm where it is not, com and inertia turn with it."""
+    """The UR5e's flange is parallel to its last link; on an arm where it is not, com and inertia
+    turn with it.
+    """
     rng = np.random.default_rng(4)
     model = ROBOT.model.copy()
     flange = model.frames[model.getFrameId("flange")]
@@ -122,7 +136,10 @@ def test_the_flange_may_be_turned() -> None:
         load, gravity = random_payload(rng), random_gravity(rng)
         oracle = turned.loaded_model(*load, gravity)
         expected = pin.rnea(oracle, oracle.createData(), q, v, a)
-        assert np.abs(evaluate(symbolic, q, v, a, load, gravity)[0][:, 0] - expected).max() < TORQUE_TOLERANCE
+        assert (
+            np.abs(evaluate(symbolic, q, v, a, load, gravity)[0][:, 0] - expected).max()
+            < TORQUE_TOLERANCE
+        )
 
 
 def test_refuses_a_joint_of_another_kind() -> None:

@@ -1,4 +1,6 @@
-"""The per-node functions: against Pinocchio, plain formulas and finite differences; each thread's memory."""
+"""The per-node functions: against Pinocchio, plain formulas and finite differences; each thread's
+memory.
+"""
 
 from __future__ import annotations
 
@@ -19,11 +21,13 @@ from joulepath.optimizer.energy.losses import drawn_power, power_flow
 from tests.optimizer.energy.kernel_states import LOSSY, NODES, TASK, TORQUE, left_out, states
 from tests.optimizer.moves import ROBOT, torques
 
-# relative to the largest candidate; compiler and virtual machine evaluate the same few thousand operations
+# relative to the largest candidate; compiler and virtual machine evaluate the same few thousand
+# operations
 ROUNDING = 1e-12
-FORMULA = 1e-9  # relative; the same power by another route, with corners rounded over a billionth of a watt
-# relative to the largest candidate; central differences with a step of 1e-6 lose about 1e-6² · f''' and 1e-16 / 1e-6
-# · f
+# relative; the same power by another route, with corners rounded over a billionth of a watt
+FORMULA = 1e-9
+# relative to the largest candidate; central differences with a step of 1e-6 lose about 1e-6² · f'''
+# and 1e-16 / 1e-6 · f
 DIFFERENCE, STEP = 2e-6, 1e-6
 
 
@@ -48,14 +52,18 @@ OBJECTIVES = {"electrical": 1.0}, {"mechanical": 1.0}, {"electrical": 1.0, "time
 
 
 @pytest.mark.parametrize("weights", OBJECTIVES, ids=str)
-def test_compiled_equals_interpreted(compiled: Kernel, interpreted: Kernel, weights: dict[str, float]) -> None:
+def test_compiled_equals_interpreted(
+    compiled: Kernel, interpreted: Kernel, weights: dict[str, float]
+) -> None:
     y, p, weight = states(), TASK.parameters(**weights), np.linspace(0.1, 2.0, NODES)
     for name, given in {"node": (y, multipliers(), weight, p), "value": (y, p)}.items():
         ours = [array.copy() for array in getattr(compiled, name)(*given)]
         for mine, theirs in zip(ours, getattr(interpreted, name)(*given), strict=True):
             assert np.abs(mine - theirs).max() <= ROUNDING * np.abs(theirs).max()
     parts = y[:, :6], y[:, 6:12], y[:, 12:]
-    assert compiled.torque(*parts, p) == pytest.approx(interpreted.torque(*parts, p), rel=ROUNDING, abs=ROUNDING)
+    assert compiled.torque(*parts, p) == pytest.approx(
+        interpreted.torque(*parts, p), rel=ROUNDING, abs=ROUNDING
+    )
 
 
 @pytest.mark.parametrize("count", [1, kernel.CHUNK - 1, kernel.CHUNK, kernel.CHUNK + 1])
@@ -70,7 +78,9 @@ def test_torques_are_pinocchios(compiled: Kernel, count: int) -> None:
 
 @pytest.mark.parametrize("kind", ["electrical", "mechanical", "time"])
 def test_costs_are_the_reported_powers(compiled: Kernel, kind: str) -> None:
-    """With corners as good as sharp: bus power, Σ |tau_j v_j|, or a price of time, from Pinocchio's torques."""
+    """With corners as good as sharp: bus power, Σ |tau_j v_j|, or a price of time, from Pinocchio's
+    torques.
+    """
     task, names = TASK.problem, list(Parameters.__dataclass_fields__)
     sharp = {"knee": task.arm.friction_law.knee, "width": 1e-9}
     p = TASK.parameters(**{kind: 2.5})
@@ -99,7 +109,9 @@ def differences(function: str, interpreted: Kernel, y: Array, p: Array) -> list[
         step[i] = STEP
         sides = []
         for side in (y + step, y - step):
-            given = (side, p) if function == "value" else (side, 0 * multipliers(), np.ones(len(y)), p)
+            given = (
+                (side, p) if function == "value" else (side, 0 * multipliers(), np.ones(len(y)), p)
+            )
             sides.append([array.copy() for array in getattr(interpreted, function)(*given)])
         slopes.append([(up - down) / (2 * STEP) for up, down in zip(*sides, strict=True)])
     return [np.stack(each, axis=1) for each in zip(*slopes, strict=True)]
@@ -107,18 +119,25 @@ def differences(function: str, interpreted: Kernel, y: Array, p: Array) -> list[
 
 @pytest.mark.parametrize("weights", OBJECTIVES, ids=str)
 def test_derivatives_are_the_slopes(compiled: Kernel, weights: dict[str, float]) -> None:
-    """First derivatives against differences of the values, second ones against differences of the first.
+    """First derivatives against differences of the values, second ones against differences of the
+    first.
 
     Without what friction's reversal makes concave.
     """
     y, p = states(5), TASK.parameters(**weights)
     weight, multiplier = np.linspace(0.5, 1.5, NODES), multipliers()
-    _, _, gradient, jacobian, hessian = (array.copy() for array in compiled.node(y, multiplier, weight, p))
+    _, _, gradient, jacobian, hessian = (
+        array.copy() for array in compiled.node(y, multiplier, weight, p)
+    )
     cost_slope, tau_slope = differences("value", compiled, y, p)
     assert np.abs(gradient - cost_slope).max() < DIFFERENCE * np.abs(cost_slope).max()
-    assert np.abs(jacobian - tau_slope.transpose(0, 2, 1)).max() < DIFFERENCE * np.abs(tau_slope).max()
+    assert (
+        np.abs(jacobian - tau_slope.transpose(0, 2, 1)).max() < DIFFERENCE * np.abs(tau_slope).max()
+    )
     _, _, gradient_slope, jacobian_slope, _ = differences("node", compiled, y, p)
-    expected = weight[:, None, None] * gradient_slope + np.einsum("nj,nijk->nik", multiplier, jacobian_slope)
+    expected = weight[:, None, None] * gradient_slope + np.einsum(
+        "nj,nijk->nik", multiplier, jacobian_slope
+    )
     concave = left_out(compiled, y, weight, p, TASK.friction.coulomb)
     assert np.abs(hessian + concave - expected).max() < DIFFERENCE * np.abs(expected).max()
     assert np.abs(hessian - hessian.transpose(0, 2, 1)).max() < ROUNDING * np.abs(hessian).max()

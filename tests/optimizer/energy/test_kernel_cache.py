@@ -1,6 +1,7 @@
 """The compiled kernel's life: its name, its seal, who compiles it, and who waits for it.
 
-Tests that compile do it without optimisation, by a compiler that adds a flag and leaves a line for each of its calls.
+Tests that compile do it without optimisation, by a compiler that adds a flag and leaves a line for
+each of its calls.
 """
 
 from __future__ import annotations
@@ -46,14 +47,22 @@ def whole() -> Path:
 
 def test_the_digest_tells_chains_apart() -> None:
     """What is compiled in changes it; what a request passes as a parameter does not."""
-    same = replace(ROBOT, drives=LOSSY, electronics=replace(ROBOT.electronics, idle_power=1.0), title="another")
+    same = replace(
+        ROBOT, drives=LOSSY, electronics=replace(ROBOT.electronics, idle_power=1.0), title="another"
+    )
     assert digest(same, PORTABLE) == digest(ROBOT, PORTABLE)
     heavier, longer, turned = ROBOT.model.copy(), ROBOT.model.copy(), ROBOT.model.copy()
-    heavier.inertias[3] = pin.Inertia(1.01 * heavier.inertias[3].mass, heavier.inertias[3].lever, np.eye(3))
-    longer.jointPlacements[2].translation = longer.jointPlacements[2].translation + np.array([1e-4, 0, 0])
+    heavier.inertias[3] = pin.Inertia(
+        1.01 * heavier.inertias[3].mass, heavier.inertias[3].lever, np.eye(3)
+    )
+    longer.jointPlacements[2].translation = longer.jointPlacements[2].translation + np.array(
+        [1e-4, 0, 0]
+    )
     turned.frames[turned.getFrameId("flange")].placement = pin.SE3.Random()
     models = (ROBOT.model, heavier, longer, turned)
-    digests = {digest(replace(ROBOT, model=model), using) for model in models for using in (PORTABLE, AVX2)}
+    digests = {
+        digest(replace(ROBOT, model=model), using) for model in models for using in (PORTABLE, AVX2)
+    }
     assert len(digests) == 8
 
 
@@ -70,12 +79,16 @@ def test_the_digest_covers_every_source_that_runs_while_the_c_is_written() -> No
         sys.setprofile(None)
     sources = {Path(str(module.__file__)).resolve() for module in SOURCES}
     rooms = [(ours / part).resolve() for part in ("optimizer", "models")]
-    assert {path.resolve() for path in ran if any(path.resolve().is_relative_to(room) for room in rooms)} == sources
+    assert {
+        path.resolve() for path in ran if any(path.resolve().is_relative_to(room) for room in rooms)
+    } == sources
 
 
 @dataclass
 class Workshop:
-    """A cache directory of its own and a compiler that counts its calls; `robot` has been loaded by nobody else."""
+    """A cache directory of its own and a compiler that counts its calls; `robot` has been loaded by
+    nobody else.
+    """
 
     folder: Path
     robot: Robot
@@ -100,7 +113,9 @@ def workshop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workshop:
     real = compiler()
     assert real is not None, "make installs a compiler where there is none"
     script = tmp_path / "compiler"
-    script.write_text(f'#!/bin/sh\necho call >> {tmp_path}/calls\nexec {real} "$@" -O0 -fno-sanitize=undefined\n')
+    script.write_text(
+        f'#!/bin/sh\necho call >> {tmp_path}/calls\nexec {real} "$@" -O0 -fno-sanitize=undefined\n'
+    )
     script.chmod(0o755)
     monkeypatch.setenv("CC", str(script))
     monkeypatch.setenv("JOULEPATH_CACHE_DIR", str(tmp_path / "cache"))
@@ -125,14 +140,21 @@ def wait_until_compiled(robot: Robot) -> Kernel:
 def assert_right(found: Kernel) -> None:
     y = states(6)
     q, v, a = y[:, :6], y[:, 6:12], y[:, 12:]
-    assert np.abs(found.torque(q, v, a, TASK.parameters()) - torques(TASK.problem, q, v, a)).max() < TORQUE
+    assert (
+        np.abs(found.torque(q, v, a, TASK.parameters()) - torques(TASK.problem, q, v, a)).max()
+        < TORQUE
+    )
 
 
 def test_a_portable_kernel_is_used_where_there_is_no_other(
     workshop: Workshop, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     made = compile_kernel(workshop.robot, portable=True)
-    assert compile_kernel(workshop.robot, portable=True) == made == library_path(workshop.robot, PORTABLE)
+    assert (
+        compile_kernel(workshop.robot, portable=True)
+        == made
+        == library_path(workshop.robot, PORTABLE)
+    )
     assert workshop.compilations == 1
     no_compiler(monkeypatch, tmp_path)
     found = kernel_for(workshop.robot)
@@ -141,7 +163,9 @@ def test_a_portable_kernel_is_used_where_there_is_no_other(
 
 
 def test_the_virtual_machine_serves_while_the_compiler_runs(workshop: Workshop) -> None:
-    """The first call does not wait; when the library is there, it is swapped in, and it has been compiled once."""
+    """The first call does not wait; when the library is there, it is swapped in, and it has been
+    compiled once.
+    """
     first = kernel_for(workshop.robot)
     assert not first.compiled
     assert_right(first)
@@ -177,7 +201,9 @@ def test_threads_that_come_at_once_share_one_kernel(workshop: Workshop) -> None:
     "damage",
     long_but(("flipped",), ("truncated", "flipped", "seal gone", "seal garbled", "library gone")),
 )
-def test_a_damaged_library_is_noticed_and_rebuilt(workshop: Workshop, whole: Path, damage: str) -> None:
+def test_a_damaged_library_is_noticed_and_rebuilt(
+    workshop: Workshop, whole: Path, damage: str
+) -> None:
     library = workshop.folder / "cache" / whole.name
     library.parent.mkdir()
     seal = library.with_suffix(".sha256")
@@ -191,7 +217,9 @@ def test_a_damaged_library_is_noticed_and_rebuilt(workshop: Workshop, whole: Pat
         case "truncated":
             library.write_bytes(content[:middle])
         case "flipped":
-            library.write_bytes(content[:middle] + bytes([content[middle] ^ 0xFF]) + content[middle + 1 :])
+            library.write_bytes(
+                content[:middle] + bytes([content[middle] ^ 0xFF]) + content[middle + 1 :]
+            )
         case "seal gone":
             seal.unlink()
         case "seal garbled":
@@ -204,10 +232,23 @@ def test_a_damaged_library_is_noticed_and_rebuilt(workshop: Workshop, whole: Pat
     assert workshop.compilations == 1  # and is whole now
 
 
-@pytest.mark.parametrize("names", long_but([["ur5e"]], [["ur5e"], []]), ids=lambda names: ", ".join(names) or "all")
-def test_several_processes_make_one_library_of_each_robot(workshop: Workshop, names: list[str]) -> None:
-    """Three at once into an empty folder: one compiles, the others wait for it, nothing is left lying about."""
-    command = [sys.executable, "-W", "error::RuntimeWarning", "-m", "joulepath.optimizer.energy.precompile", *names]
+@pytest.mark.parametrize(
+    "names", long_but([["ur5e"]], [["ur5e"], []]), ids=lambda names: ", ".join(names) or "all"
+)
+def test_several_processes_make_one_library_of_each_robot(
+    workshop: Workshop, names: list[str]
+) -> None:
+    """Three at once into an empty folder: one compiles, the others wait for it, nothing is left
+    lying about.
+    """
+    command = [
+        sys.executable,
+        "-W",
+        "error::RuntimeWarning",
+        "-m",
+        "joulepath.optimizer.energy.precompile",
+        *names,
+    ]
     processes = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(3)]
     printed = [process.communicate(timeout=ALL_COMPILED)[0].splitlines() for process in processes]
     assert [process.returncode for process in processes] == [0, 0, 0]
@@ -230,11 +271,14 @@ def test_what_a_killed_process_left_is_deleted(workshop: Workshop) -> None:
 
 
 def test_a_short_script_with_an_empty_cache_ends_well(workshop: Workshop) -> None:
-    """It has its answer from the virtual machine and does not wait for the compiler, nor stumble over it."""
+    """It has its answer from the virtual machine and does not wait for the compiler, nor stumble
+    over it.
+    """
     code = (
         "from joulepath import Arm, Problem, load_robot, optimize\n"
         f"arm, start, goal = Arm(robot=load_robot('ur5e')), {START.tolist()}, {GOAL.tolist()}\n"
-        "print(optimize(Problem(arm=arm, start=start, goal=goal, deadline=100)).certificate.valid)\n"
+        "print(optimize(Problem(arm=arm, start=start, goal=goal, "
+        "deadline=100)).certificate.valid)\n"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert (run.returncode, run.stdout.strip(), run.stderr) == (0, "True", "")
@@ -252,7 +296,9 @@ def test_without_a_compiler_the_virtual_machine_serves(
     by_hand = optimize(problem(robot=workshop.robot))
     assert not kernel_for(workshop.robot).compiled
     assert by_hand.certificate.valid
-    assert by_hand.energy.electrical.total == pytest.approx(optimize(problem()).energy.electrical.total, rel=1e-6)
+    assert by_hand.energy.electrical.total == pytest.approx(
+        optimize(problem()).energy.electrical.total, rel=1e-6
+    )
 
 
 @pytest.mark.parametrize("trouble", ["compiler fails", "cache cannot be written"])

@@ -1,4 +1,6 @@
-"""The C of the kernels: any number of nodes, several at once, to the last bit what the virtual machine gives."""
+"""The C of the kernels: any number of nodes, several at once, to the last bit what the virtual
+machine gives.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ PARAMETERS = sizes(ROBOT.nq)["torque"][0][1]
 
 
 def library(functions: list[ca.Function], lanes: int, folder: Path) -> Path:
-    """The functions compiled for so many nodes at once, without optimisation; with the vectors of this processor."""
+    """The functions compiled for so many nodes at once, without optimisation; with the vectors of
+    this processor.
+    """
     code, target = folder / "kernel.c", folder / "kernel.so"
     code.write_text(source(functions, lanes))
     command = compiler()
@@ -35,13 +39,18 @@ def library(functions: list[ca.Function], lanes: int, folder: Path) -> Path:
 @pytest.mark.parametrize("lanes", [1, 2, 4, 8])
 def test_any_number_of_nodes_is_as_in_the_virtual_machine(lanes: int, tmp_path: Path) -> None:
     functions = [each for each in build(ROBOT) if each.name() in ("torque", "value")]
-    compiled, interpreted = Compiled(library(functions, lanes, tmp_path), ROBOT.nq), Interpreted(functions)
+    compiled, interpreted = (
+        Compiled(library(functions, lanes, tmp_path), ROBOT.nq),
+        Interpreted(functions),
+    )
     rng = np.random.default_rng(lanes)
     p = rng.uniform(0.1, 1.0, PARAMETERS)
     for count in range(1, 2 * lanes + 2):
         y = states(count, count)
         for function in functions:
-            mine, theirs = (each.evaluation(function.name(), count)(y, p) for each in (compiled, interpreted))
+            mine, theirs = (
+                each.evaluation(function.name(), count)(y, p) for each in (compiled, interpreted)
+            )
             for result, expected in zip(mine, theirs, strict=True):
                 assert (result == expected).all()
 

@@ -1,4 +1,6 @@
-"""The side that a torque limit is for: of the link, neither rotor nor friction counts, in every place that looks."""
+"""The side that a torque limit is for: of the link, neither rotor nor friction counts, in every
+place that looks.
+"""
 
 from __future__ import annotations
 
@@ -45,10 +47,20 @@ def test_the_link_bears_the_bodies_alone() -> None:
     task = problem(robot=LINK, payload=PAYLOAD, gravity=TILTED)
     y = states(11)
     q, v, a = y[:, :6], y[:, 6:12], y[:, 12:]
-    assert np.abs(limited_torque(task.arm, torques(task, q, v, a), v, a) - at_link(task, q, v, a)).max() < TORQUE
+    assert (
+        np.abs(
+            limited_torque(task.arm, torques(task, q, v, a), v, a) - at_link(task, q, v, a)
+        ).max()
+        < TORQUE
+    )
     prepared = PreparedProblem.of(task)
     kernel = Kernel(LINK, Interpreted(build(LINK)))
-    assert np.abs(kernel.value(y, prepared.parameters(electrical=1.0))[1] - at_link(task, q, v, a)).max() < TORQUE
+    assert (
+        np.abs(
+            kernel.value(y, prepared.parameters(electrical=1.0))[1] - at_link(task, q, v, a)
+        ).max()
+        < TORQUE
+    )
 
 
 def test_the_energy_is_that_of_the_motor_all_the_same() -> None:
@@ -56,16 +68,27 @@ def test_the_energy_is_that_of_the_motor_all_the_same() -> None:
     y = states(12)
     for robot in (LINK, replace(LINK, torque_side="motor")):
         prepared = PreparedProblem.of(problem(robot=robot, payload=PAYLOAD))
-        costs.append(Kernel(robot, Interpreted(build(robot))).value(y, prepared.parameters(electrical=1.0))[0])
+        costs.append(
+            Kernel(robot, Interpreted(build(robot))).value(y, prepared.parameters(electrical=1.0))[
+                0
+            ]
+        )
     assert (costs[0] == costs[1]).all()
 
 
 def test_derivatives_are_the_slopes() -> None:
-    """As in test_kernel, of the torque at the link: first ones against values, second ones against first ones."""
+    """As in test_kernel, of the torque at the link: first ones against values, second ones against
+    first ones.
+    """
     kernel = Kernel(LINK, Interpreted(build(LINK)))
-    p = PreparedProblem.of(problem(robot=LINK, payload=PAYLOAD, gravity=TILTED)).parameters(electrical=1.0)
+    p = PreparedProblem.of(problem(robot=LINK, payload=PAYLOAD, gravity=TILTED)).parameters(
+        electrical=1.0
+    )
     y = states(13)
-    multiplier, weight = np.random.default_rng(3).normal(size=(len(y), 6)), np.linspace(0.5, 1.5, len(y))
+    multiplier, weight = (
+        np.random.default_rng(3).normal(size=(len(y), 6)),
+        np.linspace(0.5, 1.5, len(y)),
+    )
     _, _, _, jacobian, hessian = (array.copy() for array in kernel.node(y, multiplier, weight, p))
     hessian += left_out(kernel, y, weight, p, LINK.friction.coulomb)
     for i in range(18):
@@ -73,9 +96,12 @@ def test_derivatives_are_the_slopes() -> None:
         tau = [kernel.value(each, p)[1].copy() for each in (up, down)]
         slope = (tau[0] - tau[1]) / (2 * STEP)
         assert np.abs(jacobian[:, :, i] - slope).max() < DIFFERENCE * np.abs(jacobian).max()
-        sides = [[x.copy() for x in kernel.node(each, 0 * multiplier, weight, p)] for each in (up, down)]
+        sides = [
+            [x.copy() for x in kernel.node(each, 0 * multiplier, weight, p)] for each in (up, down)
+        ]
         pull = [
-            weight[:, None] * gradient + np.einsum("nj,njk->nk", multiplier, rows) for _, _, gradient, rows, _ in sides
+            weight[:, None] * gradient + np.einsum("nj,njk->nk", multiplier, rows)
+            for _, _, gradient, rows, _ in sides
         ]
         row = (pull[0] - pull[1]) / (2 * STEP)
         assert np.abs(hessian[:, i] - row).max() < DIFFERENCE * np.abs(hessian).max()
@@ -83,9 +109,13 @@ def test_derivatives_are_the_slopes() -> None:
 
 @pytest.mark.parametrize("method", ["bspline", "time_scaling"])
 def test_a_limit_of_the_link_lets_the_motor_do_more(method: Any) -> None:
-    """The same number on both sides: the motion with the limit at the link uses it, and is faster."""
+    """The same number on both sides: the motion with the limit at the link uses it, and is
+    faster."""
     given = {"limits": TIGHT, "method": method, "payload": PAYLOAD}
-    tasks = [problem(START, GOAL, robot=robot, **given) for robot in (LINK, replace(LINK, torque_side="motor"))]
+    tasks = [
+        problem(START, GOAL, robot=robot, **given)
+        for robot in (LINK, replace(LINK, torque_side="motor"))
+    ]
     link, motor = (optimize(task) for task in tasks)
     assert link.certificate.valid and motor.certificate.valid
     assert link.duration < 0.97 * motor.duration

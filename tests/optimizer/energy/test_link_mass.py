@@ -1,4 +1,6 @@
-"""Links made lighter or heavier: kernel, potential energy and certificate against Pinocchio with scaled inertias."""
+"""Links made lighter or heavier: kernel, potential energy and certificate against Pinocchio with
+scaled inertias.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ def scaled(scale: Array) -> pin.Model:
             scale[j] * ROBOT.model.inertias[j + 1].toDynamicParameters()
         )
     flange = model.frames[model.getFrameId("flange")].placement
-    model.inertias[6] = model.inertias[6] + flange.act(pin.Inertia(PAYLOAD.mass, PAYLOAD.com, PAYLOAD.inertia))
+    model.inertias[6] = model.inertias[6] + flange.act(
+        pin.Inertia(PAYLOAD.mass, PAYLOAD.com, PAYLOAD.inertia)
+    )
     model.gravity.linear = TILTED
     return model
 
@@ -40,7 +44,9 @@ def test_torques_and_potential_are_those_of_scaled_inertias(scale: Array) -> Non
     expected = np.array([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)])
     assert np.abs(task.torques(q, v, a) - expected).max() < TORQUE_TOLERANCE
     for at in q[:20]:
-        assert task.potential(at) == pytest.approx(pin.computePotentialEnergy(model, data, at), rel=1e-12, abs=1e-9)
+        assert task.potential(at) == pytest.approx(
+            pin.computePotentialEnergy(model, data, at), rel=1e-12, abs=1e-9
+        )
 
 
 def test_unscaled_is_the_robot_itself() -> None:
@@ -48,11 +54,15 @@ def test_unscaled_is_the_robot_itself() -> None:
     plain = optimize(problem(payload=PAYLOAD))
     one = optimize(problem(payload=PAYLOAD, link_mass_scale=1.0))
     assert one.energy.electrical.total == pytest.approx(plain.energy.electrical.total, rel=SAME)
-    assert np.abs(one.trajectory.spline.control_points - plain.trajectory.spline.control_points).max() < SAME
+    assert (
+        np.abs(one.trajectory.spline.control_points - plain.trajectory.spline.control_points).max()
+        < SAME
+    )
 
 
 def test_a_lighter_arm_draws_less() -> None:
-    """Certified against the scaled model, above its bound; and lifting, each step of weight costs."""
+    """Certified against the scaled model, above its bound; and lifting, each step of weight
+    costs."""
     compile_kernel(ROBOT)
     totals = []
     for scale in (0.5, 1.0, 1.5):

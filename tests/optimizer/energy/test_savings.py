@@ -18,5 +18,7 @@ def test_several_savings_are_each_one_by_itself() -> None:
     alone = [saving_interval(known[0], each, arm) for each in known]
     for one, other in zip(saving_intervals(known[0], known, arm), alone, strict=True):
         # means over the draws, summed in another order
-        assert [one.p5, one.p95, one.sd] == pytest.approx([other.p5, other.p95, other.sd], rel=1e-12, abs=1e-12)
+        assert [one.p5, one.p95, one.sd] == pytest.approx(
+            [other.p5, other.p95, other.sd], rel=1e-12, abs=1e-12
+        )
     assert saving_intervals(known[0], [], arm) == []

@@ -24,7 +24,8 @@ from tests.selection import long_but
 SHARP = 4e-6
 # N·m; of a joint that carries nothing
 ROUNDING = 1e-9
-# relative; a sampling of 1 ms misses the peak at a reversal by the slope of the torque times half a millisecond
+# relative; a sampling of 1 ms misses the peak at a reversal by the slope of the torque times half a
+# millisecond
 MISSED = 1e-3
 # s; dense samples, in which friction's step (1e-3 rad/s) takes a hundred samples at 10 rad/s²
 DENSE = 1e-6
@@ -71,7 +72,9 @@ def test_no_torque_between_samples_is_above_the_bound(robot: str, side: str) -> 
         bound, joint = bounds(prepared, spline), int(np.argmax(dense / limit))
         assert (bound >= dense).all()
         assert bound[joint] <= dense[joint] * (1 + SHARP)
-        missed.append(1 - sizes(prepared, spline, grid(spline.duration)).max(axis=0)[joint] / dense[joint])
+        missed.append(
+            1 - sizes(prepared, spline, grid(spline.duration)).max(axis=0)[joint] / dense[joint]
+        )
     if side == "motor":
         assert max(missed) > MISSED / 10  # else these motions would not need a bound
 
@@ -85,12 +88,17 @@ def test_the_certificate_refuses_a_peak_between_its_samples() -> None:
         if missed.max() > MISSED:
             break
     joint = int(np.argmax(missed))
-    # torques at all samples are within the limits, the peak of this joint between two of them is not
+    # torques at all samples are within the limits, the peak of this joint between two of them is
+    # not
     tau_max = np.full(6, 1e6)
     tau_max[joint] = sampled[joint] * (1 + missed[joint] / 2)
     robot = replace(prepared.arm.robot, limits=replace(prepared.arm.robot.limits, tau_max=tau_max))
     ends = spline.control_points[[0, -1]]
-    task = Problem(arm=Arm(robot=robot, payload=prepared.arm.payload, collisions=False), start=ends[0], goal=ends[1])
+    task = Problem(
+        arm=Arm(robot=robot, payload=prepared.arm.payload, collisions=False),
+        start=ends[0],
+        goal=ends[1],
+    )
     certificate = certify(task, spline, *ends, prepared.energy(spline))
     assert 1 + missed[joint] / 4 < certificate.worst_ratio["torque"] < 1 + missed[joint]
 

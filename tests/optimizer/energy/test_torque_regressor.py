@@ -20,7 +20,9 @@ def test_regressor_is_pinocchios(name: str) -> None:
     gravity = random.normal(size=3) * 5
     model = load_robot(name).loaded_model(2.0, np.array([0.0, 0.1, 0.1]), 0.01 * np.eye(3), gravity)
     nv, data = model.nv, model.createData()
-    q, v, a, g = (ca.SX.sym(each, size) for each, size in (("q", nv), ("v", nv), ("a", nv), ("g", 3)))
+    q, v, a, g = (
+        ca.SX.sym(each, size) for each, size in (("q", nv), ("v", nv), ("a", nv), ("g", 3))
+    )
     function = ca.Function("regressor", [q, v, a, g], [torque_regressor(model, q, v, a, g)])
     for _ in range(50):
         state = random.uniform(-3, 3, nv), random.uniform(-3, 3, nv), random.uniform(-10, 10, nv)

@@ -28,7 +28,8 @@ POINTS = np.array([START, VIA, GOAL])
 TIMES = np.array([1.1, 1.7])
 ARM = Arm(robot=ROBOT, payload=PAYLOAD, gravity=TILTED)
 INTERPOLATIONS = ("linear", "trapezoid", "quintic", "spline")
-# of the trapezoidal rule on a grid of 0.5 ms, where friction and acceleration may jump between two samples
+# of the trapezoidal rule on a grid of 0.5 ms, where friction and acceleration may jump between two
+# samples
 QUADRATURE = 5e-4
 # of one dynamics against the other [N·m]
 DYNAMICS = 1e-9
@@ -67,7 +68,10 @@ def test_agrees_with_pinocchio(interpolation: str) -> None:
     power = simple_power(ARM, s.v, tau)
     assert s.power == pytest.approx(power, rel=1e-9)
     mechanical = np.abs(tau * s.v).sum(axis=1)
-    for values, ours in ((power, total(result)), (mechanical, result.total.energy.mechanical.total)):
+    for values, ours in (
+        (power, total(result)),
+        (mechanical, result.total.energy.mechanical.total),
+    ):
         # each segment by itself: at a jump the sample is the later side's
         cut = round(TIMES[0] / 5e-4)
         parts = [values[:cut], values[cut:]]
@@ -81,9 +85,13 @@ def test_parts_add_up_and_segments_to_the_total(interpolation: str) -> None:
     result = evaluate(ARM, motion(interpolation))
     for interval in (result.total, *result.segments):
         assert interval.balance_error < 1e-6
-    assert sum(each.energy.electrical.total for each in result.segments) == pytest.approx(total(result))
+    assert sum(each.energy.electrical.total for each in result.segments) == pytest.approx(
+        total(result)
+    )
     assert [each.end for each in result.segments] == pytest.approx(np.cumsum(TIMES).tolist())
-    assert result.total.mean_mechanical_power == pytest.approx(result.total.energy.mechanical.total / TIMES.sum())
+    assert result.total.mean_mechanical_power == pytest.approx(
+        result.total.energy.mechanical.total / TIMES.sum()
+    )
 
 
 @pytest.mark.parametrize("interpolation", INTERPOLATIONS)
@@ -109,10 +117,14 @@ def test_is_the_baselines_own_quintic() -> None:
     result = evaluate(ARM, Waypoints(np.array([START, GOAL]), np.array(1.6), "quintic"))
     known = quintic(START, GOAL, 1.6)
     tau = Plant(ARM).torques(known.q, known.v, known.a)
-    assert total(result) == pytest.approx(float(known.weights @ simple_power(ARM, known.v, tau)), rel=1e-4)
+    assert total(result) == pytest.approx(
+        float(known.weights @ simple_power(ARM, known.v, tau)), rel=1e-4
+    )
     peaks = {report.limit: report.worst_ratio for report in result.limits}
     assert peaks["velocity"] == pytest.approx((known.peak_v / ROBOT.limits.v_max).max(), rel=1e-5)
-    assert peaks["acceleration"] == pytest.approx((known.peak_a / ROBOT.limits.a_max).max(), rel=1e-5)
+    assert peaks["acceleration"] == pytest.approx(
+        (known.peak_a / ROBOT.limits.a_max).max(), rel=1e-5
+    )
     assert peaks["jerk"] == pytest.approx((known.peak_jerk / ROBOT.limits.j_max).max(), rel=1e-5)
 
 
@@ -123,17 +135,24 @@ def test_a_velocity_step_violates_acceleration_and_needs_no_energy() -> None:
     assert not reports["acceleration"].held and not reports["jerk"].held
     assert reports["acceleration"].t == reports["jerk"].t == pytest.approx(TIMES[0])
     assert reports["velocity"].held and reports["torque"].held
-    # kinetic is what changes within the segments, at constant joint speed, not what jumps between them
+    # kinetic is what changes within the segments, at constant joint speed, not what jumps between
+    # them
     parts = [each.kinetic_end - each.kinetic_start for each in result.segments]
     assert result.total.energy.electrical.kinetic == pytest.approx(sum(parts))
-    assert result.segments[0].kinetic_end != pytest.approx(result.segments[1].kinetic_start, rel=1e-3)
+    assert result.segments[0].kinetic_end != pytest.approx(
+        result.segments[1].kinetic_start, rel=1e-3
+    )
 
 
 def test_a_trapezoid_violates_jerk_only() -> None:
     result = evaluate(ARM, motion("trapezoid"))
     assert {report.limit for report in result.limits if not report.held} == {"jerk"}
     relaxed = Arm(robot=ROBOT, payload=PAYLOAD, gravity=TILTED, limits=limits(v_max=0.3))
-    broken = {report.limit: report for report in evaluate(relaxed, motion("trapezoid")).limits if not report.held}
+    broken = {
+        report.limit: report
+        for report in evaluate(relaxed, motion("trapezoid")).limits
+        if not report.held
+    }
     assert broken["velocity"].bound == 0.3
     assert abs(broken["velocity"].value) == pytest.approx(0.3 * broken["velocity"].worst_ratio)
 
@@ -163,7 +182,8 @@ def test_blocks_do_not_show() -> None:
     for size in (50, 977, BLOCK + 3):
         parts = [RecordedRows(t[k : k + size], q[k : k + size]) for k in range(0, len(t), size)]
         result = evaluate(ARM, Recording(parts), sample_period=0.05)
-        # the spline through a block and its neighbouring rows is the spline through all rows, except for rounding
+        # the spline through a block and its neighbouring rows is the spline through all rows,
+        # except for rounding
         assert total(result) == pytest.approx(total(whole), rel=1e-9)
         assert result.samples is not None and whole.samples is not None
         assert np.abs(result.samples.a - whole.samples.a).max() < 1e-7

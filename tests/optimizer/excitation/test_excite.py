@@ -1,4 +1,6 @@
-"""Excitations tell parameters apart, rest at their ends and keep their limits; gradients and deviations are right."""
+"""Excitations tell parameters apart, rest at their ends and keep their limits; gradients and
+deviations are right.
+"""
 
 from __future__ import annotations
 
@@ -38,9 +40,16 @@ def test_the_series_is_at_rest_at_its_ends_and_the_spline_is_the_series(found: E
     series = found.coefficients
     k = np.arange(1, series.a.shape[1] + 1)
     w = 2 * np.pi / series.period * k
-    assert np.abs(series.a.sum(axis=1)).max() < 1e-12 and np.abs((series.b * k).sum(axis=1)).max() < 1e-12
+    assert (
+        np.abs(series.a.sum(axis=1)).max() < 1e-12
+        and np.abs((series.b * k).sum(axis=1)).max() < 1e-12
+    )
     t = np.linspace(0, series.period, 301)
-    q = series.centre + np.sin(np.outer(t, w)) @ (series.a / w).T - np.cos(np.outer(t, w)) @ (series.b / w).T
+    q = (
+        series.centre
+        + np.sin(np.outer(t, w)) @ (series.a / w).T
+        - np.cos(np.outer(t, w)) @ (series.b / w).T
+    )
     # the spline has 24 spans for every harmonic
     assert np.abs(found.trajectory.spline.curve(t) - q).max() < 1e-6
     v, a = (np.asarray(found.trajectory.spline.curve(t[[0, -1]], order)) for order in (1, 2))
@@ -73,7 +82,8 @@ def test_a_log_of_it_gives_the_predicted_deviations() -> None:
     truth = np.array([1.0, -2.0, 0.5, 3.0])
     predicted = Information(columns).deviations(len(columns))
     fits = [
-        np.linalg.lstsq(columns, columns @ truth + random.normal(size=len(columns)), rcond=None)[0] for _ in range(2000)
+        np.linalg.lstsq(columns, columns @ truth + random.normal(size=len(columns)), rcond=None)[0]
+        for _ in range(2000)
     ]
     # of a standard deviation from 2000 draws: 1.6 %
     assert np.std(fits, axis=0) == pytest.approx(predicted, rel=0.06)
@@ -118,7 +128,9 @@ def test_load_friction_is_a_column() -> None:
     values = columns.values(q, v, a)
     for name in ("load2", "load3"):
         joint, column = int(name[-1]) - 1, values[:, :, columns.names.index(name)]
-        assert column[:, joint] == pytest.approx(np.abs(tau[:, joint]) * np.sign(v[:, joint]), rel=0.02, abs=1.6)
+        assert column[:, joint] == pytest.approx(
+            np.abs(tau[:, joint]) * np.sign(v[:, joint]), rel=0.02, abs=1.6
+        )
         assert not np.delete(column, joint, axis=1).any()
     assert {"load1", "load6"}.isdisjoint(columns.names)
     assert len(columns.wanted) == len([each for each in columns.names if each[:-1] in FRICTION])
@@ -128,7 +140,9 @@ def test_series_at_rest_have_two_directions_fewer() -> None:
     basis = FourierBasis(3.0, 4)
     assert basis.resting.shape == (8, basis.free) == (8, 6)
     ends = np.array([0.0, 3.0])
-    assert np.abs(basis.matrix(ends, 1)).max() < 1e-12 and np.abs(basis.matrix(ends, 2)).max() < 1e-11
+    assert (
+        np.abs(basis.matrix(ends, 1)).max() < 1e-12 and np.abs(basis.matrix(ends, 2)).max() < 1e-11
+    )
 
 
 def test_no_room_is_said() -> None:
@@ -165,7 +179,10 @@ def test_an_obstacle_of_the_planes_name_stands_for_it() -> None:
         ("criterion", {"criterion": "e"}),
         ("centre", {"centre": np.zeros(5)}),
         ("noise", {"noise": -1.0}),
-        ("tool_cone", {"arm": Arm(robot=ARM.robot, tool_cone=ToolCone(np.eye(3)[2], -np.eye(3)[2], 0.2))}),
+        (
+            "tool_cone",
+            {"arm": Arm(robot=ARM.robot, tool_cone=ToolCone(np.eye(3)[2], -np.eye(3)[2], 0.2))},
+        ),
     ],
 )
 def test_wrong_problems(field: str, given: dict[str, object]) -> None:

@@ -20,9 +20,11 @@ def cycle_with_payload(robot: str = "ur5e", label: str = "start to pick") -> Pro
     first = random_spline(arm, 1)
     second = random_spline(arm, 2, first.control_points[-1])
     third = random_spline(arm, 3, second.control_points[-1])
-    return Program((
-        Move(first, arm, label),
-        Rest(0.35, "dwell at pick"),
-        Move(second, loaded, "pick to place"),
-        Move(third, arm, "place to end"),
-    ))  # fmt: skip
+    return Program(
+        (
+            Move(first, arm, label),
+            Rest(0.35, "dwell at pick"),
+            Move(second, loaded, "pick to place"),
+            Move(third, arm, "place to end"),
+        )
+    )

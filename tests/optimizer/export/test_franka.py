@@ -19,7 +19,10 @@ def test_the_table_is_the_spline_at_every_millisecond(robot: str, seed: int) -> 
     program = one_move(robot, seed)
     file = to_franka(program)
     table = np.loadtxt(StringIO(file.content.decode()), delimiter=",", skiprows=1)
-    assert file.content.decode().splitlines()[0].split(",") == ["t", *(f"{k}{j}" for k in "qv" for j in range(1, 8))]
+    assert file.content.decode().splitlines()[0].split(",") == [
+        "t",
+        *(f"{k}{j}" for k in "qv" for j in range(1, 8)),
+    ]
     assert table[:, 0] == pytest.approx(np.arange(len(table)) * 1e-3)
     q, v, _ = program.at(np.minimum(table[:, 0], program.duration))
     assert np.abs(table[:, 1:8] - q).max() <= ROUNDING and np.abs(table[:, 8:] - v).max() <= 1e-9
@@ -29,7 +32,10 @@ def test_the_table_is_the_spline_at_every_millisecond(robot: str, seed: int) -> 
 def test_the_motion_generator_has_the_same_rows() -> None:
     program = one_move("fr3")
     text = to_franka(program, FrankaOptions("cpp")).content.decode()
-    rows = [[float(x) for x in row.split(",")] for row in re.findall(r"^ +\{\{(.*)\}\},$", text, re.MULTILINE)]
+    rows = [
+        [float(x) for x in row.split(",")]
+        for row in re.findall(r"^ +\{\{(.*)\}\},$", text, re.MULTILINE)
+    ]
     assert f"kRows = {len(rows)};" in text and text.count("{") == text.count("}")
     q, _, _ = program.at(np.minimum(np.arange(len(rows)) * 1e-3, program.duration))
     assert np.abs(np.array(rows) - q).max() <= ROUNDING

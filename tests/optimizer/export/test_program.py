@@ -37,7 +37,9 @@ def test_slowing_scales_the_rates_and_is_certified_again() -> None:
     program = one_move()
     (fast,), (slow,) = certified(program), certified(program.slowed(0.1))
     for power, name in enumerate(("velocity", "acceleration", "jerk"), 1):
-        assert slow.worst_ratio[name] == pytest.approx(fast.worst_ratio[name] * 0.1**power, rel=1e-3)
+        assert slow.worst_ratio[name] == pytest.approx(
+            fast.worst_ratio[name] * 0.1**power, rel=1e-3
+        )
     assert program.slowed(0.1).duration == pytest.approx(10 * program.duration)
     assert program.slowed(0.5).slowed(0.2).speed_scale == pytest.approx(0.1)
 
@@ -77,7 +79,9 @@ def test_a_motion_that_does_not_rest_at_its_end_is_not_certified() -> None:
     points = spline.control_points.copy()
     points[-2] += 1e-4
     with pytest.raises(NotCertified, match="at rest"):
-        certified(Program((Move(replace(spline, control_points=points), arm_of("ur5e")),)).slowed(0.5))
+        certified(
+            Program((Move(replace(spline, control_points=points), arm_of("ur5e")),)).slowed(0.5)
+        )
 
 
 def test_nan_is_not_certified() -> None:
@@ -121,7 +125,9 @@ def test_a_motion_without_an_end_is_refused_before_it_is_certified() -> None:
 
 def test_samples_joined_by_quintics_are_the_motion() -> None:
     spline = random_spline(arm_of("ur5e"), 8)
-    t = np.unique(np.concatenate([spline.knots, np.random.default_rng(0).uniform(0, spline.duration, 30)]))
+    t = np.unique(
+        np.concatenate([spline.knots, np.random.default_rng(0).uniform(0, spline.duration, 30)])
+    )
     through = spline_through(t, *(spline.curve(t, order) for order in range(3)))
     fine = np.linspace(0, spline.duration, 400)
     for order in range(3):

@@ -1,4 +1,6 @@
-"""RAPID and KRL: read back by a parser of their motion part, they are within the stated deviation of the spline."""
+"""RAPID and KRL: read back by a parser of their motion part, they are within the stated deviation
+of the spline.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,14 @@ from joulepath.optimizer.export.krl import KrlOptions, to_krl
 from joulepath.optimizer.export.program import Move, Program, Rest
 from joulepath.optimizer.export.rapid import RapidOptions, to_rapid
 from tests.optimizer.export.programs import LOAD, cycle_with_payload
-from tests.optimizer.export.read_back.point_programs import cut, deviation, read_krl, read_rapid, stated, through
+from tests.optimizer.export.read_back.point_programs import (
+    cut,
+    deviation,
+    read_krl,
+    read_rapid,
+    stated,
+    through,
+)
 from tests.optimizer.export.read_back.random_motions import OWN, arm_of, one_move, random_spline
 
 # 1e-6 degrees, and the rounding of times at the speed of these motions
@@ -47,14 +56,24 @@ def test_rapid_is_within_its_stated_deviation(seed: int, tolerance: float) -> No
 def test_a_cycle_in_rapid_switches_waits_and_changes_the_load() -> None:
     file = to_rapid(cycle_with_payload(OWN), RapidOptions(digital_output="doGripper"))
     others = read_rapid(file).others
-    assert others == ["jpTool0", "jpTool0", "doGripper 1", "wait 0.350", "jpTool1", "doGripper 0", "jpTool2"]
+    assert others == [
+        "jpTool0",
+        "jpTool0",
+        "doGripper 1",
+        "wait 0.350",
+        "jpTool1",
+        "doGripper 0",
+        "jpTool2",
+    ]
     assert f"[{LOAD.mass:.4f},[0.000,10.000,60.000]" in file.content.decode()
 
 
 def test_axes_of_another_sense_and_zero() -> None:
     program = one_move(OWN)
     axes = RapidOptions(signs=(1, -1, 1, 1, -1, 1), offsets=(0.0, -90.0, 90.0, 0.0, 0.0, 180.0))
-    plain, turned = (read_rapid(to_rapid(program, each)).moves[0][1] for each in (RapidOptions(), axes))
+    plain, turned = (
+        read_rapid(to_rapid(program, each)).moves[0][1] for each in (RapidOptions(), axes)
+    )
     expected = np.array(plain) * axes.signs + np.deg2rad(axes.offsets)  # type: ignore[arg-type]
     assert np.array(turned) == pytest.approx(expected, abs=ROUNDING)
     with pytest.raises(FormatUnsuitable, match="signs must have 6"):
@@ -64,9 +83,16 @@ def test_axes_of_another_sense_and_zero() -> None:
 @pytest.mark.parametrize("label", ['pick";\n    SetDO doDoor,1;', "\u2028ENDPROC", "a\rb"])
 def test_text_of_a_user_cannot_leave_its_comment(label: str) -> None:
     for write, plain in ((to_rapid, "\n"), (to_krl, "\r\n")):
-        bad, good = (write(cycle_with_payload(OWN, each)).content.decode().split(plain) for each in (label, "x"))  # type: ignore[operator]
+        bad, good = (
+            write(cycle_with_payload(OWN, each)).content.decode().split(plain)
+            for each in (label, "x")
+        )  # type: ignore[operator]
         assert len(bad) == len(good) and all(line.isascii() for line in bad)
-        assert [a for a, b in zip(bad, good, strict=True) if a != b and not a.strip().startswith(("!", ";"))] == []
+        assert [
+            a
+            for a, b in zip(bad, good, strict=True)
+            if a != b and not a.strip().startswith(("!", ";"))
+        ] == []
 
 
 def test_a_signal_is_a_name() -> None:
@@ -74,7 +100,9 @@ def test_a_signal_is_a_name() -> None:
         to_rapid(one_move(OWN), RapidOptions(digital_output="do1;Stop"))
 
 
-@pytest.mark.parametrize(("robot", "write"), [("iiwa14", to_krl), ("ur5e", to_krl), ("kr10_r1100", to_rapid)])
+@pytest.mark.parametrize(
+    ("robot", "write"), [("iiwa14", to_krl), ("ur5e", to_krl), ("kr10_r1100", to_rapid)]
+)
 def test_robots_of_others_are_refused(robot: str, write: object) -> None:
     with pytest.raises(FormatUnsuitable, match="use ros2"):
         write(one_move(robot))  # type: ignore[operator]
@@ -83,7 +111,11 @@ def test_robots_of_others_are_refused(robot: str, write: object) -> None:
 def test_a_long_motion_has_a_bounded_program() -> None:
     arm = arm_of("kr10_r1100")
     spline = random_spline(arm, 4)
-    program = Program((Move(spline, arm), Rest(1.0), Move(random_spline(arm, 5, spline.control_points[-1]), arm)))
+    program = Program(
+        (Move(spline, arm), Rest(1.0), Move(random_spline(arm, 5, spline.control_points[-1]), arm))
+    )
     file = to_krl(program.slowed(1e-3), KrlOptions(1e-5))
     assert len(file.content) < 200_000
-    assert deviation(program.slowed(1e-3), read_krl(file), through) <= stated(file) * 1.01 + ROUNDING
+    assert (
+        deviation(program.slowed(1e-3), read_krl(file), through) <= stated(file) * 1.01 + ROUNDING
+    )

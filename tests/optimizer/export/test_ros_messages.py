@@ -1,4 +1,6 @@
-"""ROS messages: the joint trajectory controller's own quintics between the points stay within the tolerance."""
+"""ROS messages: the joint trajectory controller's own quintics between the points stay within the
+tolerance.
+"""
 
 from __future__ import annotations
 
@@ -22,9 +24,14 @@ from tests.optimizer.export.read_back.random_motions import arm_of, one_move
 
 # fields of the messages, as their definitions have them
 GOAL = {
-    "trajectory", "multi_dof_trajectory", "path_tolerance", "component_path_tolerance", "goal_tolerance",
-    "component_goal_tolerance", "goal_time_tolerance",
-}  # fmt: skip
+    "trajectory",
+    "multi_dof_trajectory",
+    "path_tolerance",
+    "component_path_tolerance",
+    "goal_tolerance",
+    "component_goal_tolerance",
+    "goal_time_tolerance",
+}
 
 
 def check(program: Program, trajectory: dict[str, Any]) -> tuple[float, float]:
@@ -33,7 +40,9 @@ def check(program: Program, trajectory: dict[str, Any]) -> tuple[float, float]:
     return found
 
 
-@pytest.mark.parametrize(("robot", "seed"), [("ur5e", 0), ("fr3", 1), ("kr10_r1100", 2), ("xarm7", 3)])
+@pytest.mark.parametrize(
+    ("robot", "seed"), [("ur5e", 0), ("fr3", 1), ("kr10_r1100", 2), ("xarm7", 3)]
+)
 def test_the_controller_follows_the_spline(robot: str, seed: int) -> None:
     program = one_move(robot, seed)
     file = to_ros2(program)
@@ -83,7 +92,10 @@ def test_json_is_an_operation_of_rosbridge(message: str) -> None:
     program = one_move()
     content = json.loads(to_ros2(program, Ros2Options(message, "json", "arm/jtc")).content)  # type: ignore[arg-type]
     if message == "goal":
-        assert content["op"] == "send_action_goal" and content["action"] == "/arm/jtc/follow_joint_trajectory"
+        assert (
+            content["op"] == "send_action_goal"
+            and content["action"] == "/arm/jtc/follow_joint_trajectory"
+        )
         trajectory = content["args"]["trajectory"]
     else:
         assert content["op"] == "publish" and content["topic"] == "/arm/jtc/joint_trajectory"
@@ -103,7 +115,9 @@ def test_the_stated_deviation_is_the_largest_found() -> None:
     program = one_move(seed=7)
     measured = check(program, yaml.safe_load(to_ros2(program).content)["trajectory"])
     stated = points_module.quintic_points(program, "ros2")
-    assert measured[0] <= stated.position * 1.1 + 1e-9 and measured[1] <= stated.velocity * 1.1 + 1e-9
+    assert (
+        measured[0] <= stated.position * 1.1 + 1e-9 and measured[1] <= stated.velocity * 1.1 + 1e-9
+    )
 
 
 def test_a_very_short_motion_is_followed() -> None:

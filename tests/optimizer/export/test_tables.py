@@ -25,13 +25,17 @@ ROUNDING = 1e-8
 @pytest.mark.parametrize("robot", ["ur5e", "fr3"])
 def test_csv_is_read_by_the_reader_of_evaluate(robot: str) -> None:
     program = one_move(robot)
-    table = MotionCsv.of(BytesIO(to_csv(program, TableOptions(0.004)).content), program.robot.nq, "rad")  # type: ignore[arg-type]
+    table = MotionCsv.of(
+        BytesIO(to_csv(program, TableOptions(0.004)).content), program.robot.nq, "rad"
+    )  # type: ignore[arg-type]
     assert table.has_time
     (block,) = table.log()
     assert block.t[0] == 0 and block.t[-1] == pytest.approx(program.duration, abs=ROUNDING)
     assert np.allclose(np.diff(block.t)[:-1], 0.004, rtol=0, atol=ROUNDING)
     for told, own in zip((block.q, block.v, block.a), program.at(block.t), strict=True):
-        assert told is not None and np.abs(told - own).max() <= ROUNDING * max(1.0, np.abs(own).max())
+        assert told is not None and np.abs(told - own).max() <= ROUNDING * max(
+            1.0, np.abs(own).max()
+        )
 
 
 def test_json_holds_the_splines_themselves() -> None:
@@ -51,7 +55,9 @@ def test_json_holds_the_splines_themselves() -> None:
 def test_npz_needs_no_pickle_and_has_samples_and_splines() -> None:
     program = cycle_with_payload()
     with np.load(BytesIO(to_npz(program).content), allow_pickle=False) as arrays:
-        for told, own in zip((arrays["q"], arrays["v"], arrays["a"]), program.at(arrays["t"]), strict=True):
+        for told, own in zip(
+            (arrays["q"], arrays["v"], arrays["a"]), program.at(arrays["t"]), strict=True
+        ):
             assert (told == own).all()
         assert arrays["joint_names"].tolist() == list(program.robot.joint_names)
         spline = Spline(int(arrays["degree_2"]), arrays["knots_2"], arrays["control_points_2"])

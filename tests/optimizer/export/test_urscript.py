@@ -1,4 +1,5 @@
-"""URScript: the program, run by a small interpreter, serves the spline; it stops where it should."""
+"""URScript: the program, run by a small interpreter, serves the spline; it stops where it
+should."""
 
 from __future__ import annotations
 
@@ -25,7 +26,11 @@ def text_of(program: Program, **options: object) -> str:
 
 
 def run(
-    program: Program, at: Array | None = None, lag: float = 0.0, carries: float = 0.0, **options: object
+    program: Program,
+    at: Array | None = None,
+    lag: float = 0.0,
+    carries: float = 0.0,
+    **options: object,
 ) -> Controller:
     controller = Controller(program.start if at is None else at, lag, carries)
     controller.run(text_of(program, **options))
@@ -33,8 +38,12 @@ def run(
 
 
 @pytest.mark.parametrize("form", ["polynomials", "points"])
-@pytest.mark.parametrize(("robot", "rate", "seed"), [("ur5e", 500, 0), ("ur10e", 500, 1), ("ur3e", 125, 2)])
-def test_the_set_points_are_the_spline_at_every_period(robot: str, rate: int, seed: int, form: str) -> None:
+@pytest.mark.parametrize(
+    ("robot", "rate", "seed"), [("ur5e", 500, 0), ("ur10e", 500, 1), ("ur3e", 125, 2)]
+)
+def test_the_set_points_are_the_spline_at_every_period(
+    robot: str, rate: int, seed: int, form: str
+) -> None:
     program = one_move(robot, seed)
     points = run(program, rate=rate, form=form).set_points
     t, q = points[:, 0] - 0.1, points[:, 1:]  # it sleeps after set_payload
@@ -50,10 +59,23 @@ def test_a_cycle_switches_payload_and_output_where_it_grasps_and_releases() -> N
     told = [event for event in events if event[0] in ("payload", "output", "sleep")]
     none, load = ("payload", 0.0, [0.0] * 3), ("payload", LOAD.mass, LOAD.com.tolist())
     pause = ("sleep", 0.1)
-    assert told == [none, pause, ("output", 3, True), load, pause, ("sleep", 0.35), ("output", 3, False), none, pause]
+    assert told == [
+        none,
+        pause,
+        ("output", 3, True),
+        load,
+        pause,
+        ("sleep", 0.35),
+        ("output", 3, False),
+        none,
+        pause,
+    ]
     served = [event[2] for event in events if event[0] == "servoj"]
     for move in program.moves:
-        assert np.abs(np.array(served) - move.spline.control_points[-1]).max(axis=1).min() < SET_POINT_ERROR
+        assert (
+            np.abs(np.array(served) - move.spline.control_points[-1]).max(axis=1).min()
+            < SET_POINT_ERROR
+        )
 
 
 def test_without_an_output_none_is_switched_and_the_file_says_so() -> None:
@@ -103,7 +125,9 @@ def test_text_of_a_user_cannot_leave_its_comment() -> None:
 
 def test_the_text_has_the_form_that_the_controller_takes_over_a_socket() -> None:
     for form in ("polynomials", "points"):
-        first, *inner, last = text_of(cycle_with_payload(), form=form, digital_output=0).splitlines()
+        first, *inner, last = text_of(
+            cycle_with_payload(), form=form, digital_output=0
+        ).splitlines()
         assert (first, last) == ("def joulepath():", "end")
         assert all(line.startswith("  ") and line.strip() and line.isascii() for line in inner)
 
@@ -114,7 +138,14 @@ def test_splines_of_other_degrees_are_served_too() -> None:
     times = np.linspace(0, 1, 12)
     knots = np.concatenate([np.zeros(8), [0.5], np.ones(8)])
     fitted = make_lsq_spline(times, spline.curve(times * spline.duration), knots, k=7)
-    program = Program((Move(replace(spline, degree=7, knots=knots * spline.duration, control_points=fitted.c), arm),))
+    program = Program(
+        (
+            Move(
+                replace(spline, degree=7, knots=knots * spline.duration, control_points=fitted.c),
+                arm,
+            ),
+        )
+    )
     points = run(program).set_points
     truth = program.moves[0].spline.curve(np.minimum(points[:, 0] - 0.1, program.duration))
     assert np.abs(points[:, 1:] - truth).max() <= SET_POINT_ERROR
@@ -122,7 +153,9 @@ def test_splines_of_other_degrees_are_served_too() -> None:
 
 def test_a_very_short_motion_is_served() -> None:
     program = one_move()
-    tiny = replace(program.moves[0], spline=retimed(program.moves[0].spline, 1e-4 / program.duration))
+    tiny = replace(
+        program.moves[0], spline=retimed(program.moves[0].spline, 1e-4 / program.duration)
+    )
     points = run(Program((tiny,)), lookahead_time=0.2).set_points
     assert np.abs(points[-1, 1:] - tiny.spline.control_points[-1]).max() <= SET_POINT_ERROR
 

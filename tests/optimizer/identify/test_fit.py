@@ -29,7 +29,9 @@ MOST = 100
 LOADED = (1, 2)
 
 
-def run(seed: int = 0, moves: int = 14, options: IdentificationOptions = WITHOUT_SPLIT) -> tuple[Truth, Identification]:
+def run(
+    seed: int = 0, moves: int = 14, options: IdentificationOptions = WITHOUT_SPLIT
+) -> tuple[Truth, Identification]:
     truth = truth_of(ROBOT, seed)
     return truth, identify(ROBOT, [recorded(ROBOT, truth, moves=moves, seed=seed).log()], options)
 
@@ -45,8 +47,12 @@ def without_power(log: Log, **changed: object) -> Log:
 def test_every_friction_figure_is_found_within_its_standard_deviations() -> None:
     truth, found = run()
     # a load term that is left out biases the others of its joint
-    told = [each for each in found.parameters if each.identified and each.joint in (*LOADED, 3, 4, 5)]
-    figures = [each for each in told if each.figure in ("coulomb", "viscous", "load", "rotor_inertia")]
+    told = [
+        each for each in found.parameters if each.identified and each.joint in (*LOADED, 3, 4, 5)
+    ]
+    figures = [
+        each for each in told if each.figure in ("coulomb", "viscous", "load", "rotor_inertia")
+    ]
     assert len(figures) >= 3 * 5
     assert {each.joint for each in figures if each.figure == "load"} == set(LOADED)
     for each in figures:
@@ -59,7 +65,11 @@ def test_the_fitted_figures_predict_held_out_moves_better_than_the_robots_own() 
     assert errors is not None and errors.fitted.torque is not None and errors.own.torque is not None
     # what is left is the noise of the current
     assert (errors.fitted.torque.relative < 0.5 * errors.own.torque.relative).all()
-    assert errors.fitted.power is not None and errors.own.power is not None and errors.constant is not None
+    assert (
+        errors.fitted.power is not None
+        and errors.own.power is not None
+        and errors.constant is not None
+    )
     assert errors.fitted.power.energy_max < errors.own.power.energy_max < errors.constant.energy_max
 
 
@@ -68,14 +78,20 @@ def test_curves_show_each_row_by_figures_that_may_predict_it() -> None:
     _, found = run(options=IdentificationOptions())
     assert found.validation is not None and found.validation.fitted.torque is not None
     seen, blind = found.curves, found.validation.curves
-    assert not set(seen.move) & set(blind.move) and set(seen.move) | set(blind.move) == set(range(14))
+    assert not set(seen.move) & set(blind.move) and set(seen.move) | set(blind.move) == set(
+        range(14)
+    )
     assert len(np.unique(blind.move)) == found.validation.moves
     left = blind.torque - blind.modelled_torque
     # every k-th row: a sample of the rows that the validation averages over
-    np.testing.assert_allclose(np.sqrt(np.nanmean(left**2, axis=0)), found.validation.fitted.torque.rmse, rtol=0.1)
+    np.testing.assert_allclose(
+        np.sqrt(np.nanmean(left**2, axis=0)), found.validation.fitted.torque.rmse, rtol=0.1
+    )
     assert found.validation.fitted.power is not None
     left = blind.power - blind.modelled_power
-    np.testing.assert_allclose(np.sqrt(np.mean(left**2)), found.validation.fitted.power.rmse, rtol=0.1)
+    np.testing.assert_allclose(
+        np.sqrt(np.mean(left**2)), found.validation.fitted.power.rmse, rtol=0.1
+    )
     for curves in (seen, blind):
         assert (np.diff(curves.time)[np.diff(curves.move) == 0] > 0).all()
 
@@ -142,7 +158,11 @@ def test_power_alone_tells_how_heavy_the_links_are(scale: float) -> None:
     log = replace(recorded(real, truth, moves=14, seed=3).log(), effort=None, effort_meaning=None)
     found = identify(ROBOT, [log])
     links = next(each for each in found.parameters if each.figure == "link_mass_scale")
-    assert links.identified and links.previous == 1.0 and abs(links.value - scale) <= FAR * links.sd < 0.1
+    assert (
+        links.identified
+        and links.previous == 1.0
+        and abs(links.value - scale) <= FAR * links.sd < 0.1
+    )
     assert found.validation is not None
     fitted, own = found.validation.fitted.power, found.validation.own.power
     assert fitted is not None and own is not None and fitted.energy_mean < 0.5 * own.energy_mean
@@ -160,8 +180,17 @@ def test_power_without_lifting_does_not_tell_how_heavy_the_links_are() -> None:
     first = np.arange(ROBOT.nq) == 0
     motion = {name: np.where(first, getattr(log, name), 0.0) for name in ("q", "v", "a")}
     speed, noise = np.abs(log.v[:, 0]), np.random.default_rng(0).normal(0.0, 0.5, len(log.v))
-    turned = replace(log, **motion, power=40 + 10 * speed + 9 * speed**2 + noise, effort=None, effort_meaning=None)
-    found = {(each.figure, each.joint): each for each in identify(ROBOT, [turned], WITHOUT_SPLIT).parameters}
+    turned = replace(
+        log,
+        **motion,
+        power=40 + 10 * speed + 9 * speed**2 + noise,
+        effort=None,
+        effort_meaning=None,
+    )
+    found = {
+        (each.figure, each.joint): each
+        for each in identify(ROBOT, [turned], WITHOUT_SPLIT).parameters
+    }
     assert found["idle_power", None].identified
     assert not found["link_mass_scale", None].identified and found["link_mass_scale", None].why
     assert not found["coulomb", 3].identified
@@ -217,9 +246,13 @@ def test_one_long_move_is_fitted_by_its_seconds() -> None:
     one = replace(log, moves=(LogMove(0, len(log.q), False),))
     found = identify(ROBOT, [one], WITHOUT_SPLIT)
     assert found.validation is None
-    coulomb = [each for each in found.parameters if each.figure == "coulomb" and each.joint in LOADED]
+    coulomb = [
+        each for each in found.parameters if each.figure == "coulomb" and each.joint in LOADED
+    ]
     assert all(each.identified for each in coulomb)
-    assert all(abs(each.value - truth.coulomb[each.joint or 0]) <= FAR * each.sd for each in coulomb)
+    assert all(
+        abs(each.value - truth.coulomb[each.joint or 0]) <= FAR * each.sd for each in coulomb
+    )
 
 
 def test_a_repeated_log_is_on_one_side_of_the_split() -> None:
@@ -271,14 +304,18 @@ def test_reweighting_keeps_outliers_out() -> None:
         # of the offset, which one-sided outliers move most
         return np.abs(found.fitted.arm.offset - truth.offset)[list(LOADED)]
 
-    plain, robust = (identify(ROBOT, [log], replace(WITHOUT_SPLIT, estimator=each)) for each in ("wls", "irls"))
+    plain, robust = (
+        identify(ROBOT, [log], replace(WITHOUT_SPLIT, estimator=each)) for each in ("wls", "irls")
+    )
     assert (error(robust) < 0.2 * error(plain)).all()
 
 
 def test_more_noise_gives_larger_standard_deviations() -> None:
     truth = truth_of(ROBOT)
     loud = Noise(current=0.2)
-    quiet_log, loud_log = (without_power(recorded(ROBOT, truth, noise=each).log()) for each in (None, loud))
+    quiet_log, loud_log = (
+        without_power(recorded(ROBOT, truth, noise=each).log()) for each in (None, loud)
+    )
     quiet_sd, loud_sd = (
         {
             (each.figure, each.joint): each.sd
@@ -298,11 +335,19 @@ def test_torque_constants_follow_from_gravity() -> None:
     truth = truth_of(ROBOT, 2)
     real = truth.torque_constant * np.array([1.0, 1.06, 0.95, 1.04, 1.0, 1.0])
     log = without_power(recorded(ROBOT, replace(truth, torque_constant=real), moves=14).log())
-    found = identify(ROBOT, [log], IdentificationOptions(fit=("friction", "rotor", "torque_constant"), held_out=0.0))
+    found = identify(
+        ROBOT,
+        [log],
+        IdentificationOptions(fit=("friction", "rotor", "torque_constant"), held_out=0.0),
+    )
     constants = {each.joint: each for each in found.parameters if each.figure == "torque_constant"}
     for joint in LOADED:
         assert constants[joint].identified
-        assert abs(constants[joint].value - real[joint]) <= FAR * constants[joint].sd < 0.02 * real[joint]
+        assert (
+            abs(constants[joint].value - real[joint])
+            <= FAR * constants[joint].sd
+            < 0.02 * real[joint]
+        )
     # nothing hangs on wrist 3
     assert not constants[5].identified and constants[5].value == ROBOT.drives.torque_constant[5]
     coulomb = next(each for each in found.parameters if (each.figure, each.joint) == ("coulomb", 1))

@@ -1,4 +1,5 @@
-"""Logs as other programs write them: each form is read, or refused with the place and the remedy."""
+"""Logs as other programs write them: each form is read, or refused with the place and the
+remedy."""
 
 from __future__ import annotations
 
@@ -55,7 +56,10 @@ def remarks(reading: LogReading) -> list[str]:
 
 
 def with_times(lines: list[str], times: list[str]) -> list[str]:
-    return [lines[0], *(f"{t},{line.partition(',')[2]}" for t, line in zip(times, lines[1:], strict=True))]
+    return [
+        lines[0],
+        *(f"{t},{line.partition(',')[2]}" for t, line in zip(times, lines[1:], strict=True)),
+    ]
 
 
 def same(reading: LogReading, recording: Recording) -> None:
@@ -82,7 +86,9 @@ SHAPES: dict[str, Callable[[list[str]], list[str]]] = {
     "numbers of rows": lambda x: [f",{x[0]}", *(f"{k},{line}" for k, line in enumerate(x[1:]))],
     "header twice": lambda x: [*x[:300], x[0], *x[300:]],
     "spaces behind commas": lambda x: [line.replace(",", ", ") for line in x],
-    "columns of equal width": lambda x: ["".join(f"{cell:>16}" for cell in line.split(",")) for line in x],
+    "columns of equal width": lambda x: [
+        "".join(f"{cell:>16}" for cell in line.split(",")) for line in x
+    ],
 }
 
 
@@ -90,7 +96,9 @@ SHAPES: dict[str, Callable[[list[str]], list[str]]] = {
 def test_shapes_of_files(recording: Recording, shape: str) -> None:
     reading = read_log(joined(SHAPES[shape](lines_of(recording))), ROBOT)
     same(reading, recording)
-    assert remarks(reading) == (["Line 2 has no number, and is taken for units."] if shape == "line of units" else [])
+    assert remarks(reading) == (
+        ["Line 2 has no number, and is taken for units."] if shape == "line of units" else []
+    )
 
 
 def test_byte_order_mark_and_line_ends(recording: Recording) -> None:
@@ -104,7 +112,11 @@ def test_units_of_time(recording: Recording, unit: str, per_second: float, begin
     reading = read_log(joined(with_times(lines_of(recording), times)), ROBOT)
     same(reading, recording)
     assert reading.log.rate == pytest.approx(125.0, rel=1e-6)
-    assert [each for each in remarks(reading) if f"taken for {unit}:" in each] == remarks(reading) != []
+    assert (
+        [each for each in remarks(reading) if f"taken for {unit}:" in each]
+        == remarks(reading)
+        != []
+    )
 
 
 def test_a_slow_log_is_not_taken_for_a_fast_one(recording: Recording) -> None:
@@ -147,11 +159,15 @@ def test_units_that_are_named_and_not_read(recording: Recording, unit: str, belo
 
 
 def test_joint_states_as_ros_2_prints_them(recording: Recording) -> None:
-    """`ros2 topic echo --csv` prints no header, and the joints in the driver's order, with those of a gripper."""
+    """`ros2 topic echo --csv` prints no header, and the joints in the driver's order, with those of
+    a gripper.
+    """
     joints = [*sorted(ROBOT.joint_names), "finger_joint"]
     order = [ROBOT.joint_names.index(joint) for joint in joints[:-1]]
     zeros = np.zeros((len(recording.time), 1))
-    parts = [np.hstack([each[:, order], zeros]) for each in (recording.q, recording.v, recording.current)]
+    parts = [
+        np.hstack([each[:, order], zeros]) for each in (recording.q, recording.v, recording.current)
+    ]
     rows = np.hstack(parts).tolist()
     lines = [
         f"{START + int(t)},{round((t - int(t)) * 1e9)},base_link,{','.join(joints)},{','.join(f'{x:.9g}' for x in row)}"
@@ -175,7 +191,9 @@ def test_exports_of_recorded_topics(recording: Recording) -> None:
     # a bag as a table: seconds and nanoseconds apart
     header = ",".join(["header.stamp.secs", "header.stamp.nsecs", *numbered("{}[{}]", STATE, 6)])
     whole = np.floor(time)
-    body = table(header, START + whole, np.round((time - whole) * 1e9), q, v, i).decode().splitlines()
+    body = (
+        table(header, START + whole, np.round((time - whole) * 1e9), q, v, i).decode().splitlines()
+    )
     same(read_log(joined(body), ROBOT), recording)
     # PlotJuggler
     header = ",".join(["__time", *numbered("/joint_states/{}[{}]", STATE, 6)])
@@ -187,7 +205,17 @@ def test_a_log_of_libfranka(seven: Recording) -> None:
     words = ("q", "q_d", "dq", "tau_J", "tau_J_d", "tau_ext_hat_filtered")
     header = ["time", "success_rate", *numbered("state.{}[{}]", words, 7)]
     zeros = np.zeros_like(seven.q)
-    body = table(", ".join(header), 1e3 * seven.time, zeros[:, 0], seven.q, zeros, seven.v, seven.torque, zeros, zeros)
+    body = table(
+        ", ".join(header),
+        1e3 * seven.time,
+        zeros[:, 0],
+        seven.q,
+        zeros,
+        seven.v,
+        seven.torque,
+        zeros,
+        zeros,
+    )
     reading = read_log(body, SEVEN)
     np.testing.assert_allclose(reading.log.q, seven.q, atol=1e-8)
     np.testing.assert_allclose(reading.log.v, seven.v, atol=1e-6)
@@ -197,25 +225,44 @@ def test_a_log_of_libfranka(seven: Recording) -> None:
 
 def test_a_log_of_the_sunrise_controller(seven: Recording) -> None:
     """Seconds and nanoseconds, spaces between columns, names with the type of the arm."""
-    words = ("axisQMsr_LBR_iiwa_14_R820_1", "axisTauMsr_LBR_iiwa_14_R820_1", "axisTauExtMsr_LBR_iiwa_14_R820_1")
+    words = (
+        "axisQMsr_LBR_iiwa_14_R820_1",
+        "axisTauMsr_LBR_iiwa_14_R820_1",
+        "axisTauExtMsr_LBR_iiwa_14_R820_1",
+    )
     header = " ".join(["ZeitInSec", "ZeitInNanoSec", *numbered("{}[{}]", words, 7)])
     whole = np.floor(seven.time)
-    columns = (START + whole, np.round((seven.time - whole) * 1e9), seven.q, seven.torque, np.zeros_like(seven.q))
+    columns = (
+        START + whole,
+        np.round((seven.time - whole) * 1e9),
+        seven.q,
+        seven.torque,
+        np.zeros_like(seven.q),
+    )
     reading = read_log(table(header, *columns, separator=" "), SEVEN)
     np.testing.assert_allclose(reading.log.q, seven.q, atol=1e-8)
     np.testing.assert_allclose(reading.log.effort, seven.torque, atol=1e-4)
     assert reading.log.effort_meaning == "torque"
     # the same with names of the caller's
-    named = {"time": "ZeitInSec", "nanoseconds": "ZeitInNanoSec", "q": [f"{words[0]}[{k}]" for k in range(7)]}
+    named = {
+        "time": "ZeitInSec",
+        "nanoseconds": "ZeitInNanoSec",
+        "q": [f"{words[0]}[{k}]" for k in range(7)],
+    }
     np.testing.assert_allclose(
-        read_log(table(header, *columns, separator=" "), SEVEN, LogOptions(columns=named)).log.q, seven.q, atol=1e-8
+        read_log(table(header, *columns, separator=" "), SEVEN, LogOptions(columns=named)).log.q,
+        seven.q,
+        atol=1e-8,
     )
 
 
 def test_positions_of_two_kinds_are_named(recording: Recording) -> None:
     lines = lines_of(recording)
     twice = joined(
-        [f"{lines[0]},{','.join(f'actual_q_{k}' for k in range(6))}", *(line + ",0" * 6 for line in lines[1:])]
+        [
+            f"{lines[0]},{','.join(f'actual_q_{k}' for k in range(6))}",
+            *(line + ",0" * 6 for line in lines[1:]),
+        ]
     )
     (words,) = [each for each in read_log(twice, ROBOT).report.warnings if "two kinds" in each]
     assert "like actual_q_0 are read" in words and "like q1 are not" in words
@@ -243,16 +290,24 @@ def test_positions_that_no_arm_reaches_in_a_step(recording: Recording) -> None:
 @pytest.mark.parametrize("factor", [0.0, -1.0, 180 / np.pi])
 def test_accelerations_that_are_none(recording: Recording, factor: float) -> None:
     reading = read_log(csv_of(replace(recording, a=recording.a * factor)), ROBOT)
-    assert any("accelerations of joints 1, 2, 3, 4, 5, 6 are not" in each for each in reading.report.warnings)
+    assert any(
+        "accelerations of joints 1, 2, 3, 4, 5, 6 are not" in each
+        for each in reading.report.warnings
+    )
     assert np.abs(reading.log.a - recording.a).std() < 0.1 * recording.a.std()
-    assert not any("accelerations" in each for each in read_log(csv_of(recording), ROBOT).report.warnings)
+    assert not any(
+        "accelerations" in each for each in read_log(csv_of(recording), ROBOT).report.warnings
+    )
 
 
 def test_speeds_of_one_joint_that_are_none(recording: Recording) -> None:
     v = recording.v * (np.arange(6) != 1)
     reading = read_log(csv_of(replace(recording, v=v)), ROBOT)
     assert any("speeds of joints 2 do not fit" in each for each in reading.report.warnings)
-    assert np.abs(reading.log.v[:, 1] - recording.exact_v[:, 1]).std() < 0.02 * recording.exact_v[:, 1].std()
+    assert (
+        np.abs(reading.log.v[:, 1] - recording.exact_v[:, 1]).std()
+        < 0.02 * recording.exact_v[:, 1].std()
+    )
 
 
 @pytest.mark.parametrize("robot", ["ur5e", "gen3"])
@@ -268,7 +323,10 @@ def test_efforts_of_one_joint_with_the_other_sign(robot: str) -> None:
 
 def test_efforts_of_small_joints_that_are_another_joints(recording: Recording) -> None:
     mixed = with_current(recording, recording.current[:, [0, 1, 2, 3, 5, 4]])
-    assert any("not what the motion makes" in each for each in read_log(csv_of(mixed), ROBOT).report.warnings)
+    assert any(
+        "not what the motion makes" in each
+        for each in read_log(csv_of(mixed), ROBOT).report.warnings
+    )
     milli = with_current(recording, recording.current * np.array([1, 1, 1, 1, 1, 1000.0]))
     words = " ".join(read_log(csv_of(milli), ROBOT).report.warnings)
     assert "efforts of joints 6 are beyond 3 times the greatest torque" in words

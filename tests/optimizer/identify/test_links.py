@@ -1,4 +1,5 @@
-"""Base parameters and refitted links: their number, their torques, and that they are real bodies."""
+"""Base parameters and refitted links: their number, their torques, and that they are real
+bodies."""
 
 from __future__ import annotations
 
@@ -14,7 +15,11 @@ from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import Array, Robot
 from joulepath.models.uncertainty.document import covariance_of, with_document
 from joulepath.models.uncertainty.parameters import LINKS
-from joulepath.optimizer.energy.link_regressor import body_parameters, rigid_regressor, rigid_torques
+from joulepath.optimizer.energy.link_regressor import (
+    body_parameters,
+    rigid_regressor,
+    rigid_torques,
+)
 from joulepath.optimizer.identify.arm.base_parameters import base_parameters
 from joulepath.optimizer.identify.arm.pseudo_inertia import nearness, pseudo_inertias
 from joulepath.optimizer.identify.fits.consistent import solve_consistent
@@ -54,13 +59,20 @@ def test_torques_follow_from_the_base_parameters_alone() -> None:
     regressor = rigid_regressor(model, q, v, a)
     values = base.combination @ body_parameters(model)
     expected = rigid_torques(model, q, v, a)
-    assert np.abs(regressor[:, :, base.independent] @ values - expected).max() < ROUNDING * np.abs(expected).max() * 100
-    assert len(base.expressions) == 36 and all("·" in each or each.isidentifier() for each in base.expressions)
+    assert (
+        np.abs(regressor[:, :, base.independent] @ values - expected).max()
+        < ROUNDING * np.abs(expected).max() * 100
+    )
+    assert len(base.expressions) == 36 and all(
+        "·" in each or each.isidentifier() for each in base.expressions
+    )
 
 
 def test_real_bodies_have_positive_pseudo_inertias_and_no_others() -> None:
     body = pin.Inertia(2.0, np.array([0.1, 0.0, 0.2]), np.diag([0.02, 0.03, 0.04]))
-    wrong = pin.Inertia(2.0, np.zeros(3), np.diag([0.02, 0.03, 0.06]))  # a moment above the sum of the others
+    wrong = pin.Inertia(
+        2.0, np.zeros(3), np.diag([0.02, 0.03, 0.06])
+    )  # a moment above the sum of the others
     assert np.linalg.eigvalsh(pseudo_inertias(body.toDynamicParameters()))[0, 0] > 0
     assert np.linalg.eigvalsh(pseudo_inertias(wrong.toDynamicParameters()))[0, 0] < 0
 
@@ -78,7 +90,9 @@ def test_links_whose_published_parameters_are_no_real_bodies_are_refitted() -> N
     least = np.linalg.eigvalsh(pseudo_inertias(body_parameters(robot.model)))[:, 0]
     assert least.min() < -1e-4
     found = identify(
-        robot, [recorded(robot, truth_of(robot), moves=6).log()], IdentificationOptions(refit=True, held_out=0.0)
+        robot,
+        [recorded(robot, truth_of(robot), moves=6).log()],
+        IdentificationOptions(refit=True, held_out=0.0),
     )
     assert found.physical is not None and found.physical.consistent
 
@@ -93,13 +107,19 @@ def test_nearness_does_not_depend_on_the_frame() -> None:
         return float(change @ nearness(one.toDynamicParameters()) @ change)
 
     # a body that has no extent is given some, in every frame
-    assert distance(placement.act(body), placement.act(other)) == pytest.approx(distance(body, other), rel=0.02)
+    assert distance(placement.act(body), placement.act(other)) == pytest.approx(
+        distance(body, other), rel=0.02
+    )
 
 
 def test_the_nearest_real_body_is_found() -> None:
-    """Of an impossible body: the solution is real, and no real body between it and the start is nearer."""
+    """Of an impossible body: the solution is real, and no real body between it and the start is
+    nearer.
+    """
     wrong = pin.Inertia(2.0, np.zeros(3), np.diag([0.02, 0.03, 0.06])).toDynamicParameters()
-    metric = nearness(pin.Inertia(2.0, np.zeros(3), np.diag([0.03, 0.04, 0.05])).toDynamicParameters())
+    metric = nearness(
+        pin.Inertia(2.0, np.zeros(3), np.diag([0.03, 0.04, 0.05])).toDynamicParameters()
+    )
     found = solve_consistent(metric, metric @ wrong, 1, np.full(10, -np.inf))
     assert np.linalg.eigvalsh(pseudo_inertias(found))[0, 0] > -1e-9
     for share in (0.5, 0.9, 0.99):
@@ -108,7 +128,9 @@ def test_the_nearest_real_body_is_found() -> None:
 
 
 def heavier(robot: Robot) -> Robot:
-    """The same robot with other links: up to 20 % heavier or lighter, their centres of mass moved by a centimetre."""
+    """The same robot with other links: up to 20 % heavier or lighter, their centres of mass moved
+    by a centimetre.
+    """
     random, model = np.random.default_rng(3), robot.model.copy()
     for joint in range(1, model.njoints):
         body, factor = model.inertias[joint], random.uniform(0.8, 1.2)
@@ -122,12 +144,16 @@ def test_a_refit_finds_links_that_the_robots_own_are_not() -> None:
     real = heavier(robot)
     truth = truth_of(real, 1)
     log = replace(recorded(real, truth, moves=12).log(), power=None)
-    kept, refitted = (identify(robot, [log], IdentificationOptions(refit=refit)) for refit in (False, True))
+    kept, refitted = (
+        identify(robot, [log], IdentificationOptions(refit=refit)) for refit in (False, True)
+    )
     assert kept.validation is not None and refitted.validation is not None
     before, after = kept.validation.fitted.torque, refitted.validation.fitted.torque
     assert before is not None and after is not None
     # the other joints carry little, and what is left there is the noise of the current
-    assert (after.relative < 1.01 * before.relative).all() and after.relative[1] < 0.2 * before.relative[1]
+    assert (after.relative < 1.01 * before.relative).all() and after.relative[
+        1
+    ] < 0.2 * before.relative[1]
     assert refitted.physical is not None and refitted.physical.consistent
     assert (refitted.structure.base, refitted.structure.excited) == (40, 40)
     change = refitted.fitted.arm.bodies
@@ -154,10 +180,16 @@ def test_a_refit_of_a_right_model_moves_nothing_that_matters() -> None:
 
 
 def test_identified_figures_become_a_robot() -> None:
-    """The document is one that requests take: the robot's own figures, with the identified ones in their place."""
+    """The document is one that requests take: the robot's own figures, with the identified ones in
+    their place.
+    """
     robot = load_robot("ur10e")
     truth = truth_of(robot, 1)
-    found = identify(robot, [recorded(robot, truth, moves=10).log()], IdentificationOptions(refit=True, held_out=0.0))
+    found = identify(
+        robot,
+        [recorded(robot, truth, moves=10).log()],
+        IdentificationOptions(refit=True, held_out=0.0),
+    )
     document = found.document("2025-03-14")
     figures = with_document(robot.name, robot.figures, document)
     made = robot_of("ur10e", figures)
@@ -166,15 +198,22 @@ def test_identified_figures_become_a_robot() -> None:
     assert made.electronics.idle_power == pytest.approx(truth.idle_power, rel=0.01)
     change = found.fitted.arm.bodies
     assert change is not None
-    assert body_parameters(made.model) == pytest.approx(body_parameters(robot.model) + change, abs=1e-6)
+    assert body_parameters(made.model) == pytest.approx(
+        body_parameters(robot.model) + change, abs=1e-6
+    )
     known = covariance_of(figures)
     assert known is not None and known.move_sd == found.spread.move
-    assert {"electronics.idle_power", "friction_laws.identified.coulomb.1", "inertials.mx.1"} <= set(known.names)
+    assert {
+        "electronics.idle_power",
+        "friction_laws.identified.coulomb.1",
+        "inertials.mx.1",
+    } <= set(known.names)
     assert found.figures().sd.shape == (len(known.names),)
 
 
 def test_errors_of_refitted_links_are_those_that_the_document_says() -> None:
-    """Torques of other motions, by links that the robot's own are not, and how far they may be off."""
+    """Torques of other motions, by links that the robot's own are not, and how far they may be
+    off."""
     robot = load_robot("ur10e")
     real = heavier(robot)
     log = replace(recorded(real, truth_of(real, 1), moves=12).log(), power=None)
@@ -184,7 +223,9 @@ def test_errors_of_refitted_links_are_those_that_the_document_says() -> None:
     at = [known.names.index(f"inertials.{part}.{joint}") for joint in range(6) for part in LINKS]
     covariance = known.matrix[np.ix_(at, at)]
     regressor = rigid_regressor(robot.model, *states(6, 200))[:, 1:3].reshape(-1, 60)
-    wrong = regressor @ (body_parameters(robot.model) + found.fitted.arm.bodies - body_parameters(real.model))
+    wrong = regressor @ (
+        body_parameters(robot.model) + found.fitted.arm.bodies - body_parameters(real.model)
+    )
     sd = np.sqrt(np.einsum("np,pq,nq->n", regressor, covariance, regressor))
     assert (np.abs(wrong) <= 3 * sd).mean() > 0.95
     # and not by far more than they are

@@ -37,8 +37,8 @@ identify(robot, [log], IdentificationOptions(refit=True))
 print(len(log.time), (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024)
 """
 
-# bytes of the whole process, from the file to the figures: with 26 columns on a uniform grid, and with 33 whose times
-# jitter, so that they are interpolated
+# bytes of the whole process, from the file to the figures: with 26 columns on a uniform grid, and
+# with 33 whose times jitter, so that they are interpolated
 MOST_OF_ALL = {"own": 480e6, "rtde": 500e6}
 ROWS = 1_000_000
 FROM_FILE = """
@@ -58,7 +58,11 @@ print(len(log.time), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
 def lines(form: Form) -> Iterator[str]:
     """Of a log with all channels, which repeats the same moves; the times of RTDE jitter."""
     robot = load_robot("ur10e")
-    short = csv_of(recorded(robot, truth_of(robot), moves=30, rate=500.0, closed=True), form).decode().splitlines()
+    short = (
+        csv_of(recorded(robot, truth_of(robot), moves=30, rate=500.0, closed=True), form)
+        .decode()
+        .splitlines()
+    )
     cells = [line.partition(",")[2] for line in short[1:]]
     shifts = np.random.default_rng(0).uniform(-0.3, 0.3, ROWS) * (form == "rtde")
     yield short[0]
@@ -81,6 +85,8 @@ def test_a_million_rows_of_a_file_are_refitted_within_memory(tmp_path: Path, for
 @pytest.mark.long
 def test_a_refit_of_a_million_rows_stays_within_memory() -> None:
     """In a process of its own, whose peak counts nothing else."""
-    done = subprocess.run([sys.executable, "-c", SCRIPT], capture_output=True, text=True, check=True, cwd=ROOT)
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT], capture_output=True, text=True, check=True, cwd=ROOT
+    )
     rows, memory = (int(each) for each in done.stdout.split())
     assert rows >= 1_000_000 and 0 < memory < MOST_MEMORY

@@ -57,9 +57,17 @@ def log_of(truth: Truth, q: Array, v: Array, a: Array, noise: Array, **channels:
     torque = rigid + truth.rotor_inertia * a + friction
     torque += np.random.default_rng(1).normal(0.0, 1.0, torque.shape) * noise
     return Log(
-        robot="ur5e", time=np.arange(len(q)) / RATE, q=q, v=v, a=a, effort=torque, effort_meaning="torque",
-        rate=RATE, moves=(LogMove(0, len(q), False),), **channels,
-    )  # fmt: skip
+        robot="ur5e",
+        time=np.arange(len(q)) / RATE,
+        q=q,
+        v=v,
+        a=a,
+        effort=torque,
+        effort_meaning="torque",
+        rate=RATE,
+        moves=(LogMove(0, len(q), False),),
+        **channels,
+    )
 
 
 def away(found: Identification, truth: Truth) -> Array:
@@ -67,7 +75,9 @@ def away(found: Identification, truth: Truth) -> Array:
     itself."""
     errors = []
     for each in found.parameters:
-        true = each.previous if each.joint is None else float(getattr(truth, each.figure)[each.joint])
+        true = (
+            each.previous if each.joint is None else float(getattr(truth, each.figure)[each.joint])
+        )
         errors.append((each.value - true) / each.sd)
     return np.array(errors)
 
@@ -107,7 +117,9 @@ def test_maximum_likelihood_from_a_periodic_excitation() -> None:
 def test_a_log_without_periods_is_refused(periods: int, period: float, said: str) -> None:
     log = log_of(truth_of(ROBOT), *fourier(ROBOT.nq, periods), SIZES)
     with pytest.raises(MethodNotApplicable, match=said):
-        identify(ROBOT, [log], IdentificationOptions(method="periodic", period=period, held_out=0.0))
+        identify(
+            ROBOT, [log], IdentificationOptions(method="periodic", period=period, held_out=0.0)
+        )
 
 
 def test_base_parameters_without_knowledge_of_the_links() -> None:
@@ -119,7 +131,9 @@ def test_base_parameters_without_knowledge_of_the_links() -> None:
     for body in list(model.inertias)[1:]:
         body.mass *= 1.3
     wrong = replace(ROBOT, model=model)
-    found = identify(wrong, [log], IdentificationOptions(method="base_parameters", terms=PLAIN, held_out=0.0))
+    found = identify(
+        wrong, [log], IdentificationOptions(method="base_parameters", terms=PLAIN, held_out=0.0)
+    )
     base = base_parameters(ROBOT.model)
     own = np.append(body_parameters(ROBOT.model), ROBOT.drives.rotor_inertia)
     true = dict(zip(base.expressions, (base.combination @ own).tolist(), strict=True))
@@ -135,7 +149,8 @@ def test_base_parameters_without_knowledge_of_the_links() -> None:
 
 
 def test_essential_parameters_are_told_and_the_rest_is_the_robots_own() -> None:
-    """Verdonck, Radkhah: what a log does not tell is left out, and what is left is told the better."""
+    """Verdonck, Radkhah: what a log does not tell is left out, and what is left is told the
+    better."""
     truth = replace(truth_of(ROBOT), rotor_inertia=ROBOT.drives.rotor_inertia)
     log = log_of(truth, *fourier(ROBOT.nq, 2), 2 * SIZES)
     every, essential = (
@@ -146,7 +161,9 @@ def test_essential_parameters_are_told_and_the_rest_is_the_robots_own() -> None:
     assert left and all(each.value == each.previous for each in left)
     assert all(each.sd <= 0.3 * abs(each.value) for each in essential.parameters if not each.why)
     before = {(each.figure, each.joint): each.sd for each in every.parameters}
-    ratios = [each.sd / before[each.figure, each.joint] for each in essential.parameters if not each.why]
+    ratios = [
+        each.sd / before[each.figure, each.joint] for each in essential.parameters if not each.why
+    ]
     assert np.median(ratios) < 1
 
 
@@ -175,13 +192,20 @@ def test_links_from_the_wrench_beneath_the_arm() -> None:
     # the sensor has an offset, and carries the base
     noise = np.random.default_rng(2).normal(0.0, 0.1, exact.shape)
     log = log_of(
-        truth_of(ROBOT), q, v, a, 50 * SIZES, wrench=exact + noise + np.array([3.0, -2.0, -40.0, 1.0, 0.0, 2.0])
+        truth_of(ROBOT),
+        q,
+        v,
+        a,
+        50 * SIZES,
+        wrench=exact + noise + np.array([3.0, -2.0, -40.0, 1.0, 0.0, 2.0]),
     )
     found = identify(ROBOT, [log], IdentificationOptions(method="base_wrench", held_out=0.0))
     assert found.physical is not None and found.physical.consistent
     test = [each[::7] for each in fourier(ROBOT.nq, 1, seed=5)]
     body = found.figures().values
-    assert body["mass"].sum() == pytest.approx(1.3 * sum(each.mass for each in list(model.inertias)[1:]), rel=0.15)
+    assert body["mass"].sum() == pytest.approx(
+        1.3 * sum(each.mass for each in list(model.inertias)[1:]), rel=0.15
+    )
     change = np.array([each.value - each.previous for each in found.parameters])
     true, own = (rigid_torques(each, *test) for each in (real, model))
     fitted = own + rigid_regressor(model, *test) @ change
@@ -194,26 +218,35 @@ def test_links_from_the_wrench_beneath_the_arm() -> None:
 def test_links_from_the_wrench_do_not_depend_on_the_payload() -> None:
     model, (q, v, a) = ROBOT.model, fourier(ROBOT.nq, 2)
     payload = Payload(3.0, np.array([0.0, 0.02, 0.1]))
-    loaded = ROBOT.loaded_model(payload.mass, payload.com, payload.inertia, np.array([0.0, 0.0, -9.81]))
+    loaded = ROBOT.loaded_model(
+        payload.mass, payload.com, payload.inertia, np.array([0.0, 0.0, -9.81])
+    )
     found = []
     for carried, load in ((model, Payload()), (loaded, payload)):
         wrench = base_wrench_regressor(carried, q, v, a) @ body_parameters(carried)
         log = log_of(truth_of(ROBOT), q, v, a, SIZES, wrench=wrench, payload=load)
         found.append(
-            identify(ROBOT, [log], IdentificationOptions(method="base_wrench", held_out=0.0)).figures().values["mass"]
+            identify(ROBOT, [log], IdentificationOptions(method="base_wrench", held_out=0.0))
+            .figures()
+            .values["mass"]
         )
     assert found[0] == pytest.approx(found[1], rel=1e-3)
 
 
 def test_four_times_the_moves_halve_the_deviations() -> None:
-    """Verdonck, Radkhah: what a log tells of a figure goes by how it excites it; and the truth is within it."""
+    """Verdonck, Radkhah: what a log tells of a figure goes by how it excites it; and the truth is
+    within it.
+    """
     truth = truth_of(ROBOT)
     deviations = []
     for moves in (8, 32):
         log = replace(recorded(ROBOT, truth, moves=moves).log("torque"), power=None)
         found = identify(ROBOT, [log], IdentificationOptions(held_out=0.0)).parameters
         told = {(each.figure, each.joint): each for each in found if each.identified}
-        away = [abs(each.value - getattr(truth, each.figure)[each.joint]) / each.sd for each in told.values()]
+        away = [
+            abs(each.value - getattr(truth, each.figure)[each.joint]) / each.sd
+            for each in told.values()
+        ]
         assert np.mean(np.array(away) < FAR) >= 0.95
         deviations.append({name: each.sd for name, each in told.items()})
     both = deviations[0].keys() & deviations[1].keys()
@@ -225,7 +258,9 @@ def test_motor_currents_need_known_links_and_give_torque_constants() -> None:
     """Paes: as asking for the torque constants, of logs of currents alone."""
     truth = truth_of(ROBOT)
     recording = recorded(ROBOT, truth, moves=8)
-    found = identify(ROBOT, [recording.log()], IdentificationOptions(method="motor_current", held_out=0.0))
+    found = identify(
+        ROBOT, [recording.log()], IdentificationOptions(method="motor_current", held_out=0.0)
+    )
     assert "torque_constant" in {each.figure for each in found.parameters}
     with pytest.raises(MethodNotApplicable, match="currents"):
         identify(ROBOT, [recording.log("torque")], IdentificationOptions(method="motor_current"))
@@ -243,12 +278,15 @@ def test_electrical_power_does_without_torques() -> None:
 
 
 def test_friction_at_the_reference_temperature() -> None:
-    """Hao: a log that begins cold has the friction of its mean temperature, and less is left over."""
+    """Hao: a log that begins cold has the friction of its mean temperature, and less is left
+    over."""
     truth = replace(truth_of(ROBOT), load=np.zeros(ROBOT.nq), offset=np.zeros(ROBOT.nq))
     log = replace(recorded(ROBOT, truth, moves=24).log("torque"), power=None)
     warm = np.linspace(20.0, 50.0, len(log.time))[:, None] * np.ones(ROBOT.nq)
     friction = truth.coulomb * log.v / np.hypot(log.v, truth.knee) + truth.viscous * log.v
-    log = replace(log, effort=log.effort + friction * (np.exp(-0.01 * (warm - 35.0)) - 1), temperature=warm)
+    log = replace(
+        log, effort=log.effort + friction * (np.exp(-0.01 * (warm - 35.0)) - 1), temperature=warm
+    )
     terms: tuple[Term, ...] = ("coulomb", "viscous", "offset")
     plain, found = (
         identify(ROBOT, [log], IdentificationOptions(method=method, terms=terms, held_out=0.0))
@@ -257,7 +295,9 @@ def test_friction_at_the_reference_temperature() -> None:
     assert found.temperatures.k[:3] == pytest.approx([0.01] * 3, abs=0.002)
     for each, before in zip(found.parameters, plain.parameters, strict=True):
         if each.figure == "coulomb" and each.joint is not None and each.joint < 3:
-            true = truth.coulomb[each.joint] * np.exp(-0.01 * (found.temperatures.reference[each.joint] - 35.0))
+            true = truth.coulomb[each.joint] * np.exp(
+                -0.01 * (found.temperatures.reference[each.joint] - 35.0)
+            )
             assert each.value == pytest.approx(true, rel=0.03)
             assert each.sd < before.sd
     cold = replace(log, temperature=np.full(log.q.shape, 30.0))
@@ -266,13 +306,17 @@ def test_friction_at_the_reference_temperature() -> None:
 
 
 @pytest.mark.parametrize(("method", "rise"), [("automatic", 0.1), ("base_parameters", None)])
-def test_a_curved_rise_is_predicted_at_the_speed_at_which_it_was_fitted(method: Method, rise: float | None) -> None:
+def test_a_curved_rise_is_predicted_at_the_speed_at_which_it_was_fitted(
+    method: Method, rise: float | None
+) -> None:
     truth, (q, v, a) = truth_of(ROBOT), fourier(ROBOT.nq, 4)
     log = log_of(truth, q, v, a, 0.1 * SIZES)
     # with known links the speed is sought, else it is the robot's own
     speed = ROBOT.friction.speed if rise is None else rise
     log = replace(log, effort=np.array(log.effort) + 4.0 * np.arcsinh(v / speed))
-    found = identify(ROBOT, [log], IdentificationOptions(method=method, terms=(*PLAIN, "curved"), held_out=0.0))
+    found = identify(
+        ROBOT, [log], IdentificationOptions(method=method, terms=(*PLAIN, "curved"), held_out=0.0)
+    )
     rows = rows_of(ROBOT, [log], regressor=True)
     error = motor_torque(found.fitted.arm, rows) - found.fitted.arm.torque(rows)
     moving = np.abs(rows.v) > 0.02
@@ -293,10 +337,15 @@ def test_figures_above_the_threshold_velocity() -> None:
     assert plain.thresholds is None and found.thresholds is not None
     assert ((found.thresholds > 0.1) & (found.thresholds < 0.4)).all()
     off = [
-        np.mean([abs(each.value / truth.coulomb[each.joint] - 1) for each in fitted.parameters
-                 if each.figure == "coulomb" and each.joint is not None])
+        np.mean(
+            [
+                abs(each.value / truth.coulomb[each.joint] - 1)
+                for each in fitted.parameters
+                if each.figure == "coulomb" and each.joint is not None
+            ]
+        )
         for fitted in (plain, found)
-    ]  # fmt: skip
+    ]
     assert off[1] < 0.05 < off[0]
 
 

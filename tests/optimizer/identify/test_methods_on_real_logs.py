@@ -1,4 +1,6 @@
-"""Methods of the literature on logs of two real arms: what a log tells of a figure, and where its friction holds."""
+"""Methods of the literature on logs of two real arms: what a log tells of a figure, and where its
+friction holds.
+"""
 
 from __future__ import annotations
 
@@ -36,11 +38,14 @@ def thresholds(v: Array, friction: Array) -> list[float]:
 
 
 def test_the_threshold_velocity_of_real_friction(place: Path) -> None:
-    """Vuong: above the threshold, Coulomb and viscous friction hold; a rise put below it is found where it was put."""
+    """Vuong: above the threshold, Coulomb and viscous friction hold; a rise put below it is found
+    where it was put.
+    """
     robot, log = ur3e(place)
     v, friction = friction_of(robot, log, PLAIN)
     found = thresholds(v, friction)
-    # the law that is fitted above 0.02 rad/s holds there for most joints, and for all in the upper part of their speeds
+    # the law that is fitted above 0.02 rad/s holds there for most joints, and for all in the upper
+    # part of their speeds
     assert all(each <= 0.26 * np.abs(v[:, j]).max() for j, each in enumerate(found))
     assert sum(each == 0 for each in found) >= 2
     # joints 3 and 4 have none: one that is put there is found
@@ -65,35 +70,46 @@ def test_a_faster_threshold_leaves_fast_friction_as_it_is(place: Path) -> None:
 
 
 def test_what_a_real_log_tells_of_a_figure(place: Path) -> None:
-    """Verdonck, Radkhah: half of a log tells less, in its standard deviations and its condition; what moves little is
-    not told, and the standard deviations cover what the halves differ by."""
+    """Verdonck, Radkhah: half of a log tells less, in its standard deviations and its condition;
+    what moves little is not told, and the standard deviations cover what the halves differ by."""
     robot, log = ur3e(place)
     rows = rows_of(robot, [log])
     whole = fit_rows(robot, rows, PLAIN).estimate
     half = rows.take(np.isin(rows.group, rows.groups[::2]))
     other = rows.take(np.isin(rows.group, rows.groups[1::2]))
     one, two = (fit_rows(robot, part, PLAIN).estimate for part in (half, other))
-    sd = [dict(zip(each.names, np.sqrt(np.diag(each.covariance)), strict=True)) for each in (whole, one, two)]
+    sd = [
+        dict(zip(each.names, np.sqrt(np.diag(each.covariance)), strict=True))
+        for each in (whole, one, two)
+    ]
     value = [dict(zip(each.names, each.value, strict=True)) for each in (one, two)]
     told = [
         name
         for name in value[0]
         if name[0] in ("coulomb", "rotor_inertia")
-        and not any(dict(zip(each.names, each.why, strict=True))[name] for each in (whole, one, two))
+        and not any(
+            dict(zip(each.names, each.why, strict=True))[name] for each in (whole, one, two)
+        )
     ]
     assert len(told) >= 6
     growth = [0.5 * (sd[1][name] + sd[2][name]) / sd[0][name] for name in told]
     assert np.median(growth) > 1.1
-    away = [abs(value[0][name] - value[1][name]) / np.hypot(sd[1][name], sd[2][name]) for name in told]
+    away = [
+        abs(value[0][name] - value[1][name]) / np.hypot(sd[1][name], sd[2][name]) for name in told
+    ]
     assert np.mean(np.array(away) < 3.0) >= 0.8
     # wrist 3 turns by 0.06 rad
-    parameters = {(each.figure, each.joint): each for each in identify(robot, [log], PLAIN).parameters}
+    parameters = {
+        (each.figure, each.joint): each for each in identify(robot, [log], PLAIN).parameters
+    }
     wrist = parameters["viscous", 5]
     assert not wrist.identified and wrist.why
 
 
 def test_the_condition_of_a_real_log(place: Path) -> None:
-    """Verdonck: a log made to excite has a far better condition than one of ordinary moves, and excites all of it."""
+    """Verdonck: a log made to excite has a far better condition than one of ordinary moves, and
+    excites all of it.
+    """
     robot, log = tx40(place)
     excited = structure_of(robot, rows_of(robot, [log], True), REFIT)
     small, moves = ur3e(place)

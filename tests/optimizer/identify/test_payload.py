@@ -27,7 +27,9 @@ FAR = 4.0
 
 
 def log_of(carried: Payload, seed: int, said: Payload, motions: int = 0) -> Log:
-    """A log of a unit with other friction than the robot's own, which carried one payload and says another."""
+    """A log of a unit with other friction than the robot's own, which carried one payload and says
+    another.
+    """
     truth = replace(truth_of(ROBOT, seed), payload=carried)
     log = recorded(ROBOT, truth, moves=12, seed=motions, noise=NOISE).log()
     return replace(log, power=None, payload=said)
@@ -56,7 +58,9 @@ def test_mass_and_centre_of_mass_are_found(seed: int) -> None:
 def test_errors_of_the_links_do_not_become_payload() -> None:
     """Of a robot whose links are taken to weigh up to 5 % more or less than they do."""
     scale = np.array([1.05, 0.95, 1.04, 0.96, 1.05, 0.95])
-    model = ROBOT.loaded_model(0.0, np.zeros(3), np.zeros((3, 3)), np.array([0.0, 0.0, -9.81]), scale)
+    model = ROBOT.loaded_model(
+        0.0, np.zeros(3), np.zeros((3, 3)), np.array([0.0, 0.0, -9.81]), scale
+    )
     logs = [log_of(NOTHING, 2, NOTHING), log_of(PAYLOAD, 2, PAYLOAD, 52)]
     found = identify(replace(ROBOT, model=model), logs, ASKED).payload
     assert found is not None
@@ -64,7 +68,10 @@ def test_errors_of_the_links_do_not_become_payload() -> None:
 
 
 def test_what_the_log_says_of_its_payload_does_not_count() -> None:
-    without, logs = log_of(NOTHING, 0, NOTHING), [log_of(PAYLOAD, 0, said, 50) for said in (NOTHING, Payload(9.0))]
+    without, logs = (
+        log_of(NOTHING, 0, NOTHING),
+        [log_of(PAYLOAD, 0, said, 50) for said in (NOTHING, Payload(9.0))],
+    )
     assert found_in(without, logs[0]).mass == found_in(without, logs[1]).mass
 
 
@@ -92,7 +99,9 @@ def test_a_payload_needs_two_logs_that_differ_by_it() -> None:
 
 def test_a_payload_that_is_not_told_is_none_and_the_rest_is_found() -> None:
     without = log_of(NOTHING, 0, NOTHING)
-    found = identify(ROBOT, [without, without], IdentificationOptions(fit=("friction", "payload"), held_out=0.0))
+    found = identify(
+        ROBOT, [without, without], IdentificationOptions(fit=("friction", "payload"), held_out=0.0)
+    )
     told = {each.figure for each in found.parameters if each.identified}
     assert "coulomb" in told and not any(each.startswith("payload") for each in told)
     assert found.payload is not None and found.payload.mass == 0 and found.payload.why
@@ -108,7 +117,11 @@ def test_held_out_motions_are_predicted_with_the_payload() -> None:
     )
     assert asked is not None and not_asked is not None
     better, worse = asked.fitted.torque, not_asked.fitted.torque
-    assert better is not None and worse is not None and (better.rmse[1:4] < 0.5 * worse.rmse[1:4]).all()
+    assert (
+        better is not None
+        and worse is not None
+        and (better.rmse[1:4] < 0.5 * worse.rmse[1:4]).all()
+    )
 
 
 def test_torque_constants_need_a_payload_that_is_known() -> None:

@@ -19,7 +19,16 @@ from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
 from joulepath.optimizer.identify.logs.reading import LogOptions, read_log
 from joulepath.optimizer.problem.arm import Payload
-from tests.identification_logs import SILENT, Form, Recording, csv_of, recorded, rigid_torques, truth_of, with_current
+from tests.identification_logs import (
+    SILENT,
+    Form,
+    Recording,
+    csv_of,
+    recorded,
+    rigid_torques,
+    truth_of,
+    with_current,
+)
 
 ROBOT = load_robot("ur5e")
 TRUTH = truth_of(ROBOT)
@@ -42,7 +51,9 @@ def test_every_form_gives_the_recorded_arrays(recording: Recording, form: Form, 
     log = read_log(csv_of(recording, form, first=first), ROBOT).log
     assert np.abs(log.q - recording.q).max() < ROUNDING
     assert np.allclose(log.v, recording.v, rtol=SINGLE, atol=0.0)
-    assert log.effort is not None and np.allclose(log.effort, recording.current, rtol=SINGLE, atol=0.0)
+    assert log.effort is not None and np.allclose(
+        log.effort, recording.current, rtol=SINGLE, atol=0.0
+    )
     assert log.effort_meaning == "current"
     assert log.rate == pytest.approx(125.0)
     assert (log.power is None) == (form == "ros")
@@ -51,7 +62,9 @@ def test_every_form_gives_the_recorded_arrays(recording: Recording, form: Form, 
     assert (log.temperature is not None) == (form == "rtde")
 
 
-@pytest.mark.parametrize(("separator", "decimal"), [(";", ","), ("\t", ","), (";", "."), (" ", "."), (",", ".")])
+@pytest.mark.parametrize(
+    ("separator", "decimal"), [(";", ","), ("\t", ","), (";", "."), (" ", "."), (",", ".")]
+)
 def test_separators_and_decimal_commas(recording: Recording, separator: str, decimal: str) -> None:
     log = read_log(csv_of(recording, separator=separator, decimal=decimal), ROBOT).log
     assert np.abs(log.q - recording.q).max() < ROUNDING
@@ -61,7 +74,9 @@ def test_gzip_degrees_and_milliamperes(recording: Recording, tmp_path: Path) -> 
     milli = with_current(recording, recording.current * 1e3)
     file = tmp_path / "log.csv.gz"
     file.write_bytes(gzip.compress(csv_of(milli, units="deg")))
-    log = read_log(file, ROBOT, LogOptions(units="deg", current_units="mA", name="cold", tags=("cold",))).log
+    log = read_log(
+        file, ROBOT, LogOptions(units="deg", current_units="mA", name="cold", tags=("cold",))
+    ).log
     assert np.abs(log.q - recording.q).max() < ROUNDING
     assert log.effort is not None and np.abs(log.effort - recording.current).max() < 1e-5
     assert (log.name, log.tags) == ("cold", ("cold",))
@@ -71,11 +86,17 @@ def test_gzip_degrees_and_milliamperes(recording: Recording, tmp_path: Path) -> 
 
 def test_named_columns(recording: Recording) -> None:
     body = csv_of(recording).replace(b"t,q1", b"when,q1", 1).replace(b"q", b"axis_")
-    names = {"time": "when", "q": [f"axis_{k}" for k in range(1, 7)], "current": [f"I{k}" for k in range(1, 7)]}
+    names = {
+        "time": "when",
+        "q": [f"axis_{k}" for k in range(1, 7)],
+        "current": [f"I{k}" for k in range(1, 7)],
+    }
     log = read_log(body, ROBOT, LogOptions(columns=names)).log
     assert np.abs(log.q - recording.q).max() < ROUNDING
     with pytest.raises(InvalidTable, match="does not have the column axis_7"):
-        read_log(body, ROBOT, LogOptions(columns=names | {"q": [f"axis_{k}" for k in range(4, 10)]}))
+        read_log(
+            body, ROBOT, LogOptions(columns=names | {"q": [f"axis_{k}" for k in range(4, 10)]})
+        )
     with pytest.raises(InvalidProblem, match="columns must name"):
         read_log(body, ROBOT, LogOptions(columns={"speed": "when"}))
 
@@ -92,7 +113,8 @@ def test_jitter_goes_onto_a_uniform_grid(recording: Recording) -> None:
     exact = recorded(ROBOT, TRUTH, moves=4, noise=SILENT)
     shift = np.append(0.0, random.uniform(-0.3, 0.3, len(exact.time) - 1) / exact.rate)
     times = exact.time + shift
-    # the arm goes on between the nominal times: positions and speeds as they are at the shifted ones
+    # the arm goes on between the nominal times: positions and speeds as they are at the shifted
+    # ones
     q = exact.q + exact.v * shift[:, None] + exact.a * shift[:, None] ** 2 / 2
     moved = Recording(**{**exact.__dict__, "q": q, "v": exact.v + exact.a * shift[:, None]})
     reading = read_log(csv_of(moved, time=times + 1e6), ROBOT)
@@ -110,7 +132,9 @@ def test_a_long_log_is_interpolated_as_by_one_spline() -> None:
     """With jitter, lost rows and a gap; a spline of all rows needs more memory than they do."""
     random, count = np.random.default_rng(0), 50_000
     times = (np.arange(count) + random.uniform(-0.45, 0.45, count)) / 500
-    times = np.delete(times, [*range(20_000, 20_300), *random.choice(count, count // 5, replace=False)])
+    times = np.delete(
+        times, [*range(20_000, 20_300), *random.choice(count, count // 5, replace=False)]
+    )
     grid = grid_of(times, np.arange(len(times)), "t")
     values = np.column_stack([np.sin(3 * grid.at), random.normal(size=len(grid.at))])
     whole = CubicSpline(grid.at, values)(grid.time)
@@ -141,7 +165,9 @@ def _sine(rate: float, seconds: float) -> bytes:
     """Joints that never rest, positions only."""
     t = np.arange(round(rate * seconds)) / rate
     q = np.sin(np.outer(t, [1.0, 1.3, 1.7, 2.1, 2.3, 2.9]))
-    rows = [",".join(f"{x:.9g}" for x in (time, *row)) for time, row in zip(t, q.tolist(), strict=True)]
+    rows = [
+        ",".join(f"{x:.9g}" for x in (time, *row)) for time, row in zip(t, q.tolist(), strict=True)
+    ]
     return "\n".join(["t,q1,q2,q3,q4,q5,q6", *rows]).encode()
 
 
@@ -167,7 +193,9 @@ def test_effort_tells_what_it_is(recording: Recording) -> None:
     assert read_log(torque, ROBOT).log.effort_meaning == "torque"
     # what a column is called counts less than what is in it
     wrong = read_log(torque.replace(b"tau", b"i"), ROBOT)
-    assert wrong.log.effort_meaning == "torque" and any("current" in each for each in wrong.report.warnings)
+    assert wrong.log.effort_meaning == "torque" and any(
+        "current" in each for each in wrong.report.warnings
+    )
 
 
 def test_effort_without_gravity_is_not_usable(recording: Recording) -> None:
@@ -225,7 +253,8 @@ def test_oddities_are_reported(recording: Recording) -> None:
     assert "Gaps in the log: 1," in words and "row before: 1." in words and "No payload" in words
     # two rests are two parts, with the hole between them
     assert any(
-        after.start > before.end for before, after in zip(reading.log.moves, reading.log.moves[1:], strict=False)
+        after.start > before.end
+        for before, after in zip(reading.log.moves, reading.log.moves[1:], strict=False)
     )
 
 
@@ -253,8 +282,18 @@ def broken(recording: Recording) -> dict[str, Case]:
 
     cells = lines[9].split(b",")
     return {
-        "NaN": (with_line(10, b",".join([cells[0], b"nan", *cells[2:]])), "q1 in line 10 is no finite", 10, "q1"),
-        "empty cell": (with_line(10, b",".join([cells[0], b"", *cells[2:]])), "q1 in line 10", 10, "q1"),
+        "NaN": (
+            with_line(10, b",".join([cells[0], b"nan", *cells[2:]])),
+            "q1 in line 10 is no finite",
+            10,
+            "q1",
+        ),
+        "empty cell": (
+            with_line(10, b",".join([cells[0], b"", *cells[2:]])),
+            "q1 in line 10",
+            10,
+            "q1",
+        ),
         "word": (with_line(10, b",".join([*cells[:-1], b"rest"])), "i6 in line 10", 10, "i6"),
         "no time": (b"\n".join(line.partition(b",")[2] for line in lines), "no column `t`", 1, "t"),
         "back": (b"\n".join([*lines[:50], *lines[20:]]), "goes back in line 51", 51, "t"),
@@ -264,7 +303,12 @@ def broken(recording: Recording) -> dict[str, Case]:
         "header only": (lines[0], "fewer than two rows", None, None),
         "nothing": (b"", "empty", None, None),
         "no header": (b"\n".join(lines[1:]), "no joint positions", 1, None),
-        "two robots": (good.replace(b",i1,i2,i3,i4,i5,i6", b",q7,q8,q9,q10,q11,q12", 1), "12 columns like q1", 1, "q1"),
+        "two robots": (
+            good.replace(b",i1,i2,i3,i4,i5,i6", b",q7,q8,q9,q10,q11,q12", 1),
+            "12 columns like q1",
+            1,
+            "q1",
+        ),
         "missing joint": (good.replace(b"q3", b"x3", 1), "without gaps", 1, "q1"),
         "twice": (good.replace(b"q2", b"q1", 1), "twice", 1, "q1"),
         "other separator": (good.replace(b",", b";", 12), "columns", 2, None),
@@ -280,10 +324,30 @@ def broken(recording: Recording) -> dict[str, Case]:
         "no gzip at all": (b"\x1f\x8b" + bytes(100), "broken gzip", None, None),
         "one long line": (b"t," + b"q" * 40_000, "longer than", 1, None),
         "a joint's number": (b"t,q" + b"9" * 6000, "no joint positions", 1, None),
-        "huge": (with_line(10, b",".join([*cells[:-1], b"1e300"])), "i6 in line 10 is too large", 10, "i6"),
-        "infinite": (with_line(10, b",".join([*cells[:-1], b"1e400"])), "i6 in line 10 is no finite", 10, "i6"),
-        "mostly cut": (b"\n".join([*lines[:50], *(line[:40] for line in lines[50:100])]), "columns", 51, None),
-        "a week later": (b"\n".join([*lines[:50], b"6e5" + lines[50][lines[50].index(b",") :]]), "missing", 51, "t"),
+        "huge": (
+            with_line(10, b",".join([*cells[:-1], b"1e300"])),
+            "i6 in line 10 is too large",
+            10,
+            "i6",
+        ),
+        "infinite": (
+            with_line(10, b",".join([*cells[:-1], b"1e400"])),
+            "i6 in line 10 is no finite",
+            10,
+            "i6",
+        ),
+        "mostly cut": (
+            b"\n".join([*lines[:50], *(line[:40] for line in lines[50:100])]),
+            "columns",
+            51,
+            None,
+        ),
+        "a week later": (
+            b"\n".join([*lines[:50], b"6e5" + lines[50][lines[50].index(b",") :]]),
+            "missing",
+            51,
+            "t",
+        ),
     }
 
 

@@ -14,11 +14,19 @@ from joulepath.optimizer.identify.options import IdentificationOptions
 
 
 def test_power_of_moves_that_no_fit_has_seen(place: Path) -> None:
-    """From motion alone, each motion left out in its turn: 2.0 W, and 1.3 % of the energy, 4 % at most."""
+    """From motion alone, each motion left out in its turn: 2.0 W, and 1.3 % of the energy, 4 % at
+    most.
+    """
     robot, log = ur3e(place)
-    found = identify(robot, [replace(log, effort=None, effort_meaning=None)], IdentificationOptions(held_out=1.0))
+    found = identify(
+        robot, [replace(log, effort=None, effort_meaning=None)], IdentificationOptions(held_out=1.0)
+    )
     assert found.validation is not None and found.validation.moves == 19
-    fitted, own, constant = found.validation.fitted.power, found.validation.own.power, found.validation.constant
+    fitted, own, constant = (
+        found.validation.fitted.power,
+        found.validation.own.power,
+        found.validation.constant,
+    )
     assert fitted is not None and own is not None and constant is not None
     assert fitted.rmse <= 2.0 and fitted.energy_mean <= 1.3 and fitted.energy_max <= 4.0
     assert fitted.energy_mean < own.energy_mean < constant.energy_mean

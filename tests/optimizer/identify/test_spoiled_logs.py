@@ -1,4 +1,5 @@
-"""Logs that would give wrong figures: each is set right, warned of, or refused with its own cause."""
+"""Logs that would give wrong figures: each is set right, warned of, or refused with its own
+cause."""
 
 from __future__ import annotations
 
@@ -29,25 +30,37 @@ def recording() -> Recording:
 
 def later(recording: Recording, lag: float) -> Recording:
     """The recording with currents that come later than the motion [s]."""
-    current = [np.interp(recording.time - lag, recording.time, channel) for channel in recording.current.T]
+    current = [
+        np.interp(recording.time - lag, recording.time, channel) for channel in recording.current.T
+    ]
     return with_current(recording, np.transpose(current))
 
 
 def table(names: list[str], *columns: Array) -> bytes:
     """A CSV file."""
     rows = np.column_stack(columns).tolist()
-    return "\n".join([",".join(names), *(",".join(f"{cell:.9g}" for cell in row) for row in rows)]).encode()
+    return "\n".join(
+        [",".join(names), *(",".join(f"{cell:.9g}" for cell in row) for row in rows)]
+    ).encode()
 
 
 @pytest.mark.parametrize("lag", [0.05, -0.1])
 def test_efforts_of_another_clock_are_set_right(recording: Recording, lag: float) -> None:
     reading = read_log(csv_of(later(recording, lag)), ROBOT)
-    (found,) = [match for each in reading.report.warnings if (match := re.search(r"comes (\d+) ms (\w+) than", each))]
-    assert abs(int(found[1]) - 1e3 * abs(lag)) <= 3 and found[2] == ("later" if lag > 0 else "earlier")
+    (found,) = [
+        match
+        for each in reading.report.warnings
+        if (match := re.search(r"comes (\d+) ms (\w+) than", each))
+    ]
+    assert abs(int(found[1]) - 1e3 * abs(lag)) <= 3 and found[2] == (
+        "later" if lag > 0 else "earlier"
+    )
     assert reading.log.effort is not None
     middle = slice(30, -30)
     error = (reading.log.effort - recording.current)[middle].std(axis=0)
-    assert (error < 0.2 * np.diff(recording.current, axis=0).std(axis=0) * abs(lag) * recording.rate).all()
+    assert (
+        error < 0.2 * np.diff(recording.current, axis=0).std(axis=0) * abs(lag) * recording.rate
+    ).all()
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.008])
@@ -60,7 +73,10 @@ def test_efforts_in_time_stay_as_they_are(recording: Recording, lag: float) -> N
 
 def test_times_of_writing_are_not_those_of_the_rows(recording: Recording) -> None:
     random = np.random.default_rng(0)
-    written = recording.time + np.append(0, random.uniform(-0.3, 0.3, len(recording.time) - 1)) / recording.rate
+    written = (
+        recording.time
+        + np.append(0, random.uniform(-0.3, 0.3, len(recording.time) - 1)) / recording.rate
+    )
     reading = read_log(csv_of(recording, time=written, without="va"), ROBOT)
     assert any("times of writing" in each for each in reading.report.warnings)
     np.testing.assert_allclose(reading.log.q, recording.q, atol=1e-7)
@@ -82,9 +98,12 @@ def test_spikes_are_no_lag_and_are_warned_of(recording: Recording) -> None:
 
 
 @pytest.mark.parametrize(
-    ("factor", "words"), [(180 / np.pi, "57.3 times"), (-1.0, "-1 times"), (0.0, "are 0, while the positions change")]
+    ("factor", "words"),
+    [(180 / np.pi, "57.3 times"), (-1.0, "-1 times"), (0.0, "are 0, while the positions change")],
 )
-def test_speeds_in_another_unit_or_sign_are_named(recording: Recording, factor: float, words: str) -> None:
+def test_speeds_in_another_unit_or_sign_are_named(
+    recording: Recording, factor: float, words: str
+) -> None:
     with pytest.raises(InvalidTable, match=words) as caught:
         read_log(csv_of(replace(recording, v=recording.v * factor)), ROBOT)
     assert caught.value.column == "v1"
@@ -107,7 +126,11 @@ def test_joints_go_by_their_names_in_whatever_order_they_are(recording: Recordin
     parts = [each[:, order] for each in (recording.q, recording.v, recording.current)]
     straight = read_log(csv_of(recording, "ros"), ROBOT).log
     words = ("position", "velocity", "effort")
-    for time, pattern in (("__time", "/joint_states/{}/{}"), ("time", "{}_{}"), ("%time", "field.{1}.{0}")):
+    for time, pattern in (
+        ("__time", "/joint_states/{}/{}"),
+        ("time", "{}_{}"),
+        ("%time", "field.{1}.{0}"),
+    ):
         header = [time, *(pattern.format(joint, word) for word in words for joint in joints)]
         reading = read_log(table(header, recording.time, *parts), ROBOT)
         np.testing.assert_allclose(reading.log.q, straight.q, atol=1e-8)
@@ -117,10 +140,14 @@ def test_joints_go_by_their_names_in_whatever_order_they_are(recording: Recordin
     header = ["time", *(f"{word}{k}" for word in words for k in range(6))]
     lines = table(header, recording.time, *parts).decode().splitlines()
     names = [",".join(f"name{k}" for k in range(6)), *[",".join(joints)] * (len(lines) - 1)]
-    log = read_log("\n".join(f"{line},{name}" for line, name in zip(lines, names, strict=True)).encode(), ROBOT).log
+    log = read_log(
+        "\n".join(f"{line},{name}" for line, name in zip(lines, names, strict=True)).encode(), ROBOT
+    ).log
     np.testing.assert_allclose(log.q, straight.q, atol=1e-8)
     np.testing.assert_allclose(log.v, straight.v, atol=1e-6)
-    lost = table(["time", *(f"{joint}_position" for joint in joints[1:])], recording.time, parts[0][:, 1:])
+    lost = table(
+        ["time", *(f"{joint}_position" for joint in joints[1:])], recording.time, parts[0][:, 1:]
+    )
     with pytest.raises(InvalidTable, match=f"no column `position` of {joints[0]}"):
         read_log(lost, ROBOT)
 
@@ -128,10 +155,15 @@ def test_joints_go_by_their_names_in_whatever_order_they_are(recording: Recordin
 def test_a_channel_that_is_empty_counts_as_not_logged(recording: Recording) -> None:
     lines = csv_of(recording).decode().splitlines()
     for empty in ("nan", "", "None"):
-        body = "\n".join([lines[0], *(line.rpartition(",")[0] + "," + empty for line in lines[1:])]).encode()
+        body = "\n".join(
+            [lines[0], *(line.rpartition(",")[0] + "," + empty for line in lines[1:])]
+        ).encode()
         reading = read_log(body, ROBOT)
         assert reading.log.power is None
-        assert "The columns of power are empty in the first row, and are not read." in reading.report.warnings
+        assert (
+            "The columns of power are empty in the first row, and are not read."
+            in reading.report.warnings
+        )
     # one that ends is an error, as it was
     body = "\n".join([*lines[:-1], lines[-1].rpartition(",")[0] + ",nan"]).encode()
     with pytest.raises(InvalidTable, match="p in line"):
@@ -145,4 +177,7 @@ def test_a_log_of_rest_is_not_excited(recording: Recording) -> None:
     log = read_log(b"\n".join(lines), ROBOT, LogOptions(effort="current")).log
     with pytest.raises(NotExcited) as caught:
         identify(ROBOT, [log])
-    assert "coulomb" in caught.value.parameters and caught.value.advice["parameters"] == ["rotor", "friction"]
+    assert "coulomb" in caught.value.parameters and caught.value.advice["parameters"] == [
+        "rotor",
+        "friction",
+    ]

@@ -1,4 +1,6 @@
-"""How well figures and energies are known: the formulas on numbers with known errors, and simulated arms."""
+"""How well figures and energies are known: the formulas on numbers with known errors, and simulated
+arms.
+"""
 
 from __future__ import annotations
 
@@ -18,12 +20,16 @@ GROUPS, SIZE = 12, 30
 
 
 def _estimates(seed: int) -> tuple[Array, Array, Array]:
-    """The error (3,) of an estimate with a prior; its covariances (3, 3) by adjusted residuals and by leaving out."""
+    """The error (3,) of an estimate with a prior; its covariances (3, 3) by adjusted residuals and
+    by leaving out.
+    """
     random = np.random.default_rng(seed)
     group = np.repeat(np.arange(GROUPS), SIZE)
     # one group alone tells the third parameter well: without it, the prior is what is left
     size = np.where(np.arange(GROUPS) == 0, 1.0, 0.02)[group]
-    columns = random.normal(size=(len(group), 3)) * np.column_stack([np.ones((len(group), 2)), size])
+    columns = random.normal(size=(len(group), 3)) * np.column_stack(
+        [np.ones((len(group), 2)), size]
+    )
     prior, true = np.eye(3), random.normal(size=3)
     shared = random.normal(size=GROUPS)[group]
     values = columns @ true + shared + random.normal(size=len(group))
@@ -40,7 +46,9 @@ def _estimates(seed: int) -> tuple[Array, Array, Array]:
 
 
 def test_adjusted_residuals_tell_the_error_where_leaving_a_group_out_says_too_much() -> None:
-    errors, by_residuals, by_leaving_out = (np.array(each) for each in zip(*map(_estimates, range(400)), strict=True))
+    errors, by_residuals, by_leaving_out = (
+        np.array(each) for each in zip(*map(_estimates, range(400)), strict=True)
+    )
     true = (errors**2).mean(axis=0)
 
     def ratio(covariances: Array) -> Array:
@@ -70,7 +78,9 @@ def test_what_figures_do_not_explain_of_moves_is_found_among_errors_of_all_sizes
 def test_energies_lie_in_their_interval_as_often_as_it_says(channels: str, effect: float) -> None:
     robot, shares = load_robot("ur10e"), list[float]()
     for seed in range(40):
-        log = off_the_model(recorded(robot, truth_of(robot, seed), moves=14, seed=seed).log(), effect, seed)
+        log = off_the_model(
+            recorded(robot, truth_of(robot, seed), moves=14, seed=seed).log(), effect, seed
+        )
         seen = replace(log, effort=None, effort_meaning=None) if channels == "power alone" else log
         validation = identify(robot, [seen]).validation
         assert validation is not None and validation.coverage is not None

@@ -54,12 +54,15 @@ def test_a_log_without_temperatures_says_so() -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_known_figure_takes_the_advised_share_of_the_variance_away(seed: int) -> None:
-    """From power alone, where errors of figures make up for each other: their own terms are beyond the whole."""
+    """From power alone, where errors of figures make up for each other: their own terms are beyond
+    the whole.
+    """
     log = recorded(ROBOT, truth_of(ROBOT, seed), moves=8, seed=seed).log()
     fitted = identify(ROBOT, [replace(log, effort=None, effort_meaning=None)], OPTIONS)
     advice, estimate = fitted.advice, fitted.fitted.estimate
     assert advice is not None and 0 < advice.share <= 1.0
-    # the variance of the energy by the arms of the covariance's own errors, before and after the figure is known
+    # the variance of the energy by the arms of the covariance's own errors, before and after the
+    # figure is known
     rows = rows_of(ROBOT, [replace(log, effort=None, effort_meaning=None)])
     gradient = np.array([advice_slope(fitted.fitted.arm, rows, *name) for name in estimate.names])
     at, covariance = estimate.names.index((advice.figure, advice.joint)), estimate.covariance

@@ -15,10 +15,12 @@ MODEL, DATA = ROBOT.model, ROBOT.model.createData()
 FLANGE = MODEL.getFrameId("flange")
 LIMITS = ROBOT.limits
 
-# what the product promises of an answer's forward kinematics [m, rad] and of a configuration found again [rad]
+# what the product promises of an answer's forward kinematics [m, rad] and of a configuration found
+# again [rad]
 ACCURACY = 1e-9
 FOUND = 1e-6
-# of double precision, and of the part of an angle that a limit may cut off an answer on it [m, turns]
+# of double precision, and of the part of an angle that a limit may cut off an answer on it [m,
+# turns]
 ROUNDING = 1e-10
 
 EVERYDAY = np.array([0.3, -1.6, 1.9, -1.8, -1.5, 0.2])

@@ -1,4 +1,6 @@
-"""Six-joint arms of other forms than Universal Robots', and what their inverse kinematics finds of a configuration."""
+"""Six-joint arms of other forms than Universal Robots', and what their inverse kinematics finds of
+a configuration.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +15,17 @@ from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.ik_solutions import PrincipalSolution
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 
-# m and rad: what an answer may miss its pose by, and a configuration itself; and what two of them differ by at least
+# m and rad: what an answer may miss its pose by, and a configuration itself; and what two of them
+# differ by at least
 ACCURACY, FOUND, SAME = 1e-9, 1e-6, 1e-6
 KUKA, UR5E = load_robot("kr10_r1100"), load_robot("ur5e")
 
 
 @dataclass(frozen=True)
 class Solved:
-    """The branches of the pose of a configuration, their worst error [m, rad], and how far they are from it [rad]."""
+    """The branches of the pose of a configuration, their worst error [m, rad], and how far they are
+    from it [rad].
+    """
 
     branches: list[PrincipalSolution]
     error: float
@@ -36,7 +41,9 @@ def flange(robot: Robot, q: Array) -> Array:
 
 
 def solved(robot: Robot, q: Array) -> Solved:
-    """What the inverse kinematics finds of the pose of q (6,); a self-motion counts as all its members."""
+    """What the inverse kinematics finds of the pose of q (6,); a self-motion counts as all its
+    members.
+    """
     T = pin.SE3(flange(robot, q))
     branches = required_inverse_kinematics(robot, "goal").branches(T.homogeneous)
     errors = [pin.log6(T.actInv(pin.SE3(flange(robot, each.q)))).vector for each in branches]
@@ -45,7 +52,10 @@ def solved(robot: Robot, q: Array) -> Solved:
     apart = np.abs(wrapped(isolated[:, None] - isolated)).max(axis=2) + np.eye(len(isolated))
     return Solved(
         branches,
-        max((max(np.linalg.norm(each[:3]), np.linalg.norm(each[3:])) for each in errors), default=0.0),
+        max(
+            (max(np.linalg.norm(each[:3]), np.linalg.norm(each[3:])) for each in errors),
+            default=0.0,
+        ),
         min((float(np.abs(wrapped(each - q)).max()) for each in members), default=np.inf),
         bool((apart < SAME).any()),
     )
@@ -59,11 +69,15 @@ def _member(branch: PrincipalSolution, q: Array) -> Array:
 
 def inside(robot: Robot, rng: np.random.Generator) -> Array:
     """A random configuration (6,) within the limits and one turn."""
-    return rng.uniform(np.maximum(robot.limits.q_min, -np.pi), np.minimum(robot.limits.q_max, np.pi))
+    return rng.uniform(
+        np.maximum(robot.limits.q_min, -np.pi), np.minimum(robot.limits.q_max, np.pi)
+    )
 
 
 def calibrated(robot: Robot, off: float, seed: int = 0) -> Robot:
-    """The robot with each joint's frame off by up to so many metres and radians along and about each axis."""
+    """The robot with each joint's frame off by up to so many metres and radians along and about
+    each axis.
+    """
     rng, model = np.random.default_rng(seed), robot.model.copy()
     for j in range(1, 7):
         M = model.jointPlacements[j]

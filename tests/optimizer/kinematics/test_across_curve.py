@@ -1,16 +1,26 @@
-"""Newton's method across a curve of configurations, with the second order of the motion, against forward kinematics."""
+"""Newton's method across a curve of configurations, with the second order of the motion, against
+forward kinematics.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.kinematics.across_curve import LEFT, MANY, led, onto, second_order, step_across
+from joulepath.optimizer.kinematics.across_curve import (
+    LEFT,
+    MANY,
+    led,
+    onto,
+    second_order,
+    step_across,
+)
 from joulepath.optimizer.kinematics.chain import Chain, miss, pose_error
 from tests.optimizer.chains import serial_chain
 
 CHAINS = [Chain.of(load_robot("gen3").model), Chain.of(serial_chain(7).model)]
-# steps [rad], and what they leave over their cube [m/rad³]: a length of the arm, times the joints that turn it
+# steps [rad], and what they leave over their cube [m/rad³]: a length of the arm, times the joints
+# that turn it
 STEPS, THIRD_ORDER = (3e-2, 3e-3, 3e-4), 40.0
 # error [m, rad] of what is on the curve: each of seven joints may be off by some LEFT
 EXACT = 10 * LEFT
@@ -26,7 +36,11 @@ def test_what_two_orders_leave_goes_with_the_cube_of_the_step() -> None:
         for step in STEPS:
             move = step * rng.uniform(-1.0, 1.0, q.shape)
             twist = pose_error(T, chain.flange(q + move))
-            left = twist - (jacobian @ move[:, :, None])[:, :, 0] - second_order(jacobian.transpose(1, 2, 0), move.T).T
+            left = (
+                twist
+                - (jacobian @ move[:, :, None])[:, :, 0]
+                - second_order(jacobian.transpose(1, 2, 0), move.T).T
+            )
             assert np.abs(left).max() < THIRD_ORDER * step**3
 
 
@@ -50,7 +64,9 @@ def test_many_points_take_the_steps_that_few_do() -> None:
         q = rng.uniform(-2.0, 2.0, (MANY + 10, 7))
         T, along = chain.flange(q[:1])[0], rng.normal(size=q.shape)
         move, tangent = step_across(chain, q, along, T)
-        parts = [step_across(chain, q[k : k + 20], along[k : k + 20], T) for k in range(0, len(q), 20)]
+        parts = [
+            step_across(chain, q[k : k + 20], along[k : k + 20], T) for k in range(0, len(q), 20)
+        ]
         few, tangents = (np.concatenate(each) for each in zip(*parts, strict=True))
         assert np.abs(move - few).max() < ROUNDING * np.abs(few).max()
         unit, other = (each / np.linalg.norm(each, axis=1)[:, None] for each in (tangent, tangents))

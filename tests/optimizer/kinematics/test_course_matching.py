@@ -1,4 +1,6 @@
-"""Points of a course that a motion is compared with: looked for all at once, they are those found one by one."""
+"""Points of a course that a motion is compared with: looked for all at once, they are those found
+one by one.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,12 @@ def _courses(rng: np.random.Generator) -> list[Array]:
     t = np.linspace(0.0, 1.0, 200)
     line = np.stack([0.4 * t, 0 * t, 0 * t], axis=1)
     knot = 0.2 * np.stack([np.sin(4 * np.pi * t), np.sin(6 * np.pi * t), 0 * t], axis=1)
-    return [line, np.concatenate([line, line[::-1] + 1e-5]), knot, np.cumsum(rng.normal(0.0, 1e-3, (200, 6)), axis=0)]
+    return [
+        line,
+        np.concatenate([line, line[::-1] + 1e-5]),
+        knot,
+        np.cumsum(rng.normal(0.0, 1e-3, (200, 6)), axis=0),
+    ]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -24,7 +31,11 @@ def test_all_at_once_are_those_one_by_one(seed: int, monkeypatch: pytest.MonkeyP
     rng = np.random.default_rng(seed)
     for known in _courses(rng):
         at, share = np.linspace(0.0, 1.0, len(known)), np.sort(rng.random(80))
-        for shares in (share, np.concatenate([share[:40], share[40::-1]]), np.clip(share, 0.3, 0.6)):
+        for shares in (
+            share,
+            np.concatenate([share[:40], share[40::-1]]),
+            np.clip(share, 0.3, 0.6),
+        ):
             asked = np.stack([np.interp(shares, at, each) for each in known.T], axis=1)
             asked += rng.normal(0.0, rng.choice([0.0, 1e-5, 1e-2]), asked.shape)
             at_once = matched(at, known, asked, 5e-4)

@@ -1,4 +1,6 @@
-"""Boxes around all that reaches a pose, of arms with seven joints that are nearly of a form with known curves."""
+"""Boxes around all that reaches a pose, of arms with seven joints that are nearly of a form with
+known curves.
+"""
 
 from __future__ import annotations
 
@@ -57,7 +59,9 @@ def holding(sheets: list[CoveringSheet], q: Array, half: float, shift: float) ->
         for low, high in sheet.arcs:
             own = float(nearest_turn(np.asarray(u), np.asarray((low + high) / 2)))
             if low - ROUNDING <= own <= high + ROUNDING:
-                centre, sides = boxes_on([sheet], np.array([0]), np.array([own + shift * half]), np.array([half]))
+                centre, sides = boxes_on(
+                    [sheet], np.array([0]), np.array([own + shift * half]), np.array([half])
+                )
                 if (np.abs(wrapped(q - centre[0])) <= sides[0] + ROUNDING).all():
                     found.append(float(sides.max()))
     return found
@@ -80,7 +84,9 @@ def test_every_configuration_is_in_a_box_of_its_pose(robot: Robot, count: int) -
 
 
 def test_the_deviation_is_reached_and_not_exceeded() -> None:
-    """The flange of the arm nearby, against that of the Gen3: as far from it as is said, and no farther."""
+    """The flange of the arm nearby, against that of the Gen3: as far from it as is said, and no
+    farther.
+    """
     robot = ROBOTS["gen3"]
     chain, rng = Chain.of(robot.model), np.random.default_rng(8)
     sheets = covering_sheets(robot, chain.flange(np.zeros((1, 7)))[0])

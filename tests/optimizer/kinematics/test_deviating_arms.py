@@ -1,4 +1,6 @@
-"""Arms whose axes meet, or are parallel, but for little: calibrated arms and descriptions with rounded angles."""
+"""Arms whose axes meet, or are parallel, but for little: calibrated arms and descriptions with
+rounded angles.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,15 @@ from joulepath.optimizer.exceptions import SingularPose
 from joulepath.optimizer.kinematics.decomposition import DecomposedArm
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.ur_closed_form import URClosedForm
-from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, KUKA, UR5E, calibrated, inside, solved
+from tests.optimizer.kinematics.six_joints import (
+    ACCURACY,
+    FOUND,
+    KUKA,
+    UR5E,
+    calibrated,
+    inside,
+    solved,
+)
 from tests.selection import long_but
 
 # m and rad, of each joint's frame: that of a factory calibration
@@ -25,8 +35,12 @@ OFF = 1e-4
 def test_every_configuration_of_a_calibrated_arm_is_found(robot: Robot, count: int) -> None:
     arm, nominal = calibrated(robot, OFF), required_inverse_kinematics(robot, "goal")
     inverse, rng = required_inverse_kinematics(arm, "goal"), np.random.default_rng(21)
-    assert URClosedForm.of(arm.model) is None and isinstance(DecomposedArm.of(arm.model), DecomposedArm)
-    assert not inverse.complete, "next to a singularity it may have branches that the simplest arm has not"
+    assert URClosedForm.of(arm.model) is None and isinstance(
+        DecomposedArm.of(arm.model), DecomposedArm
+    )
+    assert not inverse.complete, (
+        "next to a singularity it may have branches that the simplest arm has not"
+    )
     for _ in range(count):
         q = inside(arm, rng)
         found = solved(arm, q)
@@ -51,7 +65,9 @@ def test_rounded_angles_are_no_hindrance() -> None:
 
 @pytest.mark.parametrize("off", [0.0, 1e-4, 1e-3])
 def test_a_calibrated_wrist_has_no_self_motion_but_single_configurations(off: float) -> None:
-    """Where the nominal wrist is aligned: they are somewhere along the curve on which it would turn."""
+    """Where the nominal wrist is aligned: they are somewhere along the curve on which it would
+    turn.
+    """
     arm, rng = calibrated(KUKA, OFF), np.random.default_rng(23)
     for _ in range(4):
         q = inside(arm, rng)
@@ -62,10 +78,14 @@ def test_a_calibrated_wrist_has_no_self_motion_but_single_configurations(off: fl
 
 
 def skewed() -> Robot:
-    """A spherical wrist on a base whose second axis is not at right angles to the first: its branches have no names."""
+    """A spherical wrist on a base whose second axis is not at right angles to the first: its
+    branches have no names.
+    """
     model = KUKA.model.copy()
     M = model.jointPlacements[2]
-    model.jointPlacements[2] = pin.SE3(M.rotation @ pin.rpy.rpyToMatrix(0.3, 0.2, 0.0), M.translation)
+    model.jointPlacements[2] = pin.SE3(
+        M.rotation @ pin.rpy.rpyToMatrix(0.3, 0.2, 0.0), M.translation
+    )
     return replace(KUKA, model=model)
 
 
@@ -77,7 +97,9 @@ def test_branches_without_names_are_numbered() -> None:
         q = inside(arm, rng)
         found = solved(arm, q)
         assert found.away < FOUND and found.error < ACCURACY and not found.twice
-        assert [str(each.label) for each in found.branches] == [f"branch {k + 1}" for k in range(len(found.branches))]
+        assert [str(each.label) for each in found.branches] == [
+            f"branch {k + 1}" for k in range(len(found.branches))
+        ]
         own = min(found.branches, key=lambda each: np.abs(np.sin((each.q - q) / 2)).max())
         assert inverse.label(q) == own.label
 

@@ -1,4 +1,6 @@
-"""Polynomials of waves, at whose zeros the self-motions of seven-joint arms may end: against their values."""
+"""Polynomials of waves, at whose zeros the self-motions of seven-joint arms may end: against their
+values.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,8 @@ from joulepath.optimizer.kinematics.redundant_pose import Polynomial, _angles, _
 
 
 def test_polynomials_are_what_they_say() -> None:
-    """Products and sums of waves against their values, and the angles at which a product is zero."""
+    """Products and sums of waves against their values, and the angles at which a product is
+    zero."""
     rng = np.random.default_rng(75)
     q = rng.uniform(-np.pi, np.pi, 9)
 
@@ -21,7 +24,10 @@ def test_polynomials_are_what_they_say() -> None:
     one, two, three = _wave(a[0], a[1], a[2]), _wave(*b), _wave(*c)
     assert np.abs(value(one, q) - (a[0] + a[1] * np.cos(q) + a[2] * np.sin(q))).max() < 1e-14
     product = _product(_product(one, two), _product(three, three))
-    assert np.abs(value(product, q) - value(one, q) * value(two, q) * value(three, q) ** 2).max() < 1e-12
+    assert (
+        np.abs(value(product, q) - value(one, q) * value(two, q) * value(three, q) ** 2).max()
+        < 1e-12
+    )
     total = _sum((2.0, one), (-0.5, product))
     assert np.abs(value(total, q) - 2 * value(one, q) + value(product, q) / 2).max() < 1e-12
     # cos(q - middle) - cos(half) is zero at both ends

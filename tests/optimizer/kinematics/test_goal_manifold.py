@@ -1,4 +1,5 @@
-"""Configurations that reach a pose of free orientation: put on their manifold, and moved over it."""
+"""Configurations that reach a pose of free orientation: put on their manifold, and moved over
+it."""
 
 from __future__ import annotations
 
@@ -27,7 +28,9 @@ ROBOTS = ("panda", "xarm7", "gen3", "ur5e")
 
 
 def poses(arm: Arm, q: Array) -> list[ConeOrientedPose]:
-    """Poses that q (nq,) reaches: turned about an axis, within a cone, on the edge of one, of any orientation."""
+    """Poses that q (nq,) reaches: turned about an axis, within a cone, on the edge of one, of any
+    orientation.
+    """
     T, axis = tcp_pose(arm, q), np.array([0.3, -0.2, 1.0])
     pointing = T[:3, :3] @ axis / np.linalg.norm(axis)
     across = np.cross(pointing, [1.0, 0.0, 0.0])
@@ -41,7 +44,9 @@ def poses(arm: Arm, q: Array) -> list[ConeOrientedPose]:
 
 
 def misses(arm: Arm, pose: ConeOrientedPose, q: Array) -> Array:
-    """By how much [m, rad] configurations (n, nq) miss a pose: by the forward kinematics and the arc cosine."""
+    """By how much [m, rad] configurations (n, nq) miss a pose: by the forward kinematics and the
+    arc cosine.
+    """
     T = tcp_pose(arm, q)
     cosine = np.einsum("nij,j,i->n", T[:, :3, :3], pose.axis, pose.direction)
     sine = np.linalg.norm(np.cross(T[:, :3, :3] @ pose.axis, pose.direction), axis=1)
@@ -78,7 +83,10 @@ def test_what_is_said_to_reach_the_pose_does_within_the_limits(name: str) -> Non
     for pose in poses(arm, inner(arm, rng)):
         manifold = GoalManifold.of(arm, pose)
         to = inner(arm, rng)
-        for found, reached in (manifold.put(anywhere), manifold.nearest(anywhere, np.tile(to, (40, 1)), weights)):
+        for found, reached in (
+            manifold.put(anywhere),
+            manifold.nearest(anywhere, np.tile(to, (40, 1)), weights),
+        ):
             assert np.isfinite(found).all()
             assert (found >= limits.q_min).all() and (found <= limits.q_max).all()
             assert misses(arm, pose, found[reached]).max(initial=0.0) < REACHED
@@ -97,11 +105,15 @@ def test_the_way_is_shortest_around(name: str) -> None:
         assert reached.mean() > MOSTLY
         for q in came[reached]:
             beside, held = manifold.put(q + rng.normal(scale=0.02, size=(40, len(q))))
-            assert np.abs(q - to) @ weights <= (np.abs(beside[held] - to) @ weights).min() * (1 + FLAT)
+            assert np.abs(q - to) @ weights <= (np.abs(beside[held] - to) @ weights).min() * (
+                1 + FLAT
+            )
 
 
 def test_a_joint_that_may_not_go_on_leaves_the_way_to_the_others() -> None:
-    """A range that ends halfway on a joint's way: it stays on its limit, and the others still come nearer."""
+    """A range that ends halfway on a joint's way: it stays on its limit, and the others still come
+    nearer.
+    """
     arm, weights = Arm(robot=load_robot("panda")), np.ones(7)
     q = np.array([0.2, 0.3, -0.1, -1.8, 0.2, 1.9, 0.4])
     pose, to = poses(arm, q)[0], q + np.array([0.6, 0.2, 0.4, -0.2, 0.5, 0.0, -0.5])
@@ -112,6 +124,10 @@ def test_a_joint_that_may_not_go_on_leaves_the_way_to_the_others() -> None:
     ends[side][joint] = (q[joint] + free[0, joint]) / 2
     narrow = replace(arm, limits=replace(arm.active_limits, **ends))
     found, held = GoalManifold.of(narrow, pose).nearest(q[None], to[None], weights)
-    assert reached.all() and held.all() and found[0, joint] == pytest.approx(ends[side][joint], abs=REACHED)
+    assert (
+        reached.all()
+        and held.all()
+        and found[0, joint] == pytest.approx(ends[side][joint], abs=REACHED)
+    )
     assert np.abs(free[0] - to).sum() < np.abs(found[0] - to).sum() < np.abs(q - to).sum()
     assert misses(arm, pose, found).max() < REACHED

@@ -1,4 +1,6 @@
-"""Curves of configurations that hold a pose: what is put on them holds it, within the limits, and they bend as told."""
+"""Curves of configurations that hold a pose: what is put on them holds it, within the limits, and
+they bend as told.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ DIFFERENCES = 1e-2
 
 
 def curve_of(name: str, seed: int) -> tuple[HeldPose, Array]:
-    """The curve through a random configuration in the middle of its joint ranges, and this configuration."""
+    """The curve through a random configuration in the middle of its joint ranges, and this
+    configuration.
+    """
     robot = load_robot(name)
     limits, rng = robot.limits, np.random.default_rng(seed)
     q = limits.q_min + rng.uniform(0.3, 0.7, robot.nq) * (limits.q_max - limits.q_min)
@@ -46,7 +50,9 @@ def test_a_joint_that_would_leave_its_range_stays_on_its_limit() -> None:
     tangent = curve.tangent(q)
     joint = int(np.abs(tangent).argmax())
     beyond = q + 0.2 * tangent * np.sign(tangent[joint])
-    narrow = replace(curve, q_max=np.where(np.arange(7) == joint, q + 0.1 * abs(tangent[joint]), curve.q_max))
+    narrow = replace(
+        curve, q_max=np.where(np.arange(7) == joint, q + 0.1 * abs(tangent[joint]), curve.q_max)
+    )
     found = narrow.put(beyond)
     assert found is not None
     assert found[joint] == pytest.approx(narrow.q_max[joint], abs=HELD)

@@ -1,4 +1,6 @@
-"""Inverse kinematics against Pinocchio's forward kinematics, and against solvers that know nothing of branches."""
+"""Inverse kinematics against Pinocchio's forward kinematics, and against solvers that know nothing
+of branches.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for, required_inverse_kinematics
+from joulepath.optimizer.kinematics.inverse import (
+    inverse_kinematics_for,
+    required_inverse_kinematics,
+)
 from tests.optimizer.kinematics.flange import (
     ACCURACY,
     DATA,
@@ -52,9 +57,13 @@ def test_configurations_inside_the_limits(count: int) -> None:
 
         # answers of one label are one configuration and its full turns, no two of them the same ...
         first = {solution.label: solution for solution in reversed(solutions)}
-        turns = (found - np.array([first[solution.label].q for solution in solutions])) / (2 * np.pi)
+        turns = (found - np.array([first[solution.label].q for solution in solutions])) / (
+            2 * np.pi
+        )
         assert np.abs(turns - turns.round()).max() < ROUNDING
-        keys = np.column_stack([[list(first).index(solution.label) for solution in solutions], turns.round()])
+        keys = np.column_stack(
+            [[list(first).index(solution.label) for solution in solutions], turns.round()]
+        )
         assert len(np.unique(keys, axis=0)) == len(solutions)
         # ... and those of two labels are different configurations, each of which reaches the pose
         branches = joints(list(first.values()))
@@ -69,7 +78,8 @@ def test_near_singular_configurations_are_found_to_the_same_accuracy() -> None:
     for _ in range(500):
         q = rng.uniform(LIMITS.q_min, LIMITS.q_max)
         q[rng.choice([2, 4])] = rng.choice([-1, 1]) * 10 ** rng.uniform(-6, -2)
-        # two singularities at once multiply: a pose rounded to double precision then determines the joints no better
+        # two singularities at once multiply: a pose rounded to double precision then determines the
+        # joints no better
         if np.linalg.svd(jacobian(q), compute_uv=False)[-1] < DOUBLE:
             continue
         assert np.abs(joints(IK.solve(forward(q))) - q).max(axis=1).min() < FOUND
@@ -80,7 +90,9 @@ def test_reports_singular_value_and_limit_distance() -> None:
         assert solution.smallest_singular_value == pytest.approx(
             np.linalg.svd(jacobian(solution.q), compute_uv=False)[-1], abs=1e-12
         )
-        assert solution.limit_distance == min((solution.q - LIMITS.q_min).min(), (LIMITS.q_max - solution.q).min())
+        assert solution.limit_distance == min(
+            (solution.q - LIMITS.q_min).min(), (LIMITS.q_max - solution.q).min()
+        )
 
 
 def test_no_solution_is_missing_that_a_numerical_search_finds() -> None:
@@ -93,7 +105,9 @@ def test_no_solution_is_missing_that_a_numerical_search_finds() -> None:
             for _ in range(60):
                 step = pin.log6(pin.SE3(forward(q)).actInv(pin.SE3(T))).vector
                 local = pin.computeFrameJacobian(MODEL, DATA, q, FLANGE, pin.LOCAL)
-                q = q + np.clip(local.T @ np.linalg.solve(local @ local.T + 1e-9 * np.eye(6), step), -0.5, 0.5)
+                q = q + np.clip(
+                    local.T @ np.linalg.solve(local @ local.T + 1e-9 * np.eye(6), step), -0.5, 0.5
+                )
             if max(errors(T, q)) < ACCURACY:
                 converged += 1
                 assert np.abs(np.exp(1j * known) - np.exp(1j * q)).max(axis=1).min() < FOUND
@@ -114,7 +128,9 @@ def test_everyday_posture_has_the_everyday_label() -> None:
 
 
 def test_labels_say_where_the_elbow_and_the_arm_are() -> None:
-    """Of arms that reach well ahead: the elbow's height and the side of the offset, from frames alone."""
+    """Of arms that reach well ahead: the elbow's height and the side of the offset, from frames
+    alone.
+    """
     checked = 0
     for q in np.random.default_rng(3).uniform(-np.pi, np.pi, (500, 6)):
         pin.forwardKinematics(MODEL, DATA, q)
@@ -156,7 +172,8 @@ def test_label_is_constant_along_a_branch(q: Array, direction: Array) -> None:
             if solution.smallest_singular_value < 0.01:
                 continue
             gaps = [np.abs(np.exp(1j * other.q) - np.exp(1j * solution.q)).max() for other in now]
-            # a nearby one that is another branch would have to cross a singularity within a step of 1/60 rad
+            # a nearby one that is another branch would have to cross a singularity within a step of
+            # 1/60 rad
             if min(gaps) < 0.05:
                 assert now[int(np.argmin(gaps))].label == solution.label
 

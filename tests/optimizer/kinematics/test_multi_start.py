@@ -1,4 +1,6 @@
-"""Arms without any closed form: many starts find what there is to find, and say that they may have missed some."""
+"""Arms without any closed form: many starts find what there is to find, and say that they may have
+missed some.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,15 @@ from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.multi_start import MOST_BRANCHES, MultiStart
 from joulepath.optimizer.kinematics.ur_closed_form import URClosedForm
 from tests.optimizer.chains import move, serial_chain
-from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, UR5E, calibrated, flange, inside, solved
+from tests.optimizer.kinematics.six_joints import (
+    ACCURACY,
+    FOUND,
+    UR5E,
+    calibrated,
+    flange,
+    inside,
+    solved,
+)
 from tests.selection import long_but
 
 CHAIN = serial_chain(6)
@@ -35,7 +45,9 @@ def test_the_configuration_is_found(number: int, count: int) -> None:
         found = solved(robot, inside(robot, rng))
         missed += found.away > FOUND
         assert found.error < ACCURACY and not found.twice
-        assert len(found.branches) <= MOST_BRANCHES and len(found.branches) % 2 == 0, "branches come in pairs"
+        assert len(found.branches) <= MOST_BRANCHES and len(found.branches) % 2 == 0, (
+            "branches come in pairs"
+        )
     assert missed <= 0.001 * count
     assert not required_inverse_kinematics(robot, "goal").complete
 
@@ -45,7 +57,9 @@ def test_the_same_pose_has_the_same_answer() -> None:
     once, again = (MultiStart.of(CHAIN.model) for _ in range(2))
     assert once is not None and again is not None
     assert (once.solve(T)[0] == again.solve(T)[0]).all()
-    assert [str(label) for label in once.solve(T)[1]] == [f"branch {k + 1}" for k in range(len(once.solve(T)[0]))]
+    assert [str(label) for label in once.solve(T)[1]] == [
+        f"branch {k + 1}" for k in range(len(once.solve(T)[0]))
+    ]
 
 
 def test_a_label_is_that_of_the_configuration() -> None:

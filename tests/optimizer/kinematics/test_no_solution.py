@@ -1,4 +1,6 @@
-"""Poses out of reach, beyond the limits, or reached by singular configurations alone: each reported as what it is."""
+"""Poses out of reach, beyond the limits, or reached by singular configurations alone: each reported
+as what it is.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,10 @@ from scipy.optimize import minimize
 
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
-from joulepath.optimizer.kinematics.inverse import ClosedFormInverseKinematics, required_inverse_kinematics
+from joulepath.optimizer.kinematics.inverse import (
+    ClosedFormInverseKinematics,
+    required_inverse_kinematics,
+)
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
 from joulepath.optimizer.problem.branches import Label
 from tests.optimizer.kinematics.flange import (
@@ -67,14 +72,18 @@ def test_distance_from_the_first_axis_is_the_shoulders_offset() -> None:
 
 
 def nearest_by_search(T: Array) -> float:
-    """Least distance from T's position among configurations with T's orientation, from many random starts."""
+    """Least distance from T's position among configurations with T's orientation, from many random
+    starts.
+    """
 
     def turn(q: Array) -> Array:
         return np.asarray(pin.log3(T[:3, :3].T @ forward(q)[:3, :3]))
 
     def turn_gradient(q: Array) -> Array:
         R = T[:3, :3].T @ forward(q)[:3, :3]
-        return np.asarray(pin.Jlog3(R) @ pin.computeFrameJacobian(MODEL, DATA, q, FLANGE, pin.LOCAL)[3:])
+        return np.asarray(
+            pin.Jlog3(R) @ pin.computeFrameJacobian(MODEL, DATA, q, FLANGE, pin.LOCAL)[3:]
+        )
 
     def square(q: Array) -> tuple[float, Array]:
         gap = forward(q)[:3, 3] - T[:3, 3]
@@ -83,9 +92,13 @@ def nearest_by_search(T: Array) -> float:
     found = []
     for q in np.random.default_rng(1).uniform(-np.pi, np.pi, (25, 6)):
         answer = minimize(
-            square, q, jac=True, method="SLSQP", constraints={"type": "eq", "fun": turn, "jac": turn_gradient},
+            square,
+            q,
+            jac=True,
+            method="SLSQP",
+            constraints={"type": "eq", "fun": turn, "jac": turn_gradient},
             options={"maxiter": 200, "ftol": 1e-14},
-        )  # fmt: skip
+        )
         if np.linalg.norm(turn(answer.x)) < 1e-7:
             found.append(np.sqrt(answer.fun))
     return float(min(found))
@@ -99,7 +112,8 @@ def test_any_finite_pose_is_answered(far: float) -> None:
 
 
 def test_an_arm_folded_onto_its_own_axis_is_no_isolated_solution() -> None:
-    """Links of equal length put the fourth axis on the second: the arm turns about it, at every q2."""
+    """Links of equal length put the fourth axis on the second: the arm turns about it, at every
+    q2."""
     model = ROBOT.model.copy()
     model.jointPlacements[4].translation = np.array([-0.425, 0.0, 0.1333])
     kinematics = required_inverse_kinematics(replace(ROBOT, model=model), "goal")
@@ -113,7 +127,9 @@ def test_an_arm_folded_onto_its_own_axis_is_no_isolated_solution() -> None:
 
 
 class NothingKnown:
-    """A closed form that finds nothing of a pose within reach, like one that does not know its self-motion."""
+    """A closed form that finds nothing of a pose within reach, like one that does not know its
+    self-motion.
+    """
 
     confirmed = False
 

@@ -7,7 +7,11 @@ import pytest
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.forward import joint_placements
-from joulepath.optimizer.kinematics.path_constraints import PathConstraints, PointSpeedConstraint, ToolConeConstraint
+from joulepath.optimizer.kinematics.path_constraints import (
+    PathConstraints,
+    PointSpeedConstraint,
+    ToolConeConstraint,
+)
 
 ROBOT = load_robot("ur5e")
 PLACEMENTS = joint_placements(ROBOT.model)
@@ -52,7 +56,9 @@ def test_shares_are_what_pinocchio_says(states: tuple[Array, Array]) -> None:
         angle = np.arccos(data.oMi[6].rotation @ AXIS @ DIRECTION)
         speeds = [speed_of(data, 6, point) / 1.5 for point in POINTS]
         elbow = speed_of(data, 2, LIMITS["elbow"].points[0]) / 0.8
-        np.testing.assert_allclose(shares, [angle / 0.7, *speeds, elbow], atol=KINEMATICS_TOLERANCE, rtol=1e-9)
+        np.testing.assert_allclose(
+            shares, [angle / 0.7, *speeds, elbow], atol=KINEMATICS_TOLERANCE, rtol=1e-9
+        )
 
 
 def speed_of(data: pin.Data, joint: int, point: Array) -> float:
@@ -62,7 +68,9 @@ def speed_of(data: pin.Data, joint: int, point: Array) -> float:
 
 
 def test_a_tool_along_the_cones_axis_uses_nothing_of_it() -> None:
-    path = PathConstraints(PLACEMENTS, [ToolConeConstraint(np.array([0.0, 0, 1]), np.array([0.0, 0, -1]), 0.1)])
+    path = PathConstraints(
+        PLACEMENTS, [ToolConeConstraint(np.array([0.0, 0, 1]), np.array([0.0, 0, -1]), 0.1)]
+    )
     q = np.array([[0.0, -np.pi / 2, np.pi / 2, -np.pi / 2, -np.pi / 2, 0.0]])
     found = path.linearised(q, np.zeros((1, 6)))
     # the sum of rounding of six turns

@@ -1,4 +1,5 @@
-"""Configurations along a path of the TCP until the deadline: what was found before it is not lost."""
+"""Configurations along a path of the TCP until the deadline: what was found before it is not
+lost."""
 
 from __future__ import annotations
 
@@ -29,7 +30,10 @@ def followed(seconds: float) -> list[PathPoint]:
 def test_what_was_found_before_the_deadline_is_kept() -> None:
     whole, cut = followed(1000.0), followed(5.0)
     assert [point.reason for point in whole] == [None, None, "unreachable", *7 * [None]]
-    assert [point.reason for point in cut] == [*[point.reason for point in whole[:5]], *5 * ["deadline"]]
+    assert [point.reason for point in cut] == [
+        *[point.reason for point in whole[:5]],
+        *5 * ["deadline"],
+    ]
     for one, other in zip(whole[:5], cut[:5], strict=True):
         np.testing.assert_array_equal(one.q, other.q)
     for wanted, point in zip(LINE[5:], cut[5:], strict=True):

@@ -34,7 +34,9 @@ ARMS: dict[str, Arm] = {
 }
 
 
-def reached(rng: np.random.Generator, arm: Arm, half_angle: float) -> tuple[Array, ConeOrientedPose]:
+def reached(
+    rng: np.random.Generator, arm: Arm, half_angle: float
+) -> tuple[Array, ConeOrientedPose]:
     """A configuration, and a pose that it reaches: often right at the edge of its cone."""
     q = rng.uniform(-np.pi, np.pi, arm.robot.nq)
     q[rng.random(len(q)) < 0.2] = 0.0  # stretched and aligned, as singular ones are
@@ -50,7 +52,9 @@ def boxes_around(rng: np.random.Generator, q: Array, count: int) -> tuple[Array,
     """Random boxes that hold q, from narrow ones to the whole range: some with q in a corner."""
     half = np.minimum(10 ** rng.uniform(-4, 0.6, (count, len(q))), np.pi)
     within = np.where(
-        rng.random(half.shape) < 0.2, np.sign(rng.normal(size=half.shape)), rng.uniform(-1, 1, half.shape)
+        rng.random(half.shape) < 0.2,
+        np.sign(rng.normal(size=half.shape)),
+        rng.uniform(-1, 1, half.shape),
     )
     return q + half * within, half
 
@@ -71,7 +75,9 @@ def wrist_boxes(arm: Arm, pose: ConeOrientedPose) -> WristBoxes:
 @pytest.mark.parametrize("kind", [PoseBoxes, wrist_boxes])
 @pytest.mark.parametrize("half_angle", [0.0, 0.02, 0.3, 1.6, np.pi])
 @pytest.mark.parametrize("name", ARMS)
-def test_what_reaches_the_pose_stays_in_its_box(name: str, half_angle: float, kind: Any, count: int) -> None:
+def test_what_reaches_the_pose_stays_in_its_box(
+    name: str, half_angle: float, kind: Any, count: int
+) -> None:
     rng = np.random.default_rng(7)
     for _ in range(count):
         q, pose = reached(rng, ARMS[name], half_angle)
@@ -87,7 +93,9 @@ def test_what_reaches_the_pose_stays_in_its_box(name: str, half_angle: float, ki
 
 
 def test_small_boxes_shrink_onto_what_reaches_the_pose() -> None:
-    """About an axis through the TCP one angle is free: with it known, narrowing determines the other joints."""
+    """About an axis through the TCP one angle is free: with it known, narrowing determines the
+    other joints.
+    """
     rng, arm = np.random.default_rng(3), Arm(robot=ROBOT)
     q = HOME + rng.uniform(-0.3, 0.3, 6)
     T = tcp_pose(arm, q)
@@ -107,14 +115,18 @@ def test_boxes_that_cannot_reach_the_pose_are_empty() -> None:
     geometry = WristGeometry.of(arm)
     assert geometry is not None
     assert (
-        not WristBoxes(geometry, pose).narrowed(GOAL[None], np.append(np.full(3, 0.01), np.full(3, 0.3))[None])[2].any()
+        not WristBoxes(geometry, pose)
+        .narrowed(GOAL[None], np.append(np.full(3, 0.01), np.full(3, 0.3))[None])[2]
+        .any()
     )
 
 
 @pytest.mark.parametrize("name", ARMS)
 def test_no_configuration_in_a_box_has_less_potential_energy(name: str) -> None:
     rng, arm = np.random.default_rng(5), ARMS[name]
-    made = PreparedProblem.of(replace(problem(), arm=arm, start=np.zeros(arm.robot.nq), goal=np.ones(arm.robot.nq)))
+    made = PreparedProblem.of(
+        replace(problem(), arm=arm, start=np.zeros(arm.robot.nq), goal=np.ones(arm.robot.nq))
+    )
     boxes = PoseBoxes(arm, ConeOrientedPose(np.array([0.4, 0.1, 0.3])))
     assert rigid_body_model(arm).nq == arm.robot.nq
     centre = rng.uniform(-np.pi, np.pi, (40, arm.robot.nq))

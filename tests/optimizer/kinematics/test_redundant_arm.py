@@ -1,4 +1,6 @@
-"""Arms of seven joints with a spherical shoulder: curves of configurations, against Pinocchio and Newton's method."""
+"""Arms of seven joints with a spherical shoulder: curves of configurations, against Pinocchio and
+Newton's method.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +25,8 @@ from tests.selection import long_but
 ACCURACY, FOUND = 1e-9, 1e-6
 # the same of a configuration found by Newton's method, which stops at 1e-11
 FOUND_BY_NEWTON = 1e-5
-# rad²: a pose rounded to double precision leaves angles next to a singularity open by this over the distance from it;
-# more where the elbow is nearly folded, too: the xArm's may be
+# rad²: a pose rounded to double precision leaves angles next to a singularity open by this over the
+# distance from it; more where the elbow is nearly folded, too: the xArm's may be
 ROUNDED = {"panda": 1e-14, "iiwa14": 1e-14, "xarm7": 3e-14}
 # how much farther a member that counts as nearest may be
 ROUGHLY = 1.5
@@ -32,10 +34,18 @@ ROUGHLY = 1.5
 BEYOND = 0.15
 # relative
 SAME = 1e-6
-# configurations [rad] of an iiwa14 on curves of which only the ends, which others have, and the middle were once looked
-# at, and the middle is outside the limits
+# configurations [rad] of an iiwa14 on curves of which only the ends, which others have, and the
+# middle were once looked at, and the middle is outside the limits
 OUTSIDE_IN_THE_MIDDLE = (
-    [0.622008753913, 1.773831814219, 2.365978576939, -0.918253011653, -1.213216563581, -1.805610968930, 0.170567686219],
+    [
+        0.622008753913,
+        1.773831814219,
+        2.365978576939,
+        -0.918253011653,
+        -1.213216563581,
+        -1.805610968930,
+        0.170567686219,
+    ],
     [
         -2.693120771898,
         -0.108022916652,
@@ -49,7 +59,15 @@ OUTSIDE_IN_THE_MIDDLE = (
 # configurations [rad] next to a singularity, the first stretched but for 5.7e-6; and how far [rad]
 # they are from the nearest curve at most
 MISSED = {
-    "iiwa14": [0.176878052873, 1.549884477646, 1.813836506031, 5.7100475841e-06, -1.585568033, -2.064212006, -1.45936],
+    "iiwa14": [
+        0.176878052873,
+        1.549884477646,
+        1.813836506031,
+        5.7100475841e-06,
+        -1.585568033,
+        -2.064212006,
+        -1.45936,
+    ],
     "xarm7": [
         1.869737766969,
         1.645766846285,
@@ -88,7 +106,8 @@ def configurations(robot: Robot, count: int, seed: int = 41) -> Array:
 def away(curves: Sequence[RedundantCurve | FreeTurn], q: Array) -> float:
     """How far [rad] q (7,) is from the nearest of the curves."""
     return min(
-        float(np.abs(wrapped(each.at(np.array([each.parameter(q)]))[0] - q)).max(initial=0.0)) for each in curves
+        float(np.abs(wrapped(each.at(np.array([each.parameter(q)]))[0] - q)).max(initial=0.0))
+        for each in curves
     )
 
 
@@ -97,7 +116,9 @@ def parameters(curve: RedundantCurve, count: int, rng: np.random.Generator) -> A
 
 
 @pytest.mark.parametrize("count", long_but((30,), (30, 10_000)))
-def test_every_configuration_is_on_a_curve_of_its_pose(robot: Robot, arm: RedundantArm, count: int) -> None:
+def test_every_configuration_is_on_a_curve_of_its_pose(
+    robot: Robot, arm: RedundantArm, count: int
+) -> None:
     for q in configurations(robot, count):
         curves = arm.self_motions(forward(robot, q), robot.limits)
         assert away(curves, q) < FOUND
@@ -115,7 +136,9 @@ def test_every_member_reaches_the_pose(robot: Robot, arm: RedundantArm) -> None:
 
 
 def newton(robot: Robot, T: Array, q: Array) -> Array | None:
-    """A configuration that reaches T, from q by damped Newton steps of Pinocchio's Jacobian; None if none is found."""
+    """A configuration that reaches T, from q by damped Newton steps of Pinocchio's Jacobian; None
+    if none is found.
+    """
     model, data = robot.model, robot.model.createData()
     frame, goal = model.getFrameId("flange"), pin.SE3(T)
     for _ in range(60):
@@ -125,7 +148,9 @@ def newton(robot: Robot, T: Array, q: Array) -> Array | None:
         error = pin.log6(data.oMf[frame].actInv(goal)).vector
         if np.abs(error).max() < 1e-11:
             return np.asarray(q)
-        step = J.T @ np.linalg.solve(J @ J.T + 1e-6 * min(1.0, float(error @ error)) * np.eye(6), error)
+        step = J.T @ np.linalg.solve(
+            J @ J.T + 1e-6 * min(1.0, float(error @ error)) * np.eye(6), error
+        )
         q = q + step * min(1.0, 0.5 / float(np.abs(step).max()))
     return None
 
@@ -144,7 +169,9 @@ def test_what_newtons_method_finds_is_on_a_curve(robot: Robot, arm: RedundantArm
     assert found > 20
 
 
-def test_the_nearest_member_is_found_of_what_is_not_on_the_curve(robot: Robot, arm: RedundantArm) -> None:
+def test_the_nearest_member_is_found_of_what_is_not_on_the_curve(
+    robot: Robot, arm: RedundantArm
+) -> None:
     """Also where two sheets meet, and the last angle says nothing."""
     rng = np.random.default_rng(47)
     for q in configurations(robot, 6):
@@ -187,11 +214,18 @@ def test_arcs_are_what_the_limits_leave(robot: Robot, arm: RedundantArm) -> None
         T = forward(robot, q)
         kept = [each for each in arm.self_motions(T, limits) if isinstance(each, RedundantCurve)]
         for curve in (each for each in arm.self_motions(T) if isinstance(each, RedundantCurve)):
-            arcs = [arc for each in kept if (each.sheet == curve.sheet).all() for arc in each.arcs
-                    if each.interval == curve.interval]  # fmt: skip
+            arcs = [
+                arc
+                for each in kept
+                if (each.sheet == curve.sheet).all()
+                for arc in each.arcs
+                if each.interval == curve.interval
+            ]
             for u, member in zip(at := parameters(curve, 60, rng), curve.at(at), strict=True):
                 middle = (limits.q_min + limits.q_max) / 2
-                beyond = float((np.abs(wrapped(member - middle)) - (limits.q_max - limits.q_min) / 2).max())
+                beyond = float(
+                    (np.abs(wrapped(member - middle)) - (limits.q_max - limits.q_min) / 2).max()
+                )
                 on_arc = any(lower <= u <= upper for lower, upper in arcs)
                 cut += not on_arc
                 assert on_arc or beyond > 0
@@ -205,26 +239,43 @@ def test_arcs_are_what_the_limits_leave(robot: Robot, arm: RedundantArm) -> None
 def test_a_curve_of_which_little_is_within_the_limits_gives_a_member() -> None:
     """The last joint is on its limit, and both ends of the arc are beyond limits."""
     panda = load_robot("panda")
-    q = np.array([2.7836954234526634, 0.054726722201069, 0.12264925125535742, -0.38038534780456557, 1.4067400815888678,
-                  2.171561296725141, 2.8973])  # fmt: skip
-    curves = [each.self_motion for each in required_inverse_kinematics(panda, "goal").solve(forward(panda, q))]
+    q = np.array(
+        [
+            2.7836954234526634,
+            0.054726722201069,
+            0.12264925125535742,
+            -0.38038534780456557,
+            1.4067400815888678,
+            2.171561296725141,
+            2.8973,
+        ]
+    )
+    curves = [
+        each.self_motion
+        for each in required_inverse_kinematics(panda, "goal").solve(forward(panda, q))
+    ]
     nearest = [each.at(np.array([each.parameter(q)]))[0] for each in curves if each is not None]
     assert np.abs(wrapped(np.array(nearest) - q)).max(axis=1).min() < FOUND
 
 
 @pytest.mark.parametrize("joint", [1, 3, 5])
-@pytest.mark.parametrize("off", long_but([0.0, 1e-8, 1e-5], [0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-3]))
+@pytest.mark.parametrize(
+    "off", long_but([0.0, 1e-8, 1e-5], [0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-3])
+)
 def test_a_pose_on_a_singularity_or_next_to_it_is_reached(
     robot: Robot, arm: RedundantArm, joint: int, off: float
 ) -> None:
-    """Third axis in line with the first; arm stretched, where its range allows; wrist in line: curves meet there."""
+    """Third axis in line with the first; arm stretched, where its range allows; wrist in line:
+    curves meet there.
+    """
     for q in configurations(robot, 5, seed=47):
         q[joint] = np.clip(off, robot.limits.q_min[joint], robot.limits.q_max[joint])
         T = forward(robot, q)
         solutions = required_inverse_kinematics(robot, "goal").solve(T)
         assert max(np.abs(forward(robot, each.q) - T).max() for each in solutions) < ACCURACY
         if joint == 3 and robot.name == "iiwa14":
-            # an arm that is stretched but for this holds its pose on loops as small, which rounding of the pose hides
+            # an arm that is stretched but for this holds its pose on loops as small, which rounding
+            # of the pose hides
             curves = arm.self_motions(T, robot.limits)
             assert away(curves, q) < LOOPS
             inside = []
@@ -233,12 +284,18 @@ def test_a_pose_on_a_singularity_or_next_to_it_is_reached(
                 inside.append((np.abs(wrapped(q - centre[0])) <= sides[0]).all())
             assert any(inside)
             continue
-        assert away(arm.self_motions(T, robot.limits), q) < max(FOUND, 0.0 if off == 0 else ROUNDED[robot.name] / off)
+        assert away(arm.self_motions(T, robot.limits), q) < max(
+            FOUND, 0.0 if off == 0 else ROUNDED[robot.name] / off
+        )
 
 
-@pytest.mark.parametrize(("joint", "step"), [(1, [1.0, 0, -1.0, 0, 0, 0, 0]), (3, [0, 0, 1.0, 0, -1.0, 0, 0])])
+@pytest.mark.parametrize(
+    ("joint", "step"), [(1, [1.0, 0, -1.0, 0, 0, 0, 0]), (3, [0, 0, 1.0, 0, -1.0, 0, 0])]
+)
 def test_what_turns_freely_on_a_singularity_is_a_curve(joint: int, step: list[float]) -> None:
-    """With the first and the third axis in line, and with the third and the fifth in line on a stretched iiwa."""
+    """With the first and the third axis in line, and with the third and the fifth in line on a
+    stretched iiwa.
+    """
     rng = np.random.default_rng(51)
     for name in ("iiwa14", "panda") if joint == 1 else ("iiwa14",):
         robot = load_robot(name)
@@ -257,11 +314,16 @@ def test_what_turns_freely_on_a_singularity_is_a_curve(joint: int, step: list[fl
                     for k in range(4):
                         members = curve.at(u[k] + np.linspace(-0.1, 0.1, 9))
                         assert (np.abs(wrapped(members - centre[k])) <= sides[k]).all()
-                        assert max(np.abs(forward(robot, each) - T).max() for each in members) < ACCURACY
+                        assert (
+                            max(np.abs(forward(robot, each) - T).max() for each in members)
+                            < ACCURACY
+                        )
 
 
 def test_limits_keep_what_turns_freely_within_them() -> None:
-    """With the first and the third axis in line; only curves that may pass this are searched for it."""
+    """With the first and the third axis in line; only curves that may pass this are searched for
+    it.
+    """
     rng = np.random.default_rng(52)
     for name in ("iiwa14", "panda", "xarm7"):
         robot = load_robot(name)
@@ -270,13 +332,16 @@ def test_limits_keep_what_turns_freely_within_them() -> None:
         for q in configurations(robot, 10, seed=53):
             q[1], most = 0.0, np.minimum(robot.limits.q_max, np.pi)[[0, 2]]
             # both angles stay within limits, which are symmetric
-            turned = q + rng.uniform(-1, 1) * (most - np.abs(q[[0, 2]])).min() * np.array([1.0, 0, -1.0, 0, 0, 0, 0])
+            turned = q + rng.uniform(-1, 1) * (most - np.abs(q[[0, 2]])).min() * np.array(
+                [1.0, 0, -1.0, 0, 0, 0, 0]
+            )
             assert away(arm.self_motions(forward(robot, q), robot.limits), turned) < FOUND
 
 
 def test_boxes_hold_what_turns_freely_on_a_singularity(robot: Robot, arm: RedundantArm) -> None:
-    """With the third axis in line with the first, both may turn against each other while the last angle stands still:
-    no curve over it has these configurations, but the box around the point has."""
+    """With the third axis in line with the first, both may turn against each other while the last
+    angle stands still: no curve over it has these configurations, but the box around the point has.
+    """
     rng = np.random.default_rng(48)
     for q in configurations(robot, 10, seed=49):
         q[1] = 0.0
@@ -296,7 +361,9 @@ def test_boxes_hold_what_turns_freely_on_a_singularity(robot: Robot, arm: Redund
 
 
 def test_poses_out_of_reach_say_by_how_much(robot: Robot) -> None:
-    """The pose shifted by that distance, away from where it is, is still out of reach; one in reach is not refused."""
+    """The pose shifted by that distance, away from where it is, is still out of reach; one in reach
+    is not refused.
+    """
     inverse = required_inverse_kinematics(robot, "goal")
     T = np.eye(4)
     T[:3, 3] = [0.0, 0.0, 2.0]
@@ -327,12 +394,18 @@ def test_arms_of_another_form_have_none() -> None:
 
 
 @pytest.mark.parametrize("configuration", OUTSIDE_IN_THE_MIDDLE)
-def test_a_curve_that_is_outside_the_limits_in_the_middle_is_answered(configuration: list[float]) -> None:
+def test_a_curve_that_is_outside_the_limits_in_the_middle_is_answered(
+    configuration: list[float],
+) -> None:
     robot, q = load_robot("iiwa14"), np.array(configuration)
     answers = required_inverse_kinematics(robot, "goal").solve(forward(robot, q))
     curves = list({id(each.self_motion): each.self_motion for each in answers}.values())
     assert away(curves, q) < FOUND  # type: ignore[arg-type]
-    assert all(robot.limits.q_min[j] <= each.q[j] <= robot.limits.q_max[j] for each in answers for j in range(7))
+    assert all(
+        robot.limits.q_min[j] <= each.q[j] <= robot.limits.q_max[j]
+        for each in answers
+        for j in range(7)
+    )
 
 
 @pytest.mark.parametrize("name", MISSED)

@@ -15,7 +15,9 @@ BARE = sum(body.mass for body in ROBOT.model.inertias)
 
 
 def added_mass(payload: float) -> float:
-    """What a new arm's model weighs more than the robot [kg]. The arm is gone afterwards: its id may be another's."""
+    """What a new arm's model weighs more than the robot [kg]. The arm is gone afterwards: its id
+    may be another's.
+    """
     model = rigid_body_model(Arm(robot=ROBOT, payload=Payload(mass=payload, com=np.zeros(3))))
     return sum(body.mass for body in model.inertias) - BARE
 

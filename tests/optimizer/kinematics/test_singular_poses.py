@@ -1,4 +1,6 @@
-"""Singular poses: an edge of elbow or shoulder is a solution like any other, a stretched wrist has a curve of them."""
+"""Singular poses: an edge of elbow or shoulder is a solution like any other, a stretched wrist has
+a curve of them.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,8 @@ from tests.optimizer.kinematics.flange import (
 )
 from tests.optimizer.moves import ROBOT
 
-# next to an edge of the reach, a rounding of the pose by 1e-16 m moves elbow and shoulder by its square root [rad]
+# next to an edge of the reach, a rounding of the pose by 1e-16 m moves elbow and shoulder by its
+# square root [rad]
 FOUND_ON_AN_EDGE = 2e-6
 FORM = URClosedForm.of(ROBOT.model) or pytest.fail("the robot has a closed form")
 
@@ -37,11 +40,19 @@ angles = st.lists(st.floats(-3.1, 3.1), min_size=6, max_size=6).map(np.array)
 
 def self_motions(solutions: list[LimitedSolution]) -> list[SelfMotion]:
     """Every self-motion among the solutions, once."""
-    return list({id(each.self_motion): each.self_motion for each in solutions if each.self_motion is not None}.values())
+    return list(
+        {
+            id(each.self_motion): each.self_motion
+            for each in solutions
+            if each.self_motion is not None
+        }.values()
+    )
 
 
 def apart(a: Array, b: Array) -> Array:
-    """Greatest difference (n,) of joints between configurations (n, nq) or (nq,), full turns left out [rad]."""
+    """Greatest difference (n,) of joints between configurations (n, nq) or (nq,), full turns left
+    out [rad].
+    """
     return np.asarray(np.abs(np.exp(1j * a) - np.exp(1j * b)).max(axis=-1))
 
 
@@ -56,7 +67,8 @@ def test_a_singular_elbow_is_a_solution_like_any_other(q: Array, elbow: float) -
     nearest = min(solutions, key=lambda each: float(apart(each.q, q)))
     if abs(np.sin(q[4])) < 1e-4:
         return  # wrist and elbow at once: the tests of self-motions
-    # next to a stretched wrist, or a singular shoulder, the same rounding turns the fifth axis the more
+    # next to a stretched wrist, or a singular shoulder, the same rounding turns the fifth axis the
+    # more
     ahead = min(1.0, max(abs(FORM._ahead(q)), LEAST_AHEAD))
     assert apart(nearest.q, q) < max(FOUND_ON_AN_EDGE, 5e-7 / np.sqrt(abs(np.sin(q[4])) * ahead))
     assert "elbow" in nearest.singular
@@ -66,19 +78,24 @@ def test_a_singular_elbow_is_a_solution_like_any_other(q: Array, elbow: float) -
 
 
 def test_next_to_three_singularities_at_once_a_pose_is_answered() -> None:
-    """A stretched elbow, and shoulder and wrist next to their singularities: rounding carries the arm out of reach."""
+    """A stretched elbow, and shoulder and wrist next to their singularities: rounding carries the
+    arm out of reach.
+    """
     rng, answered = np.random.default_rng(0), 0
     while answered < 150:
         q = rng.uniform(-2 * np.pi, 2 * np.pi, 6)
         q[2], q[4] = rng.choice([0, np.pi, -np.pi]), 10 ** rng.uniform(-4, -1) * rng.choice([-1, 1])
-        # lift angles at which the last axis meets the first one, to within a micrometre and a decimetre
+        # lift angles at which the last axis meets the first one, to within a micrometre and a
+        # decimetre
         lifts = np.linspace(-3, 3, 41)
         ahead = [FORM._ahead(np.array([q[0], lift, *q[2:]])) for lift in lifts]
         crossings = [k for k in range(40) if ahead[k] * ahead[k + 1] < 0]
         if not crossings:
             continue
         k = crossings[0]
-        root = brentq(lambda lift, q=q: FORM._ahead(np.array([q[0], lift, *q[2:]])), lifts[k], lifts[k + 1])
+        root = brentq(
+            lambda lift, q=q: FORM._ahead(np.array([q[0], lift, *q[2:]])), lifts[k], lifts[k + 1]
+        )
         q[1] = root + 10 ** rng.uniform(-6, -1) * rng.choice([-1, 1])
         T = forward(q)
         solutions = IK.solve(T, windings=False)
@@ -88,7 +105,9 @@ def test_next_to_three_singularities_at_once_a_pose_is_answered() -> None:
 
 
 def test_an_edge_of_the_elbow_next_to_a_stretched_wrist_is_in_reach() -> None:
-    """The rounding of such a pose turns the fifth axis, and would carry the fourth out of the elbow's reach."""
+    """The rounding of such a pose turns the fifth axis, and would carry the fourth out of the
+    elbow's reach.
+    """
     rng = np.random.default_rng(1)
     for _ in range(500):
         q = rng.uniform(-3.1, 3.1, 6)
@@ -110,7 +129,9 @@ def test_on_an_edge_the_branches_that_meet_count_once() -> None:
 
 
 def test_rounding_does_not_hide_an_edge() -> None:
-    """A stretched elbow, and a tool's transform there and back, which moves the pose by its last digit."""
+    """A stretched elbow, and a tool's transform there and back, which moves the pose by its last
+    digit.
+    """
     rng = np.random.default_rng(5)
     for q in rng.uniform(-np.pi, np.pi, (300, 6)):
         q[2] = 0.0
@@ -122,7 +143,8 @@ def test_a_singular_shoulder_is_a_solution_like_any_other() -> None:
     """The last axis right beside the first: both shoulders are one."""
     rng = np.random.default_rng(8)
     for q in rng.uniform(-3, 3, (200, 6)):
-        # the last axis' origin level with the first axis: a2 c2 + a3 c23 + d5 s234 = 0, solved for q4
+        # the last axis' origin level with the first axis: a2 c2 + a3 c23 + d5 s234 = 0, solved for
+        # q4
         ahead = -0.425 * np.cos(q[1]) - 0.3922 * np.cos(q[1] + q[2])
         if abs(ahead) > 0.0997:
             continue
@@ -163,7 +185,8 @@ def test_on_a_self_motion_the_jacobian_loses_a_rank() -> None:
         for parameter in np.linspace(lower, upper, 7)[1:-1]:
             before, here, after = motion.at(parameter + np.array([-1e-6, 0.0, 1e-6]))
             tangent = after - before
-            # full turns left out; central differences are exact to their step squared, and to rounding over the step
+            # full turns left out; central differences are exact to their step squared, and to
+            # rounding over the step
             tangent -= 2 * np.pi * np.round(tangent / (2 * np.pi))
             assert np.abs(jacobian(here) @ tangent).max() < 1e-6 * np.abs(tangent).max()
 
@@ -179,7 +202,11 @@ def test_boxes_hold_every_member_of_their_cell(q: Array, seed: int) -> None:
             half = 10 ** rng.uniform(-5, 0, 40)
             centre, sides = motion.boxes(parameter, half)
             inside = np.clip(parameter + half * rng.uniform(-1, 1, 40), lower, upper)
-            for at in (inside, np.clip(parameter + half, lower, upper), np.clip(parameter - half, lower, upper)):
+            for at in (
+                inside,
+                np.clip(parameter + half, lower, upper),
+                np.clip(parameter - half, lower, upper),
+            ):
                 away = motion.at(at) - centre
                 away -= 2 * np.pi * np.round(away / (2 * np.pi))
                 assert (np.abs(away) <= sides + ROUNDING).all()
@@ -188,7 +215,8 @@ def test_boxes_hold_every_member_of_their_cell(q: Array, seed: int) -> None:
 def test_upright_all_singularities_meet_in_one_configuration() -> None:
     home = np.array([0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0])
     solutions = IK.solve(forward(home), windings=False)
-    # the wrist's self-motion has shrunk to a point, as the arm can reach no farther; rounding leaves 1e-5 rad of it
+    # the wrist's self-motion has shrunk to a point, as the arm can reach no farther; rounding
+    # leaves 1e-5 rad of it
     assert apart(joints(solutions), home).max() < 1e-4
     for each in solutions:
         assert set(each.singular) == {"shoulder", "elbow", "wrist"}

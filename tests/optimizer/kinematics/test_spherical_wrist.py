@@ -1,4 +1,5 @@
-"""An arm with a spherical wrist: every configuration is found, next to each singularity and on it."""
+"""An arm with a spherical wrist: every configuration is found, next to each singularity and on
+it."""
 
 from __future__ import annotations
 
@@ -22,9 +23,11 @@ from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, KUKA, flange,
 from tests.selection import long_but
 
 IK = required_inverse_kinematics(KUKA, "goal")
-WRIST = SphericalWrist.of(JointAxes.of(Chain.of(KUKA.model))) or pytest.fail("the arm has a spherical wrist")
-# a pose rounded by 1e-16 moves a configuration by this over the smallest singular value; the product of seven rounded
-# matrices makes some more of it
+WRIST = SphericalWrist.of(JointAxes.of(Chain.of(KUKA.model))) or pytest.fail(
+    "the arm has a spherical wrist"
+)
+# a pose rounded by 1e-16 moves a configuration by this over the smallest singular value; the
+# product of seven rounded matrices makes some more of it
 ROUNDING = 4e-15
 # distance from a fold [rad] within which both branches count as one
 ON_A_FOLD = 5e-7
@@ -32,18 +35,24 @@ ON_A_FOLD = 5e-7
 
 def stretched() -> float:
     """The third joint's position [rad] with the elbow stretched."""
-    return float(brentq(lambda q3: WRIST.measures(np.array([0, 0, q3, 0, 0, 0]))[1], -0.3, 0.3, xtol=1e-16))
+    return float(
+        brentq(lambda q3: WRIST.measures(np.array([0, 0, q3, 0, 0, 0]))[1], -0.3, 0.3, xtol=1e-16)
+    )
 
 
 def overhead(q: Array) -> Array:
-    """The configuration with the second joint moved until the wrist is on the first axis, if it can be."""
+    """The configuration with the second joint moved until the wrist is on the first axis, if it can
+    be.
+    """
     angles = np.linspace(-np.pi, np.pi, 60)
     ahead = [WRIST.measures(np.array([0, angle, q[2], 0, 0, 0]))[0] for angle in angles]
     crossing = next((k for k, (a, b) in enumerate(pairwise(ahead)) if a * b < 0), None)
     if crossing is None:
         return overhead(np.array([*q[:2], q[2] / 2, *q[3:]]))
     root = brentq(
-        lambda q2: WRIST.measures(np.array([0, q2, q[2], 0, 0, 0]))[0], *angles[crossing : crossing + 2], xtol=1e-16
+        lambda q2: WRIST.measures(np.array([0, q2, q[2], 0, 0, 0]))[0],
+        *angles[crossing : crossing + 2],
+        xtol=1e-16,
     )
     return np.array([q[0], root, *q[2:]])
 
@@ -60,7 +69,9 @@ def test_every_configuration_is_found_once(count: int) -> None:
 
 
 @pytest.mark.parametrize("off", [1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 1.0])
-def test_far_from_singularities_the_short_way_finds_the_same(off: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_far_from_singularities_the_short_way_finds_the_same(
+    off: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """So far from one of them, too: where the short way begins, and on both sides of that."""
     rng, folded = np.random.default_rng(8), stretched()
     starts = [inside(KUKA, rng) for _ in range(30)]
@@ -69,7 +80,9 @@ def test_far_from_singularities_the_short_way_finds_the_same(off: float, monkeyp
     poses = [flange(KUKA, q) for q in starts]
     form = DecomposedArm.of(KUKA.model) or pytest.fail("the arm has a decomposition")
     short = [form.solve(T) for T in poses]
-    assert [form._regular(form._rows(T), T) is not None for T in poses].count(True) >= (15 if off > 1e-4 else 0)
+    assert [form._regular(form._rows(T), T) is not None for T in poses].count(True) >= (
+        15 if off > 1e-4 else 0
+    )
     monkeypatch.setattr(DecomposedArm, "_regular", lambda *_: None)
     form = DecomposedArm.of(KUKA.model) or pytest.fail("the arm has a decomposition")
     for T, (q, labels) in zip(poses, short, strict=True):
@@ -87,7 +100,11 @@ def test_next_to_an_aligned_wrist(off: float) -> None:
         q[4] = side
         found = solved(KUKA, q)
         smallest = min(each.smallest_singular_value for each in found.branches)
-        assert found.away < max(1e-9, ROUNDING / smallest) and found.error < ACCURACY and not found.twice
+        assert (
+            found.away < max(1e-9, ROUNDING / smallest)
+            and found.error < ACCURACY
+            and not found.twice
+        )
         assert all(each.self_motion is None for each in found.branches)
 
 
@@ -99,7 +116,11 @@ def test_an_aligned_wrist_is_a_self_motion(off: float) -> None:
         q[4] = off
         found = solved(KUKA, q)
         assert found.away < FOUND and found.error < ACCURACY and not found.twice
-        motions = {id(each.self_motion): each.self_motion for each in found.branches if each.self_motion is not None}
+        motions = {
+            id(each.self_motion): each.self_motion
+            for each in found.branches
+            if each.self_motion is not None
+        }
         assert motions
         for motion in motions.values():
             assert motion.free == (3, 5)
@@ -110,7 +131,9 @@ def test_an_aligned_wrist_is_a_self_motion(off: float) -> None:
 
 def test_the_boxes_of_a_self_motion_hold_it() -> None:
     q = np.array([0.3, -1.2, 1.4, 0.5, 0.0, -0.4])
-    motion = next(each.self_motion for each in IK.branches(flange(KUKA, q)) if each.self_motion is not None)
+    motion = next(
+        each.self_motion for each in IK.branches(flange(KUKA, q)) if each.self_motion is not None
+    )
     rng = np.random.default_rng(13)
     parameter, half = rng.uniform(-np.pi, np.pi, 200), rng.uniform(0, 1, 200)
     centre, sides = motion.boxes(parameter, half)
@@ -129,7 +152,8 @@ def test_next_to_a_stretched_elbow(off: float) -> None:
         found = solved(KUKA, q)
         assert found.away < FOUND and found.error < ACCURACY and not found.twice
         here = [each for each in found.branches if abs(each.q[2] - edge) < 2 * off + 1e-6]
-        # half the branches meet: two wrists of one or two shoulders are left, or twice as many next to the edge
+        # half the branches meet: two wrists of one or two shoulders are left, or twice as many next
+        # to the edge
         assert len(here) in ((2, 4) if off < ON_A_FOLD else (4, 8))
 
 
@@ -163,13 +187,17 @@ def test_a_label_changes_only_across_its_singularity() -> None:
             shoulder, elbow, wrist = (measures[k : k + 2] < 0).T.tolist()
             assert (one.shoulder != other.shoulder) == (shoulder[0] != shoulder[1])
             assert (one.wrist != other.wrist) == (wrist[0] != wrist[1])
-            assert (one.elbow != other.elbow) == ((shoulder[0] != shoulder[1]) != (elbow[0] != elbow[1]))
+            assert (one.elbow != other.elbow) == (
+                (shoulder[0] != shoulder[1]) != (elbow[0] != elbow[1])
+            )
             changes += one != other
     assert changes > 100
 
 
 def test_parts_of_the_label_are_where_the_jacobian_is_singular() -> None:
-    """The determinant of a decoupled arm is the product of what the parts measure, times a constant."""
+    """The determinant of a decoupled arm is the product of what the parts measure, times a
+    constant.
+    """
     rng, ratios = np.random.default_rng(18), []
     model, data = KUKA.model, KUKA.model.createData()
     for _ in range(50):
@@ -185,13 +213,17 @@ def test_the_everyday_posture_has_the_everyday_names() -> None:
     q = np.array([0.2, -1.2, 1.6, 0.1, 0.6, 0.3])
     assert str(IK.label(q)).startswith("right/up")
     chosen = [
-        each for each in IK.branches(flange(KUKA, q)) if BranchFilter(elbow="up", shoulder="right").allows(each.label)
+        each
+        for each in IK.branches(flange(KUKA, q))
+        if BranchFilter(elbow="up", shoulder="right").allows(each.label)
     ]
     assert len(chosen) == 2
 
 
 def test_the_distance_out_of_reach_is_that_of_the_wrist() -> None:
-    """Towards the second axis, by less than it the pose is still out of reach, by more it is reached."""
+    """Towards the second axis, by less than it the pose is still out of reach, by more it is
+    reached.
+    """
     T = np.eye(4)
     for position in ([1.6, 0.3, 0.5], [0.2, 0.1, 2.0], [-0.7, 0.9, -0.6]):
         T[:3, 3] = position
@@ -212,8 +244,12 @@ def test_the_distance_out_of_reach_is_that_of_the_wrist() -> None:
 
 @pytest.mark.parametrize("off", [1e-5, 1e-4])
 @pytest.mark.parametrize("other", ["elbow", "shoulder"])
-def test_next_to_two_singularities_only_the_rounding_of_the_pose_is_missed(other: str, off: float) -> None:
-    """With the wrist nearly aligned, too, a configuration is found as well as a pose in double precision tells it."""
+def test_next_to_two_singularities_only_the_rounding_of_the_pose_is_missed(
+    other: str, off: float
+) -> None:
+    """With the wrist nearly aligned, too, a configuration is found as well as a pose in double
+    precision tells it.
+    """
     rng, edge = np.random.default_rng(19), stretched()
     for _ in range(20):
         q = inside(KUKA, rng)
@@ -223,7 +259,9 @@ def test_next_to_two_singularities_only_the_rounding_of_the_pose_is_missed(other
         else:
             q[2] = edge + off
         q[4] = off
-        J = pin.computeFrameJacobian(KUKA.model, KUKA.model.createData(), q, KUKA.model.getFrameId("flange"))
+        J = pin.computeFrameJacobian(
+            KUKA.model, KUKA.model.createData(), q, KUKA.model.getFrameId("flange")
+        )
         found = solved(KUKA, q)
         assert found.error < ACCURACY and not found.twice
         assert found.away < max(FOUND, ROUNDING / np.linalg.svd(J, compute_uv=False)[-1])

@@ -8,11 +8,19 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.kinematics.tcp import T_last_tcp, flange_pose, rotated_poses, tcp_jacobian, tcp_pose
+from joulepath.optimizer.kinematics.tcp import (
+    T_last_tcp,
+    flange_pose,
+    rotated_poses,
+    tcp_jacobian,
+    tcp_pose,
+)
 from joulepath.optimizer.problem.arm import Arm
 from tests.optimizer import moves
 
-T_FLANGE_TCP = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.7, 1.1), np.array([0.02, -0.05, 0.18])).homogeneous
+T_FLANGE_TCP = pin.SE3(
+    pin.rpy.rpyToMatrix(0.3, -0.7, 1.1), np.array([0.02, -0.05, 0.18])
+).homogeneous
 ARM = Arm(robot=moves.ROBOT, T_flange_tcp=T_FLANGE_TCP)
 # double precision over a product of eight matrices of entries about 1
 ROUNDING = 1e-14
@@ -57,7 +65,9 @@ def test_the_jacobian_is_that_of_finite_differences(configurations: Array) -> No
         for j in range(6):
             d = STEP * np.eye(6)[j]
             ahead, behind = tcp_pose(ARM, q + d), tcp_pose(ARM, q - d)
-            assert np.abs((ahead - behind)[:3, 3] / (2 * STEP) - J[:3, j]).max() < GRADIENT_TOLERANCE
+            assert (
+                np.abs((ahead - behind)[:3, 3] / (2 * STEP) - J[:3, j]).max() < GRADIENT_TOLERANCE
+            )
             spin = (ahead - behind)[:3, :3] / (2 * STEP) @ R.T
             assert np.abs(pin.unSkew(spin) - J[3:, j]).max() < GRADIENT_TOLERANCE
 
@@ -65,7 +75,9 @@ def test_the_jacobian_is_that_of_finite_differences(configurations: Array) -> No
 def test_rotated_poses_keep_the_tcp_in_place(configurations: Array) -> None:
     rotvecs = [np.zeros(3), np.array([0.0, 0.0, np.pi]), np.array([0.3, -0.2, 0.1])]
     T = tcp_pose(ARM, configurations[0])
-    for rotvec, (position, quaternion) in zip(rotvecs, rotated_poses(ARM, configurations[0], rotvecs), strict=True):
+    for rotvec, (position, quaternion) in zip(
+        rotvecs, rotated_poses(ARM, configurations[0], rotvecs), strict=True
+    ):
         assert (position == T[:3, 3]).all()
         # the rotation is about the TCP's own axes
         expected = T[:3, :3] @ pin.exp3(rotvec)

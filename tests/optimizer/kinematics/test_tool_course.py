@@ -30,12 +30,16 @@ def test_the_certificate_refuses_what_leaves_the_path() -> None:
 
 
 def test_the_certificate_refuses_a_short_cut_of_a_loop() -> None:
-    """Out and back on nearly the same line: who stays at the start is on the path all the time, and does not go it."""
+    """Out and back on nearly the same line: who stays at the start is on the path all the time, and
+    does not go it.
+    """
     out, back = moved([0.0, 0.2, 0.0]), moved([0.0, 0.0, 0.001])
     course = ToolCourse.of(ToolPath(via=[out], blend=0.02), tcp_pose(HOME).T, back.T)
     fractions = np.linspace(0.0, 1.0, 500)
     whole, (lazy, _) = course.poses(fractions), course.deviation(np.array([tcp_pose(HOME).T] * 50))
-    assert course.deviation(whole)[0].max() < course.path.position_tolerance and np.isinf(lazy).all()
+    assert (
+        course.deviation(whole)[0].max() < course.path.position_tolerance and np.isinf(lazy).all()
+    )
     half = whole[fractions < 0.3]
     assert np.isinf(course.deviation(np.concatenate([half, half[::-1]]))[0]).all()
 
@@ -68,15 +72,21 @@ def test_a_course_that_turns_back_between_two_of_its_points_is_compared() -> Non
     for cell in range(50, 150, 10):
         back = out * (200 / (cell + 0.5) - 1)
         goal = moved([0.0, out - back, 0.0]).T
-        course = ToolCourse.of(ToolPath(via=[moved([0.0, out, 0.0])], blend=0.001), tcp_pose(HOME).T, goal)
+        course = ToolCourse.of(
+            ToolPath(via=[moved([0.0, out, 0.0])], blend=0.001), tcp_pose(HOME).T, goal
+        )
         T = course.poses(np.linspace(0.0, 1.0, 700))
         half_a_step = course.length / 699 / 2
-        assert course.deviation(T)[0].max() < half_a_step, "what may be left out at the tip between two of the poses"
+        assert course.deviation(T)[0].max() < half_a_step, (
+            "what may be left out at the tip between two of the poses"
+        )
 
 
 def test_what_is_no_motion_is_not_certified() -> None:
     problem = along(moved([0.0, 0.3, 0.0]))
     found = optimize(problem)
-    spline = replace(found.trajectory.spline, control_points=found.trajectory.spline.control_points * np.nan)
+    spline = replace(
+        found.trajectory.spline, control_points=found.trajectory.spline.control_points * np.nan
+    )
     certificate = certify(problem, spline, HOME, found.goal.q, found.energy)
     assert np.isnan(certificate.worst_ratio["path_position"]) and not certificate.valid

@@ -1,5 +1,5 @@
-"""Seven-joint arms without a closed form: curves that are followed point by point, against Pinocchio and the closed
-form of another arm."""
+"""Seven-joint arms without a closed form: curves that are followed point by point, against
+Pinocchio and the closed form of another arm."""
 
 from __future__ import annotations
 
@@ -30,11 +30,13 @@ from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, flange, insid
 from tests.selection import long_but
 
 GEN3, CHAIN, PANDA = load_robot("gen3"), serial_chain(7), load_robot("panda")
-# rad: a parameter's derivative against a difference, and how far apart members of the least step are at most
+# rad: a parameter's derivative against a difference, and how far apart members of the least step
+# are at most
 LIMIT = 1e-8
 # rad: of points on cubics
 ROUNDING = 1e-13
-# share of the members of a closed form that are on the curves found: of a pose next to a singularity some are not
+# share of the members of a closed form that are on the curves found: of a pose next to a
+# singularity some are not
 COVERED = 0.99
 # configurations [rad] next to which the curve of their pose bends by a right angle
 BENT_CURVES = (
@@ -61,11 +63,22 @@ BENT_CURVES = (
         ]
     ),
 )
-# configuration [rad] of an arm stretched further than the one nearby reaches: 0.35 mm lie between their axes
+# configuration [rad] of an arm stretched further than the one nearby reaches: 0.35 mm lie between
+# their axes
 STRETCHED = np.array([-5.237985, 0.035838, 1.066330, -0.002736, -4.184650, -1.781755, -3.956364])
-# configuration [rad] on a curve that passes another one so near that both are followed as one: found a step beside
-MISSED = np.array([1.7421639313669246, 1.2081081464382009, -1.1520435434201328, -2.1504617708665963,
-                   3.6191942258128424, 0.5573754073121058, 4.203107568439206])  # fmt: skip
+# configuration [rad] on a curve that passes another one so near that both are followed as one:
+# found a step beside
+MISSED = np.array(
+    [
+        1.7421639313669246,
+        1.2081081464382009,
+        -1.1520435434201328,
+        -2.1504617708665963,
+        3.6191942258128424,
+        0.5573754073121058,
+        4.203107568439206,
+    ]
+)
 # least share of poses all of whose curves are found without being followed step by step
 AT_ONCE = 0.9
 # s: no search comes near it, however busy the machine
@@ -90,7 +103,9 @@ def away(curve: TracedCurve, q: Array) -> float:
 
 
 @pytest.mark.parametrize("count", long_but((12,), (12, 10_000)))
-def test_every_configuration_is_on_a_curve_of_its_pose(robot: Robot, arm: TracedArm, count: int) -> None:
+def test_every_configuration_is_on_a_curve_of_its_pose(
+    robot: Robot, arm: TracedArm, count: int
+) -> None:
     rng, missed = np.random.default_rng(51), 0
     for _ in range(count):
         q = inside(robot, rng)
@@ -123,7 +138,9 @@ def test_a_configuration_on_a_limit_is_on_an_arc(robot: Robot, arm: TracedArm) -
 
 
 def test_the_curves_of_the_arm_nearby_are_near_those_of_the_arm() -> None:
-    """From its flange on, the Gen3 is of the form with a spherical shoulder but for 0.35 mm; a calibrated Panda is."""
+    """From its flange on, the Gen3 is of the form with a spherical shoulder but for 0.35 mm; a
+    calibrated Panda is.
+    """
     rng, panda = np.random.default_rng(57), PANDA.model.copy()
     panda.jointPlacements[6].translation += np.array([1e-4, 2e-4, -1e-4])
     for model, mirrored in ((GEN3.model, True), (panda, False)):
@@ -152,20 +169,26 @@ def test_curves_found_all_points_at_once_are_those_followed_point_by_point() -> 
             start, _ = solved(chain, stack.nodes[[first]], T)
             (other,) = traced(chain, start, T)
             curve = TracedCurve.of(chain, T, other, NumberedBranch(1))
-            assert other.closed and all(away(curve, q) < SHORT for q in stack.nodes[first : last + 1])
+            assert other.closed and all(
+                away(curve, q) < SHORT for q in stack.nodes[first : last + 1]
+            )
             count += 1
     assert count > 15
 
 
 def test_nearly_all_poses_have_points_enough_along_their_curves() -> None:
-    """A pose with a curve that is followed step by step takes ten times as long; once, that was every seventh."""
+    """A pose with a curve that is followed step by step takes ten times as long; once, that was
+    every seventh.
+    """
     rng, chain, count, poses = np.random.default_rng(61), Chain.of(GEN3.model), 0, 40
     nearby = NearbyArm.of(chain)
     assert nearby is not None
     for _ in range(poses):
         T = flange(GEN3, inside(GEN3, rng))
         loops, rest = nearby.loops(T)
-        assert all(np.linalg.norm(np.diff(each, axis=0), axis=1).max() < 2 * LONG for each in loops.each())
+        assert all(
+            np.linalg.norm(np.diff(each, axis=0), axis=1).max() < 2 * LONG for each in loops.each()
+        )
         count += not rest and followed(chain, loops, T)[1].all()
     assert count >= AT_ONCE * poses
 
@@ -198,9 +221,17 @@ def test_what_limits_cut_off_is_outside(robot: Robot, arm: TracedArm) -> None:
         kept = {str(each.label): each.arcs for each in arm.self_motions(T, narrow)}
         for curve in arm.self_motions(T):
             at = np.linspace(-np.pi, np.pi, 100)
-            held = [any(a <= u + turn <= b for a, b in kept.get(str(curve.label), []) for turn in (0, 2 * np.pi))
-                    for u in at]  # fmt: skip
-            inside_limits = (np.abs(wrapped(curve.at(at) - (q_min + q_max) / 2)) < (q_max - q_min) / 2).all(axis=1)
+            held = [
+                any(
+                    a <= u + turn <= b
+                    for a, b in kept.get(str(curve.label), [])
+                    for turn in (0, 2 * np.pi)
+                )
+                for u in at
+            ]
+            inside_limits = (
+                np.abs(wrapped(curve.at(at) - (q_min + q_max) / 2)) < (q_max - q_min) / 2
+            ).all(axis=1)
             assert (inside_limits == held).all()
             cut += len(at) - sum(held)
     assert cut > 0
@@ -219,7 +250,9 @@ def test_points_at_many_shares_are_those_at_each(robot: Robot, arm: TracedArm) -
     share, joints, k = np.linspace(0.0, 1.0, 5), np.array([1, 4]), np.arange(3)
     each = curve.stack.at_each(k, hermite_weights(share), joints)
     for row in k:
-        assert np.abs(each[row] - curve.stack.at(np.full(5, row), share)[:, joints]).max() < ROUNDING
+        assert (
+            np.abs(each[row] - curve.stack.at(np.full(5, row), share)[:, joints]).max() < ROUNDING
+        )
 
 
 def test_boxes_hold_what_they_say(robot: Robot, arm: TracedArm) -> None:
@@ -255,9 +288,15 @@ def test_most_nearly_straight_arms_are_found() -> None:
     assert arm is not None
     missed = 0
     for k in range(12):
-        q = np.array([0.7778, 0.8477, -0.0961, -0.0048, -0.9417, -1.6715, -0.1179]) if k == 0 else inside(GEN3, rng)
+        q = (
+            np.array([0.7778, 0.8477, -0.0961, -0.0048, -0.9417, -1.6715, -0.1179])
+            if k == 0
+            else inside(GEN3, rng)
+        )
         q[3] = q[3] if k == 0 else 0.005 * (-1) ** k
-        found = [each for each in arm.self_motions(flange(GEN3, q), GEN3.limits) if away(each, q) < FOUND]
+        found = [
+            each for each in arm.self_motions(flange(GEN3, q), GEN3.limits) if away(each, q) < FOUND
+        ]
         missed += not found
         assert k > 0 or found
     assert missed <= 1
@@ -273,7 +312,9 @@ def test_a_curve_that_bends_within_a_thousandth_goes_on() -> None:
 
 
 def test_an_arm_stretched_further_than_the_one_nearby_is_found() -> None:
-    """The one nearby has no curve there. The starts of the table led to two others of the arm's curves."""
+    """The one nearby has no curve there. The starts of the table led to two others of the arm's
+    curves.
+    """
     arm, T = TracedArm.of(GEN3.model), flange(GEN3, STRETCHED)
     nearby = NearbyArm.of(Chain.of(GEN3.model))
     assert arm is not None and nearby is not None and nearby.beside(T)
@@ -311,7 +352,10 @@ def test_an_answer_over_curves_that_may_be_missing_is_not_optimal(from_pose: boo
     assert 0 <= found.lower_bound <= found.energy.electrical.total
     to_joints = optimize(replace(problem, goal=goal)) if not from_pose else None
     # any posture of the goal pose needs no more than the one that the pose was made of
-    assert to_joints is None or found.energy.electrical.total <= 1.001 * to_joints.energy.electrical.total
+    assert (
+        to_joints is None
+        or found.energy.electrical.total <= 1.001 * to_joints.energy.electrical.total
+    )
 
 
 @pytest.mark.parametrize("beside", [0.0, 1e-4, -1e-4])

@@ -1,4 +1,6 @@
-"""Boxes for a pose that is turned about the tool's axis: they hold every configuration that reaches it."""
+"""Boxes for a pose that is turned about the tool's axis: they hold every configuration that reaches
+it.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ def _singular(rng: np.random.Generator, kind: str) -> Array:
         # the last axis' origin as near to the first axis as it can be
         q[1:4] = [-np.pi / 2, 0.0, rng.choice([0.0, np.pi])]
     if kind != "any":
-        q[{"elbow": 2, "wrist": 4, "beside the wrist": 4, "shoulder": 2}[kind]] = 1e-6 * (kind == "beside the wrist")
+        q[{"elbow": 2, "wrist": 4, "beside the wrist": 4, "shoulder": 2}[kind]] = 1e-6 * (
+            kind == "beside the wrist"
+        )
     return q
 
 
@@ -52,7 +56,9 @@ def test_no_configuration_is_outside_the_boxes(robot: str, kind: str) -> None:
         cells = angles + width * np.append(rng.uniform(-1, 1, 11), [1.0, -1.0])
         reached = 0
         for angle, cell in zip(angles, cells, strict=True):
-            centre, half, held = turned.boxes(np.full(BRANCHES, cell), np.full(BRANCHES, width), np.arange(BRANCHES))
+            centre, half, held = turned.boxes(
+                np.full(BRANCHES, cell), np.full(BRANCHES, width), np.arange(BRANCHES)
+            )
             at = T.copy()
             at[:3, :3] = T[:3, :3] @ Rotation.from_rotvec(angle * pose.axis).as_matrix()
             solutions, _ = turned.form.solve(flange_pose(at, arm.T_flange_tcp))
@@ -65,16 +71,26 @@ def test_no_configuration_is_outside_the_boxes(robot: str, kind: str) -> None:
 
 def test_small_cells_have_small_boxes() -> None:
     """Away from singularities, boxes shrink with the cell."""
-    arm = Arm(robot=load_robot("ur5e"), T_flange_tcp=Pose.from_quaternion([0.15, 0.0, 0.1], [0, 0, 0, 1]).T)
+    arm = Arm(
+        robot=load_robot("ur5e"),
+        T_flange_tcp=Pose.from_quaternion([0.15, 0.0, 0.1], [0, 0, 0, 1]).T,
+    )
     given = Pose.from_quaternion([0.5, -0.2, 0.2], [0.0, 1.0, 0.0, 0.0])
     turned = TurnedPose.of(arm, ConeOrientedPose.about(given, np.array([0.0, 0.0, 1.0])), given)
     assert turned is not None
     for width in (1e-2, 1e-3, 1e-4):
-        _, half, held = turned.boxes(np.zeros(BRANCHES), np.full(BRANCHES, width), np.arange(BRANCHES))
+        _, half, held = turned.boxes(
+            np.zeros(BRANCHES), np.full(BRANCHES, width), np.arange(BRANCHES)
+        )
         assert held.any() and half[held].max() < 20 * width
 
 
 def test_other_arms_and_freedoms_have_none() -> None:
     arm = Arm(robot=load_robot("ur5e"))
     assert TurnedPose.of(arm, ConeOrientedPose(np.array([0.4, 0.0, 0.3]), half_angle=0.2)) is None
-    assert TurnedPose.of(Arm(robot=load_robot("iiwa14")), ConeOrientedPose(np.zeros(3), half_angle=0.0)) is None
+    assert (
+        TurnedPose.of(
+            Arm(robot=load_robot("iiwa14")), ConeOrientedPose(np.zeros(3), half_angle=0.0)
+        )
+        is None
+    )

@@ -1,4 +1,5 @@
-"""Few generations of the genetic algorithm: what holds of its motions does not need its best ones."""
+"""Few generations of the genetic algorithm: what holds of its motions does not need its best
+ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Obstacles on a method's own path: it goes around them, or its result carries the collision and the error names it."""
+"""Obstacles on a method's own path: it goes around them, or its result carries the collision and
+the error names it.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,13 @@ from joulepath.optimizer.methods import METHODS, planned_paths, solver_for
 from joulepath.optimizer.methods.duration_intervals import duration_intervals
 from joulepath.optimizer.methods.method import SolveStatus
 from joulepath.optimizer.methods.path_retiming import PathRetiming, RetimingProgram
-from joulepath.optimizer.methods.planned_paths import ALONG_PLANNED_PATH, FROM_PLANNED_PATH, plan, smooth_path, to_goal
+from joulepath.optimizer.methods.planned_paths import (
+    ALONG_PLANNED_PATH,
+    FROM_PLANNED_PATH,
+    plan,
+    smooth_path,
+    to_goal,
+)
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import MethodName, Problem
@@ -32,9 +40,11 @@ GOAL = np.array([-1.8, -1.57, 1.57, -1.57, -1.57, 0.0])
 DEADLINE = 60.0
 # states that a planning checks where there is no way: more take time alone
 FEW_STATES = 2_000
-# distance [rad] between a motion and the path it follows: the error of the fit of a spline, and of sampling the path
+# distance [rad] between a motion and the path it follows: the error of the fit of a spline, and of
+# sampling the path
 FIT = 2e-3
-# step of central differences of the retiming's variables, and their relative error; friction bends over some mrad/s
+# step of central differences of the retiming's variables, and their relative error; friction bends
+# over some mrad/s
 STEP, DIFFERENCES = 1e-6, 2e-4
 # share of a limit, as the certificate's
 HELD = 1e-6
@@ -49,9 +59,13 @@ def placed(x: float, y: float, z: float, yaw: float = 0.0) -> Array:
 
 # on the straight line in joint space
 POST = Obstacle("post", Sphere(0.06), placed(-0.45, 0.35, 0.5))
-# a wall that leads outwards from the base, between start and goal, and beside the upper arm at the goal
+# a wall that leads outwards from the base, between start and goal, and beside the upper arm at the
+# goal
 WALL = Obstacle(
-    "wall", Box(np.array([1.2, 0.02, 2.4])), placed(-0.8 * 0.8, 0.6 * 0.8, 0.0, np.arctan2(0.6, -0.8)), margin=0.0
+    "wall",
+    Box(np.array([1.2, 0.02, 2.4])),
+    placed(-0.8 * 0.8, 0.6 * 0.8, 0.0, np.arctan2(0.6, -0.8)),
+    margin=0.0,
 )
 
 
@@ -77,7 +91,9 @@ def planned_path(prepared: PreparedProblem) -> Array:
         product(METHODS, (FEW_STATES, planned_paths.MOST_STATES)),
     ),
 )
-def test_the_error_names_the_colliding_pair(method: MethodName, states: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_error_names_the_colliding_pair(
+    method: MethodName, states: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(planned_paths, "MOST_STATES", states)
     problem = blocked(method, WALL)
     with pytest.raises(NoCollisionFreeTrajectory) as caught:
@@ -93,7 +109,10 @@ def test_the_error_names_the_colliding_pair(method: MethodName, states: int, mon
 def test_every_method_passes_the_post(method: MethodName) -> None:
     solution = optimize(blocked(method, POST))
     assert solution.certificate.valid
-    assert solution.certificate.clearance is not None and solution.certificate.clearance.min_clearance >= 0
+    assert (
+        solution.certificate.clearance is not None
+        and solution.certificate.clearance.min_clearance >= 0
+    )
     along = method in ("time_scaling", "uniform_scaling")
     assert solution.candidates[0].reason.endswith(ALONG_PLANNED_PATH) == along
     assert solution.candidates[0].reason.endswith(FROM_PLANNED_PATH) == (method == "polynomial_ga")
@@ -101,18 +120,24 @@ def test_every_method_passes_the_post(method: MethodName) -> None:
 
 @pytest.mark.parametrize("method", ["time_scaling", "uniform_scaling"])
 def test_a_followed_path_is_the_smooth_one(method: MethodName) -> None:
-    """The motion stays on the smooth path along the planned one, apart from the fit of its spline."""
+    """The motion stays on the smooth path along the planned one, apart from the fit of its
+    spline."""
     prepared = PreparedProblem.of(blocked(method, POST))
     result = solver_for(prepared, START, GOAL, Deadline.after(DEADLINE)).solve()
     assert result.spline is not None
     smooth = smooth_path(prepared, planned_path(prepared))
     assert smooth is not None and prepared.surroundings.worst_violation(smooth) is None
     nearby = KDTree(smooth.curve(np.linspace(0.0, 1.0, 20_001)))
-    assert nearby.query(result.spline.curve(np.linspace(0.0, result.spline.duration, 400)))[0].max() < FIT
+    assert (
+        nearby.query(result.spline.curve(np.linspace(0.0, result.spline.duration, 400)))[0].max()
+        < FIT
+    )
 
 
 def test_time_scaling_along_a_path_needs_no_more_energy_than_the_quintic_law() -> None:
-    """The exact energy, against the quintic law along the same path in any duration within its limits."""
+    """The exact energy, against the quintic law along the same path in any duration within its
+    limits.
+    """
     prepared = PreparedProblem.of(blocked("time_scaling", POST))
     result = solver_for(prepared, START, GOAL, Deadline.after(DEADLINE)).solve()
     smooth = smooth_path(prepared, planned_path(prepared))
@@ -122,15 +147,22 @@ def test_time_scaling_along_a_path_needs_no_more_energy_than_the_quintic_law() -
     points = space.fit(smooth.curve(quintic.fraction(tau)), tau)
     unit = spline_of(space, points, 1.0)
     least = least_time_scale(unit, prepared.problem.arm.active_limits.rates)
-    energies = [prepared.energy(retimed(unit, least * k)).electrical.total for k in np.linspace(1.0, 3.0, 41)]
+    energies = [
+        prepared.energy(retimed(unit, least * k)).electrical.total
+        for k in np.linspace(1.0, 3.0, 41)
+    ]
     assert prepared.energy(result.spline).electrical.total < min(energies)
 
 
 def test_gradients_of_the_retiming() -> None:
-    """Cost and every constraint, tool cone and speed of the TCP included, against central differences."""
+    """Cost and every constraint, tool cone and speed of the TCP included, against central
+    differences.
+    """
     cone = ToolCone(np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0]), 1.5)
     prepared = PreparedProblem.of(
-        problem_with(START, GOAL, scene=Scene((POST,)), method="time_scaling", tool_cone=cone, tcp_speed=1.0)
+        problem_with(
+            START, GOAL, scene=Scene((POST,)), method="time_scaling", tool_cone=cone, tcp_speed=1.0
+        )
     )
     smooth = smooth_path(prepared, planned_path(prepared))
     assert smooth is not None
@@ -146,7 +178,9 @@ def test_gradients_of_the_retiming() -> None:
         step = STEP * np.eye(len(x))[k]
         ahead, behind = program.state(x + step), program.state(x - step)
         slope = (ahead.cost - behind.cost) / (2 * STEP)
-        assert state.gradient[k] == pytest.approx(slope, rel=DIFFERENCES, abs=DIFFERENCES * abs(state.cost))
+        assert state.gradient[k] == pytest.approx(
+            slope, rel=DIFFERENCES, abs=DIFFERENCES * abs(state.cost)
+        )
         slopes = (ahead.slack - behind.slack) / (2 * STEP)
         scale = 1 + np.abs(slopes).max()
         assert np.abs(state.slopes[:, k] - slopes).max() < DIFFERENCES * scale
@@ -158,5 +192,9 @@ def test_limits_along_the_motion_hold_on_a_planned_path(method: MethodName) -> N
     slower = optimize(problem_with(START, GOAL, scene=Scene((POST,)), method=method, tcp_speed=0.4))
     assert slower.certificate.valid and slower.certificate.worst_ratio["tcp_speed"] <= 1 + HELD
     assert slower.trajectory.spline.duration > free.trajectory.spline.duration
-    fixed = optimize(problem_with(START, GOAL, scene=Scene((POST,)), method=method, duration_min=2.5, duration_max=2.5))
+    fixed = optimize(
+        problem_with(
+            START, GOAL, scene=Scene((POST,)), method=method, duration_min=2.5, duration_max=2.5
+        )
+    )
     assert fixed.certificate.valid and fixed.trajectory.spline.duration == 2.5

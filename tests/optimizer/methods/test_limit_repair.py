@@ -1,4 +1,6 @@
-"""Torques far below their limits are checked at quadrature points alone: between them they stay within the limits."""
+"""Torques far below their limits are checked at quadrature points alone: between them they stay
+within the limits.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +23,14 @@ from tests.optimizer.moves import PAYLOAD, START, TILTED, limits, problem
 POINTS = 6_001
 # relative; torques by the same kernel at other instants
 ROUNDING = 1e-12
-# how far the control points are from START [rad], smallest first: short motions have the steepest torques
+# how far the control points are from START [rad], smallest first: short motions have the steepest
+# torques
 SPREADS = (1e-3, 1e-2, 0.1, 1.0)
-TASKS: list[dict[str, Any]] = [{}, {"payload": PAYLOAD, "gravity": TILTED}, {"friction": "coulomb_viscous"}]
+TASKS: list[dict[str, Any]] = [
+    {},
+    {"payload": PAYLOAD, "gravity": TILTED},
+    {"friction": "coulomb_viscous"},
+]
 
 
 def spaces() -> list[Basis]:
@@ -32,16 +39,22 @@ def spaces() -> list[Basis]:
     return [bspline.uniform(13), bspline.uniform(40), graded]
 
 
-def random_motion(prepared: PreparedProblem, space: Basis, spread: float, rng: np.random.Generator) -> Spline:
+def random_motion(
+    prepared: PreparedProblem, space: Basis, spread: float, rng: np.random.Generator
+) -> Spline:
     """A motion through random control points, at the greatest rates that the limits allow."""
     points = START + spread * rng.uniform(-1, 1, (space.n, len(START)))
     points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = points[0], points[-1]
     spline = Spline(bspline.DEGREE, space.knots, points)
-    return retimed(spline, time_scale(peak_rates(spline) / prepared.problem.arm.active_limits.rates))
+    return retimed(
+        spline, time_scale(peak_rates(spline) / prepared.problem.arm.active_limits.rates)
+    )
 
 
 def estimate(prepared: PreparedProblem, spline: Spline) -> Array:
-    """What decides whether a motion is far below the torque limits (nq,): it must stay below `far_below` of them."""
+    """What decides whether a motion is far below the torque limits (nq,): it must stay below
+    `far_below` of them.
+    """
     _, _, v, a, tau, _ = prepared.report_samples(spline)
     parts = limited_parts(prepared.arm, tau, v, a)
     return np.asarray(sum(np.abs(part).max(axis=0) for part in parts))

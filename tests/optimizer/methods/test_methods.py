@@ -26,10 +26,22 @@ from joulepath.optimizer.search.ends import ends
 from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.trajectories.ruckig_motion import time_optimal_spline
 from tests.optimizer.clocks import LAST_READINGS, CountingClock
-from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, fixed, limits, problem, random_moves, tcp_pose
+from tests.optimizer.moves import (
+    GOAL,
+    PAYLOAD,
+    ROBOT,
+    START,
+    TILTED,
+    fixed,
+    limits,
+    problem,
+    random_moves,
+    tcp_pose,
+)
 from tests.selection import long_but
 
-# share by which a wider space may spend more than a narrower one: both are solved to 5e-5, with smoothed friction
+# share by which a wider space may spend more than a narrower one: both are solved to 5e-5, with
+# smoothed friction
 WIDER = 2e-3
 # a factor is found to 1e-5 of itself, and energy is flat there
 LEAST = 1e-6
@@ -55,7 +67,11 @@ def test_every_method_is_there() -> None:
     assert set(METHODS) == set(get_args(MethodName))
 
 
-CONDITIONS: list[dict[str, Any]] = [{}, {"payload": PAYLOAD, "gravity": TILTED}, {"limits": limits(j_max=40.0)}]
+CONDITIONS: list[dict[str, Any]] = [
+    {},
+    {"payload": PAYLOAD, "gravity": TILTED},
+    {"limits": limits(j_max=40.0)},
+]
 
 
 @pytest.mark.parametrize("number", long_but([1], range(len(CONDITIONS))))
@@ -66,13 +82,19 @@ def test_a_free_spline_spends_least(number: int) -> None:
         best = electrical(solved("bspline", start, goal, **given))
         for method in METHODS:
             if method != "bspline":
-                assert best <= electrical(solved(method, start, goal, **given)) * (1 + WIDER), method
+                assert best <= electrical(solved(method, start, goal, **given)) * (1 + WIDER), (
+                    method
+                )
 
 
 def test_bounds_hold_for_all() -> None:
-    """They are built around the methods' own motions, but none is above the energy of another method's."""
+    """They are built around the methods' own motions, but none is above the energy of another
+    method's.
+    """
     found = [solved(method) for method in METHODS]
-    assert max(each.lower_bound for each in found) <= min(each.energy.electrical.total for each in found)
+    assert max(each.lower_bound for each in found) <= min(
+        each.energy.electrical.total for each in found
+    )
 
 
 def test_a_polynomial_is_one() -> None:
@@ -86,14 +108,18 @@ def test_a_polynomial_keeps_inside_its_joint_range() -> None:
     lower, upper = np.minimum(START, goal) - 0.003, np.maximum(START, goal) + 0.003
     q = solved("lagrange", START, goal).trajectory.q
     assert (q < lower).any() or (q > upper).any()
-    solution = solved("lagrange", START, goal, limits=replace(ROBOT.limits, q_min=lower, q_max=upper))
+    solution = solved(
+        "lagrange", START, goal, limits=replace(ROBOT.limits, q_min=lower, q_max=upper)
+    )
     q = solution.trajectory.q
     assert (q >= lower).all() and (q <= upper).all()
 
 
 def test_a_polynomial_may_start_and_end_on_its_limits() -> None:
     own = replace(ROBOT.limits, q_min=np.minimum(START, GOAL), q_max=np.maximum(START, GOAL))
-    assert electrical(solved("lagrange", limits=own)) >= electrical(solved("lagrange")) * (1 - WIDER)
+    assert electrical(solved("lagrange", limits=own)) >= electrical(solved("lagrange")) * (
+        1 - WIDER
+    )
 
 
 def test_a_polynomial_spends_no_more_than_the_quintic_that_it_could_be() -> None:
@@ -152,7 +178,9 @@ def test_mechanical_work(method: str) -> None:
 ALL = polynomial_ga.GENERATIONS
 
 
-def by_genetic_algorithm(start: Any = START, goal: Any = GOAL, **given: Any) -> tuple[PolynomialGA, SolveResult]:
+def by_genetic_algorithm(
+    start: Any = START, goal: Any = GOAL, **given: Any
+) -> tuple[PolynomialGA, SolveResult]:
     task = PreparedProblem.of(problem(start, goal, method="polynomial_ga", **given))
     solver = PolynomialGA(task, start, goal, NEVER)
     return solver, solver.solve()
@@ -182,7 +210,9 @@ def test_the_deadline_ends_the_genetic_algorithm() -> None:
 
 
 def test_the_genetic_algorithm_solves_a_few_candidates_and_says_so_of_the_others() -> None:
-    solution = optimize(problem(tcp_pose(START), tcp_pose(GOAL), method="polynomial_ga", windings=False))
+    solution = optimize(
+        problem(tcp_pose(START), tcp_pose(GOAL), method="polynomial_ga", windings=False)
+    )
     solved_ones = [each for each in solution.candidates if each.status == "solved"]
     left = [each for each in solution.candidates if each.status == "unvisited"]
     assert 0 < len(solved_ones) <= 3 and solution.status == "feasible"
@@ -192,7 +222,10 @@ def test_the_genetic_algorithm_solves_a_few_candidates_and_says_so_of_the_others
     known = pairs(asked, ends(asked, "start")[0], ends(asked, "goal")[0])
     bound(asked, known)
     plain = {each.q_start.tobytes() + each.q_goal.tobytes(): each.lower_bound for each in known}
-    first, last = ([plain[e.q_start.tobytes() + e.q_goal.tobytes()] for e in some] for some in (solved_ones, left))
+    first, last = (
+        [plain[e.q_start.tobytes() + e.q_goal.tobytes()] for e in some]
+        for some in (solved_ones, left)
+    )
     assert not left or max(first) <= min(last)
 
 
@@ -205,7 +238,9 @@ def test_the_genetic_algorithm_is_never_optimal_with_energy_storage_either() -> 
 
 @pytest.mark.parametrize("cost", [5.0, -5.0])
 def test_a_torque_beyond_its_limit_costs_more_even_if_the_cost_is_below_zero(cost: float) -> None:
-    """Where waiting less is a gain, costs are negative: then durations that no motor can make were preferred."""
+    """Where waiting less is a gain, costs are negative: then durations that no motor can make were
+    preferred.
+    """
     own = ROBOT.limits
     within, beyond = (with_excess(cost, share * own.tau_max[None], own) for share in (0.9, 1.5))
     assert within == cost and beyond == pytest.approx(cost + 2.5)

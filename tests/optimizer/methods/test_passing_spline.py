@@ -1,4 +1,6 @@
-"""Motions through configurations without a rest: exactly through them, within every limit, and of less energy."""
+"""Motions through configurations without a rest: exactly through them, within every limit, and of
+less energy.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,11 @@ ON_PASS = 1e-9
 def configurations(seed: int, passes: int) -> Array:
     """Configurations (passes + 2, nq) on the way from START to GOAL, scattered about it."""
     rng = np.random.default_rng(seed)
-    return START + np.linspace(0, 1, passes + 2)[:, None] * (GOAL - START) + rng.uniform(-0.3, 0.3, (passes + 2, 6))
+    return (
+        START
+        + np.linspace(0, 1, passes + 2)[:, None] * (GOAL - START)
+        + rng.uniform(-0.3, 0.3, (passes + 2, 6))
+    )
 
 
 def through(q: Array, **given: object) -> Problem:
@@ -38,7 +44,9 @@ def through(q: Array, **given: object) -> Problem:
 
 
 def nearest(motion: Spline, q: Array) -> tuple[float, float]:
-    """Distance of the motion from q [rad], by fine samples and a parabola, and the speed there [rad/s]."""
+    """Distance of the motion from q [rad], by fine samples and a parabola, and the speed there
+    [rad/s].
+    """
     t = np.linspace(0, motion.duration, 20001)
     squared = ((motion.curve(t) - q) ** 2).sum(axis=1)
     k = int(squared[1:-1].argmin()) + 1
@@ -82,17 +90,23 @@ def test_a_motion_that_misses_a_pass_is_not_certified() -> None:
     with pytest.raises(NoTrajectory):
         Run(through(missed)).as_it_is(spline)
     assert Run(through(q)).as_it_is(spline).energy.electrical.total == found.energy.electrical.total
-    other = turned.incumbent.certified(turned.incumbent.candidates[0], spline, run.incumbent.prepared.energy(spline))
+    other = turned.incumbent.certified(
+        turned.incumbent.candidates[0], spline, run.incumbent.prepared.energy(spline)
+    )
     assert not other.valid
 
 
 def test_it_is_never_worse_than_a_known_motion_that_stops() -> None:
-    """Passes that turn the arm right round leave nothing to save: the known motion is the answer then, or better."""
+    """Passes that turn the arm right round leave nothing to save: the known motion is the answer
+    then, or better.
+    """
     q = np.array([START, GOAL, START + 0.02 * (GOAL - START)])
     theirs = stopping(q)
     known = joined([each.trajectory.spline for each in theirs])
     found = Run(through(q), known=[known]).solution()
-    assert found.energy.electrical.total <= sum(each.energy.electrical.total for each in theirs) * (1 + 1e-9)
+    assert found.energy.electrical.total <= sum(each.energy.electrical.total for each in theirs) * (
+        1 + 1e-9
+    )
 
 
 def test_a_given_duration_is_kept_and_the_fastest_is_faster_than_stopping() -> None:
@@ -108,13 +122,21 @@ def test_a_given_duration_is_kept_and_the_fastest_is_faster_than_stopping() -> N
 
 
 def test_it_passes_by_an_obstacle() -> None:
-    """A box in the way of the tool before the pass: the motion goes round it, and still through the pass."""
+    """A box in the way of the tool before the pass: the motion goes round it, and still through the
+    pass.
+    """
     q = np.array(
-        [[0.0, -1.2, 1.6, -2.0, -1.57, 0.0], [0.7, -1.4, 1.5, -1.6, -1.57, 0.0], [1.4, -1.2, 1.6, -2.0, -1.57, 0.0]]
+        [
+            [0.0, -1.2, 1.6, -2.0, -1.57, 0.0],
+            [0.7, -1.4, 1.5, -1.6, -1.57, 0.0],
+            [1.4, -1.2, 1.6, -2.0, -1.57, 0.0],
+        ]
     )
     free = Run(through(q, collisions=True)).solution()
     T = np.eye(4)
-    T[:3, 3] = tcp_pose(problem().arm, free.trajectory.spline.curve(0.25 * free.duration))[:3, 3] - [0, 0, 0.06]
+    T[:3, 3] = tcp_pose(problem().arm, free.trajectory.spline.curve(0.25 * free.duration))[
+        :3, 3
+    ] - [0, 0, 0.06]
     scene = Scene([Obstacle("box", Box(size=np.array([0.08, 0.08, 0.1])), T)])
     found = Run(through(q, collisions=True, scene=scene)).solution()
     assert found.certificate.valid and found.certificate.clearance is not None

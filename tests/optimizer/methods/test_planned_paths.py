@@ -1,4 +1,6 @@
-"""Planned paths of candidates: to goals that differ by full turns, in how many states, and when their solves end."""
+"""Planned paths of candidates: to goals that differ by full turns, in how many states, and when
+their solves end.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.optimizer.collision.path_planner import USUAL, Effort, PlannedPaths, PlanningEnd, along, plan_paths
+from joulepath.optimizer.collision.path_planner import (
+    USUAL,
+    Effort,
+    PlannedPaths,
+    PlanningEnd,
+    along,
+    plan_paths,
+)
 from joulepath.optimizer.deadline import NEVER, Deadline
 from joulepath.optimizer.methods import free_spline, planned_paths
 from joulepath.optimizer.methods.free_spline import FreeSpline
@@ -20,7 +29,14 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.bus import Bus, BusMode
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.surroundings import Surroundings
-from tests.optimizer.collision.test_path_planner import AMPLE, between, least, problem, task, walled_in
+from tests.optimizer.collision.test_path_planner import (
+    AMPLE,
+    between,
+    least,
+    problem,
+    task,
+    walled_in,
+)
 
 
 def test_a_known_path_leads_to_goals_that_differ_by_full_turns() -> None:
@@ -37,10 +53,13 @@ def test_a_known_path_leads_to_goals_that_differ_by_full_turns() -> None:
 
 
 def test_more_paths_are_planned_only_where_the_first_is_hard_to_find() -> None:
-    """Around the post there are more than two; a first path that counts as easy leads to the usual ones."""
+    """Around the post there are more than two; a first path that counts as easy leads to the usual
+    ones.
+    """
     ends, more = task("post"), Effort(paths=4, more_states=12_000)
     usual, many, easy = (
-        plan_paths(*ends, Deadline.after(AMPLE), effort).paths for effort in (USUAL, more, replace(more, easy=10**9))
+        plan_paths(*ends, Deadline.after(AMPLE), effort).paths
+        for effort in (USUAL, more, replace(more, easy=10**9))
     )
     assert 2 == len(usual) < len(many) <= 4
     for path, same in zip(usual, easy, strict=True):
@@ -48,7 +67,9 @@ def test_more_paths_are_planned_only_where_the_first_is_hard_to_find() -> None:
 
 
 @pytest.mark.parametrize("goals", [1, 2])
-def test_more_paths_are_planned_for_the_only_candidate(goals: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_more_paths_are_planned_for_the_only_candidate(
+    goals: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     arm, q_start, q_goal = task("post")
     asked, efforts, plan = problem(arm, q_start, q_goal), list[Effort](), Surroundings.planned_paths
 
@@ -70,7 +91,9 @@ def test_a_solve_among_obstacles_ends_once_it_cannot_come_near_the_best_motion()
     alone = solver.along_path(path, t)
     energy = solver.prepared.cost_of(alone.spline)
     solver.best_known = energy / NOT_MUCH_BETTER * 1.01
-    np.testing.assert_array_equal(solver.along_path(path, t).spline.control_points, alone.spline.control_points)  # type: ignore[union-attr]
+    np.testing.assert_array_equal(
+        solver.along_path(path, t).spline.control_points, alone.spline.control_points
+    )  # type: ignore[union-attr]
     solver.best_known = energy / 1.3
     assert 0 < solver.along_path(path, t).iterations < alone.iterations
     solver.best_known = energy / 10
@@ -80,12 +103,23 @@ def test_a_solve_among_obstacles_ends_once_it_cannot_come_near_the_best_motion()
 
 @pytest.mark.parametrize(
     ("best_known", "was_postponed", "others", "thorough"),
-    [(np.inf, False, 1, False), (np.inf, True, 1, True), (np.inf, False, 0, True), (1e3, True, 1, False)],
+    [
+        (np.inf, False, 1, False),
+        (np.inf, True, 1, True),
+        (np.inf, False, 0, True),
+        (1e3, True, 1, False),
+    ],
 )
 def test_many_states_are_checked_only_where_few_were_in_vain(
-    best_known: float, was_postponed: bool, others: int, thorough: bool, monkeypatch: pytest.MonkeyPatch
+    best_known: float,
+    was_postponed: bool,
+    others: int,
+    thorough: bool,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Walled in, the planning uses all states that it may; so long as others are open, the candidate is postponed."""
+    """Walled in, the planning uses all states that it may; so long as others are open, the
+    candidate is postponed.
+    """
     monkeypatch.setattr(planned_paths, "FEW_STATES", 100)
     monkeypatch.setattr(planned_paths, "MOST_STATES", 1_000)
     arm, q_start, q_goal = walled_in()
@@ -95,30 +129,43 @@ def test_many_states_are_checked_only_where_few_were_in_vain(
     found = planned_paths.plan(solver)
     assert found.end is PlanningEnd.EXHAUSTED
     assert (found.checked_states >= 1_000) == thorough
-    failed = planned_paths.without_path(solver, SolveResult(SolveStatus.FAILED, "it collides"), found)
+    failed = planned_paths.without_path(
+        solver, SolveResult(SolveStatus.FAILED, "it collides"), found
+    )
     few = np.isinf(best_known) and not thorough
     assert failed.status is (SolveStatus.POSTPONED if few else SolveStatus.FAILED)
 
 
 def test_a_multiple_of_an_energy_is_above_it_whatever_its_sign() -> None:
-    assert (above(10.0, 1.5), above(-10.0, 1.5), above(0.0, 1.5), above(np.inf, 1.5)) == (15.0, -5.0, 0.0, np.inf)
+    assert (above(10.0, 1.5), above(-10.0, 1.5), above(0.0, 1.5), above(np.inf, 1.5)) == (
+        15.0,
+        -5.0,
+        0.0,
+        np.inf,
+    )
 
 
 @pytest.mark.parametrize(("mode", "skipped"), [("shared", True), ("recuperating", False)])
-def test_far_costlier_paths_are_skipped_only_where_no_energy_comes_back(mode: BusMode, skipped: bool) -> None:
+def test_far_costlier_paths_are_skipped_only_where_no_energy_comes_back(
+    mode: BusMode, skipped: bool
+) -> None:
     arm, q_start, q_goal = task("post")
     asked = problem(arm, q_start, q_goal)
     prepared = PreparedProblem.of(replace(asked, arm=replace(asked.arm, bus=Bus(mode))))
     solver = FreeSpline(prepared, q_start, q_goal, NEVER)
     (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
     solver.best_known = 0.1
-    assert (solver.along_path(*along(path, 1.0, arm.active_limits.v_max)).iterations == 0) == skipped
+    assert (
+        solver.along_path(*along(path, 1.0, arm.active_limits.v_max)).iterations == 0
+    ) == skipped
 
 
 def test_a_motion_that_left_an_obstacle_at_great_cost_is_compared_with_planned_paths(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """It may have left it on the wrong side; of both motions, the one of least energy is kept, with its own reason."""
+    """It may have left it on the wrong side; of both motions, the one of least energy is kept, with
+    its own reason.
+    """
     arm, q_start, q_goal = task("post")
     prepared = PreparedProblem.of(problem(arm, q_start, q_goal))
     with monkeypatch.context() as alone:
@@ -133,12 +180,21 @@ def test_a_motion_that_left_an_obstacle_at_great_cost_is_compared_with_planned_p
     costlier = replace(compared, spline=direct.spline, reason=FROM_PLANNED_PATH)
     monkeypatch.setattr(FreeSpline, "from_planned_paths", lambda *_: costlier)
     kept = FreeSpline(prepared, q_start, q_goal, NEVER).solve()
-    assert kept.reason == direct.reason and prepared.cost_of(kept.spline) == energy and not kept.cut_short
-    # a deadline that ends the comparison ends the solution of the candidate: nobody may call it optimal
+    assert (
+        kept.reason == direct.reason
+        and prepared.cost_of(kept.spline) == energy
+        and not kept.cut_short
+    )
+    # a deadline that ends the comparison ends the solution of the candidate: nobody may call it
+    # optimal
     for late in (
         SolveResult(SolveStatus.OUT_OF_TIME, ""),
         replace(direct, status=SolveStatus.FAILED, cut_short=True),
     ):
         monkeypatch.setattr(FreeSpline, "from_planned_paths", lambda *_, late=late: late)
         kept = FreeSpline(prepared, q_start, q_goal, NEVER).solve()
-        assert kept.cut_short and kept.status is SolveStatus.SOLVED and prepared.cost_of(kept.spline) == energy
+        assert (
+            kept.cut_short
+            and kept.status is SolveStatus.SOLVED
+            and prepared.cost_of(kept.spline) == energy
+        )

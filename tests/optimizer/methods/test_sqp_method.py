@@ -1,4 +1,6 @@
-"""One candidate from guess to motion: it holds every limit between the nodes too, and says so when it cannot."""
+"""One candidate from guess to motion: it holds every limit between the nodes too, and says so when
+it cannot.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +49,9 @@ CONDITIONS: list[dict[str, Any]] = [
 ]
 
 
-def solver(start: Array, goal: Array, fastest: bool = False, wait: float = 60.0, **given: Any) -> Method:
+def solver(
+    start: Array, goal: Array, fastest: bool = False, wait: float = 60.0, **given: Any
+) -> Method:
     compile_kernel(ROBOT)
     task = PreparedProblem.of(problem(start, goal, **given))
     interval = duration_intervals.fastest(task) if fastest else None
@@ -60,7 +64,9 @@ def spline(attempt: SolveResult) -> Spline:
 
 
 def assert_held(task: Problem, motion: Spline) -> None:
-    """Every limit, at samples apart from any grid of the optimiser's, with SciPy's spline and Pinocchio's torques."""
+    """Every limit, at samples apart from any grid of the optimiser's, with SciPy's spline and
+    Pinocchio's torques.
+    """
     own = task.arm.active_limits
     curve = BSpline(motion.knots, motion.control_points, motion.degree)
     t = np.linspace(0.0, motion.duration, SAMPLES)
@@ -84,8 +90,12 @@ def assert_held(task: Problem, motion: Spline) -> None:
 def test_limits_hold_between_the_nodes(method: str, objective: str) -> None:
     for (start, goal), given in zip(random_moves(31, len(CONDITIONS)), CONDITIONS, strict=True):
         own = given.get("limits", ROBOT.limits)
-        longest = None if objective == "electrical" else 2.0 * float(shortest_duration(goal - start, own))
-        mine = solver(start, goal, method=method, objective=objective, duration_max=longest, **given)
+        longest = (
+            None if objective == "electrical" else 2.0 * float(shortest_duration(goal - start, own))
+        )
+        mine = solver(
+            start, goal, method=method, objective=objective, duration_max=longest, **given
+        )
         attempt = mine.solve()
         if method == "time_scaling" and attempt.status is SolveStatus.INFEASIBLE:
             continue  # a straight line may lead where the arm cannot be held
@@ -100,14 +110,18 @@ def test_a_time_scaled_motion_stays_on_its_line() -> None:
         displacement = goal - start
         fraction = (points - start) @ displacement / (displacement @ displacement)
         assert np.abs(points - start - np.outer(fraction, displacement)).max() < ROUNDING
-        assert fraction[0] == pytest.approx(0, abs=ROUNDING) and fraction[-1] == pytest.approx(1, abs=ROUNDING)
+        assert fraction[0] == pytest.approx(0, abs=ROUNDING) and fraction[-1] == pytest.approx(
+            1, abs=ROUNDING
+        )
 
 
 def test_minimum_time_ignores_the_duration_asked_for() -> None:
     """It tells what would be possible."""
     quick = spline(solver(START, GOAL, fastest=True).solve()).duration
     for given in (fixed(0.1), fixed(5.0)):
-        assert spline(solver(START, GOAL, fastest=True, **given).solve()).duration == pytest.approx(quick, rel=1e-9)
+        assert spline(solver(START, GOAL, fastest=True, **given).solve()).duration == pytest.approx(
+            quick, rel=1e-9
+        )
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -117,7 +131,9 @@ def test_a_deadline_that_has_passed_ends_the_attempt(method: str) -> None:
 
 
 def test_a_motion_is_solved_again_from_itself_with_its_knots_where_jerk_switches_now() -> None:
-    """Its goal has moved since: in fewer steps than from fits, to no more energy, within every limit."""
+    """Its goal has moved since: in fewer steps than from fits, to no more energy, within every
+    limit.
+    """
     steps = np.zeros(2, dtype=int)
     for start, goal in ((START, GOAL), *random_moves(3, 1)):
         own, moved = solver(start, goal + 0.02), solver(start, goal)
@@ -132,7 +148,9 @@ def test_a_motion_is_solved_again_from_itself_with_its_knots_where_jerk_switches
 
 
 def test_a_sole_candidate_is_refined_at_once() -> None:
-    """Its coarse motion is only a guess: the result is that of two solves, one after the other, and within limits."""
+    """Its coarse motion is only a guess: the result is that of two solves, one after the other, and
+    within limits.
+    """
     at_once, twice = solver(START, GOAL), solver(START, GOAL)
     at_once.is_sole = True
     found = spline(at_once.solve())
@@ -141,7 +159,9 @@ def test_a_sole_candidate_is_refined_at_once() -> None:
     assert_held(at_once.prepared.problem, found)
     tight = coarse.duration < TIGHT * shortest_duration(GOAL - START, ROBOT.limits)
     cost = at_once.prepared.cost_of
-    assert cost(found) == pytest.approx(cost(spline(twice.refined(coarse, fine=bool(tight)))), rel=1e-3)
+    assert cost(found) == pytest.approx(
+        cost(spline(twice.refined(coarse, fine=bool(tight)))), rel=1e-3
+    )
 
 
 @pytest.mark.parametrize("why", ["refining fails", "another candidate", "little time"])
@@ -157,9 +177,13 @@ def test_else_the_coarse_motion_is_checked(why: str, monkeypatch: pytest.MonkeyP
     assert_held(own.prepared.problem, spline(result))
 
 
-@pytest.mark.parametrize(("readings", "refined"), [(25, False), (30, False), (34, False), (200, False), (1000, True)])
+@pytest.mark.parametrize(
+    ("readings", "refined"), [(25, False), (30, False), (34, False), (200, False), (1000, True)]
+)
 def test_on_a_slow_machine_a_checked_motion_comes_first(readings: int, refined: bool) -> None:
-    """Of the time that is left, a reading of the clock takes a share; coarse and refined motion take 34 of them."""
+    """Of the time that is left, a reading of the clock takes a share; coarse and refined motion
+    take 34 of them.
+    """
     own, ticks = solver(START, GOAL), count()
     own.is_sole, own.deadline = True, Deadline(2.0, clock=lambda: 2.0 * next(ticks) / readings)
     found = spline(own.solve())
@@ -168,7 +192,9 @@ def test_on_a_slow_machine_a_checked_motion_comes_first(readings: int, refined: 
 
 
 def test_a_coarse_motion_that_collides_is_no_guess() -> None:
-    """Of this move it hits the arm itself: clearance constraints are added to it, as without a refined motion."""
+    """Of this move it hits the arm itself: clearance constraints are added to it, as without a
+    refined motion.
+    """
     start, goal = list(random_moves(5, 7))[6]
     own, usual = (solver(start, goal, collisions=True) for _ in range(2))
     own.is_sole = True
@@ -198,7 +224,9 @@ def test_a_slow_motion_has_its_first_knots_at_the_ramps_and_is_refined_from_itse
     assert_held(own.prepared.problem, spline(finer))
 
 
-@pytest.mark.parametrize("given", [{}, {"objective": "mechanical", "duration_max": 15.0}, {"limits": ROBOT.limits}])
+@pytest.mark.parametrize(
+    "given", [{}, {"objective": "mechanical", "duration_max": 15.0}, {"limits": ROBOT.limits}]
+)
 def test_other_first_knots_are_evenly_spaced(given: dict[str, object]) -> None:
     """At the robot's own limits of speed; and of least work, for which no time is too long."""
     own = slowly(0.1, **given)

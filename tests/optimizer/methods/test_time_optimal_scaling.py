@@ -1,4 +1,6 @@
-"""The shortest law along a straight line: closed forms where torque is ample, and a true bound where it is not."""
+"""The shortest law along a straight line: closed forms where torque is ample, and a true bound
+where it is not.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +19,20 @@ from joulepath.optimizer.search.baselines import broken_limits
 from joulepath.optimizer.trajectories import bspline
 from joulepath.optimizer.trajectories.bspline import DEGREE
 from joulepath.optimizer.trajectories.time_scalings import quintic
-from tests.optimizer.moves import CEILING, GOAL, PAYLOAD, ROBOT, START, limits, problem, random_moves, torques
+from tests.optimizer.moves import (
+    CEILING,
+    GOAL,
+    PAYLOAD,
+    ROBOT,
+    START,
+    limits,
+    problem,
+    random_moves,
+    torques,
+)
 
-# relative; acceleration switches somewhere between two of the 60 steps, and toppra's lies on one of them
+# relative; acceleration switches somewhere between two of the 60 steps, and toppra's lies on one of
+# them
 GRID_STEP = 0.02
 # of the line; a law's corner is rounded over the reach of a few Greville points
 CORNER = 0.02
@@ -35,8 +48,12 @@ def law_of(start: Array, goal: Array, **given: Any) -> Any:
 @pytest.mark.parametrize(
     ("displacement", "duration"), [(2.0, 2.0 / math.pi + math.pi / 10), (0.5, 2 * math.sqrt(0.05))]
 )
-def test_one_joint_with_ample_torque_moves_in_a_trapezoid(displacement: float, duration: float) -> None:
-    """The last joint at 3.14 rad/s and 10 rad/s²: T = Δ/v + v/a, or 2 (Δ/a)^½ where it turns before its full speed."""
+def test_one_joint_with_ample_torque_moves_in_a_trapezoid(
+    displacement: float, duration: float
+) -> None:
+    """The last joint at 3.14 rad/s and 10 rad/s²: T = Δ/v + v/a, or 2 (Δ/a)^½ where it turns before
+    its full speed.
+    """
     law = law_of(START, START + displacement * np.eye(6)[5], **ALMOST_WEIGHTLESS)
     assert law.times[-1] == pytest.approx(duration, rel=GRID_STEP)
     assert TRUST * law.times[-1] == pytest.approx(law.duration_bound)
@@ -54,9 +71,15 @@ def test_the_law_runs_from_rest_to_rest() -> None:
 
 
 def fastest_quintic(start: Array, goal: Array, **given: Any) -> float:
-    """The least duration [s] at which the straight quintic holds every limit but jerk, by bisection."""
+    """The least duration [s] at which the straight quintic holds every limit but jerk, by
+    bisection.
+    """
     task = problem(start, goal, **given)
-    free = problem(start, goal, **given | {"limits": given.get("limits", limits()).tightened(j_max=np.full(6, 200.0))})
+    free = problem(
+        start,
+        goal,
+        **given | {"limits": given.get("limits", limits()).tightened(j_max=np.full(6, 200.0))},
+    )
     low, high = 0.05, 40.0
     while high / low > 1.001:
         middle = math.sqrt(low * high)
@@ -69,7 +92,10 @@ def fastest_quintic(start: Array, goal: Array, **given: Any) -> float:
 @pytest.mark.parametrize("weak", [False, True], ids=["as it comes", "weak"])
 def test_no_quintic_is_faster(weak: bool) -> None:
     """Where torque is ample, its smooth acceleration costs it time, but not the treble."""
-    given: dict[str, Any] = {"payload": PAYLOAD, "limits": limits(tau_max=WEAK) if weak else limits()}
+    given: dict[str, Any] = {
+        "payload": PAYLOAD,
+        "limits": limits(tau_max=WEAK) if weak else limits(),
+    }
     compared = 0
     for start, goal in random_moves(21, 24):
         law = law_of(start, goal, **given)
@@ -84,7 +110,9 @@ def test_no_quintic_is_faster(weak: bool) -> None:
 
 
 def test_torque_counts_with_payload_and_mounting() -> None:
-    """An arm with little torque is slower, and slower still under a load; how it hangs makes a difference."""
+    """An arm with little torque is slower, and slower still under a load; how it hangs makes a
+    difference.
+    """
     weak = limits(tau_max=[150.0, 60.0, 150.0, 28.0, 28.0, 28.0])
     lift = START + np.array([0.0, 1.0, -0.3, 0.0, 0.0, 0.0])
     strong = law_of(START, lift).duration_bound
@@ -96,10 +124,14 @@ def test_torque_counts_with_payload_and_mounting() -> None:
 
 
 def test_no_law_where_the_arm_cannot_be_held_on_the_way() -> None:
-    """Folded at both ends, stretched out in the middle: there gravity asks for more than the shoulder has."""
+    """Folded at both ends, stretched out in the middle: there gravity asks for more than the
+    shoulder has.
+    """
     start, goal = np.array([0.0, 0.0, 2.7, 0, 0, 0]), np.array([0.0, 0.0, -2.7, 0, 0, 0])
     ends = np.abs(torques(problem(), np.array([start, goal]), np.zeros((2, 6)), np.zeros((2, 6))))
-    middle = np.abs(torques(problem(), (start + goal)[None] / 2, np.zeros((1, 6)), np.zeros((1, 6))))[0]
+    middle = np.abs(
+        torques(problem(), (start + goal)[None] / 2, np.zeros((1, 6)), np.zeros((1, 6)))
+    )[0]
     friction = problem().arm.friction_law.torque(ROBOT.limits.v_max)
     enough = (ends.max(axis=0)[1] + middle[1]) / 2
     tau_max = ROBOT.limits.tau_max.copy()
@@ -113,7 +145,9 @@ def test_no_travel_takes_no_time() -> None:
     assert law_of(START, START).duration_bound < 1e-6
 
 
-@pytest.mark.parametrize("space", [bspline.uniform(13), bspline.graded(np.array([0.1, 0.4, 0.6, 0.9]), 3)])
+@pytest.mark.parametrize(
+    "space", [bspline.uniform(13), bspline.graded(np.array([0.1, 0.4, 0.6, 0.9]), 3)]
+)
 def test_control_values_follow_the_law(space: bspline.Basis) -> None:
     """At rest at both ends, never turning back, and near the law itself in between."""
     law = law_of(START, GOAL)

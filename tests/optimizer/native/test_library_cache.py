@@ -26,7 +26,9 @@ HASTY = Patience(compiler=0.5, look=0.01)
 ENDED = 20.0  # s; for a process that was killed to be gone, on a machine with much else to do
 
 
-def test_the_cache_is_where_the_user_says_or_at_home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_cache_is_where_the_user_says_or_at_home(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setenv("JOULEPATH_CACHE_DIR", str(tmp_path))
     assert cache_directory() == tmp_path
     monkeypatch.delenv("JOULEPATH_CACHE_DIR")
@@ -34,7 +36,9 @@ def test_the_cache_is_where_the_user_says_or_at_home(monkeypatch: pytest.MonkeyP
     assert cache_directory() == tmp_path / "home" / ".cache" / "joulepath"
 
 
-def test_libraries_that_rested_longest_leave(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_libraries_that_rested_longest_leave(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Of many arms that users bring; a library in use is marked, and stays."""
     monkeypatch.setattr(library_cache, "MOST_LIBRARIES", 3)
     for k in range(5):
@@ -75,7 +79,9 @@ def until_gone(ids: Path) -> None:
         time.sleep(0.02)
 
 
-def test_a_compiler_that_hangs_is_killed_with_all_that_it_started(tmp_path: Path, hung: Path) -> None:
+def test_a_compiler_that_hangs_is_killed_with_all_that_it_started(
+    tmp_path: Path, hung: Path
+) -> None:
     target = tmp_path / "cache" / "arm.so"
     with pytest.raises(RuntimeError, match=r"does not end within 0\.5 s"):
         compile_library(target, (), lambda: "", HASTY)
@@ -87,8 +93,12 @@ def test_a_compiler_that_hangs_is_killed_with_all_that_it_started(tmp_path: Path
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
-def test_a_compiler_that_hung_rests(tmp_path: Path, hung: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another process does not try it again either, until an hour later; another compiler is tried at once."""
+def test_a_compiler_that_hung_rests(
+    tmp_path: Path, hung: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another process does not try it again either, until an hour later; another compiler is tried
+    at once.
+    """
     target, note = tmp_path / "arm.so", tmp_path / "arm.hung"
     for _ in range(3):
         with pytest.raises(CompilerHangs):
@@ -108,7 +118,8 @@ def test_a_program_that_ends_takes_a_hung_compiler_along(tmp_path: Path, hung: P
     code = (
         "import sys, threading, time; from pathlib import Path\n"
         "from joulepath.optimizer.native.library_cache import compile_library\n"
-        "threading.Thread(target=compile_library, args=(Path(sys.argv[1]), (), str), daemon=True).start()\n"
+        "threading.Thread(target=compile_library, args=(Path(sys.argv[1]), (), str), "
+        "daemon=True).start()\n"
         "while not Path(sys.argv[2]).exists(): time.sleep(0.02)\n"
     )
     subprocess.run([sys.executable, "-c", code, tmp_path / "arm.so", hung], check=True, timeout=60)
@@ -118,7 +129,8 @@ def test_a_program_that_ends_takes_a_hung_compiler_along(tmp_path: Path, hung: P
 def test_killed_processes_leave_one_hung_compiler_at_most(tmp_path: Path, hung: Path) -> None:
     """It has inherited the lock: whoever comes later gives up instead of starting another one."""
     code = (
-        "import sys; from pathlib import Path; from joulepath.optimizer.native.library_cache import compile_library\n"
+        "import sys; from pathlib import Path; from joulepath.optimizer.native.library_cache "
+        "import compile_library\n"
         "compile_library(Path(sys.argv[1]), (), str)\n"
     )
     process = subprocess.Popen([sys.executable, "-c", code, tmp_path / "arm.so"])

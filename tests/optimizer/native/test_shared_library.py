@@ -1,4 +1,6 @@
-"""The C library that all arms share: how it is compiled and loaded, and the frames that it computes."""
+"""The C library that all arms share: how it is compiled and loaded, and the frames that it
+computes.
+"""
 
 from __future__ import annotations
 
@@ -78,12 +80,16 @@ def test_a_clone_that_was_not_set_up_cannot_be_imported(tmp_path: Path) -> None:
         shutil.copytree(spec.submodule_search_locations[0], tmp_path / package, ignore=ignored)
 
     def run(*command: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run([sys.executable, *command], cwd=tmp_path, capture_output=True, text=True, timeout=300)
+        return subprocess.run(
+            [sys.executable, *command], cwd=tmp_path, capture_output=True, text=True, timeout=300
+        )
 
     refused = run("-c", f"import {link_frames.__module__}")
     assert refused.returncode == 1
     said = refused.stderr.splitlines()[-1]
-    assert said.startswith(f"{LibraryUnusable.__module__}.LibraryUnusable: The C library {tmp_path}")
+    assert said.startswith(
+        f"{LibraryUnusable.__module__}.LibraryUnusable: The C library {tmp_path}"
+    )
     found = re.search("`python (.*build[.]py)`", said)
     assert found is not None
     assert run(found[1]).returncode == 0
@@ -91,7 +97,9 @@ def test_a_clone_that_was_not_set_up_cannot_be_imported(tmp_path: Path) -> None:
 
 
 def test_it_is_compiled_for_every_processor_of_its_kind(tmp_path: Path) -> None:
-    """No result depends on the processor: what was compiled for this one gives the same frames, to the last bit."""
+    """No result depends on the processor: what was compiled for this one gives the same frames, to
+    the last bit.
+    """
     compiler = build.compiler()
     assert compiler is not None
     own = tmp_path / "own.so"
@@ -117,7 +125,9 @@ def test_a_compiler_that_fails_is_told_with_its_remedy(
     broken.write_text("#!/bin/sh\necho no such option >&2\nexit 1\n", encoding="utf-8")
     broken.chmod(0o755)
     monkeypatch.setenv("CC", str(broken))
-    with pytest.raises(BuildFailed, match=r"(?s)no such option.*Name a C compiler that works by CC"):
+    with pytest.raises(
+        BuildFailed, match=r"(?s)no such option.*Name a C compiler that works by CC"
+    ):
         build.build(sources)
     monkeypatch.setenv("CC", "no-such-compiler")
     monkeypatch.setenv("PATH", os.devnull)
@@ -143,10 +153,19 @@ def frames_by_numpy(placements: Array, q: Array) -> Array:
 
 @pytest.mark.parametrize("name", robot_names())
 def test_frames_are_those_of_numpy(name: str) -> None:
-    """Also of no configuration, of some joints alone, and of arrays whose numbers do not lie one after the other."""
+    """Also of no configuration, of some joints alone, and of arrays whose numbers do not lie one
+    after the other.
+    """
     robot = load_robot(name)
     placements = joint_placements(robot.model)
     q = np.random.default_rng(4).uniform(-7, 7, (robot.nq, 200)).T
     assert not q.flags.c_contiguous
-    for given, of in ((q, placements), (q[:0], placements), (q[:, :3], placements[:3]), (q[::7], placements)):
-        np.testing.assert_allclose(link_frames(of, given), frames_by_numpy(of, given), rtol=0, atol=FRAMES)
+    for given, of in (
+        (q, placements),
+        (q[:0], placements),
+        (q[:, :3], placements[:3]),
+        (q[::7], placements),
+    ):
+        np.testing.assert_allclose(
+            link_frames(of, given), frames_by_numpy(of, given), rtol=0, atol=FRAMES
+        )

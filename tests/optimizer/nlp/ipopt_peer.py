@@ -1,7 +1,9 @@
-"""A second solver for the optimiser's NLPs: the same problem, written plainly in CasADi, solved by IPOPT.
+"""A second solver for the optimiser's NLPs: the same problem, written plainly in CasADi, solved by
+IPOPT.
 
-Shared with the optimiser are the spline basis and the expression for power at one instant. Objective,
-constraints, their derivatives (CasADi's own) and the method (interior point) are apart from it.
+Shared with the optimiser are the spline basis and the expression for power at one instant.
+Objective, constraints, their derivatives (CasADi's own) and the method (interior point) are apart
+from it.
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ THINNING = 8
 
 @dataclass(frozen=True)
 class Optimum:
-    """Where IPOPT ended: whether it converged, cost [J], duration [s], free control points (m, nq)."""
+    """Where IPOPT ended: whether it converged, cost [J], duration [s], free control points (m,
+    nq)."""
 
     converged: bool
     cost: float
@@ -39,7 +42,9 @@ def thinned(basis: Basis) -> Array:
 
 
 class Peer:
-    """One program family: motions of all joints in a spline space. Built once, solved for any ends and limits."""
+    """One program family: motions of all joints in a spline space. Built once, solved for any ends
+    and limits.
+    """
 
     def __init__(self, basis: Basis) -> None:
         nq, m = ROBOT.nq, basis.n - 2 * REST_POINTS
@@ -66,7 +71,13 @@ class Peer:
                 "f": T * ca.dot(ca.DM(basis.weights), cost.T),
                 "g": ca.vertcat(*rows, ca.vec(tau)),
             },
-            {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.tol": 1e-7, "ipopt.max_iter": 500},
+            {
+                "ipopt.print_level": 0,
+                "print_time": False,
+                "ipopt.sb": "yes",
+                "ipopt.tol": 1e-7,
+                "ipopt.max_iter": 500,
+            },
         )
 
     def solve(self, program: NonlinearProgram, free: Array, duration: float) -> Optimum:

@@ -19,7 +19,9 @@ DURATION, STEP = 2.0, 1e-3
 
 
 def without_dry_friction(program: NonlinearProgram) -> NonlinearProgram:
-    """The program of an arm whose friction has no step: the Hessian leaves out what its reversal makes concave."""
+    """The program of an arm whose friction has no step: the Hessian leaves out what its reversal
+    makes concave.
+    """
     p = program.p.copy()
     p[places("coulomb", program.kernel.nq)] = 0.0
     return replace(program, p=p)
@@ -34,11 +36,11 @@ def assert_curvature(
     steps: Sequence[Array],
     relative: float,
 ) -> None:
-    """Second differences of the cost of motions that are `put` back on what is held at `free` after each of the `steps`
-    (m, r), of length 1, which keep it to first order.
+    """Second differences of the cost of motions that are `put` back on what is held at `free` after
+    each of the `steps` (m, r), of length 1, which keep it to first order.
 
-    `drifted` is what the cost changes by to first order, for its gradient and the drift (m, r) along what is held that
-    putting back makes.
+    `drifted` is what the cost changes by to first order, for its gradient and the drift (m, r)
+    along what is held that putting back makes.
     """
     line = own.derivatives(free, DURATION, np.zeros((len(own.basis.nodes), own.r)))
     gradient = line.gradient[:-1].reshape(free.shape)

@@ -1,4 +1,5 @@
-"""Path constraints as rows of an NLP: gradients and Hessian against finite differences in (s, T)."""
+"""Path constraints as rows of an NLP: gradients and Hessian against finite differences in (s,
+T)."""
 
 from __future__ import annotations
 
@@ -7,7 +8,11 @@ import pytest
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.forward import joint_placements
-from joulepath.optimizer.kinematics.path_constraints import PathConstraints, PointSpeedConstraint, ToolConeConstraint
+from joulepath.optimizer.kinematics.path_constraints import (
+    PathConstraints,
+    PointSpeedConstraint,
+    ToolConeConstraint,
+)
 from joulepath.optimizer.nlp.active_path_constraints import PathConstraintRows
 from joulepath.optimizer.nlp.coordinates import Coordinates
 from joulepath.optimizer.trajectories import bspline
@@ -39,11 +44,17 @@ class Case:
         build = {"joints": Coordinates.joints, "line": Coordinates.straight_line}[kind]
         self.coordinates = build(START, GOAL, ROBOT.limits)
         at_free = np.ascontiguousarray(SPACE.at_path[..., SPACE.free])
-        self.rows = PathConstraintRows(PATH, np.ones(len(PATH.names)), self.coordinates, SPACE.at_path, at_free)
+        self.rows = PathConstraintRows(
+            PATH, np.ones(len(PATH.names)), self.coordinates, SPACE.at_path, at_free
+        )
         r = self.coordinates.r
-        points = self.coordinates.start + np.outer(SPACE.quintic, self.coordinates.goal - self.coordinates.start)
+        points = self.coordinates.start + np.outer(
+            SPACE.quintic, self.coordinates.goal - self.coordinates.start
+        )
         self.points = points
-        free = points[SPACE.free] + 0.05 * np.random.default_rng(4).normal(size=(points[SPACE.free].shape[0], r))
+        free = points[SPACE.free] + 0.05 * np.random.default_rng(4).normal(
+            size=(points[SPACE.free].shape[0], r)
+        )
         self.x = np.append(free.ravel(), 0.8)
 
     def values(self, x: Array) -> Array:
@@ -72,7 +83,10 @@ def test_gradients_are_those_of_finite_differences(case: Case) -> None:
     n = len(case.x)
     assert gradients.shape == (len(SPACE.at_path[0]) * len(PATH.names), n) and case.rows.n == n
     steps = STEP * np.eye(n)
-    slopes = np.stack([(case.values(case.x + d) - case.values(case.x - d)).ravel() / (2 * STEP) for d in steps], axis=1)
+    slopes = np.stack(
+        [(case.values(case.x + d) - case.values(case.x - d)).ravel() / (2 * STEP) for d in steps],
+        axis=1,
+    )
     assert np.abs(gradients - slopes).max() < FIRST * np.abs(slopes).max()
 
 
@@ -84,7 +98,10 @@ def test_the_hessian_is_the_slope_of_the_gradients(case: Case) -> None:
     hessian = case.rows.hessian(values, T, weights)
     steps = STEP * np.eye(len(case.x))
     slopes = np.stack(
-        [weights.ravel() @ (case.gradients(case.x + d) - case.gradients(case.x - d)) / (2 * STEP) for d in steps]
+        [
+            weights.ravel() @ (case.gradients(case.x + d) - case.gradients(case.x - d)) / (2 * STEP)
+            for d in steps
+        ]
     )
     assert np.abs(hessian - slopes).max() < SECOND * np.abs(slopes).max()
     assert np.abs(hessian[-1] - slopes[-1]).max() < SECOND * np.abs(slopes[-1]).max()
@@ -107,8 +124,12 @@ def test_changes_are_gradients_times_steps(case: Case) -> None:
     values = case.rows.values(case.all_points(case.x), T)
     found = case.rows.near(values, float(np.median(values.ratios.value)))
     step = np.random.default_rng(8).normal(size=case.rows.n)
-    changes = case.rows.changes(values, T, found, step[:-1].reshape(-1, case.coordinates.r), float(step[-1]))
-    assert changes == pytest.approx(case.rows.gradients(values, T, found) @ step, rel=1e-9, abs=1e-9)
+    changes = case.rows.changes(
+        values, T, found, step[:-1].reshape(-1, case.coordinates.r), float(step[-1])
+    )
+    assert changes == pytest.approx(
+        case.rows.gradients(values, T, found) @ step, rel=1e-9, abs=1e-9
+    )
 
 
 def test_without_constraints_there_are_no_rows() -> None:

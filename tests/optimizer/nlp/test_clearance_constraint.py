@@ -1,4 +1,6 @@
-"""Motions among obstacles: they keep away, they cost no less than without, and what is far costs nothing."""
+"""Motions among obstacles: they keep away, they cost no less than without, and what is far costs
+nothing.
+"""
 
 from typing import Any
 
@@ -16,7 +18,13 @@ from joulepath.optimizer.methods.free_spline import FreeSpline
 from joulepath.optimizer.methods.limit_repair import REPAIR_MARGIN
 from joulepath.optimizer.methods.method import SolveResult, SolveStatus
 from joulepath.optimizer.methods.sqp_method import COSTLIER, NO_BETTER
-from joulepath.optimizer.nlp.clearance_constraint import CHECKED, COUNTED, RESERVE, SCALE, ClearanceConstraint
+from joulepath.optimizer.nlp.clearance_constraint import (
+    CHECKED,
+    COUNTED,
+    RESERVE,
+    SCALE,
+    ClearanceConstraint,
+)
 from joulepath.optimizer.nlp.working_set_qp import NEAR_PATH
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import Problem
@@ -31,11 +39,13 @@ HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 GOAL = np.array([1.8, -1.1, 1.9, -2.4, -1.57, 0.4])
 # of the motion between the two without anything in the way: where the flange passes
 WAY = np.array([0.0, -0.57, 0.27])
-# replay, and where gradients are differenced [rad]; distances are smooth there to their own curvature
+# replay, and where gradients are differenced [rad]; distances are smooth there to their own
+# curvature
 REPLAY, STEP, GRADIENT_TOLERANCE = 1e-4, 1e-6, 1e-4
 # a limit that binds is used up to the solver's own margins
 USED = 0.999
-# one whose peaks between the points of the program are repaired is tightened by one and a half times their excess
+# one whose peaks between the points of the program are repaired is tightened by one and a half
+# times their excess
 USED_AFTER_REPAIR = 0.997
 # above this a share is exact
 COUNTED_SHARE = 1 - (COUNTED - RESERVE) / SCALE
@@ -72,7 +82,9 @@ def test_a_post_in_the_way_is_passed() -> None:
     free = solved()
     assert least_distance(free, low_post()) < 0
     around = solved(low_post())
-    assert around.certificate.clearance is not None and around.certificate.clearance.min_clearance >= 0
+    assert (
+        around.certificate.clearance is not None and around.certificate.clearance.min_clearance >= 0
+    )
     assert "post" in around.certificate.clearance.pair
     assert least_distance(around, low_post()) >= around.certificate.clearance.min_clearance
     assert around.energy.electrical.total > free.energy.electrical.total
@@ -87,17 +99,28 @@ def test_a_margin_is_kept_and_costs() -> None:
 
 def test_what_is_far_away_changes_nothing() -> None:
     ball = Obstacle("ball", Sphere(0.1), at(-0.5, 0.8, 1.2))
-    with_ball, without = solved(ball).energy.electrical.total, solved(collisions=False).energy.electrical.total
+    with_ball, without = (
+        solved(ball).energy.electrical.total,
+        solved(collisions=False).energy.electrical.total,
+    )
     assert with_ball == pytest.approx(without, rel=SAME_ENERGY)
 
 
 @pytest.mark.parametrize(
     ("given", "reason"),
-    [({}, COSTLIER), ({"objective": "mechanical"} | fixed(2.0), NO_BETTER)],  # no promise is made of work
+    [
+        ({}, COSTLIER),
+        ({"objective": "mechanical"} | fixed(2.0), NO_BETTER),
+    ],  # no promise is made of work
     ids=["electrical", "mechanical"],
 )
-def test_a_colliding_motion_that_needs_more_energy_than_a_known_one_is_pruned(given: Fields, reason: str) -> None:
-    task, empty = (PreparedProblem.of(problem_with(HOME, GOAL, scene=scene, **given)) for scene in (POST, Scene()))
+def test_a_colliding_motion_that_needs_more_energy_than_a_known_one_is_pruned(
+    given: Fields, reason: str
+) -> None:
+    task, empty = (
+        PreparedProblem.of(problem_with(HOME, GOAL, scene=scene, **given))
+        for scene in (POST, Scene())
+    )
 
     def attempt(on: PreparedProblem, best_known: float) -> SolveResult:
         solver = FreeSpline(on, HOME, GOAL, NEVER)
@@ -113,11 +136,15 @@ def test_a_colliding_motion_that_needs_more_energy_than_a_known_one_is_pruned(gi
 
 
 def every_pair(model: CollisionModel) -> PathConstraints:
-    return PathConstraints(joint_placements(ROBOT.model), [ClearanceConstraint(model, np.arange(len(model.pairs)))])
+    return PathConstraints(
+        joint_placements(ROBOT.model), [ClearanceConstraint(model, np.arange(len(model.pairs)))]
+    )
 
 
 def test_gradients_of_the_shares_are_those_of_finite_differences() -> None:
-    problem = problem_with(HOME, GOAL, scene=Scene((low_post(), Obstacle("ball", Sphere(0.1), at(0.3, -0.3, 0.4)))))
+    problem = problem_with(
+        HOME, GOAL, scene=Scene((low_post(), Obstacle("ball", Sphere(0.1), at(0.3, -0.3, 0.4))))
+    )
     path = every_pair(CollisionModel(problem.arm))
     q = np.linspace(HOME, GOAL, 25)
     v = np.zeros_like(q)
@@ -127,7 +154,9 @@ def test_gradients_of_the_shares_are_those_of_finite_differences() -> None:
     for j in range(6):
         d = STEP * np.eye(6)[j]
         by_q = (path.linearised(q + d, v).value - path.linearised(q - d, v).value) / (2 * STEP)
-        np.testing.assert_allclose(found.by_q[near][:, j], by_q[near], atol=GRADIENT_TOLERANCE / SCALE)
+        np.testing.assert_allclose(
+            found.by_q[near][:, j], by_q[near], atol=GRADIENT_TOLERANCE / SCALE
+        )
 
 
 def test_a_share_is_one_a_reserve_beyond_the_margin() -> None:
@@ -142,7 +171,8 @@ def test_a_share_is_one_a_reserve_beyond_the_margin() -> None:
         near = expected > counted
         assert 2 < near.sum() < near.size
         np.testing.assert_allclose(shares[near], expected[near])
-        # of the others only a bound is known: too low for the solver to look at them, or for a motion to be repaired
+        # of the others only a bound is known: too low for the solver to look at them, or for a
+        # motion to be repaired
         assert (shares[~near] < low).all() and (shares >= expected - 1e-12).all()
 
 
@@ -168,6 +198,8 @@ def test_a_wide_cone_changes_nothing_and_a_narrow_one_binds() -> None:
     q, v, _ = sample(free.trajectory.spline, np.linspace(0, free.duration, 400))
     tilt = float(path.ratios(q, v).max())
     wide, narrow = optimize(upright(1.5 * tilt)), optimize(upright(0.4 * tilt))
-    assert wide.energy.electrical.total == pytest.approx(free.energy.electrical.total, rel=SAME_ENERGY)
+    assert wide.energy.electrical.total == pytest.approx(
+        free.energy.electrical.total, rel=SAME_ENERGY
+    )
     assert USED_AFTER_REPAIR < narrow.certificate.worst_ratio["tool_cone"] <= 1
     assert narrow.energy.electrical.total > free.energy.electrical.total

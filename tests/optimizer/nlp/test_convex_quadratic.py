@@ -21,7 +21,9 @@ def banded(n: int, shift: float, seed: int = 0) -> tuple[Array, Array]:
     for k in range(WIDTH):
         values = rng.normal(size=n - k) + (shift if k == 0 else 0.0)
         band[: n - k, k] = values
-        H[np.arange(n - k) + k, np.arange(n - k)] = H[np.arange(n - k), np.arange(n - k) + k] = values
+        H[np.arange(n - k) + k, np.arange(n - k)] = H[np.arange(n - k), np.arange(n - k) + k] = (
+            values
+        )
     return H, band
 
 
@@ -58,7 +60,9 @@ def test_added() -> None:
 
 
 def test_what_was_lacking_is_tried_again() -> None:
-    """Of a large matrix a little different from the last one: positive definite, and not far from its own."""
+    """Of a large matrix a little different from the last one: positive definite, and not far from
+    its own.
+    """
     n = MOST_AGAIN + 1
     convexity, gradient = Convexity(), np.ones(n)
     _, band = banded(n, 0.5)

@@ -1,4 +1,6 @@
-"""What holding the arm at a goal that slides draws: its derivatives, and what the search makes of it."""
+"""What holding the arm at a goal that slides draws: its derivatives, and what the search makes of
+it.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,10 @@ from tests.optimizer.moves import AMPLE
 from tests.optimizer.nlp.test_sliding_ends import GOAL, START, curve, straight
 
 ARM = Arm(robot=load_robot("panda"), collisions=False)
-ON_MOTORS, ON_BRAKES = Dwell(time=12.0), Dwell(time=6.0, hold="brakes", brake_delay=1.0, brake_power=20.0)
+ON_MOTORS, ON_BRAKES = (
+    Dwell(time=12.0),
+    Dwell(time=6.0, hold="brakes", brake_delay=1.0, brake_power=20.0),
+)
 
 
 def test_a_quadratic_power_has_exact_derivatives() -> None:
@@ -73,7 +78,9 @@ def test_the_cost_of_another_goal_is_that_of_its_wait(dwell: Dwell) -> None:
         step = np.zeros_like(free)
         step[-1] = [0.3, -0.1, 0.2, 0.1, -0.2, 0.1, 0.3]
         sides = [own.value(free + sign * 1e-4 * step, T)[0] for sign in (1, -1)]
-        assert line.gradient[:-1] @ step.ravel() == pytest.approx((sides[0] - sides[1]) / 2e-4, rel=1e-3)
+        assert line.gradient[:-1] @ step.ravel() == pytest.approx(
+            (sides[0] - sides[1]) / 2e-4, rel=1e-3
+        )
         later = [own.value(free, T + sign * 1e-4)[0] for sign in (1, -1)]
         assert line.gradient[-1] == pytest.approx((later[0] - later[1]) / 2e-4, rel=1e-3)
 
@@ -81,7 +88,12 @@ def test_the_cost_of_another_goal_is_that_of_its_wait(dwell: Dwell) -> None:
 def test_no_posture_near_by_waits_for_less() -> None:
     """Most of this dwell is a wait: once, its posture was the one that is best without."""
     asked = Problem(
-        arm=ARM, start=START, goal=Pose(tcp_pose(ARM, GOAL)), dwell=ON_MOTORS, duration_max=1.5, deadline=AMPLE
+        arm=ARM,
+        start=START,
+        goal=Pose(tcp_pose(ARM, GOAL)),
+        dwell=ON_MOTORS,
+        duration_max=1.5,
+        deadline=AMPLE,
     )
     found = optimize(asked)
     held = HeldPose.of(ARM, found.goal.q)
@@ -89,9 +101,16 @@ def test_no_posture_near_by_waits_for_less() -> None:
     tried = 0
     for step in (-0.2, -0.1, 0.1, 0.2):
         near = held.put(found.goal.q + step * tangent)
-        if near is None or not ((ARM.robot.limits.q_min < near) & (near < ARM.robot.limits.q_max)).all():
+        if (
+            near is None
+            or not ((ARM.robot.limits.q_min < near) & (near < ARM.robot.limits.q_max)).all()
+        ):
             continue
         tried += 1
-        other = optimize(Problem(arm=ARM, start=START, goal=near, dwell=ON_MOTORS, duration_max=1.5, deadline=AMPLE))
+        other = optimize(
+            Problem(
+                arm=ARM, start=START, goal=near, dwell=ON_MOTORS, duration_max=1.5, deadline=AMPLE
+            )
+        )
         assert other.energy.electrical.total >= found.energy.electrical.total * (1 - 2e-4)
     assert tried >= 2

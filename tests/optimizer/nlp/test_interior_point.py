@@ -1,4 +1,6 @@
-"""The interior-point method of least work: its derivatives against differences, its motions against limits and SQP."""
+"""The interior-point method of least work: its derivatives against differences, its motions against
+limits and SQP.
+"""
 
 from __future__ import annotations
 
@@ -59,7 +61,9 @@ def test_ratios_change_as_their_linearisation_says(prepared: PreparedProblem) ->
     assert predicted == pytest.approx(difference, abs=FIRST * np.abs(difference).max())
     # the pull on the variables is the transpose of that
     weight = np.random.default_rng(2).normal(size=len(predicted))
-    assert float((own._pulled(nodes, weight) * change).sum()) == pytest.approx(float(weight @ predicted), rel=1e-9)
+    assert float((own._pulled(nodes, weight) * change).sum()) == pytest.approx(
+        float(weight @ predicted), rel=1e-9
+    )
 
 
 def test_hessian_is_that_of_the_lagrangian(prepared: PreparedProblem) -> None:
@@ -74,7 +78,9 @@ def test_hessian_is_that_of_the_lagrangian(prepared: PreparedProblem) -> None:
     def gradient(step: float) -> Array:
         moved = own.first(ENDS, free + step * change, WIDTH, bounds)
         nodes = own._nodes(ENDS, moved)
-        by_power = ((own._weights[:, None] * at.slope)[:, None] @ nodes.jacobian).reshape(-1, own._r)
+        by_power = ((own._weights[:, None] * at.slope)[:, None] @ nodes.jacobian).reshape(
+            -1, own._r
+        )
         by_torque = (pull[:, None] @ nodes.torque_jacobian).reshape(-1, own._r)
         return np.asarray(own._D.T @ (by_power + by_torque))
 
@@ -118,5 +124,7 @@ def test_sharp_motion_is_within_every_limit(prepared: PreparedProblem) -> None:
     assert result.spline is not None
     assert (peak_rates(result.spline) <= prepared.problem.arm.active_limits.rates).all()
     assert own == pytest.approx(result.spline.control_points)
-    costlier, _ = sharp_motion(prepared, points, DURATION, WIDTH, 0.5 * prepared.cost_of(result.spline))
+    costlier, _ = sharp_motion(
+        prepared, points, DURATION, WIDTH, 0.5 * prepared.cost_of(result.spline)
+    )
     assert costlier.spline is None

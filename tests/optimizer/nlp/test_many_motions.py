@@ -1,4 +1,6 @@
-"""Rough motions, many at a time: derivatives against differences, and energies against those of the SQP."""
+"""Rough motions, many at a time: derivatives against differences, and energies against those of the
+SQP.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,8 @@ from tests.optimizer.moves import GOAL, START, fixed, limits, problem
 
 DURATION = 2.0
 STEP = 1e-6  # of control points [rad]
-# relative to the largest entry: a central difference loses STEP² of the third derivative, and rounding over STEP
+# relative to the largest entry: a central difference loses STEP² of the third derivative, and
+# rounding over STEP
 FIRST, SECOND = 1e-6, 1e-5
 # shares by which a limit is exceeded where a penalty holds it
 EXCEEDED = 0.1
@@ -30,7 +33,9 @@ def motions(**given: float) -> ManyMotions:
 
 
 def guesses(count: int) -> tuple[Array, Array]:
-    """Ends (B, 2, nq) and free control points (B, m, nq) of motions that are neither straight nor alike."""
+    """Ends (B, 2, nq) and free control points (B, m, nq) of motions that are neither straight nor
+    alike.
+    """
     rng = np.random.default_rng(0)
     ends = np.array([[START, GOAL]] * count)
     line = START + np.outer(SPACE.quintic, GOAL - START)[SPACE.free]
@@ -59,10 +64,15 @@ def test_derivatives(given: dict[str, float]) -> None:
     for k in range(0, gradient.shape[1], 7):
         slope = (total(moved(k, STEP)) - total(moved(k, -STEP))) / (2 * STEP)
         assert gradient[:, k] == pytest.approx(slope, abs=FIRST * np.abs(gradient).max())
-        bends = (slopes(moved(k, STEP)) - slopes(moved(k, -STEP)))[:, k : k + band.shape[2]] / (2 * STEP)
-        # of penalties, what their squares' curvature times their excess adds is left out: rates are linear
+        bends = (slopes(moved(k, STEP)) - slopes(moved(k, -STEP)))[:, k : k + band.shape[2]] / (
+            2 * STEP
+        )
+        # of penalties, what their squares' curvature times their excess adds is left out: rates are
+        # linear
         relative = SECOND if not given else 0.05
-        assert band[:, k, : bends.shape[1]] == pytest.approx(bends, abs=relative * np.abs(band).max())
+        assert band[:, k, : bends.shape[1]] == pytest.approx(
+            bends, abs=relative * np.abs(band).max()
+        )
 
 
 def test_costs_fall_and_limits_are_kept() -> None:

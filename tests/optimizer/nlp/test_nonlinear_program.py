@@ -1,4 +1,6 @@
-"""The program of a candidate: its cost against an independent integral, its derivatives against differences."""
+"""The program of a candidate: its cost against an independent integral, its derivatives against
+differences.
+"""
 
 from __future__ import annotations
 
@@ -22,16 +24,20 @@ from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, p
 from tests.optimizer.nlp.second_differences import without_dry_friction
 
 STEP = 1e-6  # of control points [rad, or of the line's fraction] and of the duration [s]
-# relative to the largest candidate: a central difference loses STEP² of the third derivative, which friction's reversal
-# at KNEE makes large, and rounding over STEP of the value
+# relative to the largest candidate: a central difference loses STEP² of the third derivative, which
+# friction's reversal at KNEE makes large, and rounding over STEP of the value
 FIRST, SECOND = 1e-6, 1e-5
-# relative; corners of |power| rounded over WIDTH, and friction's reversal at rest, lie between the nodes
+# relative; corners of |power| rounded over WIDTH, and friction's reversal at rest, lie between the
+# nodes
 QUADRATURE = 2e-3
 SUM = 1e-9  # relative; the same sum of powers by another route
 EXACT = 1e-12  # relative; the same linear maps in another order
 TORQUE = 1e-9  # N·m, as symbolic inverse dynamics against Pinocchio
 
-SPACES = {"uniform": bspline.uniform(13), "graded": bspline.graded(np.array([0.06, 0.3, 0.7, 0.94]), 3)}
+SPACES = {
+    "uniform": bspline.uniform(13),
+    "graded": bspline.graded(np.array([0.06, 0.3, 0.7, 0.94]), 3),
+}
 
 
 @dataclass(frozen=True)
@@ -45,7 +51,9 @@ class Case:
     multiplier: Array
 
 
-CASES = [(o, c, s) for o in ("electrical", "mechanical") for c in ("joints", "line") for s in SPACES]
+CASES = [
+    (o, c, s) for o in ("electrical", "mechanical") for c in ("joints", "line") for s in SPACES
+]
 
 
 @pytest.fixture(params=CASES, ids="-".join)
@@ -78,11 +86,15 @@ def make(objective: str, kind: str, basis: Basis) -> Case:
 
 def motion(case: Case) -> BSpline:
     """q(t) by SciPy, from the control points of the joints."""
-    return BSpline(case.program.basis.knots * case.duration, case.program.joint_points(case.free), DEGREE)
+    return BSpline(
+        case.program.basis.knots * case.duration, case.program.joint_points(case.free), DEGREE
+    )
 
 
 def power(case: Case, q: Array, v: Array, a: Array) -> Array:
-    """The smoothed power that is minimised (k,) [W], from Pinocchio's torques and the plain formulas."""
+    """The smoothed power that is minimised (k,) [W], from Pinocchio's torques and the plain
+    formulas.
+    """
     task = case.task.problem
     tau = torques(task, q, v, a)
     if task.objective == "mechanical":
@@ -108,7 +120,9 @@ def test_cost_is_the_integral_of_power(case: Case) -> None:
     curve = motion(smooth)
     t, weights = quadrature(curve.t, 64)
     expected = weights @ power(case, curve(t), curve(t, 1), curve(t, 2))
-    assert case.program.value(smooth.free, case.duration)[0] == pytest.approx(float(expected), rel=QUADRATURE)
+    assert case.program.value(smooth.free, case.duration)[0] == pytest.approx(
+        float(expected), rel=QUADRATURE
+    )
 
 
 def test_torques_are_those_of_the_motion(case: Case) -> None:
@@ -133,16 +147,22 @@ def shifted(case: Case, i: int, by: float) -> tuple[Array, float]:
 
 def test_gradient_is_the_slope_of_the_cost(case: Case) -> None:
     n = case.free.size + 1
-    up, down = ([case.program.value(*shifted(case, i, by))[0] for i in range(n)] for by in (STEP, -STEP))
+    up, down = (
+        [case.program.value(*shifted(case, i, by))[0] for i in range(n)] for by in (STEP, -STEP)
+    )
     slope = (np.array(up) - np.array(down)) / (2 * STEP)
     gradient = case.program.derivatives(case.free, case.duration, case.multiplier).gradient
     assert gradient.shape == (n,)
     assert np.abs(gradient - slope).max() < FIRST * np.abs(slope).max()
-    assert gradient[-1] == pytest.approx(slope[-1], rel=FIRST)  # small beside those by control points
+    assert gradient[-1] == pytest.approx(
+        slope[-1], rel=FIRST
+    )  # small beside those by control points
 
 
 def test_hessian_is_the_slope_of_the_lagrangians_gradient(case: Case) -> None:
-    """Of cost + multiplier · tau_motor, in all unknowns; the last row, by the duration, on its own scale too."""
+    """Of cost + multiplier · tau_motor, in all unknowns; the last row, by the duration, on its own
+    scale too.
+    """
     program, n = without_dry_friction(case.program), case.free.size + 1
     k, j = (index.ravel() for index in np.indices(case.multiplier.shape))
 
@@ -165,7 +185,8 @@ def test_torque_rows_are_the_slopes_of_torques(case: Case) -> None:
     k, j = rng.integers(0, len(case.program.basis.nodes), 40), rng.integers(0, 6, 40)
     n = case.free.size + 1
     up, down = (
-        np.array([case.program.value(*shifted(case, i, by))[1][k, j] for i in range(n)]) for by in (STEP, -STEP)
+        np.array([case.program.value(*shifted(case, i, by))[1][k, j] for i in range(n)])
+        for by in (STEP, -STEP)
     )
     slope = (up - down).T / (2 * STEP)
     line = case.program.derivatives(case.free, case.duration, case.multiplier)
@@ -195,19 +216,31 @@ def test_points_of_the_motion(case: Case) -> None:
     q = program.joint_points(case.free)
     assert q[:3] == pytest.approx(np.tile(START, (3, 1)), rel=EXACT)
     assert q[-3:] == pytest.approx(np.tile(GOAL, (3, 1)), rel=EXACT)
-    assert program.coordinates.from_joints(q[3:-3]) == pytest.approx(case.free, rel=1e-10, abs=1e-12)
+    assert program.coordinates.from_joints(q[3:-3]) == pytest.approx(
+        case.free, rel=1e-10, abs=1e-12
+    )
 
 
 def test_a_line_is_limited_by_its_slowest_joint() -> None:
-    """Fractions of the line per second: each joint's limit over its displacement; joints that stay set no limit."""
+    """Fractions of the line per second: each joint's limit over its displacement; joints that stay
+    set no limit.
+    """
     goal = START + np.array([1.0, -0.5, 0.0, 0.0, 0.0, 0.0])
-    own = limits(v_max=[3.0, 0.6, 1, 1, 1, 1], a_max=[2.0, 5.0, 1, 1, 1, 1], j_max=[90.0, 50.0, 1, 1, 1, 1])
+    own = limits(
+        v_max=[3.0, 0.6, 1, 1, 1, 1], a_max=[2.0, 5.0, 1, 1, 1, 1], j_max=[90.0, 50.0, 1, 1, 1, 1]
+    )
     line = Coordinates.straight_line(START, goal, own)
-    assert [float(x[0]) for x in (line.limits.v_max, line.limits.a_max, line.limits.j_max)] == [1.2, 2.0, 90.0]
+    assert [float(x[0]) for x in (line.limits.v_max, line.limits.a_max, line.limits.j_max)] == [
+        1.2,
+        2.0,
+        90.0,
+    ]
     assert line.to_joints(np.array([[0.0], [0.5], [1.0]])) == pytest.approx(
         np.array([START, (START + goal) / 2, goal]), rel=EXACT
     )
-    off_line = START + np.array([0.5, 0.25, 0.3, 0.0, 0.0, 0.0])  # nearest point: (0.5 - 0.125) / 1.25 of the way
+    off_line = START + np.array(
+        [0.5, 0.25, 0.3, 0.0, 0.0, 0.0]
+    )  # nearest point: (0.5 - 0.125) / 1.25 of the way
     assert float(line.from_joints(off_line[None])[0, 0]) == pytest.approx(0.3, rel=1e-9)
 
 

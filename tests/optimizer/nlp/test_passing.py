@@ -1,4 +1,6 @@
-"""Passes of an NLP: every iterate is on them, and their curvature is that of the curves that stay on them."""
+"""Passes of an NLP: every iterate is on them, and their curvature is that of the curves that stay
+on them.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ from tests.optimizer.nlp.second_differences import assert_curvature, without_dry
 ROUNDING = 1e-12
 # relative; of second differences with steps of 1e-3
 DIFFERENCES = 2e-3
-PASSES = np.array([START + 0.4 * (GOAL - START) + [0.1, -0.2, 0.1, 0, 0.1, 0], START + 0.7 * (GOAL - START)])
+PASSES = np.array(
+    [START + 0.4 * (GOAL - START) + [0.1, -0.2, 0.1, 0, 0.1, 0], START + 0.7 * (GOAL - START)]
+)
 
 
 def program(count: int = 20) -> NonlinearProgram:
@@ -27,7 +31,13 @@ def program(count: int = 20) -> NonlinearProgram:
     coordinates = Coordinates.joints(START, GOAL, ROBOT.limits)
     space = bspline.uniform(count)
     return NonlinearProgram(
-        prepared.kernel, space, prepared.objective_parameters, coordinates, 0.01, 600.0, passes=PASSES
+        prepared.kernel,
+        space,
+        prepared.objective_parameters,
+        coordinates,
+        0.01,
+        600.0,
+        passes=PASSES,
     )
 
 
@@ -75,7 +85,9 @@ def test_the_curvature_is_that_of_the_cost_along_the_curves_that_pass() -> None:
     def drifted(gradient: Array, drift: Array) -> float:
         return float(gradient.ravel() @ (kept @ (kept.T @ drift.ravel())))
 
-    assert_curvature(own, free, at, lambda moved: passes.put(moved, at)[0], drifted, list(steps), DIFFERENCES)
+    assert_curvature(
+        own, free, at, lambda moved: passes.put(moved, at)[0], drifted, list(steps), DIFFERENCES
+    )
 
 
 def test_the_solver_ends_on_the_passes_and_slides_along_them() -> None:

@@ -1,4 +1,6 @@
-"""Ends of an NLP that slide: every iterate holds the poses, and the curvature is that of the curves."""
+"""Ends of an NLP that slide: every iterate holds the poses, and the curvature is that of the
+curves.
+"""
 
 from __future__ import annotations
 
@@ -93,7 +95,9 @@ def test_steps_in_the_null_space_keep_the_poses_to_second_order() -> None:
 
 
 def test_the_curvature_is_that_of_the_cost_along_the_curves() -> None:
-    """In steps of the ends alone: beside those of the other points, what the curves bend by is lost."""
+    """In steps of the ends alone: beside those of the other points, what the curves bend by is
+    lost.
+    """
     own = without_dry_friction(program())
     free, at = put(own, straight(own))
     steps = [np.zeros_like(free) for _ in range(3)]
@@ -104,9 +108,14 @@ def test_the_curvature_is_that_of_the_cost_along_the_curves() -> None:
     def drifted(gradient: Array, drift: Array) -> float:
         # what the ends are put back by along their curves
         ends = zip(at.rows, at.shares, at.tangents, strict=True)
-        return sum(float(share @ gradient @ tangent) * float(drift[row] @ tangent) for row, share, tangent in ends)
+        return sum(
+            float(share @ gradient @ tangent) * float(drift[row] @ tangent)
+            for row, share, tangent in ends
+        )
 
-    assert_curvature(own, free, at, lambda moved: put(own, moved, at)[0], drifted, steps, DIFFERENCES)
+    assert_curvature(
+        own, free, at, lambda moved: put(own, moved, at)[0], drifted, steps, DIFFERENCES
+    )
 
 
 @pytest.mark.parametrize(("start", "goal"), [(False, True), (True, False), (True, True)])

@@ -24,8 +24,11 @@ def of_duration(share: float) -> NonlinearProgram:
     return program(START, GOAL, duration_max=duration, duration_min=duration)
 
 
-def inputs_at(p: NonlinearProgram, qp: WorkingSetQP, free: Array, rng: np.random.Generator) -> QPInputs:
-    """A QP with the identity as its Hessian and a random gradient, at free control points (m, r)."""
+def inputs_at(
+    p: NonlinearProgram, qp: WorkingSetQP, free: Array, rng: np.random.Generator
+) -> QPInputs:
+    """A QP with the identity as its Hessian and a random gradient, at free control points (m,
+    r)."""
     one, duration = np.eye(qp.n), qp.time_scale
     line = p.derivatives(free, duration, np.zeros((len(p.basis.nodes), p.kernel.nq)))
     values = p.path_rows.values(p.points(free), duration)
@@ -35,7 +38,9 @@ def inputs_at(p: NonlinearProgram, qp: WorkingSetQP, free: Array, rng: np.random
 
 
 def test_a_step_breaks_no_limit_on_the_other_side() -> None:
-    """Of motions near their limits on one side, steps far to the other: linear predictions keep every limit."""
+    """Of motions near their limits on one side, steps far to the other: linear predictions keep
+    every limit.
+    """
     p = of_duration(2.5)
     rng = np.random.default_rng(7)
     turned = 0
@@ -64,14 +69,18 @@ def test_no_limit_has_two_rows(share: float) -> None:
     rng = np.random.default_rng(8)
     for _ in range(10):
         qp = WorkingSetQP(p, p.t_max)
-        step = qp.solve(inputs_at(p, qp, quintic(p) + 0.05 * rng.normal(size=(p.free_count, p.r)), rng), MOST_ROUNDS)
+        step = qp.solve(
+            inputs_at(p, qp, quintic(p) + 0.05 * rng.normal(size=(p.free_count, p.r)), rng),
+            MOST_ROUNDS,
+        )
         assert step is not None and (share > 1 or step.relaxed)
         # the lower and the upper one of a point
         assert np.unique(np.array(step.places), axis=1, return_counts=True)[1].max() <= 2
 
 
 def test_further_constraints_let_a_step_promise_less() -> None:
-    """So that a QP may end with its first solution if even this promises too little, and only then."""
+    """So that a QP may end with its first solution if even this promises too little, and only
+    then."""
     p = of_duration(1.2)
     rng = np.random.default_rng(9)
     ended = 0
@@ -97,14 +106,20 @@ def test_further_constraints_let_a_step_promise_less() -> None:
 def test_rows_added_one_by_one_are_those_added_at_once() -> None:
     """Several times as many as there is room for at first; half of them before a first solve."""
     rng, n, count = np.random.default_rng(6), 12, 3 * ROOM
-    A, most, gradient = rng.normal(size=(count, n)), rng.uniform(0.05, 1.0, count), rng.normal(size=n)
+    A, most, gradient = (
+        rng.normal(size=(count, n)),
+        rng.uniform(0.05, 1.0, count),
+        rng.normal(size=n),
+    )
     at_once, one_by_one = (QPRows(np.eye(n), (3, 1, 1)) for _ in range(2))
     at_once.add(A, most)
     for k in range(count):
         if k == count // 2:
             one_by_one.solve(gradient, relax=False)
         assert one_by_one.add(A[k : k + 1], most[k : k + 1]) == [k]
-    (y, price, found), (others, _, other_found) = (rows.solve(gradient, relax=False) for rows in (at_once, one_by_one))
+    (y, price, found), (others, _, other_found) = (
+        rows.solve(gradient, relax=False) for rows in (at_once, one_by_one)
+    )
     assert found and other_found
     assert others == pytest.approx(y, abs=ROUNDING)
     assert (A @ y <= most + ROUNDING).all() and (price >= 0).all()

@@ -1,4 +1,6 @@
-"""Which labels a branch filter allows, also those of arms that have other parts than shoulder, elbow and wrist."""
+"""Which labels a branch filter allows, also those of arms that have other parts than shoulder,
+elbow and wrist.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ class ElbowOnly:
 
 
 def test_an_empty_filter_allows_every_label() -> None:
-    assert all(BranchFilter().allows(label) for label in [*LABELS, ElbowOnly("up"), "another family's"])
+    assert all(
+        BranchFilter().allows(label) for label in [*LABELS, ElbowOnly("up"), "another family's"]
+    )
 
 
 def test_each_part_that_is_named_halves_the_labels() -> None:

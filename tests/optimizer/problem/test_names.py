@@ -63,7 +63,8 @@ def test_what_is_no_text_is_refused(name: object) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["table", "Tisch Nr. 4", "größte", "机器", "a" * LONGEST_NAME, "{0}/%s\\\"'<&>", "é", "🤖"]
+    "name",
+    ["table", "Tisch Nr. 4", "größte", "机器", "a" * LONGEST_NAME, "{0}/%s\\\"'<&>", "é", "🤖"],
 )
 def test_plain_text_is_kept_as_it_is(name: str) -> None:
     assert is_plain(name)
@@ -73,7 +74,11 @@ def test_plain_text_is_kept_as_it_is(name: str) -> None:
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
 def test_the_arms_own_names_are_taken(robot: Robot) -> None:
     tool = [capsule_between([0, 0, 0.03], [0, 0, 0.1], 0.03)]  # type: ignore[arg-type]
-    own = {body.name for body in bodies_of(Arm(robot=robot, tool=tool))} | set(robot.link_names) | {"tool", "payload"}
+    own = (
+        {body.name for body in bodies_of(Arm(robot=robot, tool=tool))}
+        | set(robot.link_names)
+        | {"tool", "payload"}
+    )
     assert len(own) == robot.nq + 3
     for name in own:
         for written in (name, name.upper(), f" {name} ", name.replace("t", "\uff54")):
@@ -93,7 +98,14 @@ def test_every_name_of_an_answer_means_one_body(robot: Robot) -> None:
 
 @pytest.mark.parametrize(
     ("first", "second"),
-    [("post", "post"), ("post", "Post"), ("a b", "a  b"), ("post", "post "), ("é", "e\u0301"), ("ß", "SS")],
+    [
+        ("post", "post"),
+        ("post", "Post"),
+        ("a b", "a  b"),
+        ("post", "post "),
+        ("é", "e\u0301"),
+        ("ß", "SS"),
+    ],
 )
 def test_names_that_read_alike_are_refused(first: str, second: str) -> None:
     with pytest.raises(InvalidProblem) as error:

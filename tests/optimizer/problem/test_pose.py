@@ -1,4 +1,5 @@
-"""Poses from quaternions, roll-pitch-yaw angles and rotation vectors, against Pinocchio and scipy."""
+"""Poses from quaternions, roll-pitch-yaw angles and rotation vectors, against Pinocchio and
+scipy."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ from joulepath.optimizer.problem.pose import (
 
 # of a rotation computed in double precision in two ways
 ROUNDING = 1e-14
-# the same for an angle near a half turn, where the rotation vector follows from the matrix by a square root
+# the same for an angle near a half turn, where the rotation vector follows from the matrix by a
+# square root
 ANGLE_ROUNDING = 1e-7
 POSITION = [0.1, -0.2, 0.3]
 ANGLES = [
@@ -65,11 +67,18 @@ def test_a_quaternion_is_x_y_z_w_and_normalised() -> None:
         R = rotation_from_quaternion(unit)
         assert difference(R, pin.Quaternion(unit).toRotationMatrix()) < ROUNDING
         assert difference(R, Rotation.from_quat(unit).as_matrix()) < ROUNDING
-        assert difference(rotation_from_quaternion((1 - 0.9 * QUATERNION_TOLERANCE) * unit), R) < ROUNDING
+        assert (
+            difference(rotation_from_quaternion((1 - 0.9 * QUATERNION_TOLERANCE) * unit), R)
+            < ROUNDING
+        )
 
 
 def test_zero_angles_are_exactly_the_identity() -> None:
-    for R in (rotation_from_rpy([0, 0, 0]), rotation_from_rotvec([0, 0, 0]), rotation_from_quaternion([0, 0, 0, 1])):
+    for R in (
+        rotation_from_rpy([0, 0, 0]),
+        rotation_from_rotvec([0, 0, 0]),
+        rotation_from_quaternion([0, 0, 0, 1]),
+    ):
         assert difference(R, np.eye(3)) == 0
 
 
@@ -99,7 +108,10 @@ def test_small_angles_keep_all_their_digits() -> None:
 def test_there_and_back() -> None:
     for angles in np.random.default_rng(3).uniform(-2 * np.pi, 2 * np.pi, (200, 3)):
         quaternion = Rotation.from_rotvec(angles).as_quat()
-        from_rotvec, from_quaternion = Pose.from_rotvec(POSITION, angles), Pose.from_quaternion(POSITION, quaternion)
+        from_rotvec, from_quaternion = (
+            Pose.from_rotvec(POSITION, angles),
+            Pose.from_quaternion(POSITION, quaternion),
+        )
         assert difference(from_rotvec.T, from_quaternion.T) < ROUNDING
         back = Pose.from_rotvec(POSITION, pin.log3(from_rotvec.T[:3, :3]))
         assert difference(back.T, from_rotvec.T) < ANGLE_ROUNDING
@@ -134,7 +146,10 @@ def test_a_pose_is_homogeneous_and_read_only(pose: Pose) -> None:
         (lambda: Pose.from_rotvec(POSITION, "up"), "pose.rotvec"),
         (lambda: Pose.from_quaternion(POSITION, [0, 0, 1]), "pose.quaternion"),
         (lambda: Pose.from_quaternion(POSITION, [0, 0, 0, 0]), "pose.quaternion"),
-        (lambda: Pose.from_quaternion(POSITION, [0, 0, 0, 1 + 1.1 * QUATERNION_TOLERANCE]), "pose.quaternion"),
+        (
+            lambda: Pose.from_quaternion(POSITION, [0, 0, 0, 1 + 1.1 * QUATERNION_TOLERANCE]),
+            "pose.quaternion",
+        ),
         (lambda: Pose.from_rotation(POSITION, np.diag([1.0, 1.0, -1.0])), "pose"),
         (lambda: Pose.from_rotation(POSITION, np.eye(4)), "pose.rotation"),
     ],

@@ -31,9 +31,19 @@ def test_defaults() -> None:
     task = Problem(arm=Arm(robot=ROBOT), start=START, goal=GOAL)
     assert task.arm.robot.name == "ur5e" and task.arm.payload.mass == 0
     assert task.arm.gravity.tolist() == [0, 0, -9.81]
-    assert (task.method, task.objective, task.duration_min, task.duration_max) == ("bspline", "electrical", None, None)
+    assert (task.method, task.objective, task.duration_min, task.duration_max) == (
+        "bspline",
+        "electrical",
+        None,
+        None,
+    )
     assert task.arm.active_limits is ROBOT.limits and task.arm.friction_law is ROBOT.friction
-    assert (task.windings, task.branch, task.sample_period, task.deadline) == (True, None, 0.008, 10.0)
+    assert (task.windings, task.branch, task.sample_period, task.deadline) == (
+        True,
+        None,
+        0.008,
+        10.0,
+    )
     assert (task.arm.T_flange_tcp == np.eye(4)).all()
 
 
@@ -78,9 +88,12 @@ def test_refusals_name_the_field(given: dict[str, Any], field: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "target"), [({"goal": outside(2, 1e-9)}, "goal"), ({"start": -outside(5, 1e-9)}, "start")]
+    ("given", "target"),
+    [({"goal": outside(2, 1e-9)}, "goal"), ({"start": -outside(5, 1e-9)}, "start")],
 )
-def test_joint_positions_outside_their_range_name_the_target(given: dict[str, Any], target: str) -> None:
+def test_joint_positions_outside_their_range_name_the_target(
+    given: dict[str, Any], target: str
+) -> None:
     with pytest.raises(OutsideLimits) as refusal:
         problem(**given)
     assert refusal.value.target == target
@@ -88,7 +101,9 @@ def test_joint_positions_outside_their_range_name_the_target(given: dict[str, An
 
 @pytest.mark.parametrize("name", ["v_max", "a_max", "j_max", "tau_max", "q_min", "q_max"])
 def test_nan_is_no_limit(name: str) -> None:
-    """NaN compares false with everything: a check that asks whether a limit is too large lets it pass."""
+    """NaN compares false with everything: a check that asks whether a limit is too large lets it
+    pass.
+    """
     values = getattr(ROBOT.limits, name).copy()
     values[3] = math.nan
     with pytest.raises(InvalidProblem):
@@ -114,7 +129,9 @@ def test_a_joint_outside_carries_its_data() -> None:
         problem(start=outside(2, 0.25))
     error = refusal.value
     assert (error.target, error.joint) == ("start", ROBOT.joint_names[2])
-    assert (error.value, error.lower, error.upper) == pytest.approx((math.pi + 0.25, -math.pi, math.pi))
+    assert (error.value, error.lower, error.upper) == pytest.approx(
+        (math.pi + 0.25, -math.pi, math.pi)
+    )
 
 
 def test_tightened_limits_count_for_the_ends() -> None:
@@ -148,7 +165,13 @@ def test_nothing_can_be_changed_afterwards() -> None:
     assert np.asarray(task.start)[0] == START[0]
     with pytest.raises(FrozenInstanceError):
         task.deadline = 1.0  # type: ignore[misc]
-    for array in (task.start, task.arm.gravity, task.arm.T_flange_tcp, task.arm.payload.com, Pose(ROTATED).T):
+    for array in (
+        task.start,
+        task.arm.gravity,
+        task.arm.T_flange_tcp,
+        task.arm.payload.com,
+        Pose(ROTATED).T,
+    ):
         assert isinstance(array, np.ndarray)
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1.0
@@ -174,7 +197,9 @@ def test_a_pose_must_be_rigid(T: Array) -> None:
 
 
 def test_a_pose_must_be_homogeneous() -> None:
-    """The last row of a homogeneous matrix is 0 0 0 1: a matrix transposed by mistake has its position there."""
+    """The last row of a homogeneous matrix is 0 0 0 1: a matrix transposed by mistake has its
+    position there.
+    """
     broken = ROTATED.copy()
     broken[3, :3], broken[:3, 3] = broken[:3, 3].copy(), 0.0
     with pytest.raises(InvalidProblem):
@@ -191,12 +216,17 @@ def test_a_pose_must_be_homogeneous() -> None:
         ({"mass": 1.0, "inertia": np.eye(2)}, "payload.inertia"),
         ({"mass": 1.0, "inertia": np.diag([1.0, 1.0, -1e-3])}, "payload.inertia"),
         ({"mass": 1.0, "inertia": np.diag([1.0, 1.0, 2.001])}, "payload.inertia"),
-        ({"mass": 1.0, "inertia": np.array([[1.0, 0.5, 0], [0, 1, 0], [0, 0, 1]])}, "payload.inertia"),
+        (
+            {"mass": 1.0, "inertia": np.array([[1.0, 0.5, 0], [0, 1, 0], [0, 0, 1]])},
+            "payload.inertia",
+        ),
     ],
     ids=str,
 )
 def test_a_payload_must_be_a_body(given: dict[str, Any], field: str) -> None:
-    """Positive mass, principal moments of inertia that some distribution of mass has, and a symmetric tensor."""
+    """Positive mass, principal moments of inertia that some distribution of mass has, and a
+    symmetric tensor.
+    """
     with pytest.raises(InvalidProblem) as refusal:
         Payload(**given)
     assert refusal.value.field == field

@@ -58,7 +58,18 @@ def test_sizes(bad: float) -> None:
         "vertices",
         [[0, 0, 0], [1, 0]],
     ],
-    ids=["three", "flat", "on a line", "one point", "nan", "huge", "many", "two columns", "text", "ragged"],
+    ids=[
+        "three",
+        "flat",
+        "on a line",
+        "one point",
+        "nan",
+        "huge",
+        "many",
+        "two columns",
+        "text",
+        "ragged",
+    ],
 )
 def test_meshes_without_a_body(vertices: object) -> None:
     with pytest.raises(InvalidProblem):
@@ -91,7 +102,9 @@ def test_an_obstacle_asks_for_five_millimetres_unless_told_otherwise() -> None:
     assert Obstacle("post", Sphere(0.1), margin=0.0).margin == 0.0
 
 
-@pytest.mark.parametrize("T", [np.eye(3), 2 * np.eye(4), np.diag([1.0, 1, -1, 1]), np.full((4, 4), NAN)])
+@pytest.mark.parametrize(
+    "T", [np.eye(3), 2 * np.eye(4), np.diag([1.0, 1, -1, 1]), np.full((4, 4), NAN)]
+)
 def test_poses(T: np.ndarray) -> None:
     with pytest.raises(InvalidProblem):
         Obstacle("post", Sphere(0.1), T)

@@ -1,4 +1,6 @@
-"""Motions played in MuJoCo: agreement with the plan, friction at its knee, contacts, changed arms, savings, memory."""
+"""Motions played in MuJoCo: agreement with the plan, friction at its knee, contacts, changed arms,
+savings, memory.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,8 @@ from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import GOAL, PAYLOAD, START, problem, tcp_pose
 
-# what the documentation promises of feed-forward with PD at 0.25 ms: rad, m, and parts of the energies
+# what the documentation promises of feed-forward with PD at 0.25 ms: rad, m, and parts of the
+# energies
 JOINT, TCP, ELECTRICAL, MECHANICAL = 3e-4, 2.5e-4, 5e-4, 1e-3
 # of savings
 POINT = 1e-3
@@ -49,7 +52,9 @@ def planned(arm: Arm, spline: Spline, **given: Any) -> PlannedMotion:
     return PlannedMotion(arm, course, spline.duration, *totals, torques=torques, **given)
 
 
-def quintic(arm: Arm, start: Array = START, goal: Array = GOAL, duration: float = 1.2) -> PlannedMotion:
+def quintic(
+    arm: Arm, start: Array = START, goal: Array = GOAL, duration: float = 1.2
+) -> PlannedMotion:
     return planned(arm, quintic_spline(start, goal, duration))
 
 
@@ -76,8 +81,13 @@ def holds_promise(found: Replay, plan: PlannedMotion) -> None:
 
 @pytest.mark.parametrize("name", ["ur5e", "panda", "kr10_r1100"])
 def test_the_plan_is_what_happens(name: str) -> None:
-    """Also of a robot whose torque limits are those of the links, and of one with large friction."""
-    arm = Arm(robot=load_robot(name), payload=Payload(mass=1.0, com=np.array([0.0, 0.02, 0.06])), collisions=False)
+    """Also of a robot whose torque limits are those of the links, and of one with large
+    friction."""
+    arm = Arm(
+        robot=load_robot(name),
+        payload=Payload(mass=1.0, com=np.array([0.0, 0.02, 0.06])),
+        collisions=False,
+    )
     middle = (arm.active_limits.q_min + arm.active_limits.q_max) / 2
     plan = quintic(arm, middle, middle + np.resize([0.5, -0.4, 0.3], arm.robot.nq), 1.5)
     found = replay(plan, ("feed_forward",))
@@ -97,7 +107,9 @@ def test_an_optimised_motion_is_what_happens() -> None:
 
 
 def test_joints_at_the_knee_of_friction_follow() -> None:
-    """At a milliradian per second friction is most of the torque, and changes by half of itself from joint to joint."""
+    """At a milliradian per second friction is most of the torque, and changes by half of itself
+    from joint to joint.
+    """
     goal = START + 1e-3 * np.array([1.0, -1.0, 0.5, 2.0, -0.2, 3.0])
     plan = quintic(ARM, START, goal, 1.0)
     found = replay(plan, ("feed_forward",))
@@ -114,7 +126,9 @@ def test_an_arm_at_rest_stays_there() -> None:
 
 def test_a_coarser_step_is_as_good_to_a_tenth_of_a_milliradian() -> None:
     plan = answer()
-    runs = [replay(plan, ("feed_forward",), step).under("feed_forward") for step in (2e-3, 1e-3, 5e-4)]
+    runs = [
+        replay(plan, ("feed_forward",), step).under("feed_forward") for step in (2e-3, 1e-3, 5e-4)
+    ]
     errors = [run.joint_error.max() for run in runs]
     assert errors[0] > errors[1] > errors[2]
     assert errors[0] < 2 * JOINT
@@ -138,7 +152,9 @@ def test_an_obstacle_in_the_way_is_touched() -> None:
     # our own distances say so, too
     q = quintic(arm).course(np.array([0.6]))[0]
     assert collision_model(arm).least_distance(q, np.inf) < 0
-    free = replay(quintic(replace(arm, collisions=False)), ("feed_forward",), FAST).under("feed_forward")
+    free = replay(quintic(replace(arm, collisions=False)), ("feed_forward",), FAST).under(
+        "feed_forward"
+    )
     assert free.contact is None and free.tcp_error <= TCP
 
 
@@ -146,19 +162,26 @@ def test_a_margin_is_no_body() -> None:
     arm = in_the_way(margin=0.5, above=0.5)
     q = quintic(arm).course(np.linspace(0.0, 1.2, 50))[0]
     assert (
-        collision_model(arm).least_distance(q, np.inf) < 0 < collision_model(in_the_way(0.0, 0.5)).least_distance(q, 1)
+        collision_model(arm).least_distance(q, np.inf)
+        < 0
+        < collision_model(in_the_way(0.0, 0.5)).least_distance(q, 1)
     )
     assert replay(quintic(arm), ("feed_forward",), FAST).under("feed_forward").contact is None
 
 
 def test_the_savings_persist_as_planned() -> None:
-    """Without a change of the arm, the simulated saving is the planned one; friction and payload move it."""
+    """Without a change of the arm, the simulated saving is the planned one; friction and payload
+    move it.
+    """
     plan = answer()
     assert {each.name for each in plan.baselines} == {each.name for each in solution().baselines}
     found = replay(plan, ("feed_forward",), FAST, {"payload": 0.1, "friction": 0.3})
     assert [(each.quantity, each.factor) for each in found.changes] == [
-        ("payload", 0.9), ("payload", 1.1), ("friction", 0.7), ("friction", 1.3)
-    ]  # fmt: skip
+        ("payload", 0.9),
+        ("payload", 1.1),
+        ("friction", 0.7),
+        ("friction", 1.3),
+    ]
     for each in found.savings:
         assert each.simulated == pytest.approx(each.planned, abs=POINT)
         assert each.least <= each.simulated <= each.most
@@ -173,17 +196,25 @@ def test_the_savings_persist_as_planned() -> None:
 
 
 def test_a_payload_that_is_none_is_not_changed() -> None:
-    found = replay(quintic(replace(ARM, payload=Payload())), ("feed_forward",), FAST, {"payload": 0.1})
+    found = replay(
+        quintic(replace(ARM, payload=Payload())), ("feed_forward",), FAST, {"payload": 0.1}
+    )
     assert found.changes == []
 
 
 def test_a_joint_at_its_limit_saturates() -> None:
-    """A motion planned at nearly all the torque of a joint: a heavier payload asks for more than there is."""
+    """A motion planned at nearly all the torque of a joint: a heavier payload asks for more than
+    there is.
+    """
     plan = quintic(ARM)
     tight = (
-        plan.arm.active_limits.tau_max * replay(plan, ("feed_forward",), FAST).under("feed_forward").limit_ratio / 0.99
+        plan.arm.active_limits.tau_max
+        * replay(plan, ("feed_forward",), FAST).under("feed_forward").limit_ratio
+        / 0.99
     )
-    arm = replace(ARM, limits=replace(ARM.active_limits, tau_max=np.minimum(tight, ARM.active_limits.tau_max)))
+    arm = replace(
+        ARM, limits=replace(ARM.active_limits, tau_max=np.minimum(tight, ARM.active_limits.tau_max))
+    )
     found = replay(quintic(arm), ("feed_forward",), FAST, {"payload": 0.1})
     as_planned, (lighter, heavier) = found.under("feed_forward"), found.changes
     assert as_planned.limit_ratio.max() == pytest.approx(0.99, abs=5e-3)
@@ -213,14 +244,19 @@ def test_a_velocity_step_is_not_followed() -> None:
 def test_friction_that_grows_with_the_load() -> None:
     """The controller knows it, and the losses count it."""
     law = ARM.friction_law
-    loaded = replace(ARM.robot, friction_laws={"loaded": replace(law, name="loaded", load=np.full(6, 0.05))})
+    loaded = replace(
+        ARM.robot, friction_laws={"loaded": replace(law, name="loaded", load=np.full(6, 0.05))}
+    )
     arm = replace(ARM, robot=loaded)
     plan, plain = quintic(arm), quintic(ARM)
     found = replay(plan, ("feed_forward",))
     holds_promise(found, plan)
     assert plan.electrical > plain.electrical * (1 + 10 * ELECTRICAL)
     rough = replay(plan, ("feed_forward",), FAST, {"friction": 0.3}).changes[1]
-    assert rough.energy.electrical.friction > 1.2 * found.under("feed_forward").energy.electrical.friction
+    assert (
+        rough.energy.electrical.friction
+        > 1.2 * found.under("feed_forward").energy.electrical.friction
+    )
 
 
 def test_a_motion_of_too_many_steps_is_refused() -> None:
@@ -241,7 +277,8 @@ def memory() -> int:
 
 @pytest.mark.long
 def test_no_model_leaks() -> None:
-    """A model with its data has more than a hundred kilobytes: a hundred that stay would be seen."""
+    """A model with its data has more than a hundred kilobytes: a hundred that stay would be
+    seen."""
     plan = quintic(in_the_way(above=0.5), duration=0.2)
     for _ in range(20):
         replay(plan, step=1e-2, perturb={"payload": 0.1})

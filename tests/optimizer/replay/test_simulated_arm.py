@@ -1,4 +1,6 @@
-"""The MuJoCo model of an arm: torques, accelerations and poses against Pinocchio, and the shapes of its bodies."""
+"""The MuJoCo model of an arm: torques, accelerations and poses against Pinocchio, and the shapes of
+its bodies.
+"""
 
 from __future__ import annotations
 
@@ -66,7 +68,9 @@ def loaded(robot: Robot) -> Arm:
 
 
 def accelerations(simulated: SimulatedArm, q: Array, v: Array, tau: Array) -> Array:
-    """Accelerations (k, nq) [rad/s²] under torques tau (k, nq) [N·m], friction and contacts left out."""
+    """Accelerations (k, nq) [rad/s²] under torques tau (k, nq) [N·m], friction and contacts left
+    out.
+    """
     found = np.empty_like(q)
     with simulated.without("constraint"):
         for k, state in enumerate(zip(q, v, tau, strict=True)):
@@ -95,7 +99,9 @@ def test_dynamics_and_poses_are_those_of_pinocchio(name: str) -> None:
     theirs = np.array([pin.aba(model, data, *state) for state in zip(q, v, tau, strict=True)])
     assert accelerations(simulated, q, v, tau) == pytest.approx(theirs, rel=ROUNDING, abs=ROUNDING)
     for each in q:
-        assert tcp_position(simulated, each) == pytest.approx(tcp_pose(arm, each)[:3, 3], abs=ROUNDING)
+        assert tcp_position(simulated, each) == pytest.approx(
+            tcp_pose(arm, each)[:3, 3], abs=ROUNDING
+        )
 
 
 def test_another_payload_needs_no_new_model() -> None:
@@ -106,7 +112,9 @@ def test_another_payload_needs_no_new_model() -> None:
         simulated.carry(changed)
         assert simulated.model is model
         tau = by_pinocchio(changed, q, v, a)
-        assert (np.abs(simulated.torques(q, v, a) - tau) <= ROUNDING * arm.active_limits.tau_max).all()
+        assert (
+            np.abs(simulated.torques(q, v, a) - tau) <= ROUNDING * arm.active_limits.tau_max
+        ).all()
 
 
 def test_an_inertia_that_no_body_has_is_taken_as_it_is() -> None:
@@ -126,7 +134,9 @@ def test_rotors_are_in_the_torques() -> None:
     simulated, (q, v, a) = SimulatedArm(arm), states(arm.robot)
     with_rotors = simulated.torques(q, v, a)
     simulated.model.dof_armature[:] = 0.0
-    assert with_rotors - simulated.torques(q, v, a) == pytest.approx(arm.drives.rotor_inertia * a, abs=1e-12)
+    assert with_rotors - simulated.torques(q, v, a) == pytest.approx(
+        arm.drives.rotor_inertia * a, abs=1e-12
+    )
 
 
 SHAPES: dict[str, Shape] = {
@@ -166,7 +176,9 @@ def _moved(T: Array, by: Any) -> Array:
 
 
 def ball_distance(arm: Arm) -> float:
-    """Signed distance [m] of the ball and the obstacle by our own collision model, margin subtracted."""
+    """Signed distance [m] of the ball and the obstacle by our own collision model, margin
+    subtracted.
+    """
     model = collision_model(arm)
     names = [set(model.names(k)) for k in range(len(model.pairs))]
     return float(model.signed_distances(START[None])[0][0, names.index({"tool", "thing"})])
@@ -207,12 +219,17 @@ def test_the_arm_does_not_touch_itself_where_links_meet() -> None:
 def test_obstacles_of_many_parts_are_named() -> None:
     cloud = Obstacle("scan", Points(np.array([[0.5, 0.0, 0.5]]), 0.01))
     arm = Arm(
-        robot=load_robot("ur5e"), scene=Scene([cloud, Obstacle("ball", Sphere(0.1), _moved(np.eye(4), [1, 1, 1]))])
+        robot=load_robot("ur5e"),
+        scene=Scene([cloud, Obstacle("ball", Sphere(0.1), _moved(np.eye(4), [1, 1, 1]))]),
     )
     assert unsimulated(arm) == ["scan"]
     assert "ball" in SimulatedArm(arm).bodies
     assert "scan" not in SimulatedArm(arm).bodies
-    assert unsimulated(replace(arm, collisions=False)) == SimulatedArm(replace(arm, collisions=False)).bodies == []
+    assert (
+        unsimulated(replace(arm, collisions=False))
+        == SimulatedArm(replace(arm, collisions=False)).bodies
+        == []
+    )
 
 
 def test_only_a_replay_imports_mujoco() -> None:
@@ -222,7 +239,8 @@ def test_only_a_replay_imports_mujoco() -> None:
         "import joulepath.optimizer.replay.replay\n"
         "from tests.optimizer.moves import problem; from joulepath import optimize\n"
         "optimize(problem()); print('mujoco' in sys.modules)\n"
-        "from joulepath.optimizer.replay.simulator import mujoco; mujoco(); print('mujoco' in sys.modules)\n"
+        "from joulepath.optimizer.replay.simulator import mujoco; mujoco(); print('mujoco' in "
+        "sys.modules)\n"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert (run.stdout.split(), run.stderr) == (["False", "True"], "")

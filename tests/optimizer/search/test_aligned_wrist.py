@@ -1,4 +1,6 @@
-"""A pose that a spherical wrist holds on a self-motion: no member needs less than the answer, or than the bound."""
+"""A pose that a spherical wrist holds on a self-motion: no member needs less than the answer, or
+than the bound.
+"""
 
 from __future__ import annotations
 
@@ -33,9 +35,15 @@ def test_no_member_needs_less(every: bool) -> None:
     assert found.certificate.valid and found.complete and found.lower_bound <= energy
     assert np.abs(flange(KUKA, found.goal.q) - flange(KUKA, ALIGNED)).max() < 1e-9
     branches = required_inverse_kinematics(KUKA, "goal").branches(flange(KUKA, ALIGNED))
-    motions = {id(each.self_motion): each.self_motion for each in branches if each.self_motion is not None}
+    motions = {
+        id(each.self_motion): each.self_motion for each in branches if each.self_motion is not None
+    }
     own = min(motions.values(), key=lambda each: np.abs(each.q[:3] - found.goal.q[:3]).max())
-    parameters = np.linspace(-3, 3, 24) if every else own.parameter(found.goal.q) + np.array([-0.3, -0.01, 0.3])
+    parameters = (
+        np.linspace(-3, 3, 24)
+        if every
+        else own.parameter(found.goal.q) + np.array([-0.3, -0.01, 0.3])
+    )
     tried = 0
     for motion in motions.values() if every else [own]:
         for member in motion.at(parameters):

@@ -27,14 +27,22 @@ from joulepath.optimizer.search.baselines import (
     saving,
 )
 from joulepath.optimizer.trajectories.ruckig_motion import time_optimal
-from joulepath.optimizer.trajectories.time_scalings import SampledMotion, controller_default, quintic, trapezoid
+from joulepath.optimizer.trajectories.time_scalings import (
+    SampledMotion,
+    controller_default,
+    quintic,
+    trapezoid,
+)
 from tests.optimizer.moves import problem_with
 
 EXACT = 1e-12  # relative; closed forms in double precision
-# rad; Ruckig solves its phases from polynomial roots and accepts a position within 1e-8 of the target
+# rad; Ruckig solves its phases from polynomial roots and accepts a position within 1e-8 of the
+# target
 RUCKIG_POSITION = 1e-7
 RATE = 1e-9  # relative; Ruckig's states are cubic polynomials evaluated in double precision
-BALANCE = 1e-6  # relative; shaft power is smooth within panels, but for friction's steep rise near rest
+BALANCE = (
+    1e-6  # relative; shaft power is smooth within panels, but for friction's steep rise near rest
+)
 
 ROBOT = load_robot("ur5e")
 NAMES = ["trapezoid", "quintic", "ruckig", "ruckig_slowed", "controller_default"]
@@ -50,7 +58,10 @@ def problem(start: Array = START, goal: Array = GOAL, **given: Any) -> Problem:
 
 def limits(**given: float | list[float] | Array) -> Limits:
     """The robot's limits with some replaced: one number for all joints, or one each."""
-    return replace(ROBOT.limits, **{name: np.broadcast_to(value, 6).astype(float) for name, value in given.items()})
+    return replace(
+        ROBOT.limits,
+        **{name: np.broadcast_to(value, 6).astype(float) for name, value in given.items()},
+    )
 
 
 def oracle(task: Problem) -> tuple[Callable[..., Array], Callable[[Array], float], Broken]:
@@ -59,7 +70,9 @@ def oracle(task: Problem) -> tuple[Callable[..., Array], Callable[[Array], float
     model = task.arm.robot.loaded_model(load.mass, load.com, load.inertia, task.arm.gravity)
     data = model.createData()
     return (
-        lambda q, v, a: np.array([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)]),
+        lambda q, v, a: np.array(
+            [pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)]
+        ),
         lambda q: float(pin.computePotentialEnergy(model, data, q)),
         lambda q, v: [[] for _ in q],
     )
@@ -67,7 +80,10 @@ def oracle(task: Problem) -> tuple[Callable[..., Array], Callable[[Array], float
 
 def compare(task: Problem, duration: float = DURATION, ours: float = 60.0) -> dict[str, Baseline]:
     goals = np.asarray(task.goal)[None]
-    return {each.name: each for each in baselines(task, np.asarray(task.start), goals, duration, ours, *oracle(task))}
+    return {
+        each.name: each
+        for each in baselines(task, np.asarray(task.start), goals, duration, ours, *oracle(task))
+    }
 
 
 def one_joint(displacement: float) -> Array:
@@ -79,7 +95,9 @@ def one_joint(displacement: float) -> Array:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_motion_is_what_it_says(name: str) -> None:
-    """Ends, rest, weights; and over every panel the integrals of a and v are the changes of v and q."""
+    """Ends, rest, weights; and over every panel the integrals of a and v are the changes of v and
+    q.
+    """
     motion = guesses(problem(), START, GOAL, DURATION)[name]  # type: ignore[index]
     assert motion.q[0] == pytest.approx(START, abs=EXACT)
     assert motion.q[-1] == pytest.approx(GOAL, abs=RUCKIG_POSITION)
@@ -92,7 +110,8 @@ def test_every_motion_is_what_it_says(name: str) -> None:
     assert np.abs((weights * a).sum(axis=1) - (v[:, -1] - v[:, 0])).max() < RUCKIG_POSITION
     for samples, peak in ((motion.v, motion.peak_v), (motion.a, motion.peak_a)):
         assert (np.abs(samples).max(axis=0) <= peak * (1 + RATE)).all()
-        # the samples lie at most a seventieth of the duration apart: a parabola's top is missed by less than 1 %
+        # the samples lie at most a seventieth of the duration apart: a parabola's top is missed by
+        # less than 1 %
         assert np.abs(samples).max(axis=0) == pytest.approx(peak, rel=0.01)
 
 
@@ -100,7 +119,9 @@ def test_every_motion_is_what_it_says(name: str) -> None:
 def test_durations(name: str) -> None:
     own = {
         "ruckig": time_optimal(problem().arm.active_limits, START, GOAL).duration,
-        "controller_default": controller_default(ROBOT.limits, ROBOT.default_motion, START, GOAL).duration,
+        "controller_default": controller_default(
+            ROBOT.limits, ROBOT.default_motion, START, GOAL
+        ).duration,
     }
     motion = guesses(problem(), START, GOAL, DURATION)[name]  # type: ignore[index]
     expected = own.get(name, DURATION)
@@ -118,25 +139,37 @@ def test_trapezoid_in_thirds() -> None:
 
 
 def test_trapezoid_keeps_to_limits_where_it_can() -> None:
-    """The blend that a limit asks for meets that limit exactly; where speed and acceleration disagree, thirds stay."""
+    """The blend that a limit asks for meets that limit exactly; where speed and acceleration
+    disagree, thirds stay.
+    """
     goal = one_joint(1.0)
     slow = trapezoid(limits(v_max=1.2), START, goal, 1.0)
     assert slow.peak_v.max() == pytest.approx(1.2, rel=EXACT)
     lazy = trapezoid(limits(a_max=4.2), START, goal, 1.0)
-    assert lazy.peak_a.max() == pytest.approx(4.2, rel=1e-9)  # by a square root near its branch point at 4
+    assert lazy.peak_a.max() == pytest.approx(
+        4.2, rel=1e-9
+    )  # by a square root near its branch point at 4
     for impossible in (limits(v_max=1.2, a_max=4.2), limits(v_max=0.9), limits(a_max=3.9)):
         motion = trapezoid(impossible, START, goal, 1.0)
         assert motion.peak_v.max() == pytest.approx(1.5, rel=EXACT)
 
 
 def test_ruckig_keeps_its_limits_and_its_word() -> None:
-    """Over random moves and limits: no rate above its limit, the leading joint on one, and Ruckig's own duration."""
+    """Over random moves and limits: no rate above its limit, the leading joint on one, and Ruckig's
+    own duration.
+    """
     rng = np.random.default_rng(5)
     for _ in range(50):
-        own = limits(v_max=rng.uniform(0.3, 3.0, 6), a_max=rng.uniform(1.0, 10.0, 6), j_max=rng.uniform(10, 200, 6))
+        own = limits(
+            v_max=rng.uniform(0.3, 3.0, 6),
+            a_max=rng.uniform(1.0, 10.0, 6),
+            j_max=rng.uniform(10, 200, 6),
+        )
         start, goal = rng.uniform(-3.0, 3.0, (2, 6))
         motion = time_optimal(problem(start, goal, limits=own).arm.active_limits, start, goal)
-        ratios = np.array([motion.peak_v / own.v_max, motion.peak_a / own.a_max, motion.peak_jerk / own.j_max])
+        ratios = np.array(
+            [motion.peak_v / own.v_max, motion.peak_a / own.a_max, motion.peak_jerk / own.j_max]
+        )
         assert ratios.max() == pytest.approx(1.0, rel=RATE)
         given = ruckig.InputParameter(6)
         given.current_position, given.target_position = start.tolist(), goal.tolist()
@@ -164,10 +197,14 @@ def test_controller_default_duration(displacement: float, duration: float) -> No
 
 
 def test_controller_default_is_led_by_one_axis() -> None:
-    """The longest displacement sets the pace, the others keep in step on a straight line; tighter limits count."""
+    """The longest displacement sets the pace, the others keep in step on a straight line; tighter
+    limits count.
+    """
     displacement = np.abs(GOAL - START)
     motion = controller_default(ROBOT.limits, ROBOT.default_motion, START, GOAL)
-    assert motion.duration == pytest.approx(displacement.max() / 1.0472 + 1.0472 / 1.3963, rel=EXACT)
+    assert motion.duration == pytest.approx(
+        displacement.max() / 1.0472 + 1.0472 / 1.3963, rel=EXACT
+    )
     assert motion.peak_v == pytest.approx(1.0472 * displacement / displacement.max(), rel=EXACT)
     tight = controller_default(limits(v_max=0.5, a_max=1.0), ROBOT.default_motion, START, GOAL)
     assert tight.duration == pytest.approx(displacement.max() / 0.5 + 0.5 / 1.0, rel=EXACT)
@@ -194,7 +231,9 @@ def test_energies_balance() -> None:
     task = problem(payload=payload, gravity=np.array([3.0, -5.0, -7.9]))
     torques, potential, _ = oracle(task)
     for motion in guesses(task, START, GOAL, DURATION).values():
-        energy = motion_energy(task, motion, torques(motion.q, motion.v, motion.a), potential).electrical
+        energy = motion_energy(
+            task, motion, torques(motion.q, motion.v, motion.a), potential
+        ).electrical
         assert energy.parts_sum == pytest.approx(energy.total, rel=BALANCE)
 
 
@@ -221,7 +260,9 @@ def test_report(objective: str) -> None:
 
 
 def test_savings_keep_their_sign() -> None:
-    """Regeneration may leave less than nothing to pay; a baseline of no duration has nothing to save."""
+    """Regeneration may leave less than nothing to pay; a baseline of no duration has nothing to
+    save.
+    """
     assert saving(30.0, 60.0) == 0.5
     assert saving(-2.0, -1.0) == 1.0
     assert saving(-1.0, -2.0) == -0.5
@@ -229,18 +270,31 @@ def test_savings_keep_their_sign() -> None:
 
 
 def test_within_limits_in_time() -> None:
-    """A second and more is comfortable; in less than Ruckig's own time nothing is within the limits."""
+    """A second and more is comfortable; in less than Ruckig's own time nothing is within the
+    limits.
+    """
     comfortable, hasty = compare(problem()), compare(problem(), duration=0.5)
-    assert [name for name in NAMES if comfortable[name].within_limits] == ["quintic", "ruckig", "ruckig_slowed"]
+    assert [name for name in NAMES if comfortable[name].within_limits] == [
+        "quintic",
+        "ruckig",
+        "ruckig_slowed",
+    ]
     assert comfortable["ruckig"].duration > 0.5
     assert [name for name in NAMES if hasty[name].within_limits] == ["ruckig"]
     assert hasty["ruckig_slowed"].duration == pytest.approx(0.5, rel=EXACT)
-    assert comfortable["trapezoid"].reason == "unbounded jerk" and comfortable["quintic"].reason is None
-    assert all(name in str(hasty["quintic"].reason) for name in ("velocity", "acceleration", "jerk"))
+    assert (
+        comfortable["trapezoid"].reason == "unbounded jerk"
+        and comfortable["quintic"].reason is None
+    )
+    assert all(
+        name in str(hasty["quintic"].reason) for name in ("velocity", "acceleration", "jerk")
+    )
 
 
 def test_within_limits_of_torque() -> None:
-    """Ruckig does not know torque: with a torque limit just below its peak it is out, just above it is in."""
+    """Ruckig does not know torque: with a torque limit just below its peak it is out, just above it
+    is in.
+    """
     free = problem()
     torques, *_ = oracle(free)
     motion = time_optimal(free.arm.active_limits, START, GOAL)
@@ -261,7 +315,9 @@ def test_trapezoids_pass_without_a_jerk_limit() -> None:
 
 
 def test_no_travel() -> None:
-    """Where the arm already is: those in our duration hold it there, the others are done at once for nothing."""
+    """Where the arm already is: those in our duration hold it there, the others are done at once
+    for nothing.
+    """
     task = problem(goal=START)
     report = compare(task)
     torques, *_ = oracle(task)
@@ -283,5 +339,8 @@ def test_next_to_no_travel() -> None:
         goal = START + displacement
         for motion in guesses(problem(goal=goal), START, goal, DURATION).values():
             assert isinstance(motion, SampledMotion)
-            assert all(np.isfinite(part).all() for part in (motion.t, motion.weights, motion.q, motion.v, motion.a))
+            assert all(
+                np.isfinite(part).all()
+                for part in (motion.t, motion.weights, motion.q, motion.v, motion.a)
+            )
         assert all(math.isfinite(each.saving) for each in compare(problem(goal=goal)).values())

@@ -1,4 +1,6 @@
-"""Which candidates there are, against counting them all; and that leaving some out by their bounds loses nothing."""
+"""Which candidates there are, against counting them all; and that leaving some out by their bounds
+loses nothing.
+"""
 
 from __future__ import annotations
 
@@ -27,12 +29,24 @@ from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.ends import ends
 from joulepath.optimizer.search.errors import TorqueInfeasible
 from joulepath.optimizer.surroundings import Surroundings
-from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem, tcp_pose, torques
+from tests.optimizer.moves import (
+    GOAL,
+    PAYLOAD,
+    ROBOT,
+    START,
+    TILTED,
+    limits,
+    problem,
+    tcp_pose,
+    torques,
+)
 from tests.selection import long_but
 
 TURN = 2 * np.pi
 SAME = 1e-6  # rad; inverse kinematics agrees with itself to 1e-9
-NARROW = limits(q_min=[-3.6, -3.6, -np.pi, -3.6, -3.6, -3.6], q_max=[3.6, 3.6, np.pi, 3.6, 3.6, 3.6])
+NARROW = limits(
+    q_min=[-3.6, -3.6, -np.pi, -3.6, -3.6, -3.6], q_max=[3.6, 3.6, np.pi, 3.6, 3.6, 3.6]
+)
 
 
 def candidates(task: Problem) -> list[Candidate]:
@@ -41,7 +55,9 @@ def candidates(task: Problem) -> list[Candidate]:
 
 
 def every_configuration(q: Array, task: Problem) -> list[Array]:
-    """Every branch of the pose at q with every combination of full turns inside the limits, by trying them all."""
+    """Every branch of the pose at q with every combination of full turns inside the limits, by
+    trying them all.
+    """
     own, found = task.arm.active_limits, []
     for branch in inverse_kinematics_for(task.arm.robot).branches(tcp_pose(q).T):
         for k in product((-2, -1, 0, 1, 2), repeat=6):
@@ -60,7 +76,10 @@ def test_joints_to_joints_is_one_candidate() -> None:
     (only,) = candidates(problem())
     assert only.q_start.tolist() == START.tolist() and only.q_goal.tolist() == GOAL.tolist()
     labels = inverse_kinematics_for(ROBOT)
-    assert (only.start.label, only.goal.label) == (str(labels.label(START)), str(labels.label(GOAL)))
+    assert (only.start.label, only.goal.label) == (
+        str(labels.label(START)),
+        str(labels.label(GOAL)),
+    )
 
 
 @pytest.mark.parametrize("own", [ROBOT.limits, NARROW], ids=["two turns", "one and a bit"])
@@ -90,25 +109,31 @@ def test_without_windings_every_branch_goes_the_shortest_way() -> None:
         everything = every_configuration(GOAL, task)
         assert len(found) == len({candidate.goal.label for candidate in found}) == 8
         for candidate in found:
-            siblings = [q for q in everything if np.abs(np.sin((q - candidate.q_goal) / 2)).max() < SAME]
+            siblings = [
+                q for q in everything if np.abs(np.sin((q - candidate.q_goal) / 2)).max() < SAME
+            ]
             least = np.min([np.abs(q - START) for q in siblings], axis=0)
             assert np.abs(candidate.q_goal - START) == pytest.approx(least, abs=SAME)
 
 
 def test_between_poses_relative_travels_are_distinct() -> None:
-    """Turning both ends alike changes nothing: of all pairs with the same displacement one is kept."""
+    """Turning both ends alike changes nothing: of all pairs with the same displacement one is
+    kept."""
     task = problem(start=tcp_pose(START), goal=tcp_pose(GOAL))
     found = candidates(task)
     labels = {(candidate.start.label, candidate.goal.label) for candidate in found}
     assert len(labels) == 64
     assert len(rounded([e.q_goal - e.q_start for e in found])) == len(found)
     for candidate in found:
-        assert (candidate.q_start >= ROBOT.limits.q_min).all() and (candidate.q_goal <= ROBOT.limits.q_max).all()
+        assert (candidate.q_start >= ROBOT.limits.q_min).all() and (
+            candidate.q_goal <= ROBOT.limits.q_max
+        ).all()
 
 
 @pytest.mark.parametrize("own", [ROBOT.limits, NARROW], ids=["two turns", "one and a bit"])
 def test_between_poses_every_joint_may_go_either_way_round(own: Any) -> None:
-    """Each joint's travels, branch by branch: all of less than a full turn that the limits allow."""
+    """Each joint's travels, branch by branch: all of less than a full turn that the limits
+    allow."""
     task = problem(start=tcp_pose(START), goal=tcp_pose(GOAL), limits=own)
     found: dict[tuple[str, str], list[Candidate]] = {}
     for candidate in candidates(task):
@@ -123,14 +148,16 @@ def test_between_poses_every_joint_may_go_either_way_round(own: Any) -> None:
             ]
             possible = {round(b - a, 6) for a, b in product(*inside) if abs(b - a) < TURN - SAME}
             assert possible <= {round(displacement, 6) for displacement in travels[:, j].tolist()}
-        assert len(travels) == np.prod([len(set(np.round(travels[:, j], 6).tolist())) for j in range(6)])
+        assert len(travels) == np.prod(
+            [len(set(np.round(travels[:, j], 6).tolist())) for j in range(6)]
+        )
 
 
 @pytest.mark.parametrize("count", long_but((200,), (200, 2000)))
 @pytest.mark.parametrize("own", [ROBOT.limits, NARROW], ids=["two turns", "one and a bit"])
 def test_between_poses_nothing_that_may_be_best_is_missing(own: Any, count: int) -> None:
-    """Every pair of configurations has a candidate of its own displacement, or one that ends alike and travels no
-    further."""
+    """Every pair of configurations has a candidate of its own displacement, or one that ends alike
+    and travels no further."""
     task = problem(start=tcp_pose(START), goal=tcp_pose(GOAL), limits=own)
     kept = np.array([candidate.q_goal - candidate.q_start for candidate in candidates(task)])
     starts, goals = every_configuration(START, task), every_configuration(GOAL, task)
@@ -143,7 +170,13 @@ def test_between_poses_nothing_that_may_be_best_is_missing(own: Any, count: int)
 
 
 @pytest.mark.parametrize(
-    "wanted", [{"shoulder": "left"}, {"elbow": "up", "wrist": "flip"}, {"shoulder": "right", "elbow": "down"}, {}]
+    "wanted",
+    [
+        {"shoulder": "left"},
+        {"elbow": "up", "wrist": "flip"},
+        {"shoulder": "right", "elbow": "down"},
+        {},
+    ],
 )
 def test_a_branch_filter_keeps_what_it_names(wanted: dict[str, Any]) -> None:
     """At both ends, where both are poses; joints that are given stay whatever they are."""
@@ -154,7 +187,11 @@ def test_a_branch_filter_keeps_what_it_names(wanted: dict[str, Any]) -> None:
     def kept(label: str) -> bool:
         return all(part in label.split("/") for part in wanted.values())
 
-    expected = {(e.start.label, e.goal.label) for e in everything if kept(e.start.label) and kept(e.goal.label)}
+    expected = {
+        (e.start.label, e.goal.label)
+        for e in everything
+        if kept(e.start.label) and kept(e.goal.label)
+    }
     assert {(e.start.label, e.goal.label) for e in found} == expected
     assert len(candidates(problem(branch=given))) == 1
 
@@ -165,7 +202,12 @@ def test_a_branch_that_does_not_reach_the_pose_is_refused() -> None:
     one_elbow = problem(goal=tcp_pose(GOAL), limits=bent)
     reached = {tuple(candidate.goal.label.split("/")[:2]) for candidate in candidates(one_elbow)}
     assert 0 < len(reached) < 4
-    for shoulder, elbow in {("left", "up"), ("left", "down"), ("right", "up"), ("right", "down")} - reached:
+    for shoulder, elbow in {
+        ("left", "up"),
+        ("left", "down"),
+        ("right", "up"),
+        ("right", "down"),
+    } - reached:
         with pytest.raises(UnreachablePose) as refusal:
             candidates(replace(one_elbow, branch=BranchFilter(shoulder=shoulder, elbow=elbow)))  # type: ignore[arg-type]
         assert refusal.value.target == "goal"
@@ -190,7 +232,9 @@ def test_torque_that_cannot_hold_an_end_rules_it_out() -> None:
     found = candidates(some.problem)
     search.bound(some, found)
     for candidate in found:
-        needed = np.abs(torques(some.problem, candidate.q_goal[None], np.zeros((1, 6)), np.zeros((1, 6))))[0, 1]
+        needed = np.abs(
+            torques(some.problem, candidate.q_goal[None], np.zeros((1, 6)), np.zeros((1, 6)))
+        )[0, 1]
         assert candidate.status == ("unvisited" if needed <= 80 else "infeasible")
         assert candidate.status == "unvisited" or (
             ROBOT.joint_names[1] in candidate.message and np.isinf(candidate.lower_bound)
@@ -212,23 +256,37 @@ class Recorder:
     def energy(self, candidate: Candidate) -> float:
         """What a motion of the candidate takes, inf where none is found."""
         attempt = self(candidate)
-        return np.inf if attempt.spline is None else self.task.objective_of(self.task.energy(attempt.spline))
+        return (
+            np.inf
+            if attempt.spline is None
+            else self.task.objective_of(self.task.energy(attempt.spline))
+        )
 
 
 SMALL: dict[str, dict[str, Any]] = {
     "joints to pose": {"goal": tcp_pose(GOAL), "limits": NARROW},
     "pose to joints": {"start": tcp_pose(START), "limits": NARROW, "windings": False},
-    "pose to pose": {"start": tcp_pose(START), "goal": tcp_pose(GOAL), "branch": BranchFilter(shoulder="left")},
-    "mechanical": {
-        "goal": tcp_pose(GOAL), "objective": "mechanical", "duration_min": 2.0, "duration_max": 2.0, "windings": False
+    "pose to pose": {
+        "start": tcp_pose(START),
+        "goal": tcp_pose(GOAL),
+        "branch": BranchFilter(shoulder="left"),
     },
-}  # fmt: skip
+    "mechanical": {
+        "goal": tcp_pose(GOAL),
+        "objective": "mechanical",
+        "duration_min": 2.0,
+        "duration_max": 2.0,
+        "windings": False,
+    },
+}
 MOST = 32  # candidates solved one by one, of least bound
 
 
 @pytest.mark.parametrize("name", list(SMALL))
 def test_pruning_loses_nothing(name: str) -> None:
-    """Solving all candidates one by one (of the many, those of least bound) finds no better one than the search."""
+    """Solving all candidates one by one (of the many, those of least bound) finds no better one
+    than the search.
+    """
     task = PreparedProblem.of(problem(payload=PAYLOAD, gravity=TILTED, **SMALL[name]))
     found, recorder = candidates(task.problem), Recorder(task)
     search.bound(task, found)
@@ -236,50 +294,80 @@ def test_pruning_loses_nothing(name: str) -> None:
     assert best is not None and best.energy is not None
     visited = [candidate.lower_bound for candidate in recorder.asked]
     assert visited == sorted(visited)
-    assert all(candidate.lower_bound >= best.energy for candidate in found if candidate.status == "pruned")
-    assert all(candidate.lower_bound <= candidate.energy for candidate in found if candidate.energy is not None)
+    assert all(
+        candidate.lower_bound >= best.energy for candidate in found if candidate.status == "pruned"
+    )
+    assert all(
+        candidate.lower_bound <= candidate.energy
+        for candidate in found
+        if candidate.energy is not None
+    )
     assert all(candidate.status != "unvisited" for candidate in found)
     if name != "mechanical":  # whose bound is only the potential_gain
         assert any(candidate.status == "pruned" for candidate in found)
     rest = sorted(
-        (candidate for candidate in found if candidate.status == "pruned"), key=lambda candidate: candidate.lower_bound
+        (candidate for candidate in found if candidate.status == "pruned"),
+        key=lambda candidate: candidate.lower_bound,
     )
     for candidate in rest[: MOST - len(visited)]:
         assert recorder.energy(candidate) >= best.energy
 
 
 def test_what_was_not_reached_says_so() -> None:
-    """A clock that passes the deadline at its third reading: two candidates are visited, the rest are not."""
-    task = PreparedProblem.of(problem(goal=tcp_pose(GOAL), objective="mechanical", duration_max=1.5))
+    """A clock that passes the deadline at its third reading: two candidates are visited, the rest
+    are not.
+    """
+    task = PreparedProblem.of(
+        problem(goal=tcp_pose(GOAL), objective="mechanical", duration_max=1.5)
+    )
     found, recorder, readings = candidates(task.problem), Recorder(task), iter(range(100))
     search.bound(task, found)
     explore(task, found, recorder, Deadline(1.5, lambda: float(next(readings))))
     assert len(recorder.asked) == 2
-    assert {candidate.status for candidate in found} <= {"solved", "failed", "infeasible", "unvisited"}
+    assert {candidate.status for candidate in found} <= {
+        "solved",
+        "failed",
+        "infeasible",
+        "unvisited",
+    }
     waiting = [candidate.report() for candidate in found if candidate.status == "unvisited"]
     assert waiting and all("deadline" in each.reason and each.energy is None for each in waiting)
 
 
-def test_goals_that_seem_enclosed_are_tried_after_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_goals_that_seem_enclosed_are_tried_after_the_others(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """A first attempt finds this one enclosed, and a path to another one."""
     task = PreparedProblem.of(problem(goal=tcp_pose(GOAL)))
     found, tried = candidates(task.problem)[:4], list[Candidate]()
     search.bound(task, found)
     found.sort(key=lambda candidate: candidate.lower_bound)
     enclosed, known = [id(found[k].q_goal) for k in (0, 1)], id(found[3].q_goal)
-    monkeypatch.setattr(Surroundings, "seems_enclosed", lambda self, q_start, q_goal: id(q_goal) in enclosed)
-    monkeypatch.setattr(Surroundings, "has_planned_paths", lambda self, q_start, q_goal: id(q_goal) == known)
+    monkeypatch.setattr(
+        Surroundings, "seems_enclosed", lambda self, q_start, q_goal: id(q_goal) in enclosed
+    )
+    monkeypatch.setattr(
+        Surroundings, "has_planned_paths", lambda self, q_start, q_goal: id(q_goal) == known
+    )
 
     def attempt(candidate: Candidate) -> SolveResult:
         tried.append(candidate)
         return SolveResult(SolveStatus.POSTPONED if len(tried) == 1 else SolveStatus.FAILED, "")
 
     explore(task, found, attempt, NEVER)
-    assert [[id(each) for each in found].index(id(candidate)) for candidate in tried] == [0, 3, 2, 0, 1]
+    assert [[id(each) for each in found].index(id(candidate)) for candidate in tried] == [
+        0,
+        3,
+        2,
+        0,
+        1,
+    ]
 
 
 def test_durations_rule_candidates_out() -> None:
-    """Those that cannot be that fast are infeasible, with the least time that they take; the others stay."""
+    """Those that cannot be that fast are infeasible, with the least time that they take; the others
+    stay.
+    """
     task = PreparedProblem.of(problem(goal=tcp_pose(GOAL), duration_max=1.2))
     found = candidates(task.problem)
     search.bound(task, found)
@@ -292,7 +380,8 @@ def test_durations_rule_candidates_out() -> None:
 
 
 def test_every_candidate_is_reported() -> None:
-    """In the answer: each pair with its fate, its bound and, where solved, its energy and duration."""
+    """In the answer: each pair with its fate, its bound and, where solved, its energy and
+    duration."""
     task = problem(goal=tcp_pose(GOAL), limits=NARROW)
     solution = optimize(task)
     assert len(solution.candidates) == len(candidates(task))
@@ -302,5 +391,7 @@ def test_every_candidate_is_reported() -> None:
     solved = [each.energy for each in solution.candidates if each.energy is not None]
     assert min(solved) == pytest.approx(solution.energy.electrical.total)
     assert solution.lower_bound == min(each.lower_bound for each in solution.candidates)
-    (chosen,) = [each for each in solution.candidates if np.array_equal(each.q_goal, solution.goal.q)]
+    (chosen,) = [
+        each for each in solution.candidates if np.array_equal(each.q_goal, solution.goal.q)
+    ]
     assert chosen.status == "solved" and chosen.goal == solution.goal.label

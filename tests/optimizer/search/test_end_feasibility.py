@@ -1,4 +1,6 @@
-"""Ends of motions: where the arm can be, and what the bound says of those that are too near to something."""
+"""Ends of motions: where the arm can be, and what the bound says of those that are too near to
+something.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ TOO_NEAR, TOUCHING = 1e-4, -1e-4
 
 
 def beside_goal(asked: Problem, clearance: float) -> Problem:
-    """The problem with a ball beside the elbow at GOAL, on its axis, so that the arm has this clearance [m] there."""
+    """The problem with a ball beside the elbow at GOAL, on its axis, so that the arm has this
+    clearance [m] there.
+    """
     low, high = 0.0, 1.0
     data = ROBOT.model.createData()
     pin.forwardKinematics(ROBOT.model, data, GOAL)
@@ -36,8 +40,8 @@ def beside_goal(asked: Problem, clearance: float) -> Problem:
 
 
 def test_an_end_whose_clearance_is_too_small_to_plan_for_counts_in_the_bound() -> None:
-    """Other motions may go there, and need less than the answer, which does not claim to be the best. One may be found
-    as a baseline."""
+    """Other motions may go there, and need less than the answer, which does not claim to be the
+    best. One may be found as a baseline."""
     asked = problem_with(START, tcp_pose(GOAL), windings=False)
     free = optimize(asked)
     assert np.allclose(free.goal.q, GOAL)

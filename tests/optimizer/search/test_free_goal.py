@@ -1,4 +1,6 @@
-"""Goals whose orientation is free in part: what they allow, what is found among it, and the bound on all of it."""
+"""Goals whose orientation is free in part: what they allow, what is found among it, and the bound
+on all of it.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,11 @@ from scipy.stats import qmc
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem, UnreachablePose, UnreachableTargets
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
-from joulepath.optimizer.kinematics.orientation_tolerance import excess_angle, nearest_orientation, sample_orientations
+from joulepath.optimizer.kinematics.orientation_tolerance import (
+    excess_angle,
+    nearest_orientation,
+    sample_orientations,
+)
 from joulepath.optimizer.methods.duration_intervals import duration_intervals
 from joulepath.optimizer.nlp.coordinates import Coordinates, GoalConstraints
 from joulepath.optimizer.nlp.nonlinear_program import NonlinearProgram
@@ -35,7 +41,18 @@ from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sampled_ends import BATCH
 from joulepath.optimizer.trajectories import bspline
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
-from tests.optimizer.moves import GOAL, HOME, PAYLOAD, ROBOT, START, TILTED, fixed, paper_poses, problem, tcp_pose
+from tests.optimizer.moves import (
+    GOAL,
+    HOME,
+    PAYLOAD,
+    ROBOT,
+    START,
+    TILTED,
+    fixed,
+    paper_poses,
+    problem,
+    tcp_pose,
+)
 from tests.optimizer.nlp.second_differences import without_dry_friction
 from tests.selection import long_but
 
@@ -43,7 +60,8 @@ from tests.selection import long_but
 HELD = 1e-6
 # of angles computed through rotation vectors [rad]
 ROUNDING = 1e-9
-# relative: a search that turns from a few samples against the best of many full poses, each with its own refinement
+# relative: a search that turns from a few samples against the best of many full poses, each with
+# its own refinement
 FOUND = 5e-3
 TOOL = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.2, 0.9), np.array([0.03, -0.02, 0.15])).homogeneous
 POSITIONS = [paper_poses()[k] for k in (0, 5, 10)]
@@ -51,12 +69,17 @@ POSITIONS = [paper_poses()[k] for k in (0, 5, 10)]
 
 def angle(a: Array, b: Array) -> float:
     """Between two vectors [rad], by a formula other than the code's."""
-    return 2 * float(np.arcsin(min(1.0, np.linalg.norm(a / np.linalg.norm(a) - b / np.linalg.norm(b)) / 2)))
+    return 2 * float(
+        np.arcsin(min(1.0, np.linalg.norm(a / np.linalg.norm(a) - b / np.linalg.norm(b)) / 2))
+    )
 
 
 def rotations(seed: int, count: int) -> list[Array]:
     rng = np.random.default_rng(seed)
-    return [pin.exp3(rng.uniform(-np.pi, np.pi) * v / np.linalg.norm(v)) for v in rng.normal(size=(count, 3))]
+    return [
+        pin.exp3(rng.uniform(-np.pi, np.pi) * v / np.linalg.norm(v))
+        for v in rng.normal(size=(count, 3))
+    ]
 
 
 def energy(solution: Solution) -> float:
@@ -83,7 +106,9 @@ def test_samples_are_allowed_and_fill_what_is(half_angle: float) -> None:
     assert half_angle == 0 or np.median(level) == pytest.approx(0.5, abs=0.02)
     for R in samples:
         assert excess_angle(pose, R) <= ROUNDING
-        assert pin.log3(nearest_orientation(pose, R).T @ R) == pytest.approx(np.zeros(3), abs=ROUNDING)
+        assert pin.log3(nearest_orientation(pose, R).T @ R) == pytest.approx(
+            np.zeros(3), abs=ROUNDING
+        )
 
 
 @pytest.mark.parametrize("half_angle", [0.0, 0.4, 2.5])
@@ -94,7 +119,9 @@ def test_the_nearest_orientation_is_allowed_and_as_far_as_said(half_angle: float
         assert excess_angle(pose, R) == pytest.approx(max(0.0, beyond), abs=1e-7)
         nearest = nearest_orientation(pose, R)
         assert excess_angle(pose, nearest) <= ROUNDING
-        assert np.linalg.norm(pin.log3(nearest @ R.T)) == pytest.approx(excess_angle(pose, R), abs=1e-7)
+        assert np.linalg.norm(pin.log3(nearest @ R.T)) == pytest.approx(
+            excess_angle(pose, R), abs=1e-7
+        )
 
 
 def test_opposite_axes_have_a_way_back() -> None:
@@ -112,13 +139,17 @@ def test_opposite_axes_have_a_way_back() -> None:
     ],
 )
 def test_leeway_is_the_derivative_of_forward_kinematics(pose: ConeOrientedPose) -> None:
-    """A step that its rows hold level moves neither the TCP nor, where that is fixed, its axis, to first order."""
+    """A step that its rows hold level moves neither the TCP nor, where that is fixed, its axis, to
+    first order.
+    """
     rng, step = np.random.default_rng(2), 1e-5
     task = PreparedProblem.of(problem(goal=GOAL, T_flange_tcp=TOOL, payload=PAYLOAD))
     allowed = goal_constraints(task, pose, GOAL, 0.5)
     level = allowed.rows[allowed.lower == allowed.upper]
     _, values, basis = np.linalg.svd(level)
-    free = basis[int((values > 1e-9).sum()) :].T @ rng.normal(size=len(basis) - int((values > 1e-9).sum()))
+    free = basis[int((values > 1e-9).sum()) :].T @ rng.normal(
+        size=len(basis) - int((values > 1e-9).sum())
+    )
     free *= step / np.linalg.norm(free)
     before, after = tcp_pose(GOAL - free, TOOL).T, tcp_pose(GOAL + free, TOOL).T
     # central differences: what is left is of third order
@@ -128,16 +159,22 @@ def test_leeway_is_the_derivative_of_forward_kinematics(pose: ConeOrientedPose) 
 
 
 def test_a_programme_with_its_goal_unknown_has_true_derivatives() -> None:
-    """Gradient and Hessian against central differences, the goal's row among the unknowns; the end is at rest."""
+    """Gradient and Hessian against central differences, the goal's row among the unknowns; the end
+    is at rest.
+    """
     task = PreparedProblem.of(problem(goal=GOAL))
     space, interval = bspline.uniform(9), duration_intervals(task, GOAL)[0]
     coordinates = Coordinates.joints(START, GOAL, task.arm.active_limits)
     free_end = GoalConstraints(np.eye(6), np.full(6, -1.0), np.full(6, 1.0), 1.0)
     program = without_dry_friction(
-        NonlinearProgram(task.kernel, space, interval.p, coordinates, 0.1, 10.0, goal_constraints=free_end)
+        NonlinearProgram(
+            task.kernel, space, interval.p, coordinates, 0.1, 10.0, goal_constraints=free_end
+        )
     )
     rng = np.random.default_rng(3)
-    free = np.linspace(START, GOAL, program.free_count) + rng.normal(scale=0.1, size=(program.free_count, 6))
+    free = np.linspace(START, GOAL, program.free_count) + rng.normal(
+        scale=0.1, size=(program.free_count, 6)
+    )
     assert (program.points(free)[-3:] == free[-1]).all()
     duration, none = 1.3, np.zeros((len(space.nodes), 6))
     line = program.derivatives(free, duration, none)
@@ -147,14 +184,17 @@ def test_a_programme_with_its_goal_unknown_has_true_derivatives() -> None:
     # third derivatives times the step squared, relative to a slope of tens of joules per radian
     assert slope == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=1e-5)
     gradients = [
-        program.derivatives(free + sign * step * direction, duration, none).gradient.copy() for sign in (1, -1)
+        program.derivatives(free + sign * step * direction, duration, none).gradient.copy()
+        for sign in (1, -1)
     ]
     bent = line.hessian[:, :-1] @ direction.ravel()
     assert bent == pytest.approx((gradients[0] - gradients[1]) / (2 * step), rel=1e-4, abs=1e-3)
 
 
 def test_the_solver_keeps_to_the_leeway() -> None:
-    """What it proposes lies on the plane, within the radius and within joint limits, and spends no more."""
+    """What it proposes lies on the plane, within the radius and within joint limits, and spends no
+    more.
+    """
     task = PreparedProblem.of(problem(goal=GOAL))
     space, interval = bspline.uniform(13), duration_intervals(task, GOAL)[0]
     coordinates = Coordinates.joints(START, GOAL, task.arm.active_limits)
@@ -168,7 +208,9 @@ def test_the_solver_keeps_to_the_leeway() -> None:
         ConeOrientedPose.about(Pose(T), [1, 0, 0]),
     ):
         allowed = goal_constraints(task, pose, GOAL, 0.3)
-        program = NonlinearProgram(task.kernel, space, interval.p, coordinates, 0.1, 10.0, goal_constraints=allowed)
+        program = NonlinearProgram(
+            task.kernel, space, interval.p, coordinates, 0.1, 10.0, goal_constraints=allowed
+        )
         found = solve(program, np.concatenate([at_rest.free, GOAL[None]]), at_rest.duration)
         moved = found.free[-1] - GOAL
         assert found.violation < 1e-4 and found.cost < at_rest.cost
@@ -180,7 +222,8 @@ def test_the_solver_keeps_to_the_leeway() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("number", range(3))
 def test_what_is_freer_costs_no_more(number: int) -> None:
-    """The paper's positions: free ≤ cone ≤ turned about the axis ≤ each of its five orientations."""
+    """The paper's positions: free ≤ cone ≤ turned about the axis ≤ each of its five
+    orientations."""
     pose = POSITIONS[number]
     position, direction = pose.T[:3, 3], pose.T[:3, 2]
     about = optimize(problem(HOME, ConeOrientedPose.about(pose, [0, 0, 1])))
@@ -225,7 +268,9 @@ CONDITIONS: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("condition", long_but(("tool and payload", "time scaling"), CONDITIONS))
 def test_holds_under(condition: str) -> None:
-    """Every other setting with a cone about a tool axis: in place, within the cone, above the bound."""
+    """Every other setting with a cone about a tool axis: in place, within the cone, above the
+    bound.
+    """
     given = {"payload": Payload(mass=0.5)} | CONDITIONS[condition]
     tool = given.get("T_flange_tcp", np.eye(4))
     T = tcp_pose(GOAL, tool).T
@@ -253,7 +298,9 @@ def test_out_of_reach_in_every_orientation() -> None:
 
 
 def test_no_sample_is_activated_after_the_deadline() -> None:
-    """Thousands of deferred samples: each batch of them is a search of its own, and none begins too late."""
+    """Thousands of deferred samples: each batch of them is a search of its own, and none begins too
+    late.
+    """
     rng, clock = np.random.default_rng(2), CountingClock(0.0)
     starts = AnyOf(tuple(HOME + rng.normal(scale=0.3, size=6) for _ in range(12)))
     run = Run(problem(starts, ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])), clock=clock)
@@ -266,8 +313,12 @@ def test_no_sample_is_activated_after_the_deadline() -> None:
 
 
 def test_mixes_with_full_targets() -> None:
-    """Joints next door win against a free orientation far away, which is nevertheless accounted for."""
-    solution = optimize(problem(goal=AnyOf((ConeOrientedPose(tcp_pose(GOAL).T[:3, 3]), START + 0.02))))
+    """Joints next door win against a free orientation far away, which is nevertheless accounted
+    for.
+    """
+    solution = optimize(
+        problem(goal=AnyOf((ConeOrientedPose(tcp_pose(GOAL).T[:3, 3]), START + 0.02)))
+    )
     assert solution.goal.target == 1
     assert {candidate.goal_target for candidate in solution.candidates} == {0, 1}
 
@@ -279,8 +330,14 @@ def test_mixes_with_full_targets() -> None:
         (lambda: ConeOrientedPose([0.1, 0.2, np.nan]), "pose.position"),
         (lambda: ConeOrientedPose([0, 0, 1], [0, 0, 0]), "pose.orientation.axis"),
         (lambda: ConeOrientedPose([0, 0, 1], [0, 0, 1], [0, 0, 0]), "pose.orientation.direction"),
-        (lambda: ConeOrientedPose([0, 0, 1], [0, 0, 1], [0, 0, 1], 3.2), "pose.orientation.half_angle"),
-        (lambda: ConeOrientedPose([0, 0, 1], [0, 0, 1], [0, 0, 1], np.nan), "pose.orientation.half_angle"),
+        (
+            lambda: ConeOrientedPose([0, 0, 1], [0, 0, 1], [0, 0, 1], 3.2),
+            "pose.orientation.half_angle",
+        ),
+        (
+            lambda: ConeOrientedPose([0, 0, 1], [0, 0, 1], [0, 0, 1], np.nan),
+            "pose.orientation.half_angle",
+        ),
         (lambda: ConeOrientedPose.about(Pose(np.eye(4)), [0, np.inf, 0]), "pose.orientation.axis"),
         (lambda: problem(start=ConeOrientedPose([0.4, 0, 0.3])), "start"),
         (lambda: problem(start=AnyOf((START, ConeOrientedPose([0.4, 0, 0.3])))), "start"),
@@ -293,9 +350,13 @@ def test_what_is_malformed_is_refused(make: Any, field: str) -> None:
 
 
 def test_respects_the_deadline() -> None:
-    """A free orientation from a start that is a pose itself: the answer comes a few readings after the deadline."""
+    """A free orientation from a start that is a pose itself: the answer comes a few readings after
+    the deadline.
+    """
     readings = 60
-    task = problem(tcp_pose(START), ConeOrientedPose(tcp_pose(GOAL).T[:3, 3]), deadline=float(readings))
+    task = problem(
+        tcp_pose(START), ConeOrientedPose(tcp_pose(GOAL).T[:3, 3]), deadline=float(readings)
+    )
     solution = optimize(task, CountingClock())
     assert solution.certificate.valid and solution.status == "feasible"
     assert readings - RESERVE < solution.solver.wall_time < readings + LAST_READINGS
@@ -305,21 +366,31 @@ def test_respects_the_deadline() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("count", [2, 3, 4])
 def test_a_front_follows_a_goal_that_turns(count: int) -> None:
-    """Every point of a front goes where its own duration is cheapest: none is beaten by a longer one's motion."""
+    """Every point of a front goes where its own duration is cheapest: none is beaten by a longer
+    one's motion.
+    """
     # with little idle power, time costs little: slower motions need less energy
     robot = replace(ROBOT, electronics=replace(ROBOT.electronics, idle_power=4.0))
-    front = pareto(problem(goal=ConeOrientedPose(tcp_pose(GOAL).T[:3, 3]), robot=robot), count, still)
+    front = pareto(
+        problem(goal=ConeOrientedPose(tcp_pose(GOAL).T[:3, 3]), robot=robot), count, still
+    )
     energies = [energy(point) for point in front.points]
     assert len(energies) >= 2 and energies == sorted(energies, reverse=True)
-    assert all(point.certificate.valid and point.lower_bound <= energy(point) for point in front.points)
+    assert all(
+        point.certificate.valid and point.lower_bound <= energy(point) for point in front.points
+    )
 
 
 @pytest.mark.parametrize(
     "given",
     [
         pytest.param({"dwell": Dwell(time=4.0, hold="motors")}, marks=pytest.mark.long),
-        pytest.param({"dwell": Dwell(time=4.0, hold="brakes", brake_delay=0.3)}, marks=pytest.mark.long),
-        pytest.param({"bus": Bus(mode="storage", capacity=20.0, efficiency=0.9)}, marks=pytest.mark.long),
+        pytest.param(
+            {"dwell": Dwell(time=4.0, hold="brakes", brake_delay=0.3)}, marks=pytest.mark.long
+        ),
+        pytest.param(
+            {"bus": Bus(mode="storage", capacity=20.0, efficiency=0.9)}, marks=pytest.mark.long
+        ),
         pytest.param({"bus": Bus(mode="isolated")}, marks=pytest.mark.long),
     ],
     ids=str,
@@ -328,6 +399,8 @@ def test_waiting_and_every_bus_count(given: dict[str, Any]) -> None:
     """What the goal costs to hold is part of what is compared, and of the bound."""
     T = tcp_pose(GOAL).T
     pose = ConeOrientedPose(T[:3, 3], [0, 0, 1], T[:3, 2], 0.4)
-    free, full = (optimize(problem(goal=goal, payload=PAYLOAD, **given)) for goal in (pose, Pose(T)))
+    free, full = (
+        optimize(problem(goal=goal, payload=PAYLOAD, **given)) for goal in (pose, Pose(T))
+    )
     assert free.certificate.valid
     assert free.lower_bound <= energy(free) <= energy(full) * (1 + FOUND)

@@ -1,4 +1,6 @@
-"""The lower bound on motions to a goal whose orientation is free in part, against configurations that reach it."""
+"""The lower bound on motions to a goal whose orientation is free in part, against configurations
+that reach it.
+"""
 
 from __future__ import annotations
 
@@ -34,17 +36,24 @@ CONDITIONS: dict[str, dict[str, Any]] = {
 
 
 def bound_of_samples(task: Problem, pose: ConeOrientedPose, count: int) -> float:
-    """The least `lower_bounds` of any branch of many orientations, joints as near to the start as full turns allow."""
+    """The least `lower_bounds` of any branch of many orientations, joints as near to the start as
+    full turns allow.
+    """
     made, kinematics = PreparedProblem.of(task), inverse_kinematics_for(ROBOT)
     start, limits = np.asarray(task.start), task.arm.active_limits
     choices = [
         full_turn_alternatives(branch.q, limits.q_min, limits.q_max)
         for R in sample_orientations(pose, count)
-        for branch in kinematics.branches(pose.with_orientation(R).T @ np.linalg.inv(task.arm.T_flange_tcp))
+        for branch in kinematics.branches(
+            pose.with_orientation(R).T @ np.linalg.inv(task.arm.T_flange_tcp)
+        )
     ]
     q = np.array(
         [
-            [min(turns, key=lambda angle, at=at: abs(angle - at)) for turns, at in zip(each, start, strict=True)]
+            [
+                min(turns, key=lambda angle, at=at: abs(angle - at))
+                for turns, at in zip(each, start, strict=True)
+            ]
             for each in choices
             if all(each)
         ]
@@ -63,14 +72,19 @@ def bound_of_samples(task: Problem, pose: ConeOrientedPose, count: int) -> float
     ],
 )
 def test_the_bound_holds_for_the_whole_family(half_angle: float, condition: str) -> None:
-    """It is below the bound of every configuration sampled, at every depth of the search, and rises with depth."""
+    """It is below the bound of every configuration sampled, at every depth of the search, and rises
+    with depth.
+    """
     rng, given = np.random.default_rng(4), CONDITIONS[condition]
     for _ in range(3):
         start, goal = rng.uniform(-np.pi, np.pi, (2, 6))
         task = problem(start, GOAL, **given)
         T = tcp_pose(goal, given.get("T_flange_tcp")).T
         pose = ConeOrientedPose(T[:3, 3], [0, 0, 1], T[:3, 2], half_angle)
-        values = [family_bound(PreparedProblem.of(task), pose, start[None], rounds) for rounds in (0, 5, 20)]
+        values = [
+            family_bound(PreparedProblem.of(task), pose, start[None], rounds)
+            for rounds in (0, 5, 20)
+        ]
         assert values == sorted(values)
         assert values[-1] <= bound_of_samples(task, pose, 150)
 
@@ -78,11 +92,15 @@ def test_the_bound_holds_for_the_whole_family(half_angle: float, condition: str)
 @pytest.mark.parametrize("nq", [2, 3, 4, 5, 7])
 @pytest.mark.parametrize("given", [{}, {"objective": "mechanical", "duration_max": 5.0}], ids=str)
 def test_the_bound_holds_for_any_chain(nq: int, given: dict[str, Any]) -> None:
-    """It is below the bound of a configuration that reaches the pose, also for chains without inner joints."""
+    """It is below the bound of a configuration that reaches the pose, also for chains without inner
+    joints.
+    """
     robot, rng = serial_chain(nq), np.random.default_rng(nq)
     for half_angle in (0.0, 0.3, np.pi):
         start, goal = rng.uniform(-3, 3, (2, nq))
-        made = PreparedProblem.of(problem(start, goal, robot=robot, payload=Payload(mass=0.5), **given))
+        made = PreparedProblem.of(
+            problem(start, goal, robot=robot, payload=Payload(mass=0.5), **given)
+        )
         data = robot.model.createData()
         pin.framesForwardKinematics(robot.model, data, goal)
         T = data.oMf[robot.model.getFrameId("flange")].homogeneous
@@ -115,30 +133,42 @@ def test_the_bound_tells_far_from_near() -> None:
 def test_many_starts_are_bounded_together(
     most: int, alone: int, rounds: int, rounds_at_goal: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Also more starts than can have fine boxes at first: the bound of all is no higher than that of any."""
+    """Also more starts than can have fine boxes at first: the bound of all is no higher than that
+    of any.
+    """
     monkeypatch.setattr(free_goal_bound, "MOST_FIRST", most)
     rng = np.random.default_rng(6)
     made, pose = PreparedProblem.of(problem(HOME, GOAL)), ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])
     starts = HOME + rng.normal(scale=0.05, size=(4, 6))
     together = family_bound(made, pose, starts, rounds)
-    assert 0 < together <= min(family_bound(made, pose, start[None], 2 * rounds) for start in starts[:alone])
+    assert (
+        0
+        < together
+        <= min(family_bound(made, pose, start[None], 2 * rounds) for start in starts[:alone])
+    )
     assert family_bound(made, pose, np.concatenate([starts, GOAL[None]]), rounds_at_goal) == 0
 
 
 def test_the_rim_of_the_tools_cone_is_covered() -> None:
     cone = ToolCone([0, 0, 1], [0, 0, -1], 0.4)
     made = PreparedProblem.of(problem(HOME, GOAL, tool_cone=cone))
-    assert within_cone(made, ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])).half_angle == cone.half_angle
+    assert (
+        within_cone(made, ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])).half_angle == cone.half_angle
+    )
 
 
 @pytest.mark.long
 def test_more_boxes_are_halved_where_the_bound_is_far_from_the_energy() -> None:
-    """The bound reaches nine tenths of an energy that few rounds leave it far below; what is near ends after a few."""
+    """The bound reaches nine tenths of an energy that few rounds leave it far below; what is near
+    ends after a few.
+    """
     made = PreparedProblem.of(problem(HOME, GOAL))
     pose = ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])
     few, many = (family_bound(made, pose, HOME[None], rounds) for rounds in (FEW, ROUNDS))
     assert few < many
     enough = few / (1 - NEARLY)
     assert family_bound(made, pose, HOME[None], ROUNDS, enough=enough, nearly=NEARLY) == few
-    between = family_bound(made, pose, HOME[None], ROUNDS, enough=many / (1 - NEARLY), nearly=NEARLY)
+    between = family_bound(
+        made, pose, HOME[None], ROUNDS, enough=many / (1 - NEARLY), nearly=NEARLY
+    )
     assert between >= many * (1 - 1e-9)

@@ -1,4 +1,6 @@
-"""The least displacement between boxes, against displacements of random members with every full turn."""
+"""The least displacement between boxes, against displacements of random members with every full
+turn.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,10 @@ def test_no_member_is_nearer() -> None:
     pairs = 0
     for k in range(COUNT):
         for _ in range(5):
-            s, g = start[k] + rng.uniform(-1, 1, NQ) * start_half[k], goal[k] + rng.uniform(-1, 1, NQ) * goal_half[k]
+            s, g = (
+                start[k] + rng.uniform(-1, 1, NQ) * start_half[k],
+                goal[k] + rng.uniform(-1, 1, NQ) * goal_half[k],
+            )
             for a, b in product(turned_inside(s), turned_inside(g)):
                 pairs += 1
                 assert possible[k] and (np.abs(b - a) >= least[k] - 2 * ROUNDING).all()
@@ -46,12 +51,16 @@ def test_a_given_start_stands_as_it_is() -> None:
     start, goal, none = np.array([[0.0, 13.0]]), np.array([[0.0, 0.5]]), np.zeros((1, NQ))
     given, _ = least_displacement(LIMITS, start, none, goal, none, given=True)
     free, _ = least_displacement(LIMITS, start, none, goal, none, given=False)
-    assert np.allclose(given, [[0.0, 13.0 - 0.5 - 4 * np.pi]]) or np.allclose(given, [[0.0, 0.5 + 4 * np.pi - 13.0]])
+    assert np.allclose(given, [[0.0, 13.0 - 0.5 - 4 * np.pi]]) or np.allclose(
+        given, [[0.0, 0.5 + 4 * np.pi - 13.0]]
+    )
     assert (free <= given + ROUNDING).all()
 
 
 def test_boxes_beyond_the_limits_hold_nothing() -> None:
     q = np.array([[3.1, 0.0], [2.95, 0.0]])
     half = np.full((2, NQ), 0.1)
-    _, possible = least_displacement(LIMITS, np.zeros((2, NQ)), np.zeros((2, NQ)), q, half, given=True)
+    _, possible = least_displacement(
+        LIMITS, np.zeros((2, NQ)), np.zeros((2, NQ)), q, half, given=True
+    )
     assert possible.tolist() == [False, True]

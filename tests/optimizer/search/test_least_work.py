@@ -1,4 +1,6 @@
-"""Least mechanical work at a fixed duration: what becomes of the candidates, and when others find it."""
+"""Least mechanical work at a fixed duration: what becomes of the candidates, and when others find
+it.
+"""
 
 from __future__ import annotations
 
@@ -27,14 +29,20 @@ LOCAL = 0.02
 
 
 def run(**given: Any) -> Run:
-    found = Run(problem(goal=tcp_pose(GOAL), **{"objective": "mechanical", **fixed(DURATION)} | given))
+    found = Run(
+        problem(goal=tcp_pose(GOAL), **{"objective": "mechanical", **fixed(DURATION)} | given)
+    )
     found.prepare()
     return found
 
 
 @cache
 def answer(collisions: bool) -> Solution:
-    return optimize(problem(goal=tcp_pose(GOAL), objective="mechanical", collisions=collisions, **fixed(DURATION)))
+    return optimize(
+        problem(
+            goal=tcp_pose(GOAL), objective="mechanical", collisions=collisions, **fixed(DURATION)
+        )
+    )
 
 
 def rough_work(own: Run) -> RoughWork:
@@ -50,7 +58,10 @@ def test_what_becomes_of_the_candidates(collisions: bool) -> None:
     assert min(each.energy for each in found.candidates if each.energy is not None) == work
     for each in found.candidates:
         if each.status is CandidateStatus.UNVISITED:
-            assert each.reason in (Reason.FAMILY.value, Reason.ROUGHLY.value) and each.lower_bound < work
+            assert (
+                each.reason in (Reason.FAMILY.value, Reason.ROUGHLY.value)
+                and each.lower_bound < work
+            )
         if each.reason == Reason.BOUND.value:
             assert each.lower_bound >= work
     left = any(each.status is CandidateStatus.UNVISITED for each in found.candidates)
@@ -59,7 +70,9 @@ def test_what_becomes_of_the_candidates(collisions: bool) -> None:
 
 @pytest.mark.long
 def test_as_good_as_if_all_are_solved() -> None:
-    every = optimize(problem(goal=tcp_pose(GOAL), objective="mechanical", bound="tight", **fixed(DURATION)))
+    every = optimize(
+        problem(goal=tcp_pose(GOAL), objective="mechanical", bound="tight", **fixed(DURATION))
+    )
     assert answer(False).energy.mechanical.total <= every.energy.mechanical.total * (1 + LOCAL)
 
 
@@ -103,16 +116,28 @@ def test_guesses_rest_at_their_ends() -> None:
         assert (each.points[:rest] == candidate.q_start).all()
         assert (each.points[-rest:] == candidate.q_goal).all()
         finer = each.on(24)
-        assert (finer[:rest] == candidate.q_start).all() and (finer[-rest:] == candidate.q_goal).all()
+        assert (finer[:rest] == candidate.q_start).all() and (
+            finer[-rest:] == candidate.q_goal
+        ).all()
 
 
 def test_rough_work_is_that_of_the_motion() -> None:
-    """By few nodes and without penalties, it is nearly the exact work; and the best of each candidate comes first."""
+    """By few nodes and without penalties, it is nearly the exact work; and the best of each
+    candidate comes first.
+    """
     own = run()
     prepared: PreparedProblem = own.incumbent.prepared
-    chosen = [each for each in own.incumbent.candidates if each.holdable and each.shortest < DURATION / 2][:2]
+    chosen = [
+        each for each in own.incumbent.candidates if each.holdable and each.shortest < DURATION / 2
+    ][:2]
     work = rough_work(own)
-    found = work.solved([*work.first(chosen), *(work.random(each, 1)[0] for each in chosen)], COARSE, 0.5, 1e-2, np.inf)
+    found = work.solved(
+        [*work.first(chosen), *(work.random(each, 1)[0] for each in chosen)],
+        COARSE,
+        0.5,
+        1e-2,
+        np.inf,
+    )
     assert [each.work for each in found] == sorted(each.work for each in found)
     for each in found:
         exact = prepared.objective_of(prepared.energy(each.spline(DURATION)))

@@ -1,4 +1,6 @@
-"""The lower bounds: never above the energy of any motion, however it moves, and not needlessly far below."""
+"""The lower bounds: never above the energy of any motion, however it moves, and not needlessly far
+below.
+"""
 
 from __future__ import annotations
 
@@ -29,9 +31,12 @@ from joulepath.optimizer.trajectories.spline import peak_rates, spline_of
 from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, changed, fixed, limits, problem
 from tests.selection import long_but
 
-# relative; energies are sums over samples, and a true bound may lie below a motion by nothing but that
+# relative; energies are sums over samples, and a true bound may lie below a motion by nothing but
+# that
 QUADRATURE = 1e-4
-EXACT = 1e-9  # relative; closed forms, minimised to a millionth of an interval around a flat minimum
+EXACT = (
+    1e-9  # relative; closed forms, minimised to a millionth of an interval around a flat minimum
+)
 MOVES = 24
 
 SHALLOW = replace(  # friction whose reversal is spread so wide that motions crawl through it
@@ -48,7 +53,9 @@ UNEVEN = np.array([30.0, 0.1, 5.0, 0.02, 10.0, 1.0])
 
 
 def robot(idle: float = 36.7, regeneration: float = 0.0, **given: Any) -> Robot:
-    """The UR5e with other electronics and figures; the kernel is the same, figures being its parameters."""
+    """The UR5e with other electronics and figures; the kernel is the same, figures being its
+    parameters.
+    """
     electronics = replace(ROBOT.electronics, idle_power=idle, regeneration=regeneration)
     return replace(ROBOT, electronics=electronics, **given)
 
@@ -65,9 +72,15 @@ CONDITIONS: dict[str, dict[str, Any]] = {
     "slow limits": {"limits": limits(v_max=0.4, a_max=1.5, j_max=8.0)},
     "weightless": {"gravity": [0, 0, 0]},
     "friction of the load": {"robot": robot(friction_laws={"loaded": LOADED}), "payload": PAYLOAD},
-    "much copper": {"robot": robot(idle=5.0, drives=replace(ROBOT.drives, copper=20 * ROBOT.drives.copper))},
-    "uneven copper": {"robot": robot(drives=replace(ROBOT.drives, copper=UNEVEN * ROBOT.drives.copper))},
-    "load, all recovered": {"robot": robot(idle=0.5, regeneration=1.0, friction_laws={"loaded": LOADED})},
+    "much copper": {
+        "robot": robot(idle=5.0, drives=replace(ROBOT.drives, copper=20 * ROBOT.drives.copper))
+    },
+    "uneven copper": {
+        "robot": robot(drives=replace(ROBOT.drives, copper=UNEVEN * ROBOT.drives.copper))
+    },
+    "load, all recovered": {
+        "robot": robot(idle=0.5, regeneration=1.0, friction_laws={"loaded": LOADED})
+    },
 }
 
 
@@ -92,13 +105,21 @@ def ends(seed: int, count: int = MOVES) -> tuple[Array, Array]:
     return start, np.clip(start + displacement, ROBOT.limits.q_min, ROBOT.limits.q_max)
 
 
-def motions(task: Problem, start: Array, goal: Array, torques: Torques, seed: int) -> Iterator[tuple[float, Energy]]:
-    """Durations and energies of motions that hold the limits on speed, acceleration and jerk: straight and bent."""
+def motions(
+    task: Problem, start: Array, goal: Array, torques: Torques, seed: int
+) -> Iterator[tuple[float, Energy]]:
+    """Durations and energies of motions that hold the limits on speed, acceleration and jerk:
+    straight and bent.
+    """
     own = task.arm.active_limits
     least = max(float(shortest_duration(goal - start, own)), LEAST_DURATION)
     for stretch in (1.0, 1.4, 5.0):
         for motion in guesses(task, start, goal, stretch * least).values():
-            ratios = (motion.peak_v / own.v_max, motion.peak_a / own.a_max, motion.peak_jerk / own.j_max)
+            ratios = (
+                motion.peak_v / own.v_max,
+                motion.peak_a / own.a_max,
+                motion.peak_jerk / own.j_max,
+            )
             if motion.duration > 0 and np.max(ratios) <= 1 + 1e-9:
                 tau = torques(motion.q, motion.v, motion.a)
                 yield motion.duration, motion_energy(task, motion, tau, torques.task.potential)
@@ -120,13 +141,19 @@ def motions(task: Problem, start: Array, goal: Array, torques: Torques, seed: in
 def bound(torques: Torques, start: Array, goal: Array, **given: Any) -> tuple[Array, Array]:
     """Bounds and least durations (P,) for starts and goals (P, 6)."""
     task = PreparedProblem.of(changed(torques.task.problem, **given))
-    potential_gain = np.array([task.potential(b) - task.potential(a) for a, b in zip(start, goal, strict=True)])
+    potential_gain = np.array(
+        [task.potential(b) - task.potential(a) for a, b in zip(start, goal, strict=True)]
+    )
     return lower_bounds(task, goal - start, potential_gain)
 
 
-@pytest.mark.parametrize("name", long_but(("loaded and tilted", "lossy", "load, all recovered"), CONDITIONS))
+@pytest.mark.parametrize(
+    "name", long_but(("loaded and tilted", "lossy", "load, all recovered"), CONDITIONS)
+)
 def test_no_motion_spends_less(name: str) -> None:
-    """Thousands of motions over all conditions, electrical and mechanical, with free duration and with their own."""
+    """Thousands of motions over all conditions, electrical and mechanical, with free duration and
+    with their own.
+    """
     task = problem(objective="electrical", duration_max=500.0, **CONDITIONS[name])
     torques = Torques(task)
     start, goal = ends(len(name))
@@ -137,23 +164,30 @@ def test_no_motion_spends_less(name: str) -> None:
         best = np.inf
         for duration, energy in motions(task, start[k], goal[k], torques, k):
             total = energy.electrical.total
-            # energies may be near zero, or below it: the rounding is of what they are the difference of
+            # energies may be near zero, or below it: the rounding is of what they are the
+            # difference of
             slack = QUADRATURE * (abs(total) + energy.electrical.braking)
             assert duration >= shortest[k] * (1 - 1e-9)
             assert electrical[k] <= total + slack
             assert mechanical[k] <= energy.mechanical.total * (1 + QUADRATURE) + 1e-6
-            own, _ = bound(torques, start[k : k + 1], goal[k : k + 1], **fixed(duration * (1 + 1e-9)))  # rounding
+            own, _ = bound(
+                torques, start[k : k + 1], goal[k : k + 1], **fixed(duration * (1 + 1e-9))
+            )  # rounding
             assert electrical[k] - 1e-9 * abs(total) <= own[0] <= total + slack
             best, seen = min(best, total), seen + 1
         ratios.append(electrical[k] / best)
     assert seen > 10 * MOVES
     if CONDITIONS[name].get("robot") is None:
-        assert np.median(ratios) > 0.6  # of the cheapest of a few plain motions: a bound worth having
+        assert (
+            np.median(ratios) > 0.6
+        )  # of the cheapest of a few plain motions: a bound worth having
 
 
 @pytest.mark.parametrize("law", list(ROBOT.friction_laws))
 def test_no_answer_spends_less(law: str) -> None:
-    """Nor do motions that the optimiser finds; half of them are no further above than a third of themselves."""
+    """Nor do motions that the optimiser finds; half of them are no further above than a third of
+    themselves.
+    """
     gaps = []
     for start, goal in zip(*ends(99, 8), strict=True):
         if np.array_equal(start, goal):
@@ -165,11 +199,15 @@ def test_no_answer_spends_less(law: str) -> None:
 
 
 def test_a_bound_may_be_below_zero_where_energy_comes_back() -> None:
-    """Lowering 5 kg with an arm that idles for nothing, hardly rubs, and feeds all of it back: the bus gains."""
+    """Lowering 5 kg with an arm that idles for nothing, hardly rubs, and feeds all of it back: the
+    bus gains.
+    """
     smooth = replace(
-        ROBOT.friction, coulomb=ROBOT.friction.coulomb / 50, curved=0 * ROBOT.friction.curved,
+        ROBOT.friction,
+        coulomb=ROBOT.friction.coulomb / 50,
+        curved=0 * ROBOT.friction.curved,
         viscous=ROBOT.friction.viscous / 50,
-    )  # fmt: skip
+    )
     task = problem(
         start=[0, -1.2, 0.3, 0, 0, 0],
         goal=[0, -0.2, 0.3, 0, 0, 0],
@@ -195,30 +233,41 @@ def test_without_regeneration_nothing_is_below_zero() -> None:
 @pytest.mark.parametrize("law", list(ROBOT.friction_laws))
 @pytest.mark.parametrize("speed", [0.02, 0.2, 2.0])
 def test_the_bound_is_reached_where_only_friction_costs(law: str, speed: float) -> None:
-    """A weightless joint that cruises in an arm without copper loss, in its shortest time: nothing is left to save."""
+    """A weightless joint that cruises in an arm without copper loss, in its shortest time: nothing
+    is left to save.
+    """
     lossless = robot(idle=1.0, drives=replace(ROBOT.drives, copper=np.full(6, 1e-9)))
     task = problem(gravity=[0, 0, 0], robot=lossless, friction=law, limits=limits(v_max=speed))
     torques = Torques(task)
     start, goal = np.zeros(6), 3.0 * np.eye(6)[5]
     least = float(shortest_duration(goal - start, task.arm.active_limits))
     motion = guesses(task, start, goal, least)["ruckig"]
-    energy = motion_energy(task, motion, torques(motion.q, motion.v, motion.a), torques.task.potential)
+    energy = motion_energy(
+        task, motion, torques(motion.q, motion.v, motion.a), torques.task.potential
+    )
     ours, _ = bound(torques, start[None], goal[None], **fixed(least * (1 + 1e-9)))
     share = ours[0] / (energy.electrical.total - energy.electrical.braking)
-    # while it speeds up the bound allows for no jerk below half its speed, and at 2 rad/s that is much of the way
+    # while it speeds up the bound allows for no jerk below half its speed, and at 2 rad/s that is
+    # much of the way
     assert (0.95 if speed > 1 else 0.99) < share <= 1 + QUADRATURE
 
 
 @pytest.mark.parametrize("share", [1.0, 3.0])
 def test_the_copper_loss_of_friction_counts(share: float) -> None:
-    """A weightless joint that cruises against friction: the bound has most of its copper loss, whatever it is."""
+    """A weightless joint that cruises against friction: the bound has most of its copper loss,
+    whatever it is.
+    """
     drives = replace(ROBOT.drives, copper=share * ROBOT.drives.copper)
-    task = problem(gravity=[0, 0, 0], robot=robot(idle=1.0, drives=drives), limits=limits(v_max=0.2))
+    task = problem(
+        gravity=[0, 0, 0], robot=robot(idle=1.0, drives=drives), limits=limits(v_max=0.2)
+    )
     torques = Torques(task)
     start, goal = np.zeros(6), 3.0 * np.eye(6)[5]
     least = float(shortest_duration(goal - start, task.arm.active_limits))
     motion = guesses(task, start, goal, least)["ruckig"]
-    energy = motion_energy(task, motion, torques(motion.q, motion.v, motion.a), torques.task.potential).electrical
+    energy = motion_energy(
+        task, motion, torques(motion.q, motion.v, motion.a), torques.task.potential
+    ).electrical
     ours, _ = bound(torques, start[None], goal[None], **fixed(least * (1 + 1e-9)))
     left = energy.total - energy.braking - float(ours[0])
     assert 0 <= left < 0.25 * energy.copper
@@ -226,18 +275,22 @@ def test_the_copper_loss_of_friction_counts(share: float) -> None:
 
 def test_one_share_of_the_copper_loss_is_for_all_joints() -> None:
     """The proof takes the same η for every joint, as links pass work from one to another."""
-    torques = Torques(problem(robot=robot(drives=replace(ROBOT.drives, copper=0 * ROBOT.drives.copper))))
+    torques = Torques(
+        problem(robot=robot(drives=replace(ROBOT.drives, copper=0 * ROBOT.drives.copper)))
+    )
     start, goal = ends(12)
     without, _ = bound(torques, start, goal)
     # one joint without copper loss leaves nothing for the others
     one = np.array([1.0, 1.0, 0.0, 1.0, 1.0, 1.0])
-    torques = Torques(problem(robot=robot(drives=replace(ROBOT.drives, copper=one * ROBOT.drives.copper))))
+    torques = Torques(
+        problem(robot=robot(drives=replace(ROBOT.drives, copper=one * ROBOT.drives.copper)))
+    )
     assert bound(torques, start, goal)[0] == pytest.approx(without, rel=EXACT)
 
 
 def test_standing_still_costs_idling() -> None:
-    """No displacement: the idle power over the least duration, which is the one asked for or the least that is
-    planned."""
+    """No displacement: the idle power over the least duration, which is the one asked for or the
+    least that is planned."""
     torques = Torques(problem())
     q = np.zeros((1, 6))
     assert bound(torques, q, q)[0][0] == pytest.approx(36.7 * LEAST_DURATION, rel=1e-3)
@@ -247,11 +300,14 @@ def test_standing_still_costs_idling() -> None:
 @pytest.mark.parametrize(
     ("name", "pairs"),
     long_but(
-        (("as it comes", 2), ("wide reversal", 2)), product(("as it comes", "hardly idle", "wide reversal"), (2, 4))
+        (("as it comes", 2), ("wide reversal", 2)),
+        product(("as it comes", "hardly idle", "wide reversal"), (2, 4)),
     ),
 )
 def test_the_bound_is_the_least_over_the_duration(name: str, pairs: int) -> None:
-    """Against bounds at two thousand fixed durations: none is lower, and the least of them is as low."""
+    """Against bounds at two thousand fixed durations: none is lower, and the least of them is as
+    low.
+    """
     torques = Torques(problem(**CONDITIONS[name]))
     start, goal = ends(7, pairs)
     free, shortest = bound(torques, start, goal)
@@ -260,7 +316,10 @@ def test_the_bound_is_the_least_over_the_duration(name: str, pairs: int) -> None
         each = [bound(torques, start[[k]], goal[[k]], **fixed(float(T)))[0][0] for T in times[::20]]
         assert free[k] <= min(each) * (1 + EXACT)
         low = max(int(np.argmin(each)) - 1, 0) * 20
-        fine = [bound(torques, start[[k]], goal[[k]], **fixed(float(T)))[0][0] for T in times[low : low + 41]]
+        fine = [
+            bound(torques, start[[k]], goal[[k]], **fixed(float(T)))[0][0]
+            for T in times[low : low + 41]
+        ]
         assert free[k] == pytest.approx(min(fine), rel=1e-4)  # between two of the durations
 
 
@@ -269,23 +328,37 @@ def test_the_bound_at_a_price_of_time_is_the_least_over_the_duration(price: floa
     """Slow ways pay where time is cheap, the slowest where it is paid for."""
     torques, longest = Torques(problem(payload=PAYLOAD)), 90.0
     start, goal = ends(9, 3)
-    gain = np.array([torques.task.potential(b) - torques.task.potential(a) for a, b in zip(start, goal, strict=True)])
+    gain = np.array(
+        [
+            torques.task.potential(b) - torques.task.potential(a)
+            for a, b in zip(start, goal, strict=True)
+        ]
+    )
     priced = priced_bounds(torques.task, goal - start, gain, price, longest)
     for k in range(3):
-        times = np.geomspace(float(shortest_duration(goal[k] - start[k], ROBOT.limits)), longest, 400)
-        each = [bound(torques, start[[k]], goal[[k]], **fixed(float(T)))[0][0] + price * T for T in times]
+        times = np.geomspace(
+            float(shortest_duration(goal[k] - start[k], ROBOT.limits)), longest, 400
+        )
+        each = [
+            bound(torques, start[[k]], goal[[k]], **fixed(float(T)))[0][0] + price * T
+            for T in times
+        ]
         assert priced[k] <= min(each) + EXACT * abs(min(each))
         assert priced[k] == pytest.approx(min(each), rel=2e-3)
 
 
 def test_duration_bounds_raise_the_bound() -> None:
-    """To the convex function's value at the nearer end of the interval, or to infinity where no motion is that fast."""
+    """To the convex function's value at the nearer end of the interval, or to infinity where no
+    motion is that fast.
+    """
     torques = Torques(problem())
     start, goal = ends(8)
     free, shortest = bound(torques, start, goal)
     longer, _ = bound(torques, start, goal, duration_min=12.0)
     assert (longer >= free * (1 - EXACT)).all()
-    assert longer == pytest.approx(bound(torques, start, goal, **fixed(12.0))[0], rel=1e-6)  # all would be faster
+    assert longer == pytest.approx(
+        bound(torques, start, goal, **fixed(12.0))[0], rel=1e-6
+    )  # all would be faster
     limit = float(np.median(shortest))
     capped, _ = bound(torques, start, goal, duration_max=limit)
     assert (np.isinf(capped) == (shortest > limit)).all()
@@ -317,13 +390,20 @@ def test_longer_travel_never_lowers_the_bound() -> None:
 def test_tighter_limits_never_lower_the_bound() -> None:
     start, goal = ends(10)
     tolerance, _ = bound(Torques(problem()), start, goal)
-    for tight in (limits(v_max=0.5), limits(a_max=2.0), limits(j_max=20.0), limits(tau_max=[80, 120, 80, 9, 9, 9])):
+    for tight in (
+        limits(v_max=0.5),
+        limits(a_max=2.0),
+        limits(j_max=20.0),
+        limits(tau_max=[80, 120, 80, 9, 9, 9]),
+    ):
         ours, _ = bound(Torques(problem(limits=tight)), start, goal)
         assert (ours >= tolerance * (1 - EXACT)).all()
 
 
 def test_mechanical_bound_is_the_climb() -> None:
-    """By hand: 2 kg on the flange lifted with the arm; the work against gravity is the least, up or down."""
+    """By hand: 2 kg on the flange lifted with the arm; the work against gravity is the least, up or
+    down.
+    """
     task = PreparedProblem.of(problem(objective="mechanical", duration_max=5.0))
     ours, _ = lower_bounds(task, np.ones((2, 6)), np.array([12.0, -7.0]))
     assert ours.tolist() == [12.0, 7.0]

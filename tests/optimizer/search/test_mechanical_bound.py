@@ -1,4 +1,6 @@
-"""The lower bound on mechanical work: its parts against Pinocchio, and no motion below it, however it moves."""
+"""The lower bound on mechanical work: its parts against Pinocchio, and no motion below it, however
+it moves.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,8 @@ from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.moves import PAYLOAD, TILTED, fixed, limits, problem
 from tests.selection import long_but
 
-# relative; corners of |tau v| fall inside the quadrature's panels, and the weightless bound is near a motion's work
+# relative; corners of |tau v| fall inside the quadrature's panels, and the weightless bound is near
+# a motion's work
 QUADRATURE = 1e-4
 # J; differences of potential energies of some 100 J in double precision
 EXACT = 1e-9
@@ -41,18 +44,27 @@ CONDITIONS: dict[str, dict[str, Any]] = {
 
 
 def prepared(duration: float, **conditions: Any) -> PreparedProblem:
-    return PreparedProblem.of(problem(objective="mechanical", collisions=False, **fixed(duration), **conditions))
+    return PreparedProblem.of(
+        problem(objective="mechanical", collisions=False, **fixed(duration), **conditions)
+    )
 
 
 def bound(task: PreparedProblem, start: Array, goal: Array) -> Array:
     """Bounds for starts and goals (P, 6)."""
-    ends = np.array([[task.potential(one), task.potential(other)] for one, other in zip(start, goal, strict=True)])
+    ends = np.array(
+        [
+            [task.potential(one), task.potential(other)]
+            for one, other in zip(start, goal, strict=True)
+        ]
+    )
     return mechanical_bounds(task, start, goal, ends)
 
 
 @pytest.mark.parametrize("name", CONDITIONS)
 def test_what_the_proof_uses_holds(name: str) -> None:
-    """The wave of the leading joint, the slopes of the potential and the kinetic energy, against Pinocchio."""
+    """The wave of the leading joint, the slopes of the potential and the kinetic energy, against
+    Pinocchio.
+    """
     task = prepared(1.0, **CONDITIONS[name])
     reach, model, rng = EnergyRange(task), task.model, np.random.default_rng(1)
     data, own = model.createData(), task.problem.arm.active_limits
@@ -77,7 +89,9 @@ def test_what_the_proof_uses_holds(name: str) -> None:
 
 
 def test_the_leading_joint_is_the_first_that_lifts() -> None:
-    """The shoulder pan of an upright arm turns about the vertical; on a wall it lifts the whole arm."""
+    """The shoulder pan of an upright arm turns about the vertical; on a wall it lifts the whole
+    arm.
+    """
     assert EnergyRange(prepared(1.0)).leading == 1
     assert EnergyRange(prepared(1.0, **CONDITIONS["hanging"])).leading == 1
     assert EnergyRange(prepared(1.0, **CONDITIONS["wall"])).leading == 0
@@ -87,10 +101,16 @@ def _random_motion(rng: np.random.Generator, start: Array, goal: Array, rates: A
     """A motion between two configurations as fast as its path and the limits allow, or slower."""
     space = bspline.uniform(int(rng.integers(8, 20)))
     points = start + np.outer(space.quintic, goal - start)
-    points[space.free] += 10 ** rng.uniform(-3, 0.3) * rng.normal(size=(space.n - 6, 6)) * (rng.random(6) < 0.5)
+    points[space.free] += (
+        10 ** rng.uniform(-3, 0.3) * rng.normal(size=(space.n - 6, 6)) * (rng.random(6) < 0.5)
+    )
     spline = spline_of(space, points, 1.0)
     fastest = time_scale(peak_rates(spline) / rates)
-    return spline_of(space, points, fastest * (1 + 1e-9) * (1.0 if rng.random() < 0.5 else 10 ** rng.uniform(0, 1)))
+    return spline_of(
+        space,
+        points,
+        fastest * (1 + 1e-9) * (1.0 if rng.random() < 0.5 else 10 ** rng.uniform(0, 1)),
+    )
 
 
 @pytest.mark.parametrize("count", long_but((80,), (80, 150)))
@@ -107,23 +127,34 @@ def test_no_random_motion_does_less_work(name: str, count: int) -> None:
         goal[:2] += rng.choice([0.0, -5.0, 5.0], 2)  # over the top, or through the bottom
         motion = _random_motion(rng, start, goal, own.rates)
         timed = replace(task, problem=replace(task.problem, **fixed(motion.duration)))
-        ours, work = float(bound(timed, start[None], goal[None])[0]), task.energy(motion).mechanical.total
+        ours, work = (
+            float(bound(timed, start[None], goal[None])[0]),
+            task.energy(motion).mechanical.total,
+        )
         assert ours <= work * (1 + QUADRATURE) + EXACT
         stronger += ours > abs(task.potential(goal) - task.potential(start)) + EXACT
-    # the barrier and the travel were attacked, not the climb alone; what a tilted first joint lifts is less than R
+    # the barrier and the travel were attacked, not the climb alone; what a tilted first joint lifts
+    # is less than R
     assert stronger > 3 or EnergyRange(task).leading == 0
 
 
-@pytest.mark.parametrize("name", long_but(["slow limits"], ["as it comes", "slow limits", "weightless"]))
+@pytest.mark.parametrize(
+    "name", long_but(["slow limits"], ["as it comes", "slow limits", "weightless"])
+)
 def test_no_descent_gets_below(name: str) -> None:
-    """The mechanical work is minimised from random guesses between the ends where the bound exceeds the climb most."""
+    """The mechanical work is minimised from random guesses between the ends where the bound exceeds
+    the climb most.
+    """
     rng = np.random.default_rng(3)
     own = prepared(1.0, **CONDITIONS[name]).problem.arm.active_limits
     start = rng.uniform(-np.pi, np.pi, (500, 6))
     goal = start + rng.uniform(-1.0, 1.0, (500, 6))
     goal[:, 1] += rng.choice([-4.0, 0.0, 4.0], 500)
     still = prepared(60.0, **CONDITIONS[name])
-    climb = [abs(still.potential(other) - still.potential(one)) for one, other in zip(start, goal, strict=True)]
+    climb = [
+        abs(still.potential(other) - still.potential(one))
+        for one, other in zip(start, goal, strict=True)
+    ]
     attacks = 0
     for k in np.argsort(climb - bound(still, start, goal))[:3]:
         duration = float(shortest_duration(goal[k] - start[k], own)) * 1.6
@@ -133,7 +164,9 @@ def test_no_descent_gets_below(name: str) -> None:
         for bend in (0.0, 0.3):
             line = quintic_spline(start[k], goal[k], duration)
             t = np.linspace(0.0, duration, 101)
-            q = line.curve(t) + bend * np.outer(np.sin(np.pi * t / duration) ** 3, rng.normal(size=6))
+            q = line.curve(t) + bend * np.outer(
+                np.sin(np.pi * t / duration) ** 3, rng.normal(size=6)
+            )
             method = FreeSpline(task, start[k], goal[k], NEVER)
             found = method.solve_evenly(np.clip(q, own.q_min, own.q_max), t, 17, 1e-4)
             if found.spline is not None:
@@ -143,7 +176,9 @@ def test_no_descent_gets_below(name: str) -> None:
 
 
 def test_over_the_top() -> None:
-    """By hand: from hanging over the top and down again; the upper arm alone is lifted by twice its weight's height."""
+    """By hand: from hanging over the top and down again; the upper arm alone is lifted by twice its
+    weight's height.
+    """
     task = prepared(10.0)
     hanging = np.array([0.0, np.pi / 2, 0.0, 0.0, 0.0, 0.0])
     turned = hanging - 2 * np.pi * np.eye(6)[1]
@@ -152,15 +187,20 @@ def test_over_the_top() -> None:
     # upper arm of 8.058 kg, its centre at half of 0.425 m, and 5.881 kg beyond, which may stay down
     lifted = 9.81 * (8.058 * 0.2125 + 5.881 * 0.425)
     top = EnergyRange(task).lumped[1] + lifted - EnergyRange(task).lumped[2]
-    assert bound(task, hanging[None], turned[None])[0] == pytest.approx(2 * (top - ends[0]), abs=GIVEN_AWAY)
+    assert bound(task, hanging[None], turned[None])[0] == pytest.approx(
+        2 * (top - ends[0]), abs=GIVEN_AWAY
+    )
 
 
 def test_weightless_travel() -> None:
-    """One joint without gravity: rotor and link must be moved; the bound knows the rotor's part of it."""
+    """One joint without gravity: rotor and link must be moved; the bound knows the rotor's part of
+    it.
+    """
     task = prepared(2.0, gravity=[0, 0, 0])
     start, goal = np.zeros(6), np.eye(6)[5]
     own, rotor = task.problem.arm.active_limits, float(task.problem.arm.drives.rotor_inertia[5])
-    # speeding up at a_max to v and slowing down: v (T - v / a_max) = displacement, work 2 · rotor v² / 2
+    # speeding up at a_max to v and slowing down: v (T - v / a_max) = displacement, work 2 · rotor
+    # v² / 2
     v = own.a_max[5] * (1 - np.sqrt(1 - 1 / own.a_max[5]))
     ours = float(bound(task, start[None], goal[None])[0])
     assert 0.85 * rotor * v**2 < ours <= rotor * v**2
@@ -171,5 +211,8 @@ def test_a_longer_duration_never_raises_the_bound() -> None:
     start, goal = rng.uniform(-3.0, 3.0, (2, 200, 6))
     bounds = np.array([bound(prepared(T), start, goal) for T in (0.3, 0.6, 1.0, 3.0, 10.0)])
     assert (np.diff(bounds, axis=0) <= EXACT).all()
-    climb = [abs(prepared(1.0).potential(b) - prepared(1.0).potential(a)) for a, b in zip(start, goal, strict=True)]
+    climb = [
+        abs(prepared(1.0).potential(b) - prepared(1.0).potential(a))
+        for a, b in zip(start, goal, strict=True)
+    ]
     assert (bounds >= np.array(climb) - GIVEN_AWAY).all()

@@ -1,4 +1,6 @@
-"""The lower bound where an inverse kinematics may miss branches: no configuration that reaches a pose is below it."""
+"""The lower bound where an inverse kinematics may miss branches: no configuration that reaches a
+pose is below it.
+"""
 
 from __future__ import annotations
 
@@ -32,8 +34,8 @@ PARTICLES, STEPS = 80, 25
 EXACT = 1e-11
 # relative
 ROUNDING = 1e-12
-# a bound over a pose is nearly that of its best configuration, but where the wrist may be near a singularity: 0.35 mm,
-# by which the arm nearby is off, leaves two joints free there
+# a bound over a pose is nearly that of its best configuration, but where the wrist may be near a
+# singularity: 0.35 mm, by which the arm nearby is off, leaves two joints free there
 NEAR = 0.95
 
 
@@ -58,7 +60,9 @@ def of_pairs(starts: Array, goals: Array, **given: Any) -> Array:
     turned = nearest_turn(goals, starts)
     goals = np.where(within_limits(turned), turned, goals)
     prepared = PreparedProblem.of(asked(GEN3, starts[0], starts[0], **given))
-    gain = np.array([prepared.potential(b) - prepared.potential(a) for a, b in zip(starts, goals, strict=True)])
+    gain = np.array(
+        [prepared.potential(b) - prepared.potential(a) for a, b in zip(starts, goals, strict=True)]
+    )
     return lower_bounds(prepared, goals - starts, gain, prepared.holding_power(goals))[0]
 
 
@@ -67,8 +71,8 @@ def within_limits(q: Array) -> Array:
 
 
 def attacked(start: Array, goal: Array, seed: int) -> float:
-    """The least bound to any configuration of a pose that is found without curves: Newton's method from random joint
-    positions, then random steps along the self-motion that lower the bound."""
+    """The least bound to any configuration of a pose that is found without curves: Newton's method
+    from random joint positions, then random steps along the self-motion that lower the bound."""
     rng, T = np.random.default_rng(seed), CHAIN.flange(goal[None])[0]
     q = np.vstack([goal, solved(CHAIN, rng.uniform(-np.pi, np.pi, (PARTICLES, 7)), T)[0]])
     best = np.full(len(q), np.inf)
@@ -85,12 +89,17 @@ def attacked(start: Array, goal: Array, seed: int) -> float:
     return float(best.min())
 
 
-@pytest.mark.parametrize("given", [{}, {"duration_min": 6.0}, {"dwell": Dwell(8.0)}], ids=["free", "slow", "dwell"])
+@pytest.mark.parametrize(
+    "given", [{}, {"duration_min": 6.0}, {"dwell": Dwell(8.0)}], ids=["free", "slow", "dwell"]
+)
 def test_no_configuration_of_the_pose_is_below(given: dict[str, Any]) -> None:
     ratios = []
     for k, (start, goal) in enumerate(tasks("gen3", 6)):
         reached = np.array(members(GEN3, goal, 200, seed=70 + k))
-        ratios.append(whole(start, pose_of(GEN3, goal), **given) / least(np.tile(start, (200, 1)), reached, **given))
+        ratios.append(
+            whole(start, pose_of(GEN3, goal), **given)
+            / least(np.tile(start, (200, 1)), reached, **given)
+        )
     assert max(ratios) <= 1 + ROUNDING
     assert np.quantile(ratios, 0.6) > NEAR
 
@@ -110,7 +119,8 @@ def test_between_poses_and_among_several_targets() -> None:
     one, two = pose_of(GEN3, start), pose_of(GEN3, goal)
     each = [np.array(members(GEN3, q, 300, seed=80)) for q in (start, goal)]
     assert 0 < whole(one, two) <= least(*each) * (1 + ROUNDING)
-    # joint positions beside a pose are candidates of their own: what is missed is on the pose's sheets
+    # joint positions beside a pose are candidates of their own: what is missed is on the pose's
+    # sheets
     mixed = whole(AnyOf((start, pose_of(GEN3, other))), two)
     assert mixed <= min(whole(start, two), whole(pose_of(GEN3, other), two)) * (1 + ROUNDING)
     assert whole(start, AnyOf((other, two))) <= whole(start, two) * (1 + ROUNDING)
@@ -121,7 +131,9 @@ def test_no_configuration_on_a_singularity_is_below() -> None:
     rng, (start, _) = np.random.default_rng(9), tasks("gen3", 1)[0]
     compared = 0
     for _ in range(8):
-        goal = rng.uniform(np.maximum(GEN3.limits.q_min, -np.pi), np.minimum(GEN3.limits.q_max, np.pi))
+        goal = rng.uniform(
+            np.maximum(GEN3.limits.q_min, -np.pi), np.minimum(GEN3.limits.q_max, np.pi)
+        )
         goal[rng.choice([1, 3, 5], 2, replace=False)] = rng.choice([0.0, 1e-6, 1e-3], 2)
         prepared = PreparedProblem.of(asked(GEN3, start, pose_of(GEN3, goal)))
         try:

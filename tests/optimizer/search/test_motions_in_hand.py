@@ -1,4 +1,6 @@
-"""An answer needs no more than a feasible motion in hand: earlier motions of a candidate, and baselines of its kind."""
+"""An answer needs no more than a feasible motion in hand: earlier motions of a candidate, and
+baselines of its kind.
+"""
 
 from __future__ import annotations
 
@@ -61,7 +63,9 @@ def incumbent_with(*splines: Spline) -> Incumbent:
     run.prepare()
     for spline in splines:
         result = SolveResult(SolveStatus.SOLVED, f"{spline.duration:g} s", spline=spline)
-        run.incumbent.accept_if_better(run.incumbent.candidates[0], result, run.incumbent.prepared.energy(spline))
+        run.incumbent.accept_if_better(
+            run.incumbent.candidates[0], result, run.incumbent.prepared.energy(spline)
+        )
     return run.incumbent
 
 
@@ -73,7 +77,11 @@ def test_a_refused_motion_leaves_the_one_before_it() -> None:
         assert candidate.spline is spline and candidate.message == f"{spline.duration:g} s"
         assert candidate.energy == incumbent.prepared.cost_of(spline)
         incumbent.reject(candidate)
-    assert candidate.energy is None and candidate.attempt is None and candidate.status.value == "failed"
+    assert (
+        candidate.energy is None
+        and candidate.attempt is None
+        and candidate.status.value == "failed"
+    )
 
 
 def test_a_refused_candidate_takes_certified_motions_alone() -> None:
@@ -81,15 +89,21 @@ def test_a_refused_candidate_takes_certified_motions_alone() -> None:
     (candidate,) = incumbent.candidates
     incumbent.reject(candidate)
     best = quintic_spline(START, GOAL, SLOW)
-    result, energy = SolveResult(SolveStatus.SOLVED, "found", spline=best), incumbent.prepared.energy(best)
+    result, energy = (
+        SolveResult(SolveStatus.SOLVED, "found", spline=best),
+        incumbent.prepared.energy(best),
+    )
     incumbent.accept_if_better(candidate, result, energy)
     assert candidate.duration == 9.0
     incumbent.accept_if_better(candidate, result, energy, certified=True)
     assert candidate.spline is best
 
 
-def test_what_the_certificate_refuses_is_not_all_that_was_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    """There is one candidate: without its earlier motion, which is known, there would be no answer."""
+def test_what_the_certificate_refuses_is_not_all_that_was_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """There is one candidate: without its earlier motion, which is known, there would be no
+    answer."""
     asked, known = problem(payload=PAYLOAD), quintic_spline(START, GOAL, SLOW)
     cost_of = PreparedProblem.of(asked).cost_of
     refused = list[float]()
@@ -127,7 +141,9 @@ KINDS: dict[MethodName, tuple[str, ...]] = {
 def test_a_baseline_of_the_own_kind_is_the_answer_if_nothing_better_is_found(
     method: MethodName, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All that a method finds is what its first solve is made to find: a motion that needs more than the baselines."""
+    """All that a method finds is what its first solve is made to find: a motion that needs more
+    than the baselines.
+    """
     assert METHODS[method].accepted_baselines == KINDS[method]
     poor = _detour()
 
@@ -152,11 +168,17 @@ def _detour() -> Spline:
     return lasting(replace(fine, control_points=points), SLOW)
 
 
-def test_a_baseline_that_is_not_certified_in_time_is_not_feasible(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_baseline_that_is_not_certified_in_time_is_not_feasible(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """It would be the answer: what may not be one is not said to be within the limits."""
     poor = _detour()
     for name in ("solve", "solve_from"):
-        monkeypatch.setattr(METHODS["bspline"], name, lambda *_, **__: SolveResult(SolveStatus.SOLVED, "", spline=poor))
+        monkeypatch.setattr(
+            METHODS["bspline"],
+            name,
+            lambda *_, **__: SolveResult(SolveStatus.SOLVED, "", spline=poor),
+        )
 
     def late(*_: Any) -> Any:
         raise DeadlinePassed
@@ -168,9 +190,13 @@ def test_a_baseline_that_is_not_certified_in_time_is_not_feasible(monkeypatch: p
     assert all(each >= -SLACK for each in own_kind(found, "bspline"))
 
 
-@pytest.mark.parametrize("method", long_but(["bspline"], ["bspline", "time_scaling", "lagrange", "uniform_scaling"]))
+@pytest.mark.parametrize(
+    "method", long_but(["bspline"], ["bspline", "time_scaling", "lagrange", "uniform_scaling"])
+)
 @pytest.mark.parametrize("readings", long_but([80, 400], range(20, 1000, 20)))
-def test_wherever_the_deadline_ends_it_no_feasible_baseline_needs_less(method: MethodName, readings: int) -> None:
+def test_wherever_the_deadline_ends_it_no_feasible_baseline_needs_less(
+    method: MethodName, readings: int
+) -> None:
     asked = problem(method=method, deadline=float(readings), payload=PAYLOAD, **fixed(SLOW))
     try:
         found = optimize(asked, CountingClock())

@@ -1,4 +1,6 @@
-"""Goals of free orientation: no more energy than to goals beside the start, or where another goal was proposed."""
+"""Goals of free orientation: no more energy than to goals beside the start, or where another goal
+was proposed.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,9 @@ FEW_POINTS = 1e-2
 
 
 def task(name: str, seed: int, kind: str, **given: Any) -> tuple[Problem, Array]:
-    """A problem with a goal of free orientation, and a configuration near the start that reaches it."""
+    """A problem with a goal of free orientation, and a configuration near the start that reaches
+    it.
+    """
     arm, rng = Arm(robot=load_robot(name), collisions=False), np.random.default_rng([17, seed])
     limits = arm.active_limits
     start = rng.uniform(*np.clip([0.7 * limits.q_min, 0.7 * limits.q_max], -2.5, 2.5))
@@ -65,14 +69,21 @@ def explored(problem: Problem) -> Candidate:
     return best
 
 
-CASES = [(name, kind, seed) for seed in range(3) for name in ("xarm7", "panda", "gen3") for kind in ("about", "cone")]
+CASES = [
+    (name, kind, seed)
+    for seed in range(3)
+    for name in ("xarm7", "panda", "gen3")
+    for kind in ("about", "cone")
+]
 
 
 @pytest.mark.parametrize(
     ("name", "kind", "seed"),
     long_but((("xarm7", "about", 0),), [*CASES, ("ur5e", "free", 0), ("iiwa14", "free", 1)]),
 )
-def test_a_goal_needs_no_more_than_a_configuration_of_it_beside_the_start(name: str, kind: str, seed: int) -> None:
+def test_a_goal_needs_no_more_than_a_configuration_of_it_beside_the_start(
+    name: str, kind: str, seed: int
+) -> None:
     problem, goal = task(name, seed, kind)
     known = optimize(replace(problem, goal=goal)).energy.electrical.total
     answer = optimize(problem)
@@ -118,7 +129,9 @@ def test_a_full_pose_among_free_ones_is_searched_too() -> None:
 
 @pytest.mark.parametrize("name", ["xarm7", "iiwa14"])
 def test_a_proposed_goal_is_put_back_beside(name: str) -> None:
-    """A seven-joint arm holds each orientation on curves: the nearest member counts, not one of a few samples."""
+    """A seven-joint arm holds each orientation on curves: the nearest member counts, not one of a
+    few samples.
+    """
     problem, goal = task(name, 4, "about")
     run, rng = Run(problem), np.random.default_rng(9)
     run.prepare()
@@ -132,11 +145,21 @@ def test_a_proposed_goal_is_put_back_beside(name: str) -> None:
 def test_a_branch_that_is_asked_for_is_kept() -> None:
     problem, goal = task("xarm7", 0, "about")
     elbow: Any = label_of(problem.arm.robot, goal).split("/")[1]
-    assert explored(replace(problem, branch=BranchFilter(elbow=elbow))).goal.label.split("/")[1] == elbow
+    assert (
+        explored(replace(problem, branch=BranchFilter(elbow=elbow))).goal.label.split("/")[1]
+        == elbow
+    )
 
 
 def test_estimates_count_what_waiting_at_a_goal_draws() -> None:
-    problem, _ = task("panda", 1, "about", dwell=Dwell(time=4.0, hold="motors"), duration_min=2.0, duration_max=2.0)
+    problem, _ = task(
+        "panda",
+        1,
+        "about",
+        dwell=Dwell(time=4.0, hold="motors"),
+        duration_min=2.0,
+        duration_max=2.0,
+    )
     run = Run(problem)
     run.prepare()
     some = [each for each in run.incumbent.candidates if each.holdable][:20:4]

@@ -1,4 +1,6 @@
-"""Another start for ends that slide: no worse, and better where the first motion is in a poor local optimum."""
+"""Another start for ends that slide: no worse, and better where the first motion is in a poor local
+optimum.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ HELD = 1e-9
 
 
 def explored(index: int, both: bool, bus: Bus) -> tuple[Incumbent, Candidate]:
-    """The search for a random task to a pose, from a pose too if `both`, before anything is refined."""
+    """The search for a random task to a pose, from a pose too if `both`, before anything is
+    refined.
+    """
     robot, rng = load_robot("panda"), np.random.default_rng([0, index])
     arm = Arm(robot=robot, bus=bus)
     start, goal = collision_free(rng, robot), collision_free(rng, robot)
@@ -48,7 +52,9 @@ def test_what_is_found_beside_needs_less_and_holds_the_poses(index: int, both: b
         assert (each.energy or 0.0) < energy and each.lower_bound <= (each.energy or 0.0)
         assert (each.spline.control_points[[0, -1]] == [each.q_start, each.q_goal]).all()
         for side in ("start", "goal"):
-            reached, asked = (tcp_pose(incumbent.prepared.arm, getattr(end, f"q_{side}")) for end in (each, first))
+            reached, asked = (
+                tcp_pose(incumbent.prepared.arm, getattr(end, f"q_{side}")) for end in (each, first)
+            )
             assert np.abs(reached - asked).max() < HELD
     # of these tasks, the first two begin in a poor local optimum
     assert fresh or index not in (5, 19)

@@ -1,4 +1,6 @@
-"""Goals of free orientation with a joint turned the other way around: found where that needs less energy."""
+"""Goals of free orientation with a joint turned the other way around: found where that needs less
+energy.
+"""
 
 from __future__ import annotations
 
@@ -28,14 +30,17 @@ START = np.array([-0.56, 2.62, -0.15, -2.88, -1.61, 1.48])
 GOAL = np.array([-0.53, 5.82, 0.81, -1.87, -1.16, 0.96])
 # rad: a joint that goes another way is turned by far more
 SAME = 2e-3
-# relative: motions that nothing refines end in local optima apart, where every joint's power has a corner of its own
+# relative: motions that nothing refines end in local optima apart, where every joint's power has a
+# corner of its own
 LOCAL = 3e-2
 # relative: an estimate of one duration and half the instants
 ROUGH = 0.1
 
 
 def task(**given: Any) -> Problem:
-    """A hanging arm with a heavy part, on a bus that burns what lowering it gives back: one way, it is lifted less."""
+    """A hanging arm with a heavy part, on a bus that burns what lowering it gives back: one way, it
+    is lifted less.
+    """
     payload = Payload(mass=4.3, com=np.array([0.0, 0.0, 0.05]))
     hanging, bus = np.array([0.0, 0.0, 9.81]), Bus(mode="isolated")
     arm = Arm(robot=load_robot("ur5e"), payload=payload, gravity=hanging, bus=bus, collisions=False)
@@ -107,10 +112,13 @@ def test_without_full_turns_nothing_is_turned() -> None:
 def test_a_rough_estimate_is_near_that_of_several_durations() -> None:
     run = prepared(task())
     some = [each for each in run.incumbent.candidates if each.holdable][:40]
-    q_start, q_goal = (np.array([getattr(each, name) for each in some]) for name in ("q_start", "q_goal"))
+    q_start, q_goal = (
+        np.array([getattr(each, name) for each in some]) for name in ("q_start", "q_goal")
+    )
     shortest = np.asarray(shortest_duration(q_goal - q_start, run.problem.arm.active_limits))
     rough, exact = (
-        estimates_between(run.incumbent.prepared, q_start, q_goal, shortest, rough=rough) for rough in (True, False)
+        estimates_between(run.incumbent.prepared, q_start, q_goal, shortest, rough=rough)
+        for rough in (True, False)
     )
     ratio = rough / exact
     assert np.median(np.abs(ratio - 1)) < ROUGH

@@ -1,4 +1,6 @@
-"""Families of candidates that differ by full turns of the outer joints: who is solved, what becomes of the others."""
+"""Families of candidates that differ by full turns of the outer joints: who is solved, what becomes
+of the others.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,13 @@ from joulepath.optimizer.methods.method import SolveResult, SolveStatus
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import FULL_TURN, Candidate, Reason
 from joulepath.optimizer.search.incumbent import Incumbent
-from joulepath.optimizer.search.outer_turns import FAMILIES, MEMBERS, NEAR, explore_families, families_of
+from joulepath.optimizer.search.outer_turns import (
+    FAMILIES,
+    MEMBERS,
+    NEAR,
+    explore_families,
+    families_of,
+)
 from joulepath.optimizer.search.run import Run
 from tests.optimizer.moves import GOAL, fixed, problem, tcp_pose
 
@@ -20,12 +28,16 @@ DURATION = 3.0
 
 
 def prepared(**given: Any) -> Incumbent:
-    run = Run(problem(goal=tcp_pose(GOAL), **{"objective": "mechanical", **fixed(DURATION)} | given))
+    run = Run(
+        problem(goal=tcp_pose(GOAL), **{"objective": "mechanical", **fixed(DURATION)} | given)
+    )
     run.prepare()
     return run.incumbent
 
 
-def exploring(incumbent: Incumbent, energy: Callable[[Candidate], float | None]) -> Callable[[], None]:
+def exploring(
+    incumbent: Incumbent, energy: Callable[[Candidate], float | None]
+) -> Callable[[], None]:
     """An exploration that finds these energies [J]; a candidate without one collides."""
 
     def explore() -> None:
@@ -46,7 +58,9 @@ def exploring(incumbent: Incumbent, energy: Callable[[Candidate], float | None])
 def test_families() -> None:
     incumbent = prepared()
     families = families_of(incumbent)
-    everyone = [each for each in incumbent.candidates if each.status is not CandidateStatus.INFEASIBLE]
+    everyone = [
+        each for each in incumbent.candidates if each.status is not CandidateStatus.INFEASIBLE
+    ]
     assert sorted(id(each) for family in families for each in family) == sorted(map(id, everyone))
     assert 1 < len(families) < len(everyone)
     for family in families:
@@ -56,16 +70,22 @@ def test_families() -> None:
         assert family[0].shortest == min(each.shortest for each in family)
 
 
-@pytest.mark.parametrize("given", [{"objective": "electrical"}, {"method": "time_scaling"}, {"bound": "tight"}])
+@pytest.mark.parametrize(
+    "given", [{"objective": "electrical"}, {"method": "time_scaling"}, {"bound": "tight"}]
+)
 def test_no_families(given: dict[str, Any]) -> None:
-    """Every candidate is tried where bounds rule out enough, a solve takes little, or nothing shall be left."""
+    """Every candidate is tried where bounds rule out enough, a solve takes little, or nothing shall
+    be left.
+    """
     incumbent = prepared(**given)
     explore_families(incumbent, exploring(incumbent, lambda each: each.lower_bound + 1.0))
     assert not any(each.reason is Reason.FAMILY for each in incumbent.candidates)
 
 
 def test_best_families_are_solved() -> None:
-    """Others are left, and no solved member is worth less than one that its family would have let by."""
+    """Others are left, and no solved member is worth less than one that its family would have let
+    by.
+    """
     incumbent = prepared()
     families = families_of(incumbent)
     rank = {id(each): k for k, family in enumerate(families) for each in family}
@@ -76,7 +96,10 @@ def test_best_families_are_solved() -> None:
         solved = [each.energy is not None for each in family]
         assert solved == [place < (MEMBERS if k in near else 1) for place in range(len(family))]
         left = [each for each in family if each.energy is None]
-        assert all((each.status, each.reason) == (CandidateStatus.UNVISITED, Reason.FAMILY) for each in left)
+        assert all(
+            (each.status, each.reason) == (CandidateStatus.UNVISITED, Reason.FAMILY)
+            for each in left
+        )
     assert not any(each.deferred for each in incumbent.candidates)
 
 
@@ -86,7 +109,10 @@ def test_what_bounds_rule_out_is_said_to_be() -> None:
     best = incumbent.best()
     assert best is not None
     left = [each for each in incumbent.candidates if each.energy is None and each.holdable]
-    assert {each.reason for each in left if each.lower_bound >= (best.energy or 0.0)} <= {Reason.BOUND, Reason.TOO_SLOW}
+    assert {each.reason for each in left if each.lower_bound >= (best.energy or 0.0)} <= {
+        Reason.BOUND,
+        Reason.TOO_SLOW,
+    }
 
 
 def test_another_member_stands_for_one_that_collides() -> None:
@@ -95,7 +121,9 @@ def test_another_member_stands_for_one_that_collides() -> None:
     hindered = max(families, key=len)
     assert len(hindered) > 2
     wanted, collide = hindered[2], {id(each) for each in hindered[:2]}
-    explore_families(incumbent, exploring(incumbent, lambda each: None if id(each) in collide else 1e3))
+    explore_families(
+        incumbent, exploring(incumbent, lambda each: None if id(each) in collide else 1e3)
+    )
     assert wanted.energy is not None
 
 
@@ -110,4 +138,7 @@ def test_once_time_is_over_nothing_is_left_for_its_family() -> None:
     incumbent.end = incumbent.end.within(-1.0)
     explore_families(incumbent, lambda: None)
     open_ = [each for family in families_of(incumbent) for each in family]
-    assert all(each.status is CandidateStatus.UNVISITED and each.reason is Reason.NOT_REACHED for each in open_)
+    assert all(
+        each.status is CandidateStatus.UNVISITED and each.reason is Reason.NOT_REACHED
+        for each in open_
+    )

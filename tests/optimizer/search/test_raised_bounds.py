@@ -1,4 +1,6 @@
-"""Bounds raised by the copper loss of holding: where it pays, never above an energy, and only as far as it matters."""
+"""Bounds raised by the copper loss of holding: where it pays, never above an energy, and only as
+far as it matters.
+"""
 
 from __future__ import annotations
 
@@ -58,7 +60,9 @@ def test_a_heavy_arm_that_holds_its_weight_gains_much() -> None:
 
 
 def test_the_lowest_are_raised_until_the_least_is() -> None:
-    """No bound falls or goes beyond the target, and the least one is that of a pair that was raised."""
+    """No bound falls or goes beyond the target, and the least one is that of a pair that was
+    raised.
+    """
     made, found = bounded(problem(OUT, tcp_pose(TURNED)))
     energy = optimize(made.problem).energy.electrical.total
     before = {id(each): each.lower_bound for each in found}
@@ -75,10 +79,18 @@ def test_the_lowest_are_raised_until_the_least_is() -> None:
 
 @pytest.mark.parametrize("bound", long_but(["normal"], ["normal", "tight"]))
 def test_turns_that_are_no_candidates_are_bounded_too(bound: str) -> None:
-    """Without full turns, a joint that has half a turn to go has about as far the other way around."""
+    """Without full turns, a joint that has half a turn to go has about as far the other way
+    around."""
     arm = problem(robot=load_robot("ur20")).arm
     goal = TURNED + (np.pi - HALF_TURN_LESS - TURNED[5]) * np.eye(6)[5]
-    asked = problem(OUT, Pose(tcp_pose_of(arm, goal)), robot=arm.robot, windings=False, bound=bound, branch=BRANCH)
+    asked = problem(
+        OUT,
+        Pose(tcp_pose_of(arm, goal)),
+        robot=arm.robot,
+        windings=False,
+        bound=bound,
+        branch=BRANCH,
+    )
     other = problem(OUT, goal - 2 * np.pi * np.eye(6)[5], robot=arm.robot)
     _, (around,) = bounded(other)
     assert optimize(asked).lower_bound <= around.lower_bound
@@ -105,4 +117,10 @@ def test_no_bound_is_begun_that_would_end_late() -> None:
     assert found[0].lower_bound == plain
     raise_bounds(made, found, ENOUGH, Deadline.after(left, lambda: 0.0))
     assert found[0].lower_bound > plain
-    assert QUICK.effort.takes(6) == QUICK.effort.time < left < QUICK.effort.takes(7) < QUICK.effort.takes(8)
+    assert (
+        QUICK.effort.takes(6)
+        == QUICK.effort.time
+        < left
+        < QUICK.effort.takes(7)
+        < QUICK.effort.takes(8)
+    )

@@ -1,4 +1,6 @@
-"""Poses of an arm with seven joints: answers need no more than to any configuration of the pose, the bound no more."""
+"""Poses of an arm with seven joints: answers need no more than to any configuration of the pose,
+the bound no more.
+"""
 
 from __future__ import annotations
 
@@ -33,11 +35,14 @@ REFINED = 1e-3
 ROUNDING = 1e-12
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0
-# least share by which the copper loss of holding raises one of a few bounds, and how many of them are solved
+# least share by which the copper loss of holding raises one of a few bounds, and how many of them
+# are solved
 RAISED, SOLVED = 0.01, 2
-# start and goal [rad] of an xarm7: a curve of the goal's pose that needs little passes half a turn; the share
-# by which its bound is raised: 0.031, or 0.011 with wide boxes
-PASSING = np.array([[5.88, -0.49, 3.3, 2.46, 4.1, 1.22, -4.77], [1.06, 0.64, 2.12, 1.79, 3.32, -0.01, -3.04]])
+# start and goal [rad] of an xarm7: a curve of the goal's pose that needs little passes half a turn;
+# the share by which its bound is raised: 0.031, or 0.011 with wide boxes
+PASSING = np.array(
+    [[5.88, -0.49, 3.3, 2.46, 4.1, 1.22, -4.77], [1.06, 0.64, 2.12, 1.79, 3.32, -0.01, -3.04]]
+)
 PASSING_RAISED = 0.02
 # m that links keep from each other at the ends of a task
 CLEAR = 0.01
@@ -47,7 +52,9 @@ CLEAR = 0.01
 def tasks(name: str, count: int) -> list[tuple[Array, Array]]:
     """Start and goal configurations in which no links meet, drawn at random."""
     robot = load_robot(name)
-    drawn = np.random.default_rng(61).uniform(robot.limits.q_min, robot.limits.q_max, (4 * count + 8, robot.nq))
+    drawn = np.random.default_rng(61).uniform(
+        robot.limits.q_min, robot.limits.q_max, (4 * count + 8, robot.nq)
+    )
     clear = drawn[collision_model(Arm(robot=robot)).signed_distances(drawn)[0].min(axis=1) > CLEAR]
     return [(clear[2 * k], clear[2 * k + 1]) for k in range(count)]
 
@@ -84,7 +91,9 @@ def members(robot: Robot, q: Array, count: int, seed: int) -> list[Array]:
     ("name", "count", "fixed"),
     long_but((("panda", 1, 3),), [("panda", 1, 3), ("panda", 20, 100), ("iiwa14", 20, 100)]),
 )
-def test_a_pose_needs_no_more_than_any_of_its_configurations(name: str, count: int, fixed: int) -> None:
+def test_a_pose_needs_no_more_than_any_of_its_configurations(
+    name: str, count: int, fixed: int
+) -> None:
     robot = load_robot(name)
     for start, goal in tasks(name, count):
         answer = optimize(asked(robot, start, pose_of(robot, goal)))
@@ -113,10 +122,14 @@ def test_no_member_has_a_lower_bound_below_the_curves(
     for start, goal in tasks(name, 3):
         one = (pose_of(robot, goal), start) if at_start else (start, pose_of(robot, goal))
         prepared = PreparedProblem.of(asked(robot, *one))
-        whole = self_motion_bound(prepared, pairs(prepared, ends(prepared, "start")[0], ends(prepared, "goal")[0]))
+        whole = self_motion_bound(
+            prepared, pairs(prepared, ends(prepared, "start")[0], ends(prepared, "goal")[0])
+        )
         assert 0 < whole < np.inf
         for member in members(robot, goal, 30, seed=63):
-            alone = PreparedProblem.of(asked(robot, *((member, start) if at_start else (start, member))))
+            alone = PreparedProblem.of(
+                asked(robot, *((member, start) if at_start else (start, member)))
+            )
             candidates = pairs(alone, ends(alone, "start")[0], ends(alone, "goal")[0])
             try:
                 bound(alone, candidates)
@@ -135,7 +148,9 @@ def plain_and_held(posed: Problem, monkeypatch: pytest.MonkeyPatch) -> tuple[flo
         return self_motion_bound(prepared, candidates), held
 
 
-def test_holding_raises_the_bound_of_curves_and_no_motion_spends_less(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_holding_raises_the_bound_of_curves_and_no_motion_spends_less(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     robot, raised = load_robot("xarm7"), list[float]()
     for start, goal in tasks("xarm7", 4):
         posed = asked(robot, start, pose_of(robot, goal))
@@ -147,7 +162,9 @@ def test_holding_raises_the_bound_of_curves_and_no_motion_spends_less(monkeypatc
     assert max(raised) > RAISED
 
 
-def test_a_curve_whose_angles_pass_half_a_turn_is_raised_too(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_curve_whose_angles_pass_half_a_turn_is_raised_too(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """There the angles of neighbours differ by a full turn, which must not widen their box."""
     robot = load_robot("xarm7")
     posed = asked(robot, PASSING[0], pose_of(robot, PASSING[1]))

@@ -1,4 +1,6 @@
-"""Seeds of redundant arms: where the estimated energy is least along the self-motions; ends slide from there."""
+"""Seeds of redundant arms: where the estimated energy is least along the self-motions; ends slide
+from there.
+"""
 
 from __future__ import annotations
 
@@ -20,12 +22,19 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.search.seeds import MOST_ESTIMATED, MOST_SEEDS, NEAR, activate_seeds, estimates
+from joulepath.optimizer.search.seeds import (
+    MOST_ESTIMATED,
+    MOST_SEEDS,
+    NEAR,
+    activate_seeds,
+    estimates,
+)
 from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0
-# an estimate is that of a motion of two numbers: it is above the least energy, by less than this ratio
+# an estimate is that of a motion of two numbers: it is above the least energy, by less than this
+# ratio
 HIGHEST = 1.4
 # m, rad
 HELD = 1e-9
@@ -69,17 +78,27 @@ def test_estimates_are_of_motions_in_the_time_that_is_asked_for() -> None:
     run.prepare()
     some = run.incumbent.candidates[::9]
     energy = [
-        run.incumbent.prepared.energy(quintic_spline(each.q_start, each.q_goal, SLOW)).electrical.total for each in some
+        run.incumbent.prepared.energy(
+            quintic_spline(each.q_start, each.q_goal, SLOW)
+        ).electrical.total
+        for each in some
     ]
     np.testing.assert_allclose(estimates(run.incumbent.prepared, some), energy, rtol=FEW_POINTS)
 
 
 @pytest.mark.long
 def test_of_work_more_is_tried_than_what_the_straight_line_says() -> None:
-    """A posture that needs much more than others on a straight line, and less than these on the best motion."""
+    """A posture that needs much more than others on a straight line, and less than these on the
+    best motion.
+    """
     robot, rng = load_robot("panda"), np.random.default_rng([77, 0])
     arm, start, goal = Arm(robot=robot), collision_free(rng, robot), collision_free(rng, robot)
-    given: dict[str, Any] = {"arm": arm, "objective": "mechanical", "duration_max": 3.0, "deadline": AMPLE}
+    given: dict[str, Any] = {
+        "arm": arm,
+        "objective": "mechanical",
+        "duration_max": 3.0,
+        "deadline": AMPLE,
+    }
     found = optimize(Problem(start=start, goal=Pose(tcp_pose(arm, goal)), **given))
     good = np.array([2.4536, -0.9365, -0.8697, -0.7589, -0.7433, 0.4103, 0.4834])
     assert np.abs(tcp_pose(arm, good) - tcp_pose(arm, goal)).max() < 1e-3
@@ -104,10 +123,16 @@ def test_seeds_are_the_least_along_their_self_motions(both: bool) -> None:
         beside = [
             each
             for each in before
-            if each.start is seed.start and each.goal.self_motion is seed.goal.self_motion and each is not seed
+            if each.start is seed.start
+            and each.goal.self_motion is seed.goal.self_motion
+            and each is not seed
         ]
         place = next(k for k, q in enumerate(ends) if q is seed.goal.q)
-        near = [each for each in beside if any(each.goal.q is q for q in ends[max(place - 1, 0) : place + 2])]
+        near = [
+            each
+            for each in beside
+            if any(each.goal.q is q for q in ends[max(place - 1, 0) : place + 2])
+        ]
         assert all(energy[id(each)] >= energy[id(seed)] for each in near)
 
 
@@ -118,7 +143,9 @@ def test_the_next_seeds_follow_until_none_is_left() -> None:
     while activate_seeds(incumbent.prepared, incumbent.candidates):
         rounds += 1
         assert rounds <= len(incumbent.candidates)
-    assert not any(each.deferred and each.status is CandidateStatus.UNVISITED for each in incumbent.candidates)
+    assert not any(
+        each.deferred and each.status is CandidateStatus.UNVISITED for each in incumbent.candidates
+    )
 
 
 def downwards(name: str, high: list[float], low: list[float], bus: Bus) -> Problem:
@@ -131,10 +158,18 @@ def downwards(name: str, high: list[float], low: list[float], bus: Bus) -> Probl
 
 def test_pairs_whose_lower_bounds_are_all_the_same_have_seeds_too() -> None:
     """Gravity pays for everything: most pairs are bounded by zero."""
-    run = Run(downwards("panda", [0, 0.2, 0, -0.6, 0, 0.8, 0.785], [0, 1.2, 0, -1.6, 0, 2.8, 0.785], Bus()))
+    run = Run(
+        downwards(
+            "panda", [0, 0.2, 0, -0.6, 0, 0.8, 0.785], [0, 1.2, 0, -1.6, 0, 2.8, 0.785], Bus()
+        )
+    )
     run.prepare()
     incumbent = run.incumbent
-    before = [each for each in incumbent.candidates if each.deferred and each.status is CandidateStatus.UNVISITED]
+    before = [
+        each
+        for each in incumbent.candidates
+        if each.deferred and each.status is CandidateStatus.UNVISITED
+    ]
     assert sum(each.lower_bound == 0 for each in before) > MOST_ESTIMATED
     assert activate_seeds(incumbent.prepared, incumbent.candidates)
     assert 0 < sum(not each.deferred for each in before) <= MOST_SEEDS
@@ -147,7 +182,11 @@ def test_motions_that_give_energy_back_have_seeds_too() -> None:
     run = Run(asked)
     run.prepare()
     incumbent = run.incumbent
-    before = [each for each in incumbent.candidates if each.deferred and each.status is CandidateStatus.UNVISITED]
+    before = [
+        each
+        for each in incumbent.candidates
+        if each.deferred and each.status is CandidateStatus.UNVISITED
+    ]
     assert estimates(incumbent.prepared, before).min() < 0
     assert activate_seeds(incumbent.prepared, incumbent.candidates)
     assert any(not each.deferred for each in before)
@@ -155,7 +194,8 @@ def test_motions_that_give_energy_back_have_seeds_too() -> None:
 
 
 def test_an_end_may_slide_onto_a_joint_limit() -> None:
-    """The sixth joint of this goal is on its limit: the samples beside it need some percent more."""
+    """The sixth joint of this goal is on its limit: the samples beside it need some percent
+    more."""
     run = prepared("iiwa14", 4)
     answer = optimize(run.problem)
     limits = run.problem.arm.robot.limits
@@ -169,5 +209,7 @@ def test_an_answer_between_poses_holds_both() -> None:
     assert answer.certificate.valid
     for end in (answer.certificate.start_error, answer.certificate.goal_error):
         assert max(end) < HELD
-    fixed = optimize(Problem(arm=Arm(robot=load_robot("panda")), start=answer.start.q, goal=answer.goal.q))
+    fixed = optimize(
+        Problem(arm=Arm(robot=load_robot("panda")), start=answer.start.q, goal=answer.goal.q)
+    )
     assert answer.energy.electrical.total <= fixed.energy.electrical.total * (1 + 1e-3)

@@ -1,4 +1,6 @@
-"""Poses that a singular arm reaches: answers need no more than to any of their configurations, the bound no more."""
+"""Poses that a singular arm reaches: answers need no more than to any of their configurations, the
+bound no more.
+"""
 
 from __future__ import annotations
 
@@ -46,12 +48,20 @@ def energy(solution: Solution) -> float:
 def curves(q: Array) -> list[SelfMotion]:
     """The self-motions that hold the pose of a configuration."""
     found = required_inverse_kinematics(ROBOT, "goal").solve(tcp_pose(q).T, windings=False)
-    return list({id(each.self_motion): each.self_motion for each in found if each.self_motion is not None}.values())
+    return list(
+        {
+            id(each.self_motion): each.self_motion for each in found if each.self_motion is not None
+        }.values()
+    )
 
 
 @pytest.mark.parametrize(
     "goal",
-    [STRETCHED, pytest.param(STRAIGHT, marks=pytest.mark.long), pytest.param(UPRIGHT, marks=pytest.mark.long)],
+    [
+        STRETCHED,
+        pytest.param(STRAIGHT, marks=pytest.mark.long),
+        pytest.param(UPRIGHT, marks=pytest.mark.long),
+    ],
     ids=["wrist", "elbow", "all"],
 )
 def test_a_pose_needs_no_more_than_its_configuration(goal: Array) -> None:
@@ -80,7 +90,9 @@ def test_the_answer_is_the_best_of_the_curve(count: int) -> None:
 
 @pytest.mark.parametrize("joint", long_but([4], [2, 4]))
 def test_answers_next_to_a_singularity_are_those_beside_them(joint: int) -> None:
-    """The elbow's also those on it. On the wrist's, more configurations reach the pose, and the answer may be less."""
+    """The elbow's also those on it. On the wrist's, more configurations reach the pose, and the
+    answer may be less.
+    """
     energies = []
     for away in (0.0, 1e-9, 1e-8, 1e-7, 1e-5, 1e-3):
         goal = (STRAIGHT if joint == 2 else STRETCHED).copy()
@@ -102,10 +114,19 @@ def test_between_two_curves() -> None:
 
 def test_a_branch_may_be_asked_for_on_its_singularity() -> None:
     both = [
-        energy(solved(START, tcp_pose(STRAIGHT), branch=BranchFilter(shoulder="left", elbow=side), windings=False))
+        energy(
+            solved(
+                START,
+                tcp_pose(STRAIGHT),
+                branch=BranchFilter(shoulder="left", elbow=side),
+                windings=False,
+            )
+        )
         for side in ("up", "down")
     ]
-    assert min(both) == pytest.approx(energy(solved(START, tcp_pose(STRAIGHT), windings=False)), rel=REFINED)
+    assert min(both) == pytest.approx(
+        energy(solved(START, tcp_pose(STRAIGHT), windings=False)), rel=REFINED
+    )
 
 
 @pytest.mark.long
@@ -113,7 +134,12 @@ def test_one_of_several_targets_and_a_store() -> None:
     """A store's answer is found again among the candidates, whose samples do not hold it."""
     targets = AnyOf((tcp_pose(STRETCHED), tcp_pose(STRAIGHT)))
     plain = solved(START, targets, windings=False)
-    stored = solved(START, targets, windings=False, bus=Bus(mode="storage", capacity=50.0, power=200.0, efficiency=0.9))
+    stored = solved(
+        START,
+        targets,
+        windings=False,
+        bus=Bus(mode="storage", capacity=50.0, power=200.0, efficiency=0.9),
+    )
     assert energy(stored) <= energy(plain) * (1 + REFINED)
 
 

@@ -1,4 +1,6 @@
-"""Motions with sharp corners: less energy than those of the smoothed cost, and only where every joint has a corner."""
+"""Motions with sharp corners: less energy than those of the smoothed cost, and only where every
+joint has a corner.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +25,12 @@ from tests.optimizer.moves import AMPLE, ROBOT, problem
 # relative; what is promised against the best of many starts on as many control points
 PROMISED = 5e-3
 # a motion in a given time [s], and the least mechanical energy [J] that is known of it
-BEST_START = np.array([-1.0563769171, 0.7030631375, 0.0479574165, -2.1595422481, 1.9102876515, -3.0230673183])
-BEST_GOAL = np.array([-2.6596545658, -0.3932695539, 2.8468960492, 1.9756345344, -1.3513098591, 0.5445385554])
+BEST_START = np.array(
+    [-1.0563769171, 0.7030631375, 0.0479574165, -2.1595422481, 1.9102876515, -3.0230673183]
+)
+BEST_GOAL = np.array(
+    [-2.6596545658, -0.3932695539, 2.8468960492, 1.9756345344, -1.3513098591, 0.5445385554]
+)
 BEST_DURATION, BEST_ENERGY = 3.977043743, 44.05294296
 
 
@@ -33,7 +39,12 @@ def explored(**given: Any) -> Incumbent:
     run = Run(problem(**given))
     run.prepare()
     incumbent = run.incumbent
-    explore(incumbent.prepared, incumbent.candidates, lambda each: solve(incumbent, each), incumbent.deadline)
+    explore(
+        incumbent.prepared,
+        incumbent.candidates,
+        lambda each: solve(incumbent, each),
+        incumbent.deadline,
+    )
     return incumbent
 
 
@@ -72,7 +83,9 @@ def test_sharper_corners_need_less(given: dict[str, Any]) -> None:
     assert after.energy == prepared.objective_of(prepared.energy(after.spline))
 
 
-@pytest.mark.parametrize("given", [{}, {"method": "uniform_scaling", "objective": "mechanical", "duration_max": 1.5}])
+@pytest.mark.parametrize(
+    "given", [{}, {"method": "uniform_scaling", "objective": "mechanical", "duration_max": 1.5}]
+)
 def test_nothing_is_solved_again_without_corners_or_even_spacing(given: dict[str, Any]) -> None:
     incumbent = explored(**given)
     best = incumbent.best()

@@ -1,4 +1,6 @@
-"""Several targets: the best of them is taken, the others are accounted for, and what is no list is refused."""
+"""Several targets: the best of them is taken, the others are accounted for, and what is no list is
+refused.
+"""
 
 from __future__ import annotations
 
@@ -17,18 +19,22 @@ from joulepath.optimizer.problem.targets import AnyOf, members, single
 from tests.optimizer.moves import GOAL, HOME, START, limits, paper_poses, problem, tcp_pose
 from tests.selection import long_but
 
-# relative: in a search of its own every target's winner is refined over more control points, in a common one only the
-# best of all, and refining gains some tenths of a percent
+# relative: in a search of its own every target's winner is refined over more control points, in a
+# common one only the best of all, and refining gains some tenths of a percent
 REFINEMENT = 5e-3
 # relative; what a solver that stops where a step promises 5e-5 of the cost may leave behind, twice
 CONVERGED = 1e-3
-FAR = Pose(np.block([[np.eye(3), np.array([[2.0], [0.0], [0.3]])], [np.zeros((1, 3)), np.ones((1, 1))]]))
+FAR = Pose(
+    np.block([[np.eye(3), np.array([[2.0], [0.0], [0.3]])], [np.zeros((1, 3)), np.ones((1, 1))]])
+)
 BEYOND = np.array([0.0, -1.57, 3.5, -1.57, -1.57, 0.0])
 
 
 @pytest.mark.parametrize("position", long_but(range(1), range(3)))
 def test_the_papers_orientations_are_one_request(position: int) -> None:
-    """Its five orientations at a position: no worse than the best of five requests, and it says which that is."""
+    """Its five orientations at a position: no worse than the best of five requests, and it says
+    which that is.
+    """
     poses = paper_poses()[5 * position : 5 * position + 5]
     solution = optimize(problem(HOME, AnyOf(tuple(poses))))
     apart = [optimize(problem(HOME, pose)).energy.electrical.total for pose in poses]
@@ -45,14 +51,20 @@ def test_the_papers_orientations_are_one_request(position: int) -> None:
 def test_one_of_one_is_that_one() -> None:
     pose = tcp_pose(GOAL)
     alone, listed = (optimize(problem(goal=goal)) for goal in (pose, AnyOf((pose,))))
-    assert listed.energy.electrical.total == pytest.approx(alone.energy.electrical.total, rel=CONVERGED)
+    assert listed.energy.electrical.total == pytest.approx(
+        alone.energy.electrical.total, rel=CONVERGED
+    )
     assert len(listed.candidates) == len(alone.candidates)
 
 
 def test_both_ends_may_be_any_of_several() -> None:
-    """Joints and poses mixed, the cheapest pair last: staying where a start and a goal are the same."""
+    """Joints and poses mixed, the cheapest pair last: staying where a start and a goal are the
+    same.
+    """
     other = START + 1.0
-    solution = optimize(problem(AnyOf((other, START)), AnyOf((tcp_pose(GOAL), GOAL + 0.3, START + 0.01))))
+    solution = optimize(
+        problem(AnyOf((other, START)), AnyOf((tcp_pose(GOAL), GOAL + 0.3, START + 0.01)))
+    )
     assert (solution.start.target, solution.goal.target) == (1, 2)
     assert solution.trajectory.q[0] == pytest.approx(START)
     assert solution.trajectory.q[-1] == pytest.approx(START + 0.01)
@@ -65,7 +77,10 @@ def test_what_is_out_of_reach_is_named_and_left_out() -> None:
     solution = optimize(problem(goal=AnyOf((FAR, tcp_pose(GOAL), BEYOND))))
     assert solution.goal.target == 1
     assert [(each.end, each.target) for each in solution.unreachable] == [("goal", 0), ("goal", 2)]
-    assert "out of reach" in solution.unreachable[0].reason and "elbow_joint" in solution.unreachable[1].reason
+    assert (
+        "out of reach" in solution.unreachable[0].reason
+        and "elbow_joint" in solution.unreachable[1].reason
+    )
     assert {candidate.goal_target for candidate in solution.candidates} == {1}
 
 

@@ -1,4 +1,6 @@
-"""The tight bound through `optimize`: greater than the plain one, never above an energy, in time, or the plain one."""
+"""The tight bound through `optimize`: greater than the plain one, never above an energy, in time,
+or the plain one.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,16 @@ from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.solution import Solution
-from tests.optimizer.moves import PAYLOAD, ROBOT, START, fixed, limits, problem, random_moves, tcp_pose
+from tests.optimizer.moves import (
+    PAYLOAD,
+    ROBOT,
+    START,
+    fixed,
+    limits,
+    problem,
+    random_moves,
+    tcp_pose,
+)
 from tests.selection import long_but
 
 SEED, MOVES = 17, 4
@@ -41,7 +52,9 @@ QUICK = {"as it comes", "duration near the shortest"}
 @pytest.mark.parametrize("name", long_but(QUICK, CASES))
 def test_it_is_between_the_plain_bound_and_the_energy(name: str) -> None:
     plain, tight = both(problem(**CASES[name]))
-    assert np.array_equal(plain.trajectory.spline.control_points, tight.trajectory.spline.control_points)
+    assert np.array_equal(
+        plain.trajectory.spline.control_points, tight.trajectory.spline.control_points
+    )
     energy = tight.energy.electrical.total
     assert plain.lower_bound <= tight.lower_bound <= energy
     if name == "as it comes":
@@ -49,14 +62,18 @@ def test_it_is_between_the_plain_bound_and_the_energy(name: str) -> None:
 
 
 def test_motions_of_other_durations_spend_no_less() -> None:
-    """The least energy at fixed durations from the best one on is not below the tight bound for all of them."""
+    """The least energy at fixed durations from the best one on is not below the tight bound for all
+    of them.
+    """
     free = optimize(problem(bound="tight"))
     for factor in (1.0, 1.1, 1.3, 1.7):
         found = optimize(problem(**fixed(factor * free.duration)))
         assert free.lower_bound <= found.energy.electrical.total
 
 
-ODD = replace(ROBOT, friction_laws={"odd": replace(ROBOT.friction, curved=-0.1 * ROBOT.friction.curved)})
+ODD = replace(
+    ROBOT, friction_laws={"odd": replace(ROBOT.friction, curved=-0.1 * ROBOT.friction.curved)}
+)
 DRY = replace(ROBOT.friction, curved=0 * ROBOT.friction.curved, viscous=0 * ROBOT.friction.viscous)
 PLAIN: dict[str, dict[str, Any]] = {
     "friction of one torque": {"robot": replace(ROBOT, friction_laws={"dry": DRY})},
@@ -67,7 +84,9 @@ PLAIN: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("name", long_but([name for name in PLAIN if name != "mechanical"][:1], PLAIN))
+@pytest.mark.parametrize(
+    "name", long_but([name for name in PLAIN if name != "mechanical"][:1], PLAIN)
+)
 def test_the_plain_bound_stays_where_the_dual_one_does_not_help(name: str) -> None:
     asked = problem(**PLAIN[name])
     plain, tight = both(asked)

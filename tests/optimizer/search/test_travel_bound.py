@@ -1,4 +1,6 @@
-"""The bound on travel: over the parts of any motion from rest to rest, its sum is never above what the motion draws."""
+"""The bound on travel: over the parts of any motion from rest to rest, its sum is never above what
+the motion draws.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ PARTS = (2, 3, 5, 40)
 
 
 def robot(idle: float, regeneration: float = 0.0) -> Any:
-    return replace(ROBOT, electronics=replace(ROBOT.electronics, idle_power=idle, regeneration=regeneration))
+    return replace(
+        ROBOT, electronics=replace(ROBOT.electronics, idle_power=idle, regeneration=regeneration)
+    )
 
 
 CONDITIONS: dict[str, dict[str, Any]] = {
@@ -53,7 +57,9 @@ def bent(rng: np.random.Generator, start: Array, goal: Array) -> Spline:
     points = start + np.outer(space.quintic, goal - start)
     points[space.free] += rng.choice([0.03, 0.3, 1.0]) * rng.normal(size=(space.n - 6, 6))
     motion = spline_of(space, points, 1.0)
-    return retimed(motion, least_time_scale(motion, ROBOT.limits.rates) * rng.choice([1.0, 1.5, 6.0]))
+    return retimed(
+        motion, least_time_scale(motion, ROBOT.limits.rates) * rng.choice([1.0, 1.5, 6.0])
+    )
 
 
 def cuts(rng: np.random.Generator, motion: Spline) -> list[Array]:
@@ -62,10 +68,16 @@ def cuts(rng: np.random.Generator, motion: Spline) -> list[Array]:
     return [motion.curve(np.concatenate([[0.0], t, [motion.duration]])) for t in times]
 
 
-@pytest.mark.parametrize("name", long_but(("loaded and tilted", "all recovered", "hardly idle"), CONDITIONS))
+@pytest.mark.parametrize(
+    "name", long_but(("loaded and tilted", "all recovered", "hardly idle"), CONDITIONS)
+)
 def test_no_motion_draws_less_however_it_is_cut(name: str) -> None:
     """Random motions, and those of least energy, which are the hardest to stay below."""
-    prepared, rng, nearest = PreparedProblem.of(problem(**CONDITIONS[name])), np.random.default_rng(len(name)), -np.inf
+    prepared, rng, nearest = (
+        PreparedProblem.of(problem(**CONDITIONS[name])),
+        np.random.default_rng(len(name)),
+        -np.inf,
+    )
     for k in range(40):
         start = rng.uniform(-np.pi, np.pi, 6)
         goal = start + rng.uniform(-1.5, 1.5, 6) * (rng.random(6) < rng.choice([0.3, 1.0])) + 1e-3
@@ -97,21 +109,29 @@ def test_the_search_does_not_find_less_either() -> None:
 
 
 def test_bounds_from_rest_to_rest_do_not_hold_where_the_arm_passes() -> None:
-    """Cut into many parts, the motion of least energy draws less than these say: the attack above can fail."""
+    """Cut into many parts, the motion of least energy draws less than these say: the attack above
+    can fail.
+    """
     found = optimize(problem())
     q = found.trajectory.spline.curve(np.linspace(0, found.duration, 41))
     prepared = PreparedProblem.of(problem())
     gains = np.diff([prepared.potential(each) for each in q])
-    assert lower_bounds(prepared, np.diff(q, axis=0), gains)[0].sum() > 1.5 * found.energy.electrical.total
+    assert (
+        lower_bounds(prepared, np.diff(q, axis=0), gains)[0].sum()
+        > 1.5 * found.energy.electrical.total
+    )
 
 
 def test_that_nothing_is_drawn_below_zero_does_not_hold_part_by_part() -> None:
-    """A load that swings from one side to the other: what the fall gives, the rise draws less. Parts of at least zero
-    add up to many times what the swing draws; the travel's own bounds, some of them below zero, do not."""
+    """A load that swings from one side to the other: what the fall gives, the rise draws less.
+    Parts of at least zero add up to many times what the swing draws; the travel's own bounds, some
+    of them below zero, do not."""
     smooth = replace(
-        ROBOT.friction, coulomb=ROBOT.friction.coulomb / 50, curved=0 * ROBOT.friction.curved,
+        ROBOT.friction,
+        coulomb=ROBOT.friction.coulomb / 50,
+        curved=0 * ROBOT.friction.curved,
         viscous=ROBOT.friction.viscous / 50,
-    )  # fmt: skip
+    )
     arm = replace(robot(0.5), friction_laws={"smooth": smooth})
     here, there = (np.array([0, shoulder, 0.3, 0, 0, 0]) for shoulder in (0.3, np.pi - 0.9))
     prepared = PreparedProblem.of(problem(here, there, robot=arm, payload=Payload(mass=5.0)))

@@ -1,4 +1,6 @@
-"""Spline spaces: what they reproduce exactly, where their knots lie, and that motions in them rest at both ends."""
+"""Spline spaces: what they reproduce exactly, where their knots lie, and that motions in them rest
+at both ends.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +14,12 @@ from joulepath.optimizer.trajectories.bspline import DEGREE, REST_POINTS, Basis
 from joulepath.optimizer.trajectories.quadrature import quadrature
 
 EXACT = 1e-11  # a few dozen operations in double precision, on basis functions of order 1
-# absolute, times (points per unit)^d: differentiating d times multiplies rounding by the inverse of a span's length
+# absolute, times (points per unit)^d: differentiating d times multiplies rounding by the inverse of
+# a span's length
 DERIVATIVE = 1e-11
-# relative to a speed's or acceleration's own peak; the grid's points are a hundredth of the time apart at most, so a
-# parabola's top lies above the nearest of them by less than (1/200)² · x'' / 2, and x'' < 60 x for a spline of 8 spans
+# relative to a speed's or acceleration's own peak; the grid's points are a hundredth of the time
+# apart at most, so a parabola's top lies above the nearest of them by less than (1/200)² · x'' / 2,
+# and x'' < 60 x for a spline of 8 spans
 GRID_MISS = 1e-3
 
 SWITCHES = np.array([0.05, 0.31, 0.4, 0.6, 0.69, 0.95])
@@ -41,19 +45,26 @@ def spans(space: Basis) -> Array:
 
 
 def test_basis_functions_share_out_unity(space: Basis) -> None:
-    """They are nonnegative and add up to one everywhere, so that a curve stays in the hull of its control points."""
+    """They are nonnegative and add up to one everywhere, so that a curve stays in the hull of its
+    control points.
+    """
     values = bspline.basis_matrix(space.knots, np.linspace(0.0, 1.0, 997))
     assert values.min() >= 0
     assert np.abs(values.sum(axis=1) - 1).max() < EXACT
     for d in range(3):
-        assert np.abs(space.at_nodes[d].sum(axis=1) - (d == 0)).max() < DERIVATIVE / spans(space).min() ** d
+        assert (
+            np.abs(space.at_nodes[d].sum(axis=1) - (d == 0)).max()
+            < DERIVATIVE / spans(space).min() ** d
+        )
     for d in range(1, 4):
         assert np.abs(space.at_grid[d - 1].sum(axis=1)).max() < DERIVATIVE / spans(space).min() ** d
 
 
 @pytest.mark.parametrize("power", range(DEGREE + 1))
 def test_polynomials_of_the_degree_are_reproduced(space: Basis, power: int) -> None:
-    """x^k has control points that interpolate it at the Greville points; its derivatives follow at nodes and grid."""
+    """x^k has control points that interpolate it at the Greville points; its derivatives follow at
+    nodes and grid.
+    """
     x = bspline.greville(space.knots)
     points = np.linalg.solve(bspline.basis_matrix(space.knots, x), x**power)
     polynomial = np.polynomial.Polynomial([0.0] * power + [1.0])
@@ -84,7 +95,9 @@ def test_the_quintic_is_in_every_space(space: Basis) -> None:
 
 
 def test_motions_rest_at_both_ends(space: Basis) -> None:
-    """Whatever the free control points, three that coincide at an end leave neither speed nor acceleration there."""
+    """Whatever the free control points, three that coincide at an end leave neither speed nor
+    acceleration there.
+    """
     rng = np.random.default_rng(1)
     points = np.full(space.n, 0.3)
     points[-REST_POINTS:] = -1.2
@@ -94,12 +107,16 @@ def test_motions_rest_at_both_ends(space: Basis) -> None:
     assert curve([0.0, 1.0]) == pytest.approx([0.3, -1.2], abs=EXACT)
     for d in (1, 2):
         assert np.abs(curve([0.0, 1.0], d)).max() < DERIVATIVE / spans(space).min() ** d
-    assert space.n == 7 or np.abs(curve([0.0, 1.0], 3)).min() > 1e-3  # jerk, and only jerk, is theirs to choose
+    assert (
+        space.n == 7 or np.abs(curve([0.0, 1.0], 3)).min() > 1e-3
+    )  # jerk, and only jerk, is theirs to choose
 
 
 @pytest.mark.parametrize("per_span", [3, 5, 16])
 def test_quadrature_is_exact_for_polynomials(space: Basis, per_span: int) -> None:
-    """n Gauss points per span integrate degree 2n - 1: piecewise polynomials with kinks at the knots, no others."""
+    """n Gauss points per span integrate degree 2n - 1: piecewise polynomials with kinks at the
+    knots, no others.
+    """
     points, weights = quadrature(space.knots, per_span)
     assert weights.min() > 0 and weights.sum() == pytest.approx(1.0, abs=EXACT)
     assert points.min() > 0 and points.max() < 1 and (np.diff(points) > 0).all()
@@ -115,7 +132,9 @@ def test_nodes_integrate_the_square_of_an_acceleration(space: Basis) -> None:
     rng = np.random.default_rng(2)
     curve = BSpline(space.knots, rng.normal(size=space.n), DEGREE)
     points, weights = quadrature(space.knots, 12)
-    assert space.weights @ curve(space.nodes, 2) ** 2 == pytest.approx(weights @ curve(points, 2) ** 2, rel=EXACT)
+    assert space.weights @ curve(space.nodes, 2) ** 2 == pytest.approx(
+        weights @ curve(points, 2) ** 2, rel=EXACT
+    )
     assert len(space.nodes) >= bspline.LEAST_NODES
 
 
@@ -131,10 +150,15 @@ def test_nodes_give_kinetic_energy_back(space: Basis) -> None:
 
 
 def test_the_grid_finds_peaks(space: Basis) -> None:
-    """Of speed, acceleration and jerk of random motions, against ten thousand samples; jerk jumps at repeated knots."""
+    """Of speed, acceleration and jerk of random motions, against ten thousand samples; jerk jumps
+    at repeated knots.
+    """
     rng = np.random.default_rng(3)
     eps = 1e-12
-    t = np.union1d(np.linspace(0.0, 1.0, 10_001), np.concatenate([space.knots - eps, space.knots + eps]).clip(0, 1))
+    t = np.union1d(
+        np.linspace(0.0, 1.0, 10_001),
+        np.concatenate([space.knots - eps, space.knots + eps]).clip(0, 1),
+    )
     for _ in range(5):
         curve = BSpline(space.knots, rng.normal(size=space.n), DEGREE)
         for d in range(1, 4):
@@ -143,7 +167,9 @@ def test_the_grid_finds_peaks(space: Basis) -> None:
 
 
 def test_anchors_hold_the_ends_of_every_span(space: Basis) -> None:
-    """And points evenly in between, so that a derivative cannot leave its limit along a whole span unnoticed."""
+    """And points evenly in between, so that a derivative cannot leave its limit along a whole span
+    unnoticed.
+    """
     grid = grid_points(space)
     edges = np.unique(space.knots)
     for anchors, parts in zip(space.anchors, bspline.ANCHORS, strict=True):
@@ -174,7 +200,9 @@ def test_switches_at_the_ends_make_no_knots() -> None:
 
 @pytest.mark.parametrize("repeat", [2, 3])
 def test_moved_knots_follow_the_switches(repeat: int) -> None:
-    """The others keep their places between them, and with the same control points the motion hardly changes."""
+    """The others keep their places between them, and with the same control points the motion hardly
+    changes.
+    """
     space, by = bspline.graded(SWITCHES, repeat), 1e-3
     fewer = np.append(1e-4, SWITCHES[1:])
     assert bspline.moved(space.knots, fewer, repeat) is None
@@ -199,7 +227,9 @@ def test_jerk_jumps_at_a_knot_repeated_three_times(repeat: int, jumps: bool) -> 
     scale = np.abs(space.at_grid[2] @ curve.c).max()
     assert (abs(after - before) > 1e-3 * scale) == jumps
     for d in range(3):
-        assert np.ptp(curve([0.4 - 1e-12, 0.4 + 1e-12], d)) < 1e-6  # all that a motion needs stays continuous
+        assert (
+            np.ptp(curve([0.4 - 1e-12, 0.4 + 1e-12], d)) < 1e-6
+        )  # all that a motion needs stays continuous
 
 
 def test_refit_is_exact_on_a_refinement(space: Basis) -> None:
@@ -207,14 +237,20 @@ def test_refit_is_exact_on_a_refinement(space: Basis) -> None:
     rng = np.random.default_rng(5)
     inner = space.knots[DEGREE + 1 : -DEGREE - 1]
     once = np.unique(inner)
-    more = np.concatenate([rng.uniform(0.01, 0.99, 6), once[np.array([np.sum(inner == k) < 3 for k in once], bool)]])
+    more = np.concatenate(
+        [rng.uniform(0.01, 0.99, 6), once[np.array([np.sum(inner == k) < 3 for k in once], bool)]]
+    )
     onto = np.sort(np.concatenate([space.knots, more]))
     points = rng.normal(size=(space.n, 6))
     refined = bspline.refit(points, space.knots, onto)
     t = np.linspace(0.0, 1.0, 501)
     assert refined.shape == (len(onto) - DEGREE - 1, 6)
-    difference = bspline.basis_matrix(onto, t) @ refined - bspline.basis_matrix(space.knots, t) @ points
-    assert np.abs(difference).max() < 1e-9  # random knots may lie close together, which interpolation feels
+    difference = (
+        bspline.basis_matrix(onto, t) @ refined - bspline.basis_matrix(space.knots, t) @ points
+    )
+    assert (
+        np.abs(difference).max() < 1e-9
+    )  # random knots may lie close together, which interpolation feels
 
 
 def test_fit_finds_the_spline_behind_its_samples(space: Basis) -> None:
@@ -223,11 +259,15 @@ def test_fit_finds_the_spline_behind_its_samples(space: Basis) -> None:
     points[:REST_POINTS], points[-REST_POINTS:] = points[0], points[-1]
     t = np.linspace(0.0, 1.0, 401)
     found = bspline.fit(bspline.basis_matrix(space.knots, t) @ points, t, space.knots)
-    assert np.abs(found - points).max() < 1e-8  # the condition of a least-squares fit, squared, times rounding
+    assert (
+        np.abs(found - points).max() < 1e-8
+    )  # the condition of a least-squares fit, squared, times rounding
 
 
 def test_fit_is_the_nearest_motion_at_rest() -> None:
-    """Samples of a motion that is not at rest: the fit keeps the ends and rests there, and no other comes closer."""
+    """Samples of a motion that is not at rest: the fit keeps the ends and rests there, and no other
+    comes closer.
+    """
     space = bspline.uniform(13)
     t = np.linspace(0.0, 1.0, 201)
     samples = np.stack([np.sin(3 * t), t], axis=1)
@@ -236,12 +276,18 @@ def test_fit_is_the_nearest_motion_at_rest() -> None:
     assert points[-REST_POINTS:] == pytest.approx(np.repeat(samples[-1:], 3, axis=0))
     matrix = bspline.basis_matrix(space.knots, t)
     residual = matrix @ points - samples
-    assert np.abs(residual).max() > 1e-3  # samples that move at their ends are out of the space's reach
-    assert np.abs(matrix[:, space.free].T @ residual).max() < EXACT * len(t)  # orthogonal to every free direction
+    assert (
+        np.abs(residual).max() > 1e-3
+    )  # samples that move at their ends are out of the space's reach
+    assert np.abs(matrix[:, space.free].T @ residual).max() < EXACT * len(
+        t
+    )  # orthogonal to every free direction
 
 
 def test_a_smooth_fit_keeps_positions_and_jerk_where_knots_are_repeated() -> None:
-    """Switches so near to the ends that no sample lies between: a fit to the positions alone has any jerk there."""
+    """Switches so near to the ends that no sample lies between: a fit to the positions alone has
+    any jerk there.
+    """
     switches = np.array([0.002, 0.3, 0.302, 0.698, 0.7, 0.998])
     space = bspline.graded(switches, 3)
     at = np.linspace(0.0, 1.0, 201)
@@ -250,7 +296,9 @@ def test_a_smooth_fit_keeps_positions_and_jerk_where_knots_are_repeated() -> Non
     points[:REST_POINTS], points[-REST_POINTS:] = 0.0, 1.0
     samples = BSpline(coarse.knots, points, DEGREE)(at)
     fitted = bspline.smooth_fit(samples, at, space.knots)
-    assert (fitted[:REST_POINTS] == samples[0]).all() and (fitted[-REST_POINTS:] == samples[-1]).all()
+    assert (fitted[:REST_POINTS] == samples[0]).all() and (
+        fitted[-REST_POINTS:] == samples[-1]
+    ).all()
     curve = BSpline(space.knots, fitted, DEGREE)
     assert np.abs(curve(at) - samples).max() < 0.02 * np.ptp(samples)
     peak = np.abs(coarse.at_grid[2] @ points).max()

@@ -1,4 +1,6 @@
-"""Ruckig's motion as a spline: as fast, through the same positions, however close the jumps of jerk are."""
+"""Ruckig's motion as a spline: as fast, through the same positions, however close the jumps of jerk
+are.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,10 @@ import numpy as np
 import pytest
 
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.trajectories.ruckig_motion import time_optimal_positions, time_optimal_spline
+from joulepath.optimizer.trajectories.ruckig_motion import (
+    time_optimal_positions,
+    time_optimal_spline,
+)
 from joulepath.optimizer.trajectories.spline import least_time_scale, sample
 
 MOVES = 40
@@ -23,7 +28,9 @@ NEARLY = 1e-5  # relative, of limits that are nearly equal
 @pytest.mark.parametrize("name", ["ur5e", "kr10_r1100", "panda"])
 @pytest.mark.parametrize("nearly_equal", [False, True], ids=["own limits", "nearly equal limits"])
 def test_it_is_ruckigs_motion(name: str, nearly_equal: bool) -> None:
-    """Under nearly equal limits, jumps of all joints are too close to be apart, and too far to be one."""
+    """Under nearly equal limits, jumps of all joints are too close to be apart, and too far to be
+    one.
+    """
     limits, rng = load_robot(name).limits, np.random.default_rng(5)
     lower, upper = np.maximum(limits.q_min, -np.pi), np.minimum(limits.q_max, np.pi)
     scales = []
@@ -34,7 +41,9 @@ def test_it_is_ruckigs_motion(name: str, nearly_equal: bool) -> None:
             near = 1 + NEARLY * rng.normal(size=(3, len(lower)))
             rates = limits.rates.min(axis=1, keepdims=True) * near
             own = replace(limits, v_max=rates[0], a_max=rates[1], j_max=rates[2])
-            goal = start + np.where(rng.random(len(lower)) < 0.8, 0.7 * near[0], rng.uniform(-0.7, 0.7, len(lower)))
+            goal = start + np.where(
+                rng.random(len(lower)) < 0.8, 0.7 * near[0], rng.uniform(-0.7, 0.7, len(lower))
+            )
         spline = time_optimal_spline(own, start, goal)
         scales.append(least_time_scale(spline, own.rates))
         at = np.linspace(0, 1, 60)
@@ -55,7 +64,9 @@ def test_some_joints_hardly_move(name: str) -> None:
         spline = time_optimal_spline(limits, np.zeros_like(goal), goal)
         scales.append(least_time_scale(spline, limits.rates))
         at = np.linspace(0, 1, 60)
-        away = sample(spline, at * spline.duration)[0] - time_optimal_positions(limits, np.zeros_like(goal), goal, at)
+        away = sample(spline, at * spline.duration)[0] - time_optimal_positions(
+            limits, np.zeros_like(goal), goal, at
+        )
         assert np.abs(away).max() < 10 * AWAY
     assert np.percentile(scales, 80) < 1 + ALWAYS and max(scales) < 1 + HARDLY
 

@@ -29,7 +29,9 @@ def test_times_of_points_on_a_curve_are_found() -> None:
 
 
 def test_passes_are_met_in_their_order() -> None:
-    """A motion there and back meets a configuration twice: asked for after the turn, it is that of the way back."""
+    """A motion there and back meets a configuration twice: asked for after the turn, it is that of
+    the way back.
+    """
     there = quintic_spline(np.zeros(6), np.ones(6), 1.0)
     back = quintic_spline(np.ones(6), np.zeros(6), 1.0)
     motion, half = joined([there, back]), np.full(6, 0.5)
@@ -50,15 +52,23 @@ def test_a_point_beside_the_curve_is_missed_by_its_distance() -> None:
 
 def test_joined_motions_are_each_as_before() -> None:
     first, second = wavy(2), wavy(3)
-    shift = Spline(5, second.knots, second.control_points + (first.control_points[-1] - second.control_points[0]))
+    shift = Spline(
+        5,
+        second.knots,
+        second.control_points + (first.control_points[-1] - second.control_points[0]),
+    )
     whole = joined([first, shift, shift_to(shift.control_points[-1])])
     assert abs(whole.duration - 9.0) < ROUNDING
     t = np.linspace(0.01, 2.99, 50)
     for own, begin in ((first, 0.0), (shift, 3.0)):
         for ours, theirs in zip(sample(whole, begin + t), sample(own, t), strict=True):
             assert np.abs(ours - theirs).max() < 1e-9
-    assert np.allclose(peak_rates(whole).max(axis=1), peak_rates(joined([first, shift])).max(axis=1).clip(
-        peak_rates(shift_to(shift.control_points[-1])).max(axis=1)))  # fmt: skip
+    assert np.allclose(
+        peak_rates(whole).max(axis=1),
+        peak_rates(joined([first, shift]))
+        .max(axis=1)
+        .clip(peak_rates(shift_to(shift.control_points[-1])).max(axis=1)),
+    )
 
 
 def shift_to(q: np.ndarray) -> Spline:

@@ -1,4 +1,6 @@
-"""Polynomials by their values at Chebyshev nodes, against the product formula, differences and Bernstein's form."""
+"""Polynomials by their values at Chebyshev nodes, against the product formula, differences and
+Bernstein's form.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +13,10 @@ from joulepath.optimizer.trajectories.polynomial import cardinals, chebyshev, po
 from joulepath.optimizer.trajectories.spline import peak_rates, sample, spline_of
 
 COUNTS = [1, 4, 8, 10, 12]
-EXACT = 1e-10  # Bernstein's coefficients of degree 17 reach 5e3 times the values: five digits of sixteen are lost
-STEP = 1e-5  # of the central differences: their error is its square times the third derivative, some 1e4
+# Bernstein's coefficients of degree 17 reach 5e3 times the values: five digits of sixteen are lost
+EXACT = 1e-10
+# of the central differences: their error is its square times the third derivative, some 1e4
+STEP = 1e-5
 DIFFERENCES = 1e-4  # relative
 
 
@@ -22,7 +26,9 @@ def by_products(m: int, at: Array) -> Array:
     ends = (at * (1 - at)) ** 3
     return np.stack(
         [
-            ends / (x[i] * (1 - x[i])) ** 3 * np.prod([(at - x[j]) / (x[i] - x[j]) for j in range(m) if j != i], axis=0)
+            ends
+            / (x[i] * (1 - x[i])) ** 3
+            * np.prod([(at - x[j]) / (x[i] - x[j]) for j in range(m) if j != i], axis=0)
             for i in range(m)
         ],
         axis=1,
@@ -52,12 +58,15 @@ def test_cardinal_functions_are_products(m: int) -> None:
 def test_derivatives_against_differences(m: int, derivative: int) -> None:
     space, at = polynomials(m), np.linspace(0.01, 0.99, 53)
     found = cardinals(space.knots, space.bernstein, at, derivative)
-    below, above = (cardinals(space.knots, space.bernstein, at + h, derivative - 1) for h in (-STEP, STEP))
+    below, above = (
+        cardinals(space.knots, space.bernstein, at + h, derivative - 1) for h in (-STEP, STEP)
+    )
     assert np.abs((above - below) / (2 * STEP) - found).max() < DIFFERENCES * np.abs(found).max()
 
 
 def test_nodes_are_those_of_chebyshev() -> None:
-    """Extremes of the Chebyshev polynomial of degree m + 5, without the outer three at either end."""
+    """Extremes of the Chebyshev polynomial of degree m + 5, without the outer three at either
+    end."""
     m = 9
     extremes = np.polynomial.chebyshev.Chebyshev.basis(m + 5).deriv().roots()
     assert chebyshev(m) == pytest.approx((1 + np.sort(extremes)[2:-2]) / 2, abs=1e-12)
@@ -88,7 +97,9 @@ def test_the_quintic_is_among_them() -> None:
     space, at = polynomials(10), np.linspace(0.0, 1.0, 201)
     law = at**3 * (10 - 15 * at + 6 * at**2)
     points = space.fit(law[:, None], at)
-    assert spline_of(space, points, 1.0).control_points[:, 0] == pytest.approx(bernstein_of_quintic(15), abs=EXACT)
+    assert spline_of(space, points, 1.0).control_points[:, 0] == pytest.approx(
+        bernstein_of_quintic(15), abs=EXACT
+    )
 
 
 def bernstein_of_quintic(degree: int) -> Array:

@@ -12,7 +12,8 @@ S = Polynomial([0, 0, 0, 10, -15, 6])
 TAU = np.linspace(0.0, 1.0, 101)
 # rounding of a few operations on numbers up to 60
 ROUNDING = 1e-12
-# relative; a peak between two of 10001 points: its curvature, at most 360, times (half their distance)², halved
+# relative; a peak between two of 10001 points: its curvature, at most 360, times (half their
+# distance)², halved
 BETWEEN = 1e-6
 
 

@@ -1,4 +1,6 @@
-"""Knots of slow motions: at the ramps, in spans that grow from there, and refined into spaces that hold the first."""
+"""Knots of slow motions: at the ramps, in spans that grow from there, and refined into spaces that
+hold the first.
+"""
 
 from __future__ import annotations
 
@@ -71,7 +73,9 @@ def test_what_is_slow_depends_on_ramp_and_duration(speed: float, slow: bool) -> 
 def test_the_ramp_is_that_of_the_leading_joint() -> None:
     """Speed over acceleration, and acceleration over jerk; of a short way, half of the time."""
     own = limits(v_max=1.0, a_max=[1, 2, 4, 5, 8, 10], j_max=20.0)
-    assert seven_segment.ramp(np.array([0, 0, 3.0, 0, 0, 0.1]), own) == pytest.approx(1 / 4 + 4 / 20)
+    assert seven_segment.ramp(np.array([0, 0, 3.0, 0, 0, 0.1]), own) == pytest.approx(
+        1 / 4 + 4 / 20
+    )
     short = np.full(6, 1e-3)
     half = float(seven_segment.shortest_duration(short, own)) / 2
     assert seven_segment.ramp(short, own) == pytest.approx(half)

@@ -1,4 +1,5 @@
-"""Ruckig's motion, evaluated from its phases, is the one that Ruckig evaluates instant by instant."""
+"""Ruckig's motion, evaluated from its phases, is the one that Ruckig evaluates instant by
+instant."""
 
 from __future__ import annotations
 

@@ -27,7 +27,9 @@ def test_a_duration_is_met_exactly(duration: float) -> None:
     slower = lasting(MOTION, duration)
     assert slower.duration == duration
     t = np.linspace(0.0, 1.0, 50)
-    assert slower.curve(t * duration) == pytest.approx(MOTION.curve(t * MOTION.duration), abs=ROUNDING)
+    assert slower.curve(t * duration) == pytest.approx(
+        MOTION.curve(t * MOTION.duration), abs=ROUNDING
+    )
 
 
 def test_rates_fall_with_powers_of_the_factor() -> None:

@@ -30,8 +30,9 @@ async def follow(
     settings: ServiceSettings,
     engine: ServiceArmEngine,
 ) -> Response:
-    """Follows positions or poses of the TCP from a guess, each from the configuration before (Levenberg-Marquardt).
-    Points that are out of reach, nearly singular or beyond the range of a joint are listed, but left out of
-    `trajectory`. `POST /evaluate` takes `trajectory` unchanged."""
+    """Follows positions or poses of the TCP from a guess, each from the configuration before
+    (Levenberg-Marquardt). Points that are out of reach, nearly singular or beyond the range of a
+    joint are listed, but left out of `trajectory`. `POST /evaluate` takes `trajectory` unchanged.
+    """
     work = engine.run(IKPathTask(body, request.state.id), deadline_of(body, settings.max_deadline))
     return result_response(await unless_disconnected(request, work))

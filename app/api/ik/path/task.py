@@ -37,27 +37,36 @@ MOST_POINTS = 1000
 class IKPathRequest(RobotWithTcp):
     """Positions or poses of the TCP over time, as exactly one of `points` and `poses`."""
 
-    t: Annotated[list[Annotated[float, Field(ge=0, le=1e6)]], Field(min_length=1, max_length=MOST_POINTS)] = described(
+    t: Annotated[
+        list[Annotated[float, Field(ge=0, le=1e6)]], Field(min_length=1, max_length=MOST_POINTS)
+    ] = described(
         "Time of each point; each later than the previous one by 1 µs or more.",
         "s",
         [0.0, 0.5, 1.0],
     )
-    points: Annotated[list[Vector3], Field(min_length=1, max_length=MOST_POINTS)] | None = described(
-        "Positions [x, y, z] of the TCP in `frame`. The orientation is free.",
-        "m",
-        [[0.45, -0.15, 0.35], [0.45, 0.0, 0.4], [0.45, 0.15, 0.35]],
-        default=None,
+    points: Annotated[list[Vector3], Field(min_length=1, max_length=MOST_POINTS)] | None = (
+        described(
+            "Positions [x, y, z] of the TCP in `frame`. The orientation is free.",
+            "m",
+            [[0.45, -0.15, 0.35], [0.45, 0.0, 0.4], [0.45, 0.15, 0.35]],
+            default=None,
+        )
     )
     frame: Frame = frame_of("`points`; each of `poses` has its own")
-    poses: Annotated[list[BasePose], Field(min_length=1, max_length=MOST_POINTS)] | None = described(
-        "Poses of the TCP, each in the robot's base frame or in its `frame`.",
-        None,
-        [{"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}],
-        default=None,
+    poses: Annotated[list[BasePose], Field(min_length=1, max_length=MOST_POINTS)] | None = (
+        described(
+            "Poses of the TCP, each in the robot's base frame or in its `frame`.",
+            None,
+            [{"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}],
+            default=None,
+        )
     )
-    guess: JointPositions = described("Initial guess of the joint positions for the first point.", "rad", HOME)
+    guess: JointPositions = described(
+        "Initial guess of the joint positions for the first point.", "rad", HOME
+    )
     tolerance: float = described(
-        "Largest error of a point that counts as reached. It applies to the position and, for poses, to the rotation.",
+        "Largest error of a point that counts as reached. It applies to the position and, for "
+        "poses, to the rotation.",
         "m, rad",
         1e-6,
         default=1e-6,
@@ -65,7 +74,8 @@ class IKPathRequest(RobotWithTcp):
         le=0.1,
     )
     near_singular: float = described(
-        "A configuration is left out if the smallest singular value of the TCP's Jacobian is below this.",
+        "A configuration is left out if the smallest singular value of the TCP's Jacobian is below "
+        "this.",
         "1",
         0.01,
         default=0.01,
@@ -89,7 +99,9 @@ class IKPathRequest(RobotWithTcp):
         if len(self.t) != len(self.points or self.poses or []):
             raise PydanticCustomError("lengths", "`t` must have one time per point")
         if any(later - earlier < 1e-6 for earlier, later in pairwise(self.t)):
-            raise PydanticCustomError("order", "`t` must increase by 1 µs or more from point to point")
+            raise PydanticCustomError(
+                "order", "`t` must increase by 1 µs or more from point to point"
+            )
         return self
 
 
@@ -125,7 +137,9 @@ class IKPathAnswer(Answer):
     """Configurations along the path."""
 
     trajectory: JointPath
-    """Configurations of all points that are reached, not nearly singular and within the joint range."""
+    """Configurations of all points that are reached, not nearly singular and within the joint
+    range.
+    """
     points: list[TimedPathPoint]
     """One entry per point."""
 
@@ -138,7 +152,9 @@ class IKPathTask:
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """The answer of `POST /ik/path`, with the points that were tried within about `deadline` seconds."""
+        """The answer of `POST /ik/path`, with the points that were tried within about `deadline`
+        seconds.
+        """
         end = Deadline.after(deadline)
         request = self.request
         arm = Arm(robot=robot_named(request.robot), T_flange_tcp=to_matrix(request.tcp))
@@ -155,7 +171,9 @@ class IKPathTask:
         answer = IKPathAnswer(
             request=self.request_id,
             robot=request.robot,
-            trajectory=JointPath(np.array([point.t for point in written]), np.array([point.q for point in written])),
+            trajectory=JointPath(
+                np.array([point.t for point in written]), np.array([point.q for point in written])
+            ),
             points=points,
         )
         return TaskResult.of_json(answer)

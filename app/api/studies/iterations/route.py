@@ -20,10 +20,21 @@ from joulepath.app.api.shared.dependencies import (
     ServiceStore,
 )
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
-from joulepath.app.api.shared.parameters import CREATED_HEADERS, Key, StudyId, deadline_of, set_location
+from joulepath.app.api.shared.parameters import (
+    CREATED_HEADERS,
+    Key,
+    StudyId,
+    deadline_of,
+    set_location,
+)
 from joulepath.app.api.shared.problem_lists import MOTION_PROBLEMS
 from joulepath.app.api.shared.uploads import upload
-from joulepath.app.api.studies.iterations.task import StudyStep, StudyStepTask, large_step, study_step
+from joulepath.app.api.studies.iterations.task import (
+    StudyStep,
+    StudyStepTask,
+    large_step,
+    study_step,
+)
 from joulepath.app.engine.result import StoredAnswer, TaskResult
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import FieldError, InvalidRequest
@@ -80,16 +91,25 @@ async def add(
     cache: ServiceCache,
     key: Key = None,
 ) -> Any:
-    """Computes the next iteration and stores the request and the complete answer. Returns its energy and the changes
-    from the previous and the best iteration. A failed request returns its problem, and the study does not record it."""
+    """Computes the next iteration and stores the request and the complete answer. Returns its
+    energy and the changes from the previous and the best iteration. A failed request returns its
+    problem, and the study does not record it."""
     study = (await store.read(partial(studies.state, study_id=id))).study
     check_owner(client, study.owner)
-    step = await unless_disconnected(request, _step(body, study, request.state.id, engine, settings))
-    known = await store.read(partial(studies.known_step, study_id=id, kind=step.kind, request=step.sent, key=key))
+    step = await unless_disconnected(
+        request, _step(body, study, request.state.id, engine, settings)
+    )
+    known = await store.read(
+        partial(studies.known_step, study_id=id, kind=step.kind, request=step.sent, key=key)
+    )
     if known is None:
-        work = _located(step.kind, _made(step, request.state.id, engine, settings.max_deadline, cache))
+        work = _located(
+            step.kind, _made(step, request.state.id, engine, settings.max_deadline, cache)
+        )
         made = await unless_disconnected(request, work)
-        number, again = await store.write(partial(studies.add, study_id=id, step=made, key=key, client=client))
+        number, again = await store.write(
+            partial(studies.add, study_id=id, step=made, key=key, client=client)
+        )
     else:
         number, again = known, True
     set_location(request, response, f"/studies/{id}/iterations/{number}", again)
@@ -97,9 +117,15 @@ async def add(
 
 
 async def _step(
-    body: IterationBody | HeldBody, study: Study, request_id: str, engine: ArmEngine, settings: ServiceSettings
+    body: IterationBody | HeldBody,
+    study: Study,
+    request_id: str,
+    engine: ArmEngine,
+    settings: ServiceSettings,
 ) -> StudyStep:
-    """The request with the study's robot, figures and objective. Raises InvalidProblem if it names others."""
+    """The request with the study's robot, figures and objective. Raises InvalidProblem if it names
+    others.
+    """
     if not isinstance(body, HeldBody):
         return study_step(body, study.robot, study.figures, study.objective)
     task = StudyStepTask(body, study.robot, study.figures, study.objective, request_id)
@@ -107,11 +133,16 @@ async def _step(
 
 
 async def _located(kind: str, work: Coroutine[Any, Any, T]) -> T:
-    """What `work` returns. Raises what it raises; errors about a field with its path in this request."""
+    """What `work` returns. Raises what it raises; errors about a field with its path in this
+    request.
+    """
     try:
         return await work
     except InvalidRequest as error:
-        moved = [FieldError(loc=[each["loc"][0], kind, *each["loc"][1:]], msg=each["msg"]) for each in error.errors]
+        moved = [
+            FieldError(loc=[each["loc"][0], kind, *each["loc"][1:]], msg=each["msg"])
+            for each in error.errors
+        ]
         raise InvalidRequest(moved) from None
     except InvalidProblem as error:
         raise InvalidProblem(f"{kind}.{error.field}", str(error)) from None
@@ -120,7 +151,9 @@ async def _located(kind: str, work: Coroutine[Any, Any, T]) -> T:
 async def _made(
     step: StudyStep, request_id: str, engine: ArmEngine, max_deadline: float, cache: AnswerCache
 ) -> studies.Step:
-    """The iteration, with the answer of the endpoint that the request is for, or to an equal request."""
+    """The iteration, with the answer of the endpoint that the request is for, or to an equal
+    request.
+    """
     if step.optimize is None:
         with upload() as (file, path):
             file.write(step.evaluate)
@@ -131,7 +164,9 @@ async def _made(
     copy = await cache.copy(asked, request_id)
     if copy is not None:
         return _iteration(step, copy)
-    return _iteration(step, await engine.run(OptimizeTask(step.optimize, request_id), deadline), asked)
+    return _iteration(
+        step, await engine.run(OptimizeTask(step.optimize, request_id), deadline), asked
+    )
 
 
 @router.get(
@@ -142,7 +177,9 @@ async def _made(
 )
 async def show(
     id: StudyId,
-    number: Annotated[int, Path(description="The iteration's number.", examples=[1], ge=1, le=MOST_ITERATIONS)],
+    number: Annotated[
+        int, Path(description="The iteration's number.", examples=[1], ge=1, le=MOST_ITERATIONS)
+    ],
     store: ServiceStore,
 ) -> IterationDetail:
     """The request, its energy, and the state of the study after this iteration."""

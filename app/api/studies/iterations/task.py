@@ -1,4 +1,6 @@
-"""What an iteration of a study computes: the request that it gives, with the study's robot, figures and objective."""
+"""What an iteration of a study computes: the request that it gives, with the study's robot, figures
+and objective.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ R = TypeVar("R", OptimizeRequest, EvaluateRequest)
 
 @dataclass(frozen=True)
 class StudyStep:
-    """A request to the endpoint `kind` as it is stored, and as it is computed: `optimize`, or the document `evaluate`.
+    """A request to the endpoint `kind` as it is stored, and as it is computed: `optimize`, or the
+    document `evaluate`.
 
     `optimize` of a large body is a HeldBody.
     """
@@ -40,7 +43,9 @@ class StudyStepTask:
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """The content of a StudyStep. `deadline` is not watched: it takes a second at most. Raises InvalidProblem."""
+        """The content of a StudyStep. `deadline` is not watched: it takes a second at most. Raises
+        InvalidProblem.
+        """
         assert not isinstance(self.body, HeldBody), "in a worker it is the model itself"
         step = study_step(self.body, self.robot, self.figures, self.objective)
         held = None if step.optimize is None else pickled_body(step.optimize)
@@ -49,14 +54,16 @@ class StudyStepTask:
 
 
 def study_step(body: IterationBody, robot: str, figures: str | None, objective: str) -> StudyStep:
-    """The step that a body gives. Raises InvalidProblem if it names another robot or objective than its study, or other
-    figures."""
+    """The step that a body gives. Raises InvalidProblem if it names another robot or objective than
+    its study, or other figures."""
     step = body.root
     if isinstance(step, OptimizeStep):
         asked = _about("optimize", step.optimize, robot=robot, figures=figures, objective=objective)
         # all candidates: suggestions start from those that were ruled out, too
         computed = asked.model_copy(update={"candidates": "all"})
-        return StudyStep("optimize", asked.model_dump(mode="json", exclude_unset=True), optimize=computed)
+        return StudyStep(
+            "optimize", asked.model_dump(mode="json", exclude_unset=True), optimize=computed
+        )
     given = _about("evaluate", step.evaluate, robot=robot, figures=figures)
     sent = given.model_dump(mode="json", exclude_unset=True)
     return StudyStep("evaluate", sent, evaluate=given.model_dump_json(exclude_unset=True).encode())
@@ -73,7 +80,10 @@ def _about(kind: str, asked: R, **of_study: str | None) -> R:
     for name, value in of_study.items():
         if name in asked.model_fields_set and getattr(asked, name) != value:
             raise InvalidProblem(
-                f"{kind}.{name}", f"The study has another {name}: leave {name} out, or create another study."
+                f"{kind}.{name}",
+                f"The study has another {name}: leave {name} out, or create another study.",
             )
     # null is left out: that is what a request without figures says
-    return asked.model_copy(update={name: value for name, value in of_study.items() if value is not None})
+    return asked.model_copy(
+        update={name: value for name, value in of_study.items() if value is not None}
+    )

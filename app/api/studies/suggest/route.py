@@ -55,23 +55,31 @@ async def suggest(
     engine: ServiceArmEngine,
     store: ServiceStore,
 ) -> Response:
-    """Suggestions for the next iteration: each differs from the best iteration (or the last) in one respect. The
-    optimiser computes every suggestion. They are in order of the energy that they save, each with its body for
-    `POST /studies/{id}/iterations`."""
-    deadline = allowed_deadline(query.deadline, SuggestQuery.DEFAULT_DEADLINE, settings.max_deadline, "query")
+    """Suggestions for the next iteration: each differs from the best iteration (or the last) in one
+    respect. The optimiser computes every suggestion. They are in order of the energy that they
+    save, each with its body for `POST /studies/{id}/iterations`."""
+    deadline = allowed_deadline(
+        query.deadline, SuggestQuery.DEFAULT_DEADLINE, settings.max_deadline, "query"
+    )
     end = asyncio.get_running_loop().time() + deadline
     # if there are several workers, one stays free for other clients
-    computing = _Computing(engine, asyncio.Semaphore(max(1, settings.workers - 1)), request.state.id, end)
+    computing = _Computing(
+        engine, asyncio.Semaphore(max(1, settings.workers - 1)), request.state.id, end
+    )
     content = await unless_disconnected(request, _suggestions(store, id, query.base, computing))
     return result_response(TaskResult.of_json(content))
 
 
-async def _suggestions(store: Store, study_id: str, which: str, computing: _Computing) -> dict[str, Any]:
+async def _suggestions(
+    store: Store, study_id: str, which: str, computing: _Computing
+) -> dict[str, Any]:
     state = await store.read(partial(studies.state, study_id=study_id))
     known, study = state.best if which == "best" else state.last, state.study
     if known is None:
         raise EmptyStudy
-    iteration = (await store.read(partial(studies.entry, study_id=study_id, number=known.number))).iteration
+    iteration = (
+        await store.read(partial(studies.entry, study_id=study_id, number=known.number))
+    ).iteration
     least = studies.energy_of(study, iteration)
     _, body = await store.read(partial(answers.get, answer_id=iteration.answer_id))
     base = base_of(iteration.kind, iteration.request, orjson.loads(body), study.objective)
@@ -82,7 +90,9 @@ async def _suggestions(store: Store, study_id: str, which: str, computing: _Comp
     for outcome in outcomes:
         if "energy" in outcome:
             energy = outcome["energy"]
-            computed.append(outcome | {"gain": least - energy, "threshold_met": energy <= study.threshold})
+            computed.append(
+                outcome | {"gain": least - energy, "threshold_met": energy <= study.threshold}
+            )
     return {
         "study": study.id,
         "base": {"number": iteration.number, "energy": least},
@@ -93,7 +103,9 @@ async def _suggestions(store: Store, study_id: str, which: str, computing: _Comp
 
 @dataclass(frozen=True)
 class _Computing:
-    """Computes proposals until `end` [s] of the event loop's clock; `turn` limits how many run at the same time."""
+    """Computes proposals until `end` [s] of the event loop's clock; `turn` limits how many run at
+    the same time.
+    """
 
     engine: ArmEngine
     turn: asyncio.Semaphore
@@ -104,7 +116,9 @@ class _Computing:
         """The outcome of each proposal. Raises ShuttingDown."""
         try:
             async with asyncio.TaskGroup() as group:
-                running = [group.create_task(self._outcome(proposal, objective)) for proposal in found]
+                running = [
+                    group.create_task(self._outcome(proposal, objective)) for proposal in found
+                ]
         except ExceptionGroup as errors:
             # the first cancelled the other proposals
             raise errors.exceptions[0] from None
@@ -128,4 +142,8 @@ class _Computing:
                 return outcome | {"problem": reported(error).slug()}
         answer = orjson.loads(result.document)
         energy = answer["energy"][objective]["total"]
-        return outcome | {"energy": energy, "duration": answer["duration"], "status": answer["status"]}
+        return outcome | {
+            "energy": energy,
+            "duration": answer["duration"],
+            "status": answer["status"],
+        }

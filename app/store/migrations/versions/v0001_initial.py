@@ -138,7 +138,9 @@ def _answers() -> None:
         sa.Column("status", sa.String(16), nullable=True),
         sa.Column("size", sa.Integer(), nullable=False),
         sa.Column("body", sa.LargeBinary(), nullable=False),
-        sa.ForeignKeyConstraint(["study_id"], ["studies.id"], name="fk_answers_study_id", ondelete="CASCADE"),
+        sa.ForeignKeyConstraint(
+            ["study_id"], ["studies.id"], name="fk_answers_study_id", ondelete="CASCADE"
+        ),
         sa.PrimaryKeyConstraint("id", name="pk_answers"),
     )
     op.create_index("ix_answers_created_id", "answers", ["created", "id"])
@@ -154,7 +156,9 @@ def _job_events() -> None:
         sa.Column("number", sa.Integer(), autoincrement=False, nullable=False),
         sa.Column("name", sa.String(16), nullable=False),
         sa.Column("data", sa.JSON(), nullable=False),
-        sa.ForeignKeyConstraint(["job_id"], ["jobs.id"], name="fk_job_events_job_id", ondelete="CASCADE"),
+        sa.ForeignKeyConstraint(
+            ["job_id"], ["jobs.id"], name="fk_job_events_job_id", ondelete="CASCADE"
+        ),
         sa.PrimaryKeyConstraint("job_id", "number", name="pk_job_events"),
     )
 
@@ -165,7 +169,9 @@ def _cached_answers() -> None:
         sa.Column("key", sa.String(64), nullable=False),
         sa.Column("answer_id", sa.String(36), nullable=False),
         sa.Column("deadline", sa.Double(), nullable=True),
-        sa.ForeignKeyConstraint(["answer_id"], ["answers.id"], name="fk_cached_answers_answer_id", ondelete="CASCADE"),
+        sa.ForeignKeyConstraint(
+            ["answer_id"], ["answers.id"], name="fk_cached_answers_answer_id", ondelete="CASCADE"
+        ),
         sa.PrimaryKeyConstraint("key", name="pk_cached_answers"),
     )
     op.create_index("ix_cached_answers_answer_id", "cached_answers", ["answer_id"])
@@ -187,12 +193,17 @@ def _iterations() -> None:
         sa.Column("met_by", sa.Integer(), nullable=True),
         sa.Column("idempotency_key", sa.String(128), nullable=True),
         sa.ForeignKeyConstraint(["answer_id"], ["answers.id"], name="fk_iterations_answer_id"),
-        sa.ForeignKeyConstraint(["study_id"], ["studies.id"], name="fk_iterations_study_id", ondelete="CASCADE"),
+        sa.ForeignKeyConstraint(
+            ["study_id"], ["studies.id"], name="fk_iterations_study_id", ondelete="CASCADE"
+        ),
         sa.PrimaryKeyConstraint("study_id", "number", name="pk_iterations"),
         sa.UniqueConstraint("answer_id", name="uq_iterations_answer_id"),
     )
     op.create_index(
-        "ix_iterations_study_id_idempotency_key", "iterations", ["study_id", "idempotency_key"], unique=True
+        "ix_iterations_study_id_idempotency_key",
+        "iterations",
+        ["study_id", "idempotency_key"],
+        unique=True,
     )
 
 
@@ -219,12 +230,16 @@ def _job_requests() -> None:
         sa.Column("problem", sa.JSON(none_as_null=True), nullable=True),
         sa.Column("figures", sa.String(36), nullable=True),
         sa.ForeignKeyConstraint(["answer_id"], ["answers.id"], name="fk_job_requests_answer_id"),
-        sa.ForeignKeyConstraint(["job_id"], ["jobs.id"], name="fk_job_requests_job_id", ondelete="CASCADE"),
+        sa.ForeignKeyConstraint(
+            ["job_id"], ["jobs.id"], name="fk_job_requests_job_id", ondelete="CASCADE"
+        ),
         sa.PrimaryKeyConstraint("job_id", "number", name="pk_job_requests"),
         sa.UniqueConstraint("answer_id", name="uq_job_requests_answer_id"),
     )
     op.create_index("ix_job_requests_job_id_state", "job_requests", ["job_id", "state"])
-    op.create_index("ix_job_requests_state_number_job_id", "job_requests", ["state", "number", "job_id"])
+    op.create_index(
+        "ix_job_requests_state_number_job_id", "job_requests", ["state", "number", "job_id"]
+    )
 
 
 def downgrade() -> None:

@@ -13,7 +13,8 @@ POINT = {"positions", "velocities", "accelerations", "effort", "time_from_start"
 
 
 def followed(trajectory: dict[str, Any]) -> BPoly:
-    """What the controller does: the quintic through position, velocity and acceleration at both ends of a segment.
+    """What the controller does: the quintic through position, velocity and acceleration at both
+    ends of a segment.
 
     SciPy makes it from the Bernstein basis, apart from the formula in the library.
     """
@@ -24,7 +25,9 @@ def followed(trajectory: dict[str, Any]) -> BPoly:
     assert all(0 <= each["nanosec"] < 1_000_000_000 for each in times)
     t = np.array([each["sec"] + each["nanosec"] * 1e-9 for each in times])
     assert t[0] == 0 and (np.diff(t) > 0).all()
-    states = [[point[name] for name in ("positions", "velocities", "accelerations")] for point in points]
+    states = [
+        [point[name] for name in ("positions", "velocities", "accelerations")] for point in points
+    ]
     return BPoly.from_derivatives(t, np.array(states))
 
 

@@ -1,4 +1,6 @@
-"""Reads the motion part of RAPID and KRL programs, in the forms of the makers' manuals, statement by statement."""
+"""Reads the motion part of RAPID and KRL programs, in the forms of the makers' manuals, statement
+by statement.
+"""
 
 from __future__ import annotations
 
@@ -16,10 +18,13 @@ from joulepath.optimizer.export.program import Program
 NUMBER = r"-?\d+\.\d+"
 # the statements that the generated programs use, in the forms of the makers' manuals
 RAPID = re.compile(
-    rf"MODULE \w+|ENDMODULE|PROC \w+\(\)|ENDPROC|!.*|PERS tooldata (?P<tool>\w+):=\[TRUE,\[\[0,0,0\],\[1,0,0,0\]\],"
+    r"MODULE \w+|ENDMODULE|PROC \w+\(\)|ENDPROC|!.*|PERS tooldata "
+    r"(?P<tool>\w+):=\[TRUE,\[\[0,0,0\],\[1,0,0,0\]\],"
     rf"\[(?P<mass>{NUMBER}),\[(?P<com>[\d.,-]+)\],\[1,0,0,0\],0,0,0\]\];"
-    rf"|MoveAbsJ \[\[(?P<axes>({NUMBER},){{5}}{NUMBER})\],\[9E9(,9E9){{5}}\]\]\\NoEOffs,v\d+(\\T:=(?P<time>{NUMBER}))?,"
-    rf"(?P<zone>fine|z10),(?P<used>\w+);|WaitTime (?P<wait>{NUMBER});|SetDO (?P<signal>\w+),(?P<value>[01]);"
+    r"|MoveAbsJ "
+    rf"\[\[(?P<axes>({NUMBER},){{5}}{NUMBER})\],\[9E9(,9E9){{5}}\]\]\\NoEOffs,v\d+(\\T:=(?P<time>{NUMBER}))?,"
+    rf"(?P<zone>fine|z10),(?P<used>\w+);|WaitTime (?P<wait>{NUMBER});|SetDO "
+    r"(?P<signal>\w+),(?P<value>[01]);"
 )
 AXES = r"\{" + ",".join(rf"A{k} {NUMBER}" for k in range(1, 7)) + r"\}"
 KRL = re.compile(
@@ -89,7 +94,10 @@ def read_krl(file: WrittenFile) -> ReadBack:
         elif found["total"]:
             whole = moves[-1][0][-1]
             assert abs(whole - 100) < 1e-3
-            moves[-1] = [each * float(found["total"]) / whole for each in moves[-1][0]], moves[-1][1]
+            moves[-1] = (
+                [each * float(found["total"]) / whole for each in moves[-1][0]],
+                moves[-1][1],
+            )
             last = moves[-1][1][-1]
         others += [f"wait {found['wait']}"] if found["wait"] else []
         others += [f"{found['output']} {found['value']}"] if found["output"] else []
@@ -110,7 +118,9 @@ def through(t: Array, q: Array, at: Array) -> Array:
 
 
 def cut(t: Array, q: Array, at: Array) -> Array:
-    """Corners cut from middle to middle: the speed changes evenly in between; summed up in small steps."""
+    """Corners cut from middle to middle: the speed changes evenly in between; summed up in small
+    steps.
+    """
     speeds = np.diff(q, axis=0) / np.diff(t)[:, None]
     middles = (t[1:] + t[:-1]) / 2
     v = np.stack([np.interp(at, middles, speeds[:, j]) for j in range(6)], axis=1)
@@ -118,7 +128,9 @@ def cut(t: Array, q: Array, at: Array) -> Array:
     return np.asarray(q[0] + np.concatenate([np.zeros((1, 6)), travelled.cumsum(axis=0)]))
 
 
-def deviation(program: Program, back: ReadBack, other: Callable[[Array, Array, Array], Array]) -> float:
+def deviation(
+    program: Program, back: ReadBack, other: Callable[[Array, Array, Array], Array]
+) -> float:
     """Of straight lines between the points, and of another course along them."""
     worst = 0.0
     for move, (times, rows) in zip(program.moves, back.moves, strict=True):
@@ -127,5 +139,7 @@ def deviation(program: Program, back: ReadBack, other: Callable[[Array, Array, A
         fine = np.linspace(0, min(move.duration, t[-1]), 5000)
         truth = move.spline.curve(fine)
         lines = np.stack([np.interp(fine, t, q[:, j]) for j in range(6)], axis=1)
-        worst = max(worst, *(float(np.abs(each - truth).max()) for each in (lines, other(t, q, fine))))
+        worst = max(
+            worst, *(float(np.abs(each - truth).max()) for each in (lines, other(t, q, fine)))
+        )
     return worst

@@ -34,7 +34,9 @@ def random_spline(arm: Arm, seed: int, q_start: Array | None = None, inner: int 
 def arm_of(robot: str) -> Arm:
     """The arm, without a check of collisions. OWN is one of six joints whose maker is not known."""
     if robot == OWN:
-        return Arm(robot=replace(load_robot("ur5e"), name=OWN, title="Arm of a user"), collisions=False)
+        return Arm(
+            robot=replace(load_robot("ur5e"), name=OWN, title="Arm of a user"), collisions=False
+        )
     return Arm(robot=load_robot(robot), collisions=False)
 
 

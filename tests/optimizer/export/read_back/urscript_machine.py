@@ -1,4 +1,5 @@
-"""A small interpreter of URScript: what the generated programs use of it, statement by statement."""
+"""A small interpreter of URScript: what the generated programs use of it, statement by
+statement."""
 
 from __future__ import annotations
 
@@ -25,7 +26,8 @@ SIGNATURES: dict[str, tuple[str, ...]] = {
 }
 _STATEMENT = re.compile(
     r"(?P<begins>(def \w+\([\w, ]*\)|while .+|if .+|elif .+|else):)|(?P<end>end)|(?P<halt>halt)"
-    r"|(?P<returns>return .+)|((local |global )?(?P<name>[a-z]\w*) = (?P<value>.+))|(?P<call>[a-z]\w*\(.*\))"
+    r"|(?P<returns>return .+)|((local |global )?(?P<name>[a-z]\w*) = "
+    r"(?P<value>.+))|(?P<call>[a-z]\w*\(.*\))"
 )
 _EXPRESSION = re.compile(r"""^[\w\s.,+\-*/()<>=\[\]'"?:]+$""")
 
@@ -35,12 +37,15 @@ class Halt(Exception):
 
 
 class Controller:
-    """An arm that stands wherever servoj or movej last sent it, `lag` [rad] behind, with a `payload` [kg] in force.
+    """An arm that stands wherever servoj or movej last sent it, `lag` [rad] behind, with a
+    `payload` [kg] in force.
 
     It records what it is told.
     """
 
-    def __init__(self, q: Array, lag: float = 0.0, payload: float = 0.0, takes_payload: bool = True) -> None:
+    def __init__(
+        self, q: Array, lag: float = 0.0, payload: float = 0.0, takes_payload: bool = True
+    ) -> None:
         self.q, self.lag, self.payload = np.asarray(q, dtype=float), lag, payload
         self.takes_payload = takes_payload
         self.events: list[tuple[Any, ...]] = []
@@ -106,7 +111,9 @@ class Controller:
 
 
 def translated(text: str) -> str:
-    """The program as Python, line by line. Raises SyntaxError for a line that is no statement of URScript."""
+    """The program as Python, line by line. Raises SyntaxError for a line that is no statement of
+    URScript.
+    """
     lines, depth, globals_ = list[str](), 0, set(re.findall(r"global (\w+) =", text))
     outside = len(lines)
     for number, raw in enumerate(text.splitlines(), 1):
@@ -126,7 +133,9 @@ def translated(text: str) -> str:
         if found["begins"]:
             depth = inner + 1
             if line.startswith("def "):
-                lines.append("  " * depth + ("global " + ", ".join(sorted(globals_)) if globals_ else "pass"))
+                lines.append(
+                    "  " * depth + ("global " + ", ".join(sorted(globals_)) if globals_ else "pass")
+                )
     if depth != outside:
         raise SyntaxError("a block has no end")
     return "\n".join(lines)
