@@ -36,7 +36,7 @@ COPY scripts/import_all.py /tmp/
 RUN mkdir /opt/matplotlib \
     && python optimizer/native/build.py \
     && python /tmp/import_all.py \
-    && python -m joulepath.optimizer.energy.precompile --portable
+    && python -m joulepath.optimizer.dynamics.precompile --portable
 
 FROM ${BASE_IMAGE}
 RUN apt-get update \

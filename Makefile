@@ -70,7 +70,7 @@ bench: $(VENV)/.benchmarks kernels
 	$(PY) -m benchmarks $(BENCH_ARGS)
 
 kernels: $(VENV)/.runtime $(NATIVE)
-	@$(if $(JOULEPATH_ROBOTS),$(PY) -m joulepath.optimizer.energy.precompile $(subst $(comma), ,$(JOULEPATH_ROBOTS)))
+	@$(if $(JOULEPATH_ROBOTS),$(PY) -m joulepath.optimizer.dynamics.precompile $(subst $(comma), ,$(JOULEPATH_ROBOTS)))
 
 # The dev lockfile holds the runtime one whole, at the same versions.
 $(VENV)/.runtime: requirements.lock $(PY)

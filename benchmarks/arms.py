@@ -23,7 +23,7 @@ from benchmarks.service import Service, running
 from benchmarks.statistics import Spread
 from benchmarks.tasks import Kind, request_tasks
 from joulepath.models.registry import load_robot, robot_names
-from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 
 KIND: Kind = "joint to pose"
 

@@ -28,13 +28,12 @@ from benchmarks.tasks import MOUNTS
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.methods.free_spline import FreeSpline
-from joulepath.optimizer.methods.sqp_method import Guess
+from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm, Payload
@@ -45,7 +44,8 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.ends import label_of
-from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods.sqp_method import Guess
 
 POINTS = 40
 # members of each self-motion, and orientations of each free goal, among which the attack draws

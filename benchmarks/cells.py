@@ -18,13 +18,13 @@ from scipy.spatial.transform import Rotation
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
+from joulepath.optimizer.collision.clearance_constraint import RESERVE
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.collision.path_planner import Effort, plan_paths
-from joulepath.optimizer.collision.state_validity import ValidityCheckers
+from joulepath.optimizer.collision.planner.path_planner import Effort, plan_paths
+from joulepath.optimizer.collision.planner.state_validity import ValidityCheckers
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
-from joulepath.optimizer.nlp.clearance_constraint import RESERVE
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.scene import (
     Box,

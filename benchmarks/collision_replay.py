@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.collision.state_validity import StateValidityChecker
+from joulepath.optimizer.collision.planner.state_validity import StateValidityChecker
+from joulepath.optimizer.motion.spline import Spline, sample
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.trajectories.spline import Spline, sample
 
 
 def collisions(arm: Arm, spline: Spline, period: float) -> int:

@@ -38,9 +38,9 @@ from benchmarks.statistics import Spread
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
-from joulepath.optimizer.energy.dwell import holding_power
-from joulepath.optimizer.energy.kernel_cache import compile_kernel
-from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.dynamics.dwell import holding_power
+from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
+from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose

@@ -28,7 +28,7 @@ from benchmarks.slow_moves import compare
 from benchmarks.tasks import collision_free, flange
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
-from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.optimize import optimize, warm_up
 from joulepath.optimizer.problem.arm import Arm, Payload

@@ -16,6 +16,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -25,15 +26,15 @@ from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.linear_algebra import one_thread
-from joulepath.optimizer.methods.duration_intervals import fastest
+from joulepath.optimizer.motion import quintic
+from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.problem import LEAST_DURATION, Problem
 from joulepath.optimizer.search.attempts import in_time, solver_of
 from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.trajectories import quintic
-from joulepath.optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.optimizer.solve.methods.duration_intervals import fastest
 
 NEAR = 1.5  # rad
 # payloads as shares of the robot's rating, and where their centre of mass is [m], at most
@@ -120,9 +121,7 @@ def from_random_starts(problem: Problem, starts: int, rng: np.random.Generator) 
             candidate.q_start, candidate.q_goal, least * float(rng.uniform(*SLOWER)), rng
         )
         solver, fine = solver_of(incumbent, candidate, interval), number % 2 == 0
-        found = in_time(
-            incumbent, lambda s=solver, q=q, t=t, fine=fine: s.solve_from(q, t, fine)
-        ).spline  # type: ignore[misc]
+        found = in_time(incumbent, partial(solver.solve_from, q, t, fine)).spline
         if found is None or found.duration >= best:
             continue
         if incumbent.certified(candidate, found, incumbent.prepared.energy(found)).valid:

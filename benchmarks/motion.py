@@ -13,11 +13,11 @@ import pinocchio as pin
 from scipy.interpolate import BSpline
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.energy.limited_torque import limited_torque
-from joulepath.optimizer.energy.losses import breakdown
+from joulepath.optimizer.dynamics.limited_torque import limited_torque
+from joulepath.optimizer.dynamics.losses import breakdown
+from joulepath.optimizer.motion.limit_ratios import limit_ratios
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.energy import Energy
-from joulepath.optimizer.trajectories.limit_ratios import limit_ratios
 
 PERIOD = 1e-3  # largest period of the fine grid [s]
 

@@ -11,7 +11,7 @@ from benchmarks.reference import FILE, fingerprint, load, problem_of
 from benchmarks.statistics import Spread
 from benchmarks.tasks import move
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.optimize import optimize
 

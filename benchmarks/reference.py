@@ -32,15 +32,15 @@ from benchmarks.tasks import Move, move
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.energy.kernel_cache import compile_kernel
-from joulepath.optimizer.methods.duration_intervals import duration_intervals
-from joulepath.optimizer.methods.free_spline import FreeSpline
-from joulepath.optimizer.methods.sqp_method import Guess
+from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
+from joulepath.optimizer.motion import bspline
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.trajectories import bspline
-from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
+from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods.sqp_method import Guess
 
 FILE = Path(__file__).with_name("reference_energies.json")
 SEED, TASKS = 1, 100

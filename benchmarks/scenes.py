@@ -29,11 +29,11 @@ from joulepath import optimize
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
-from joulepath.optimizer.methods import METHODS
-from joulepath.optimizer.methods.planned_paths import ALONG_PLANNED_PATH, FROM_PLANNED_PATH
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import MethodName, Problem
+from joulepath.optimizer.solve.methods import METHODS
+from joulepath.optimizer.solve.methods.planned_paths import ALONG_PLANNED_PATH, FROM_PLANNED_PATH
 
 REPLAY = 1e-4  # s
 SOLVED = 0.99  # least fraction of solved tasks, of either kind

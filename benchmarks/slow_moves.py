@@ -29,16 +29,16 @@ from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import NEVER
 from joulepath.optimizer.exceptions import JoulepathError
-from joulepath.optimizer.methods.free_spline import FreeSpline
-from joulepath.optimizer.methods.method import SolveResult
-from joulepath.optimizer.methods.sqp_method import Guess
+from joulepath.optimizer.motion import bspline
+from joulepath.optimizer.motion.bspline import Basis
+from joulepath.optimizer.motion.spline import Spline, sampled
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.trajectories import bspline
-from joulepath.optimizer.trajectories.bspline import Basis
-from joulepath.optimizer.trajectories.spline import Spline, sampled
+from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods.method import SolveResult
+from joulepath.optimizer.solve.methods.sqp_method import Guess
 
 SlowKind = Literal["all joints", "one joint", "tenth"]
 SLOW_KINDS: tuple[SlowKind, ...] = ("all joints", "one joint", "tenth")

@@ -18,16 +18,16 @@ from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
 from benchmarks.tasks import Move, moves
 from joulepath.models.registry import load_robot
+from joulepath.optimizer.collision.clearance_constraint import RESERVE
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.energy.kernel_cache import compile_kernel
-from joulepath.optimizer.methods import solver_for
-from joulepath.optimizer.methods.method import SolveResult
-from joulepath.optimizer.nlp.clearance_constraint import RESERVE
+from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.optimize import warm_up
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import MethodName, Problem
+from joulepath.optimizer.solve.methods import solver_for
+from joulepath.optimizer.solve.methods.method import SolveResult
 
 PATIENCE = 60.0  # longest time of one solve [s]
 METHODS: tuple[MethodName, ...] = ("bspline", "time_scaling")

@@ -13,8 +13,8 @@ import pinocchio as pin
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.collision.clearance_constraint import RESERVE
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.nlp.clearance_constraint import RESERVE
 from joulepath.optimizer.problem.arm import Arm
 
 Kind = Literal["joint to pose", "pose to pose"]

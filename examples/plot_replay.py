@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.problem import Problem

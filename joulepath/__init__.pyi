@@ -52,6 +52,7 @@ from .optimizer.identify.logs.reading import LogOptions, LogReading, read_log
 from .optimizer.identify.options import Coupling, IdentificationOptions
 from .optimizer.identify.results import Advice, Parameter, Validation
 from .optimizer.inverse_kinematics import IKSolution, IKSolutions, inverse_kinematics
+from .optimizer.motion.spline import Spline
 from .optimizer.optimize import optimize
 from .optimizer.optimize_many import Optimized, optimize_many
 from .optimizer.pareto import pareto
@@ -128,7 +129,6 @@ from .optimizer.search.errors import (
     StopInCollision,
     TorqueInfeasible,
 )
-from .optimizer.trajectories.spline import Spline
 from .optimizer.what_if import WhatIf, what_if
 
 __all__ = [

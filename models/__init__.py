@@ -1,2 +1,1 @@
-"""Robots: their figures, each with a source, and the loader. Knows nothing of optimisation or
-HTTP."""
+"""Robots: data with sources and letters of trust, and the loaders."""

@@ -271,7 +271,7 @@ def main() -> None:
         print(f"  {name}:\n    value:")
         for capsule in fit(robot, folder, robot.link_names.index(name)):
             print(
-                f"      - [{', '.join(f'{x:.4f}' for x in [*capsule.axis.ravel(), capsule.radius])}]",
+                f"      - [{', '.join(f'{x:.4f}' for x in [*capsule.axis.ravel(), capsule.radius])}]",  # noqa: E501
                 flush=True,
             )
 

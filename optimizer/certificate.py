@@ -16,14 +16,18 @@ from joulepath.optimizer.collision.clearance_proof import proven_clearance
 from joulepath.optimizer.collision.close_pass import close_pass
 from joulepath.optimizer.collision.model import collision_model
 from joulepath.optimizer.deadline import checkpoint
-from joulepath.optimizer.energy.dwell import dwell_energy, holding_power
-from joulepath.optimizer.energy.losses import breakdown, friction_torque, relative_error
-from joulepath.optimizer.energy.torque_bound import TorqueSamples, torque_bounds
+from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power
+from joulepath.optimizer.dynamics.losses import breakdown, friction_torque, relative_error
+from joulepath.optimizer.dynamics.torque_bound import TorqueSamples, torque_bounds
 from joulepath.optimizer.kinematics.orientation_tolerance import excess_angle
 from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
 from joulepath.optimizer.kinematics.tcp import T_last_tcp
-from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.motion.limit_ratios import limit_ratios
+from joulepath.optimizer.motion.passing import deviations
+from joulepath.optimizer.motion.quadrature import grid, simpson_weights
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
@@ -33,10 +37,6 @@ from joulepath.optimizer.problem.tool_cone import ToolCone
 from joulepath.optimizer.problem.tool_path import SPEED_TOLERANCE, ToolPath
 from joulepath.optimizer.result.certificate import Certificate, EndError
 from joulepath.optimizer.result.energy import Energy
-from joulepath.optimizer.trajectories.limit_ratios import limit_ratios
-from joulepath.optimizer.trajectories.passing import deviations
-from joulepath.optimizer.trajectories.quadrature import grid, simpson_weights
-from joulepath.optimizer.trajectories.spline import Spline
 
 # instants of the grid between two looks at the deadline: some ten milliseconds
 BLOCK = 5000

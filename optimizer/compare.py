@@ -9,7 +9,6 @@ from functools import cached_property
 
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlineShares
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, JoulepathError
-from joulepath.optimizer.methods import METHODS
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.problem import MethodName, Problem
 from joulepath.optimizer.progress import (
@@ -22,6 +21,7 @@ from joulepath.optimizer.progress import (
 )
 from joulepath.optimizer.result.energy import Objective
 from joulepath.optimizer.result.solution import Solution
+from joulepath.optimizer.solve.methods import METHODS
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,14 +6,14 @@ import time
 
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.deadline import Clock
-from joulepath.optimizer.energy.kernel import kernel_for
+from joulepath.optimizer.dynamics.kernel import kernel_for
 from joulepath.optimizer.linear_algebra import one_thread
-from joulepath.optimizer.methods import METHODS
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.progress import Tell, forward, nobody
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.solve.methods import METHODS
 
 
 def optimize(problem: Problem, clock: Clock = time.perf_counter, tell: Tell = nobody) -> Solution:

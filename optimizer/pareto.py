@@ -29,6 +29,7 @@ import numpy as np
 from joulepath.optimizer.deadline import Clock
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, NoTrajectory
 from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.progress import (
     CandidatesFound,
@@ -45,7 +46,6 @@ from joulepath.optimizer.search.fastest import fastest, fastest_of
 from joulepath.optimizer.search.reserve import report_time
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sampled_ends import between
-from joulepath.optimizer.trajectories.spline import Spline
 
 LEAST_POINTS, MOST_POINTS = 2, 100
 # share of the time left for the search of the fastest motion, and for each end of the front

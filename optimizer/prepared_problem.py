@@ -11,24 +11,24 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.model import ClosestPair
-from joulepath.optimizer.energy.dwell import dwell_energy, holding_power, waits
-from joulepath.optimizer.energy.interval import arm_spread
-from joulepath.optimizer.energy.plant import Plant
-from joulepath.optimizer.energy.sensitivity import waiting_sensitivity
-from joulepath.optimizer.kinematics.course_tracing import Trace, joint_path, traces
-from joulepath.optimizer.kinematics.least_speed import LeastSpeed
-from joulepath.optimizer.kinematics.least_time import least_time
+from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power, waits
+from joulepath.optimizer.dynamics.interval import arm_spread
+from joulepath.optimizer.dynamics.plant import Plant
+from joulepath.optimizer.dynamics.sensitivity import waiting_sensitivity
 from joulepath.optimizer.kinematics.path_constraints import PathConstraints, path_constraints_of
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace, joint_path, traces
+from joulepath.optimizer.kinematics.tool_path.least_speed import LeastSpeed
+from joulepath.optimizer.kinematics.tool_path.least_time import least_time
+from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
+from joulepath.optimizer.motion.limit_ratios import too_much
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import Target
 from joulepath.optimizer.result.energy import Energy, Sensitivity
 from joulepath.optimizer.surroundings import Surroundings
-from joulepath.optimizer.trajectories.limit_ratios import too_much
-from joulepath.optimizer.trajectories.spline import Spline
 
 # value of a second in a minimum-time solve [W]: a hundred times what energy could make up for
 TIME_WEIGHT = 1e4

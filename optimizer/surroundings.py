@@ -12,24 +12,24 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.bodies import Indices
+from joulepath.optimizer.collision.clearance_constraint import ClearanceConstraint
 from joulepath.optimizer.collision.clearance_proof import is_proven_clear, proven_clearance
 from joulepath.optimizer.collision.model import ClosestPair, CollisionModel, collision_model
-from joulepath.optimizer.collision.path_planner import (
+from joulepath.optimizer.collision.planner.path_planner import (
     USUAL,
     Effort,
     PlannedPaths,
     PlanningEnd,
     plan_paths,
 )
+from joulepath.optimizer.collision.planner.state_validity import ValidityCheckers
 from joulepath.optimizer.collision.stand_ins import StandIns
-from joulepath.optimizer.collision.state_validity import ValidityCheckers
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.kinematics.forward import joint_placements
 from joulepath.optimizer.kinematics.path_constraints import PathConstraints, path_constraint_list
-from joulepath.optimizer.nlp.clearance_constraint import ClearanceConstraint
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.result.certificate import Clearance
-from joulepath.optimizer.trajectories.spline import Spline
 
 # samples of a motion at which distances are computed
 CONTACT_SAMPLES = 96

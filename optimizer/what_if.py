@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
-from joulepath.optimizer.energy.interval import with_interval
+from joulepath.optimizer.dynamics.interval import with_interval
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import Problem, narrowed
@@ -24,7 +25,6 @@ from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.incumbent import SLACK
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.trajectories.spline import Spline
 
 # least deadline of a search [s]; shares of the time that the first search leaves to the known
 # motion, and of what is left then for a search from it

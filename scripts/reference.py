@@ -19,7 +19,7 @@ HEAD = """# Reference
 
 Every endpoint with its request, answer and problems, and the fields of each of them. SI units; arrays over time are
 `[sample][joint]`. This page is written by `python -m scripts.reference` from the OpenAPI document at `/openapi.json`.
-"""
+"""  # noqa: E501
 PROBLEMS = """## Problems
 
 Every error is an `application/problem+json` document (RFC 9457) with `type`, `title`, `status`, `detail`, `instance`
@@ -27,7 +27,7 @@ Every error is an `application/problem+json` document (RFC 9457) with `type`, `t
 `/problems/duration-too-short`. Problems with the status 429 or 503 come with the header `Retry-After` [s].
 
 | type | status | when, and what to do | fields |
-| --- | --- | --- | --- |"""
+| --- | --- | --- | --- |"""  # noqa: E501
 _RANGES = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
 # fields of every problem
 _EVERY = {"type", "title", "status", "detail", "instance"}

@@ -354,5 +354,5 @@ assert all(each.MINE for each in (app, compare, evaluate, exceptions, models, op
 arm = joulepath.Arm(robot=joulepath.load_robot("ur5e"), collisions=False)
 motion = joulepath.Waypoints([[0.0] * 6, [0.1] * 6], 1.0)
 print(joulepath.evaluate(arm, motion).total.duration)
-"""
+"""  # noqa: E501
     assert in_a_process(code, tmp_path) == "1.0"

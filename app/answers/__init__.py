@@ -1,3 +1,1 @@
-"""Answers that the dataclasses of the library declare: JSON, schemas, and the fields of every
-answer.
-"""
+"""JSON documents and schemas of the answers that the library declares."""

@@ -103,7 +103,7 @@ def compile_kernel_of(robot_name: str) -> None:
     """
     from joulepath.app.cli.store import robot_named
     from joulepath.app.exceptions.stored import StoreUnavailable
-    from joulepath.optimizer.energy.kernel_cache import compile_kernel
+    from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
     from joulepath.optimizer.exceptions import UnknownRobot
     from joulepath.optimizer.native.library_cache import PATIENCE, CompilerHangs
 

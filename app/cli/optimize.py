@@ -16,7 +16,7 @@ from joulepath.app.cli.search import proof, search
 Examples:
   joulepath optimize request.json --output answer.json
   echo '{"start": {"q": [0, -1.57, 1.57, -1.57, -1.57, 0]}, "goal": {"q": [1, -1.2, 1.8, -2, -1.3, 0.5]}}' \\
-    | joulepath optimize - > answer.json"""
+    | joulepath optimize - > answer.json"""  # noqa: E501
 )
 @FILE
 @OUTPUT

@@ -17,7 +17,7 @@ Exit codes:
 
 \b
 Example:
-  joulepath serve --port 8080"""
+  joulepath serve --port 8080"""  # noqa: E501
 )
 @click.option(
     "--host", help="Address to listen on. Default: JOULEPATH_HOST, or 127.0.0.1: this machine only."

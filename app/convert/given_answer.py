@@ -19,10 +19,10 @@ from joulepath.optimizer.evaluate.sample_check import check_samples
 from joulepath.optimizer.evaluate.sampler import MOST_SAMPLES
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.export.program import Move, Program, Rest
+from joulepath.optimizer.motion.spline import Spline
+from joulepath.optimizer.motion.through_samples import spline_through
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cycle import LONGEST_ROUND, MOST_STOPS
-from joulepath.optimizer.trajectories.spline import Spline
-from joulepath.optimizer.trajectories.through_samples import spline_through
 
 MOST_KNOTS, HIGHEST_DEGREE, LONGEST_REST = 4096, 31, LONGEST_ROUND
 # of a stop: a move, two lines, a path, a dwell and a wait

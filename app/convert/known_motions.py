@@ -9,7 +9,7 @@ import orjson
 
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.optimizer.cycle.known_motions import KnownMotion, KnownMotions
-from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.motion.spline import Spline
 
 _SPLINE = ("degree", "knots", "control_points")
 

@@ -12,10 +12,10 @@ import numpy as np
 from benchmarks.motion import SplineMotion
 from benchmarks.planners.planner import CONTROL_POINTS, NODES
 from joulepath.models.robot import Array, FrictionLaw, Robot
-from joulepath.optimizer.energy.inverse_dynamics import SymbolicPayload, inverse_dynamics
-from joulepath.optimizer.energy.losses import drawn_power, power_flow
-from joulepath.optimizer.trajectories.bspline import DEGREE, Basis, basis_matrix, clamped
-from joulepath.optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.optimizer.dynamics.inverse_dynamics import SymbolicPayload, inverse_dynamics
+from joulepath.optimizer.dynamics.losses import drawn_power, power_flow
+from joulepath.optimizer.motion.bspline import DEGREE, Basis, basis_matrix, clamped
+from joulepath.optimizer.motion.seven_segment import shortest_duration
 
 WIDTH = 0.5  # width of the smoothed corners of the power [W]
 KNEE = 0.02  # speed range of the smoothed friction reversal [rad/s]

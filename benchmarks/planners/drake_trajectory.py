@@ -20,8 +20,8 @@ from benchmarks.motion import SplineMotion
 from benchmarks.planners.planner import CONTROL_POINTS, NODES
 from joulepath.models.robot import Array, Robot
 from joulepath.models.urdf import urdf_of
-from joulepath.optimizer.trajectories.bspline import DEGREE, Basis, clamped
-from joulepath.optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.optimizer.motion.bspline import DEGREE, Basis, clamped
+from joulepath.optimizer.motion.seven_segment import shortest_duration
 
 WIDTH = 0.5  # width of the smoothed corners of the power [W]
 KNEE = 0.02  # speed range of the smoothed friction reversal [rad/s]

@@ -7,14 +7,14 @@ from __future__ import annotations
 from benchmarks.motion import SplineMotion
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.exceptions import JoulepathError
-from joulepath.optimizer.methods import solver_for
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.optimize import optimize, warm_up
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.solve.methods import solver_for
 
 PATIENCE = 10.0  # s
 

@@ -1,3 +1,1 @@
-"""How well a robot's figures are known: the document of those identified on one arm, and what their
-errors may be.
-"""
+"""Uncertainty of a robot's figures, and the document of figures identified on one arm."""

@@ -1,2 +1,1 @@
-"""Readers of files that users upload: they count what they read, and can be stopped while they
-do."""
+"""Bounded, interruptible readers of uploaded files."""

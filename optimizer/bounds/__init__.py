@@ -1,3 +1,1 @@
-"""A bound on the energy of a pair that takes the copper loss of holding against gravity into
-account.
-"""
+"""Proven lower bounds on the energy of a motion."""

@@ -43,8 +43,8 @@ from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.collision.pair_distance import WitnessPoints
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.result.certificate import Clearance
-from joulepath.optimizer.trajectories.spline import Spline
 
 # an interval is done if its bound is this near to the least sampled distance: absolutely [m], or
 # relative to it

@@ -11,10 +11,10 @@ from dataclasses import replace
 
 from joulepath.optimizer.collision.clearance_proof import proven_clearance
 from joulepath.optimizer.collision.model import CollisionModel, collision_model
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.scene import Scene
 from joulepath.optimizer.result.certificate import Clearance
-from joulepath.optimizer.trajectories.spline import Spline
 
 # distance [m] below which a motion is reported to pass close: what the tracking error of a
 # controller, the calibration of an arm and the place of a body in a cell add up to

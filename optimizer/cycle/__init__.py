@@ -1,3 +1,1 @@
-"""Cycles of many stops: which configuration at each, found as a shortest path through proven
-bounds.
-"""
+"""Work cycles of many stops: the configuration at each stop, by a shortest path."""

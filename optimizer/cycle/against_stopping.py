@@ -16,10 +16,10 @@ from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleMove, C
 from joulepath.optimizer.cycle.layers import Layer
 from joulepath.optimizer.cycle.moves import Wait
 from joulepath.optimizer.cycle.passing_leg import PassingLeg
-from joulepath.optimizer.energy.interval import Known
+from joulepath.optimizer.dynamics.interval import Known
+from joulepath.optimizer.motion.joined import joined
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.result.solution import Solution
-from joulepath.optimizer.trajectories.joined import joined
 
 # share of the deadline that the cycle with rests may take
 SHARE = 0.4

@@ -17,13 +17,13 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.bounds.least_displacement import ROUNDING
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.cycle.layers import Layer
 from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
-from joulepath.optimizer.kinematics.pose_boxes import PoseBoxes
-from joulepath.optimizer.kinematics.turned_pose_boxes import BRANCHES, TurnedPose
+from joulepath.optimizer.kinematics.covers.pose_boxes import PoseBoxes
+from joulepath.optimizer.kinematics.covers.turned_pose_boxes import BRANCHES, TurnedPose
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.search.least_displacement import ROUNDING
 
 # cells of the angle at first, and the half width [rad] below which one is not halved; nor if no
 # side of its box is longer than another one

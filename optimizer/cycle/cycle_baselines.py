@@ -19,7 +19,7 @@ from joulepath.optimizer.cycle.cycle_solution import (
 from joulepath.optimizer.cycle.moves import moves_of
 from joulepath.optimizer.cycle.rests import dwell_energies, rest_sensitivity
 from joulepath.optimizer.deadline import Clock
-from joulepath.optimizer.energy.interval import Known, saving_interval
+from joulepath.optimizer.dynamics.interval import Known, saving_interval
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.free_order import is_given_order_allowed

@@ -23,7 +23,7 @@ from joulepath.optimizer.cycle.rests import dwell_costs
 from joulepath.optimizer.cycle.ways import layers_of
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError, NoTrajectory
-from joulepath.optimizer.methods.method import SolveStatus
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.problem import Problem
@@ -33,7 +33,7 @@ from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.attempts import settled, solve
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.solve.methods.method import SolveStatus
 
 # shares of the deadline that the search leaves to the motions of its answer, and these to certify a
 # simpler cycle that needs less

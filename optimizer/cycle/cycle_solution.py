@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from joulepath.optimizer.declared import Internal, Joules, Ratio, Seconds
-from joulepath.optimizer.energy.interval import Known, with_interval
+from joulepath.optimizer.dynamics.interval import Known, with_interval
 from joulepath.optimizer.problem.stops import PlannedMove
 from joulepath.optimizer.result.cycle import (
     CycleCertificate,

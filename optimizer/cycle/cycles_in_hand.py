@@ -17,11 +17,11 @@ from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleBaselin
 from joulepath.optimizer.cycle.time_sharing import duration_of
 from joulepath.optimizer.cycle.timed_cycle import Pair, Timed, TimedSearch
 from joulepath.optimizer.deadline import DeadlinePassed, watch
-from joulepath.optimizer.energy.interval import Known
+from joulepath.optimizer.dynamics.interval import Known
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
+from joulepath.optimizer.motion.spline import Spline, lasting, retimed
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.incumbent import SLACK
-from joulepath.optimizer.trajectories.spline import Spline, lasting, retimed
 
 # share of a duration by which moves are slowed to see what a second more saves
 SLOWER = 1e-3

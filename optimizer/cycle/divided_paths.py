@@ -16,10 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from joulepath.models.robot import Array, Limits, Mask
+from joulepath.optimizer.bounds.lower_bound import lower_bounds
 from joulepath.optimizer.cycle.layers import arms_at
 from joulepath.optimizer.cycle.strands import Strand, strands_of
 from joulepath.optimizer.cycle.ways import layers_of_stop
-from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.free_order import FreeOrder
@@ -29,7 +30,6 @@ from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.tool_path import Section
 from joulepath.optimizer.search.end_feasibility import check_configurations
 from joulepath.optimizer.search.errors import PathInfeasible
-from joulepath.optimizer.search.lower_bound import lower_bounds
 
 # places at which a path may be divided: even fractions of it
 PLACES = np.linspace(0.0, 1.0, 129)

@@ -24,6 +24,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.least_displacement import ROUNDING
+from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.cycle.chains import LeastChain
 from joulepath.optimizer.cycle.covered_layer import CoveredLayer
@@ -35,8 +37,6 @@ from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.search.least_displacement import ROUNDING
-from joulepath.optimizer.search.lower_bound import LeastBound
 
 # cells of a layer that are split in a cycle; pairs of two layers of cells that are bounded at once,
 # and how often in a cycle; cycles; the share of the least known chain that will do

@@ -18,10 +18,10 @@ from typing import Any, Literal
 import numpy as np
 import pinocchio as pin
 
-from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
 
 # how a motion was looked for: as the search of a cycle tries it, to the end, at a price of time, or
 # for its duration

@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.kinematics.course_tracing import Trace
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
+from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.branches import BranchFilter

@@ -19,7 +19,7 @@ from joulepath.optimizer.cycle.errors import NoSequence
 from joulepath.optimizer.cycle.legs import Leg
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
-from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.motion.spline import Spline
 
 # share of the search's time left that one leg may take: among obstacles, one without a way would
 # take all of it

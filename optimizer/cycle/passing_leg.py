@@ -16,16 +16,16 @@ from itertools import pairwise
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.lower_bound import travel_bounds
 from joulepath.optimizer.cycle.layers import Layer
 from joulepath.optimizer.cycle.legs import Leg, between, bounds_of, kinds_of
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.motion.passing import pass_times
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LONGEST_DURATION
 from joulepath.optimizer.result.cycle import Pass
-from joulepath.optimizer.search.lower_bound import travel_bounds
-from joulepath.optimizer.trajectories.passing import pass_times
-from joulepath.optimizer.trajectories.spline import Spline
 
 # pairs of ends of one leg, each of which has routes of its own
 MOST_PASSING_PAIRS = 500_000

@@ -13,12 +13,12 @@ from joulepath.optimizer.cycle.lazy_search import SHARE_OF_A_LEG, LazySearch
 from joulepath.optimizer.cycle.legs import Leg
 from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
-from joulepath.optimizer.methods import solver_for
-from joulepath.optimizer.methods.duration_intervals import DurationInterval
-from joulepath.optimizer.methods.fastest_motion import FastestMotion
-from joulepath.optimizer.methods.method import Method, SolveResult
+from joulepath.optimizer.motion.spline import Spline, sampled
 from joulepath.optimizer.problem.problem import LEAST_DURATION
-from joulepath.optimizer.trajectories.spline import Spline, sampled
+from joulepath.optimizer.solve.methods import solver_for
+from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval
+from joulepath.optimizer.solve.methods.fastest_motion import FastestMotion
+from joulepath.optimizer.solve.methods.method import Method, SolveResult
 
 
 @dataclass(frozen=True)

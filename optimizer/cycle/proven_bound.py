@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.cycle.chains import LeastChain
 from joulepath.optimizer.cycle.free_ends_chain import FreeEndsChain
 from joulepath.optimizer.cycle.layers import Layer
@@ -15,14 +16,13 @@ from joulepath.optimizer.cycle.legs import Leg
 from joulepath.optimizer.cycle.passing_leg import PassingLeg
 from joulepath.optimizer.cycle.rests import least_holding_power, rest_energy
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.kinematics.wrist_geometry import potential_rates
+from joulepath.optimizer.kinematics.covers.wrist_geometry import potential_rates
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.stops import PlannedMove
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.free_ends_bound import backwards, bound_between
 from joulepath.optimizer.search.free_goal_bound import family_bound
-from joulepath.optimizer.search.lower_bound import LeastBound
 from joulepath.optimizer.search.self_motion_bound import self_motion_bound
 
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.layers import Layer
-from joulepath.optimizer.energy.dwell import brake_power, dwell_energy, holding_power, waits
-from joulepath.optimizer.energy.interval import arm_spread
-from joulepath.optimizer.energy.plant import Plant
-from joulepath.optimizer.energy.sensitivity import waiting_sensitivity
+from joulepath.optimizer.dynamics.dwell import brake_power, dwell_energy, holding_power, waits
+from joulepath.optimizer.dynamics.interval import arm_spread
+from joulepath.optimizer.dynamics.plant import Plant
+from joulepath.optimizer.dynamics.sensitivity import waiting_sensitivity
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.stops import PlannedMove
 from joulepath.optimizer.result.energy import Sensitivity

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.deadline import end_if_stopped
 from joulepath.optimizer.kinematics.angles import wrapped
-from joulepath.optimizer.search.lower_bound import LeastBound
 
 # steps of displacement, up to so much [rad], and of gain
 AWAY, FARTHEST, GAINS = 48, 4 * np.pi, 48

@@ -15,14 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.energy.bus_flow import BusFlow, charge_steps, charges, pooled
-from joulepath.optimizer.energy.dwell import brake_power, holding_power, waits
-from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.dynamics.bus_flow import BusFlow, charge_steps, charges, pooled
+from joulepath.optimizer.dynamics.dwell import brake_power, holding_power, waits
+from joulepath.optimizer.dynamics.plant import Plant
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.stops import PlannedMove
-from joulepath.optimizer.trajectories.spline import Spline
 
 
 @dataclass(frozen=True)

@@ -28,15 +28,15 @@ from joulepath.optimizer.cycle.move_problem import LEAST_TIME, problem_of
 from joulepath.optimizer.cycle.rests import rest_sensitivity
 from joulepath.optimizer.cycle.stored_charge import Demand, charges_of, drawn, flows
 from joulepath.optimizer.deadline import Clock, Deadline
-from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stops import PlannedMove
 from joulepath.optimizer.result.energy import StorageUse
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.trajectories.spline import Spline
 
 # shares of the deadline for the first search, and of what is left for the second one and for the
 # moves

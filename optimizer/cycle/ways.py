@@ -16,10 +16,10 @@ from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.cycle.layers import Layer, arms_at, layer_of
 from joulepath.optimizer.cycle.legs import MOST_ON_WAY
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.kinematics.course_tracing import Trace, traces_of_each
 from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace, traces_of_each
+from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.cycle import START, Cycle

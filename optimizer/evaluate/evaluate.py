@@ -18,11 +18,11 @@ import pinocchio as pin
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
-from joulepath.optimizer.energy.bus_flow import charges
-from joulepath.optimizer.energy.interval import arm_spread, with_interval
-from joulepath.optimizer.energy.losses import breakdown, power_flow
-from joulepath.optimizer.energy.plant import Plant
-from joulepath.optimizer.energy.sensitivity import energy_sensitivity
+from joulepath.optimizer.dynamics.bus_flow import charges
+from joulepath.optimizer.dynamics.interval import arm_spread, with_interval
+from joulepath.optimizer.dynamics.losses import breakdown, power_flow
+from joulepath.optimizer.dynamics.plant import Plant
+from joulepath.optimizer.dynamics.sensitivity import energy_sensitivity
 from joulepath.optimizer.evaluate.interval_energy import IntervalEnergy, joined
 from joulepath.optimizer.evaluate.limit_report import LimitMonitor, LimitReport
 from joulepath.optimizer.evaluate.nearest_contact import ClearanceMonitor, LeastClearance
@@ -36,12 +36,12 @@ from joulepath.optimizer.evaluate.recording import BLOCK
 from joulepath.optimizer.evaluate.sampler import Sampler
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.motion.quadrature import lobatto_panels
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.result.certificate import Clearance
 from joulepath.optimizer.result.energy import Energy, Sensitivity
 from joulepath.optimizer.result.solution import Samples, Solution
-from joulepath.optimizer.trajectories.quadrature import lobatto_panels
-from joulepath.optimizer.trajectories.spline import Spline
 
 # quadrature panels: their greatest length [s], unless a polynomial piece would have more than
 # MOST_PANELS of them

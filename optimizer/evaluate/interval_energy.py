@@ -8,7 +8,7 @@ from functools import reduce
 from typing import TypeVar
 
 from joulepath.optimizer.declared import Joules, Ratio, Seconds, Watts
-from joulepath.optimizer.energy.losses import relative_error
+from joulepath.optimizer.dynamics.losses import relative_error
 from joulepath.optimizer.result.energy import Energy, StorageUse
 
 Sum = TypeVar("Sum")

@@ -9,11 +9,11 @@ import numpy as np
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.declared import NullIfInfinite, Ratio, Seconds, Unit
-from joulepath.optimizer.energy.limited_torque import limited_torque
+from joulepath.optimizer.dynamics.limited_torque import limited_torque
 from joulepath.optimizer.evaluate.piecewise_motion import Indices, PiecewiseMotion
 from joulepath.optimizer.kinematics.path_constraints import path_constraints_of
+from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE, ratios
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE, ratios
 
 LimitName = Literal[
     "position",
@@ -97,13 +97,13 @@ class LimitMonitor:
             k, j = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
             bound = nearer[k, j] if name == "position" else bounds[name][j]
             self._note(
-                name,
+                name,  # type: ignore[arg-type]
                 float(ratio[k, j]),
                 int(j),
                 float(t[k]),
                 float(values[name][k, j]),
                 float(bound),
-            )  # type: ignore[arg-type]
+            )
         if self._path is not None:
             path_ratios = self._path.ratios(q, v)
             for c, path_name in enumerate(self._path.names):

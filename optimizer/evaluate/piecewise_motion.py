@@ -32,10 +32,10 @@ from joulepath.optimizer.evaluate.recording import (
     Waypoints,
     check_joints,
 )
+from joulepath.optimizer.motion import quintic
+from joulepath.optimizer.motion.spline import Spline
+from joulepath.optimizer.motion.time_scalings import blend_time
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.trajectories import quintic
-from joulepath.optimizer.trajectories.spline import Spline
-from joulepath.optimizer.trajectories.time_scalings import blend_time
 
 Indices = npt.NDArray[np.int64]
 

@@ -141,9 +141,9 @@ class Recording:
             )
         rows = [slice(low, high) for low, high in pairwise([*range(0, len(t), BLOCK), len(t)])]
         blocks = [
-            RecordedRows(*(None if each is None else each[part] for each in columns))
+            RecordedRows(*(None if each is None else each[part] for each in columns))  # type: ignore[arg-type]
             for part in rows
-        ]  # type: ignore[arg-type]
+        ]
         return cls(blocks, edges=edges)
 
     @property

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.evaluate.errors import NotCertified
+from joulepath.optimizer.motion.spline import Spline, sample
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.trajectories.spline import Spline, sample
 
 # largest difference of given samples from a motion: rounding of q [rad], and of v, a, tau relative
 # to their limits

@@ -8,9 +8,9 @@ from dataclasses import fields
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.energy.bus_flow import drawn_at
-from joulepath.optimizer.energy.losses import power_flow
-from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.dynamics.bus_flow import drawn_at
+from joulepath.optimizer.dynamics.losses import power_flow
+from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.evaluate.piecewise_motion import PiecewiseMotion
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.result.solution import Samples

@@ -20,7 +20,7 @@ from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.collision.model import CollisionModel, collision_model
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.declared import Axes, Count, Internal, PerJoint, Ratio, Seconds, Unit
-from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.excitation.errors import ExcitationInfeasible
 from joulepath.optimizer.excitation.excitation_problem import ExcitationProblem
@@ -34,13 +34,13 @@ from joulepath.optimizer.excitation.limits import (
 )
 from joulepath.optimizer.excitation.torque_columns import TorqueColumns
 from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.motion.spline import Spline, retimed
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import HalfSpace, Obstacle, Scene
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.result.solution import Trajectory
-from joulepath.optimizer.trajectories.spline import Spline, retimed
 
 MOUNTING_PLANE = "mounting plane"
 # states of the period at which columns are computed; at each of them the limits, too

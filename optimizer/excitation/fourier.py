@@ -16,8 +16,8 @@ import numpy as np
 from scipy.linalg import null_space
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.trajectories.bspline import DEGREE, clamped, fit
-from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.motion.bspline import DEGREE, clamped, fit
+from joulepath.optimizer.motion.spline import Spline
 
 # knot spans of the spline for every harmonic: it differs from the series by some 1e-9 rad
 _SPANS = 24

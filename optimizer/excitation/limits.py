@@ -10,7 +10,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.energy.limited_torque import limited_torque
+from joulepath.optimizer.dynamics.limited_torque import limited_torque
 from joulepath.optimizer.problem.arm import Arm
 
 # share of a limit that the penalty begins at: it gives way a little

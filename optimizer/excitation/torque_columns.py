@@ -11,8 +11,8 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.energy.link_regressor import body_parameters
-from joulepath.optimizer.energy.torque_regressor import torque_regressor
+from joulepath.optimizer.dynamics.link_regressor import body_parameters
+from joulepath.optimizer.dynamics.torque_regressor import torque_regressor
 from joulepath.optimizer.excitation.excitation_problem import Part
 from joulepath.optimizer.identify.arm.base_parameters import base_parameters
 from joulepath.optimizer.identify.fits.torque_fit import LEAST_LOAD_SPREAD

@@ -6,7 +6,7 @@ import numpy as np
 
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.deadline import checkpoint
-from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.evaluate.errors import NotCertified
 from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
 from joulepath.optimizer.export.program import Program

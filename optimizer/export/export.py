@@ -177,7 +177,7 @@ def export(
         raise DeadlineExceeded([]) from None
     scale = program.speed_scale
     return ExportedFile(
-        name=f"joulepath-{program.robot.name}{'' if scale == 1 else f'-speed-{scale:g}'}.{written.extension}",
+        name=f"joulepath-{program.robot.name}{'' if scale == 1 else f'-speed-{scale:g}'}.{written.extension}",  # noqa: E501
         content=written.content,
         media_type=written.media_type,
         speed_scale=scale,

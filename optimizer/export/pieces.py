@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.motion.spline import Spline
 
 
 def breaks(spline: Spline) -> Array:

@@ -11,8 +11,8 @@ import numpy as np
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.motion.spline import Spline, retimed, sample
 from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.trajectories.spline import Spline, retimed, sample
 
 JOIN = 1e-6
 """Largest jump [rad] of a joint from the end of a move to the start of the next."""

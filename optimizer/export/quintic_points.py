@@ -12,7 +12,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.pieces import breaks
 from joulepath.optimizer.export.program import Move, Program
-from joulepath.optimizer.trajectories.spline import Spline, sample
+from joulepath.optimizer.motion.spline import Spline, sample
 
 POSITION_TOLERANCE, VELOCITY_TOLERANCE = 1e-4, 1e-2
 """Largest deviation from the spline [rad], [rad/s]."""

@@ -24,8 +24,8 @@ from joulepath.optimizer.export.facts import WrittenFile, check_joints, comment,
 from joulepath.optimizer.export.pieces import pieces
 from joulepath.optimizer.export.program import Move, Program, Timed
 from joulepath.optimizer.export.urscript_parts import CHECKS, serving
+from joulepath.optimizer.motion.spline import peak_rates
 from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.trajectories.spline import peak_rates
 
 MOST_PIECES = 2_000
 """Most polynomials of a program: about a megabyte."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from joulepath.models.robot import Array, Mask, Robot
 from joulepath.models.uncertainty.parameters import LINKS
-from joulepath.optimizer.energy.link_regressor import BODY, body_parameters
+from joulepath.optimizer.dynamics.link_regressor import BODY, body_parameters
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.arm.fitted_arm import own_arm
 from joulepath.optimizer.identify.document import document_of

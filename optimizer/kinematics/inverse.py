@@ -27,10 +27,7 @@ import numpy as np
 
 from joulepath.models.robot import MOST_ROBOTS, Array, Limits, Robot
 from joulepath.optimizer.exceptions import InvalidProblem, SingularPose, UnreachablePose
-from joulepath.optimizer.kinematics import redundant_curve, traced_curve
 from joulepath.optimizer.kinematics.chain import Chain
-from joulepath.optimizer.kinematics.decomposition import DecomposedArm
-from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives, nearest_turns
 from joulepath.optimizer.kinematics.ik_solutions import (
     LimitedSolution,
     PrincipalSolution,
@@ -39,13 +36,16 @@ from joulepath.optimizer.kinematics.ik_solutions import (
 from joulepath.optimizer.kinematics.isolated import distinct
 from joulepath.optimizer.kinematics.multi_start import MultiStart
 from joulepath.optimizer.kinematics.reach import REACH, at_the_edge, out_of_reach
-from joulepath.optimizer.kinematics.redundant_arm import RedundantArm
-from joulepath.optimizer.kinematics.redundant_curve import RedundantCurve
 from joulepath.optimizer.kinematics.self_motion import SelfMotion, is_point, spread, without_gaps
+from joulepath.optimizer.kinematics.seven import redundant_curve, traced_curve
+from joulepath.optimizer.kinematics.seven.redundant_arm import RedundantArm
+from joulepath.optimizer.kinematics.seven.redundant_curve import RedundantCurve
+from joulepath.optimizer.kinematics.seven.traced_arm import TracedArm
+from joulepath.optimizer.kinematics.seven.traced_curve import TracedCurve
+from joulepath.optimizer.kinematics.six.decomposition import DecomposedArm
+from joulepath.optimizer.kinematics.six.full_turns import full_turn_alternatives, nearest_turns
+from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
 from joulepath.optimizer.kinematics.tcp import flange_pose
-from joulepath.optimizer.kinematics.traced_arm import TracedArm
-from joulepath.optimizer.kinematics.traced_curve import TracedCurve
-from joulepath.optimizer.kinematics.ur_closed_form import URClosedForm
 from joulepath.optimizer.problem.branches import BranchLabel
 
 # greatest error [m, rad] of the forward kinematics of a solution against the pose

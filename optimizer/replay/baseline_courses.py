@@ -9,23 +9,23 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import checkpoint
-from joulepath.optimizer.energy.losses import breakdown
-from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.dynamics.losses import breakdown
+from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.replay.planned import PlannedBaseline
-from joulepath.optimizer.replay.reference import Course, course_of, reference
-from joulepath.optimizer.result.solution import BaselineName
-from joulepath.optimizer.trajectories.ruckig_motion import time_optimal_spline
-from joulepath.optimizer.trajectories.spline import lasting
-from joulepath.optimizer.trajectories.time_scalings import (
+from joulepath.optimizer.motion.ruckig_motion import time_optimal_spline
+from joulepath.optimizer.motion.spline import lasting
+from joulepath.optimizer.motion.time_scalings import (
     blend_time,
     default_times,
     quintic_spline,
     trapezoid_law,
 )
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.replay.planned import PlannedBaseline
+from joulepath.optimizer.replay.reference import Course, course_of, reference
+from joulepath.optimizer.result.solution import BaselineName
 
 # relative differences of a reported duration, which is exact, and of a mechanical work, which two
 # quadratures give

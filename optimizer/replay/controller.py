@@ -11,8 +11,8 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.energy.losses import friction_torque
-from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.dynamics.losses import friction_torque
+from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.replay.reference import Reference
 
 ControlName = Literal["feed_forward", "pd"]

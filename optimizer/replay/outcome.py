@@ -9,9 +9,9 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.declared import Internal, Joules, Metres, PerJoint, Ratio, Unit
-from joulepath.optimizer.energy.limited_torque import limited_torque
-from joulepath.optimizer.energy.losses import breakdown, friction_torque
-from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.dynamics.limited_torque import limited_torque
+from joulepath.optimizer.dynamics.losses import breakdown, friction_torque
+from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.replay.planned import PlannedMotion

@@ -10,7 +10,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.trajectories.spline import Spline, sample
+from joulepath.optimizer.motion.spline import Spline, sample
 
 Course = Callable[[Array], tuple[Array, Array, Array]]
 """A motion as a function of time: q [rad], v [rad/s], a [rad/s²], (k, nq) each, at times (k,)

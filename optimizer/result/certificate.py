@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, NamedTuple, NotRequired, TypedDict
 
 from joulepath.optimizer.declared import Internal, Keys, Metres, Radians, Ratio, Seconds, Unit
-from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
+from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE
 
 
 @dataclass(frozen=True)

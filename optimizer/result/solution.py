@@ -19,10 +19,10 @@ from joulepath.optimizer.declared import (
     Seconds,
     Unit,
 )
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.result.candidates import CandidateReport, UnreachableTarget
 from joulepath.optimizer.result.certificate import Certificate, Clearance
 from joulepath.optimizer.result.energy import Energy, SavingInterval, Sensitivity
-from joulepath.optimizer.trajectories.spline import Spline
 
 JointTorques = Annotated[PerSampleAndJoint, Unit("N·m")]
 

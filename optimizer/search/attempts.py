@@ -8,14 +8,22 @@ from functools import partial
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import DeadlinePassed, watch
-from joulepath.optimizer.methods import solver_for
-from joulepath.optimizer.methods.duration_intervals import DurationInterval, duration_intervals
-from joulepath.optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
-from joulepath.optimizer.methods.planned_paths import FROM_PLANNED_PATH
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.sliding import SLID, moved_to, released
+from joulepath.optimizer.solve.methods import solver_for
+from joulepath.optimizer.solve.methods.duration_intervals import (
+    DurationInterval,
+    duration_intervals,
+)
+from joulepath.optimizer.solve.methods.method import (
+    DEADLINE_PASSED,
+    Method,
+    SolveResult,
+    SolveStatus,
+)
+from joulepath.optimizer.solve.methods.planned_paths import FROM_PLANNED_PATH
 
 # goals of other candidates that a path may lead to as long as no motion is known
 MOST_OTHER_GOALS = 7

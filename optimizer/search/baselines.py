@@ -23,22 +23,22 @@ from dataclasses import replace
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.energy.dwell import dwell_energy, holding_power, waits
-from joulepath.optimizer.energy.interval import Known, arm_spread, saving_intervals
-from joulepath.optimizer.energy.limited_torque import limited_torque
-from joulepath.optimizer.energy.losses import breakdown, friction_torque
-from joulepath.optimizer.energy.sensitivity import energy_sensitivity, waiting_sensitivity
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.result.energy import Energy
-from joulepath.optimizer.result.solution import Baseline, BaselineName
-from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE, limit_ratios, too_much
-from joulepath.optimizer.trajectories.ruckig_motion import time_optimal
-from joulepath.optimizer.trajectories.time_scalings import (
+from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power, waits
+from joulepath.optimizer.dynamics.interval import Known, arm_spread, saving_intervals
+from joulepath.optimizer.dynamics.limited_torque import limited_torque
+from joulepath.optimizer.dynamics.losses import breakdown, friction_torque
+from joulepath.optimizer.dynamics.sensitivity import energy_sensitivity, waiting_sensitivity
+from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE, limit_ratios, too_much
+from joulepath.optimizer.motion.ruckig_motion import time_optimal
+from joulepath.optimizer.motion.time_scalings import (
     SampledMotion,
     controller_default,
     quintic,
     trapezoid,
 )
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.result.energy import Energy
+from joulepath.optimizer.result.solution import Baseline, BaselineName
 
 Torques = Callable[[Array, Array, Array], Array]
 Broken = Callable[[Sequence[Array], Sequence[Array]], list[list[str]]]

@@ -7,11 +7,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.methods import method_of
-from joulepath.optimizer.methods.method import SolveResult, SolveStatus
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason
+from joulepath.optimizer.solve.methods import method_of
+from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
 
 
 def explore(

@@ -13,18 +13,18 @@ import numpy as np
 import numpy.typing as npt
 
 from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.bounds.lower_bound import lower_bounds
+from joulepath.optimizer.bounds.mechanical_bound import mechanical_bounds
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.methods.method import SolveResult
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.targets import AnyOf, Side
 from joulepath.optimizer.result.candidates import CandidateReport, CandidateStatus
 from joulepath.optimizer.search.end_feasibility import check_configurations, raise_if_none_is_left
 from joulepath.optimizer.search.ends import SIDES, EndConfiguration
-from joulepath.optimizer.search.lower_bound import lower_bounds
-from joulepath.optimizer.search.mechanical_bound import mechanical_bounds
 from joulepath.optimizer.search.passing import bound_through
-from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.solve.methods.method import SolveResult
 
 FULL_TURN = 2 * np.pi
 # 64 poses from a given start make 16384, two poses 2048; each is named in the answer with some 400

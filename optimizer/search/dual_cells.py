@@ -20,20 +20,20 @@ import numpy as np
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
+from joulepath.optimizer.bounds.cruise import TINY, copper_loss
 from joulepath.optimizer.bounds.dual_bound import CellBounds, DualBound, multiplier_rates
 from joulepath.optimizer.bounds.friction_conjugate import FrictionConjugate
 from joulepath.optimizer.bounds.grid_cells import Spacing
+from joulepath.optimizer.bounds.lower_bound import copper_multiplier, electrical
 from joulepath.optimizer.bounds.path_terms import path_terms
 from joulepath.optimizer.bounds.reference import Reference, half_sides
 from joulepath.optimizer.bounds.weights import Weights
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.energy.dwell import LinearDwell
+from joulepath.optimizer.dynamics.dwell import LinearDwell
+from joulepath.optimizer.motion.spline import sample
+from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.candidates import Candidate
-from joulepath.optimizer.search.cruise import TINY, copper_loss
-from joulepath.optimizer.search.lower_bound import copper_multiplier, electrical
-from joulepath.optimizer.trajectories.spline import sample
-from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 
 # at how many points of the straight line gravity is compared
 LINE_POINTS = 17

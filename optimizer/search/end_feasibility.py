@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.collision.clearance_constraint import RESERVE
 from joulepath.optimizer.collision.model import ClosestPair
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
 from joulepath.optimizer.kinematics.path_constraints import ToolConeConstraint
-from joulepath.optimizer.nlp.clearance_constraint import RESERVE
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.errors import CollidingBranch, TorqueInfeasible, in_collision
 

@@ -11,9 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
-from joulepath.optimizer.methods.duration_intervals import DurationInterval
-from joulepath.optimizer.methods.fastest_motion import FastestMotion, FastestSettings
-from joulepath.optimizer.methods.method import Method, SolveResult, SolveStatus
+from joulepath.optimizer.motion.spline import Spline, lasting, sampled
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.search.attempts import solve_from, solver_of
@@ -24,7 +22,9 @@ from joulepath.optimizer.search.missed_branches import all_known
 from joulepath.optimizer.search.outer_turns import families_of
 from joulepath.optimizer.search.quicker_ends import with_quicker_ends
 from joulepath.optimizer.search.sampled_ends import fastest_samples
-from joulepath.optimizer.trajectories.spline import Spline, lasting, sampled
+from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval
+from joulepath.optimizer.solve.methods.fastest_motion import FastestMotion, FastestSettings
+from joulepath.optimizer.solve.methods.method import Method, SolveResult, SolveStatus
 
 # motions that obstacles stop are not too slow if so many times the shortest duration is allowed
 AMPLE = 20.0

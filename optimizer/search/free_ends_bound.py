@@ -17,16 +17,16 @@ from math import prod
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.box_search import NEARLY, ROUNDS, TIGHT_ROUNDS, Boxes, BoxSearch
+from joulepath.optimizer.bounds.least_displacement import least_displacement
+from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import Target
-from joulepath.optimizer.search.box_search import NEARLY, ROUNDS, TIGHT_ROUNDS, Boxes, BoxSearch
 from joulepath.optimizer.search.ends import within_cone
 from joulepath.optimizer.search.free_goal_bound import Family, halved, whole_turns
-from joulepath.optimizer.search.least_displacement import least_displacement
-from joulepath.optimizer.search.lower_bound import LeastBound
 
 # boxes along each inner joint at first, of either end; how often they are halved before they are
 # paired, as long as an end has not more boxes, nor both together more pairs

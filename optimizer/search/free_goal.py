@@ -15,13 +15,9 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import DeadlinePassed, watch
 from joulepath.optimizer.kinematics.orientation_tolerance import tilt
 from joulepath.optimizer.kinematics.tcp import tcp_jacobian, tcp_pose
-from joulepath.optimizer.methods.duration_intervals import DurationInterval, duration_intervals
-from joulepath.optimizer.methods.free_spline import COARSE, FreeSpline
-from joulepath.optimizer.methods.method import SolveResult, SolveStatus
-from joulepath.optimizer.methods.sqp_method import Guess
-from joulepath.optimizer.nlp.coordinates import Coordinates, GoalConstraints
-from joulepath.optimizer.nlp.nonlinear_program import NonlinearProgram
-from joulepath.optimizer.nlp.sqp import solve
+from joulepath.optimizer.motion import bspline
+from joulepath.optimizer.motion.bspline import REST_POINTS
+from joulepath.optimizer.motion.spline import sample
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.search.attempts import settled, solver_of
@@ -29,9 +25,16 @@ from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.ends import EndConfiguration
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
-from joulepath.optimizer.trajectories import bspline
-from joulepath.optimizer.trajectories.bspline import REST_POINTS
-from joulepath.optimizer.trajectories.spline import sample
+from joulepath.optimizer.solve.methods.duration_intervals import (
+    DurationInterval,
+    duration_intervals,
+)
+from joulepath.optimizer.solve.methods.free_spline import COARSE, FreeSpline
+from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.sqp_method import Guess
+from joulepath.optimizer.solve.nlp.coordinates import Coordinates, GoalConstraints
+from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
+from joulepath.optimizer.solve.nlp.sqp import solve
 
 # rounds of refinement, the trust region of a goal joint in one of them [rad], and the least one
 ROUNDS, RADIUS, LEAST_RADIUS = 8, 0.6, 0.01

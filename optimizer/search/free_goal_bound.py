@@ -22,11 +22,14 @@ from itertools import product
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.bounds.box_search import NEARLY, ROUNDS, TIGHT_ROUNDS, Boxes, BoxSearch
+from joulepath.optimizer.bounds.least_displacement import least_displacement
+from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.deadline import NEVER, Deadline
-from joulepath.optimizer.kinematics.pose_boxes import PoseBoxes
-from joulepath.optimizer.kinematics.wrist_boxes import WristBoxes
-from joulepath.optimizer.kinematics.wrist_geometry import (
+from joulepath.optimizer.kinematics.covers.pose_boxes import PoseBoxes
+from joulepath.optimizer.kinematics.covers.wrist_boxes import WristBoxes
+from joulepath.optimizer.kinematics.covers.wrist_geometry import (
     OUTER,
     Shell,
     WristBody,
@@ -36,11 +39,8 @@ from joulepath.optimizer.kinematics.wrist_geometry import (
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.targets import AnyOf
-from joulepath.optimizer.search.box_search import NEARLY, ROUNDS, TIGHT_ROUNDS, Boxes, BoxSearch
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.ends import within_cone
-from joulepath.optimizer.search.least_displacement import least_displacement
-from joulepath.optimizer.search.lower_bound import LeastBound
 from joulepath.optimizer.search.self_motion_bound import EndCurves
 
 # boxes along each inner joint at first, but for so many starts that there would be more than

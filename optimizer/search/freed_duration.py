@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from joulepath.optimizer.methods.free_spline import FreeSpline
-from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.motion.spline import lasting, sampled
 from joulepath.optimizer.search.attempts import solve, solve_from
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.refinement import refine
-from joulepath.optimizer.trajectories.spline import lasting, sampled
+from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
 
 # greatest ratio of the two durations, and of the two energies, at which the free motion may lead to
 # a better one

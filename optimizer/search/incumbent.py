@@ -11,8 +11,7 @@ import numpy as np
 
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
-from joulepath.optimizer.methods import method_of
-from joulepath.optimizer.methods.method import Method, SolveResult
+from joulepath.optimizer.motion.spline import Spline, lasting
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LEAST_DURATION, Problem, narrowed
 from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, nobody
@@ -21,7 +20,8 @@ from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.reserve import reserve
-from joulepath.optimizer.trajectories.spline import Spline, lasting
+from joulepath.optimizer.solve.methods import method_of
+from joulepath.optimizer.solve.methods.method import Method, SolveResult
 
 # a baseline counts as better only beyond this share, the error of the quadratures that are compared
 SLACK = 1e-6

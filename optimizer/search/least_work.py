@@ -21,12 +21,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import DeadlinePassed, watch
-from joulepath.optimizer.energy.plant import SHARPER_WIDTHS, WIDTH
-from joulepath.optimizer.methods.duration_intervals import duration_intervals
-from joulepath.optimizer.methods.free_spline import TIGHT, FreeSpline
-from joulepath.optimizer.methods.method import SolveResult, SolveStatus
-from joulepath.optimizer.methods.sharp_motion import sharp_motion
-from joulepath.optimizer.methods.sqp_method import above
+from joulepath.optimizer.dynamics.plant import SHARPER_WIDTHS, WIDTH
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.attempts import in_time, solver_of
 from joulepath.optimizer.search.candidates import Candidate, Reason
@@ -41,6 +36,11 @@ from joulepath.optimizer.search.sharpening import (
     PROGRESS,
     follow_in_time,
 )
+from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
+from joulepath.optimizer.solve.methods.free_spline import TIGHT, FreeSpline
+from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.sharp_motion import sharp_motion
+from joulepath.optimizer.solve.methods.sqp_method import above
 
 # time [s] that the search needs to be sure of a motion
 LEAST_TIME = 3.0

@@ -7,20 +7,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.box_search import FEW, TIGHT_ROUNDS
+from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.deadline import NEVER, Deadline
-from joulepath.optimizer.kinematics.covering_sheets import CoveringSheet, covering_sheets
+from joulepath.optimizer.kinematics.covers.covering_sheets import CoveringSheet, covering_sheets
+from joulepath.optimizer.kinematics.covers.wrist_geometry import potential_rates
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.tcp import flange_pose
-from joulepath.optimizer.kinematics.wrist_geometry import potential_rates
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import Side, Target, members
-from joulepath.optimizer.search.box_search import FEW, TIGHT_ROUNDS
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.free_goal_bound import family_bound
-from joulepath.optimizer.search.lower_bound import LeastBound
 from joulepath.optimizer.search.self_motion_bound import EndCurves, bound_between, self_motion_bound
 
 

@@ -15,7 +15,6 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.goal_manifold import GoalManifold
-from joulepath.optimizer.methods.sqp_method import above
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason, bound
@@ -23,6 +22,7 @@ from joulepath.optimizer.search.end_feasibility import check_configurations
 from joulepath.optimizer.search.other_turns import other_turns
 from joulepath.optimizer.search.sampled_ends import activate_deferred, moved_end, on_branch
 from joulepath.optimizer.search.seeds import NEAR_IN_WORK, estimates, expected
+from joulepath.optimizer.solve.methods.sqp_method import above
 
 # samples that move: those of least lower bound
 MOST_MOVED = 384

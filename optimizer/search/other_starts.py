@@ -10,20 +10,20 @@ from __future__ import annotations
 
 from functools import partial
 
-from joulepath.optimizer.energy.plant import has_corners
-from joulepath.optimizer.kinematics.held_pose import HeldPose
-from joulepath.optimizer.methods.duration_intervals import duration_intervals
-from joulepath.optimizer.methods.free_spline import COARSE, FreeSpline
-from joulepath.optimizer.methods.method import Method, SolveResult
-from joulepath.optimizer.methods.sqp_method import above
-from joulepath.optimizer.nlp.sqp import PROGRESS
+from joulepath.optimizer.dynamics.plant import has_corners
+from joulepath.optimizer.kinematics.tool_path.held_pose import HeldPose
+from joulepath.optimizer.motion.spline import sampled
 from joulepath.optimizer.search.attempts import improve, in_time, settled, solver_of
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.ends import SIDES
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.sampled_ends import with_ends
 from joulepath.optimizer.search.sliding import slides
-from joulepath.optimizer.trajectories.spline import sampled
+from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
+from joulepath.optimizer.solve.methods.free_spline import COARSE, FreeSpline
+from joulepath.optimizer.solve.methods.method import Method, SolveResult
+from joulepath.optimizer.solve.methods.sqp_method import above
+from joulepath.optimizer.solve.nlp.sqp import PROGRESS
 
 # length of the step along a curve [rad]
 STEP = 0.15

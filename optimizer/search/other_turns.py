@@ -12,11 +12,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from joulepath.optimizer.methods.sqp_method import above
+from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.candidates import FULL_TURN, Candidate, bound
 from joulepath.optimizer.search.seeds import estimates_between
-from joulepath.optimizer.trajectories.seven_segment import shortest_duration
+from joulepath.optimizer.solve.methods.sqp_method import above
 
 # motions that are returned: those that are expected to need least, at most this ratio of the least
 # of all

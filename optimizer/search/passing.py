@@ -10,13 +10,13 @@ from operator import add
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.lower_bound import travel_bounds
+from joulepath.optimizer.motion.passing import pass_times
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
 from joulepath.optimizer.result.solution import Baseline
 from joulepath.optimizer.search.baselines import baselines, saving
-from joulepath.optimizer.search.lower_bound import travel_bounds
-from joulepath.optimizer.trajectories.passing import pass_times
-from joulepath.optimizer.trajectories.spline import Spline
 
 
 def bound_through(prepared: PreparedProblem, q_start: Array, q_goal: Array) -> float:

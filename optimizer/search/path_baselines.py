@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from joulepath.optimizer.motion.spline import Spline
+from joulepath.optimizer.motion.time_scalings import SampledMotion, even_speed
 from joulepath.optimizer.result.solution import Baseline
 from joulepath.optimizer.search.baselines import compared
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.incumbent import Incumbent
-from joulepath.optimizer.trajectories.spline import Spline
-from joulepath.optimizer.trajectories.time_scalings import SampledMotion, even_speed
 
 
 def path_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseline]:

@@ -11,7 +11,7 @@ import numpy as np
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.kinematics.angles import wrapped
-from joulepath.optimizer.kinematics.course_tracing import (
+from joulepath.optimizer.kinematics.tool_path.course_tracing import (
     Trace,
     traces,
     turned,

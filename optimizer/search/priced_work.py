@@ -17,10 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.mechanical_bound import EnergyRange, Swing, most_travel
+from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LEAST_DURATION
-from joulepath.optimizer.search.mechanical_bound import EnergyRange, Swing, most_travel
-from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 
 # cells of the durations, and works of the table, from this share of the greatest one on
 CELLS, WORKS, LEAST_WORK = 40, 96, 1e-3

@@ -11,11 +11,11 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.kinematics.angles import nearest_turn
+from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.ends import EndConfiguration
 from joulepath.optimizer.search.sampled_ends import nearest_configuration, with_ends
-from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from functools import cached_property
 
 from joulepath.optimizer.bounds.grid_cells import Spacing
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.energy.dwell import LinearDwell, linear_dwells
+from joulepath.optimizer.dynamics.dwell import LinearDwell, linear_dwells
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 from joulepath.optimizer.search.candidates import Candidate

@@ -10,9 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from joulepath.optimizer.deadline import DeadlinePassed, watch
-from joulepath.optimizer.energy.plant import has_corners
-from joulepath.optimizer.methods.free_spline import EXACT_BELOW, TIGHT
-from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.dynamics.plant import has_corners
+from joulepath.optimizer.motion.ruckig_motion import time_optimal_spline
+from joulepath.optimizer.motion.seven_segment import shortest_duration
+from joulepath.optimizer.motion.spline import Spline, least_time_scale, retimed, sampled
+from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.result.solution import Baseline, BaselineName
 from joulepath.optimizer.search.attempts import improve, solve_from
 from joulepath.optimizer.search.baselines import baselines, guesses, nearest
@@ -23,10 +25,8 @@ from joulepath.optimizer.search.path_baselines import path_baselines
 from joulepath.optimizer.search.regrading import grade
 from joulepath.optimizer.search.sharpening import sharpen
 from joulepath.optimizer.search.sliding import slides
-from joulepath.optimizer.trajectories.ruckig_motion import time_optimal_spline
-from joulepath.optimizer.trajectories.seven_segment import shortest_duration
-from joulepath.optimizer.trajectories.spline import Spline, least_time_scale, retimed, sampled
-from joulepath.optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.optimizer.solve.methods.free_spline import EXACT_BELOW, TIGHT
+from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
 
 # assumed values of a joule of surplus if the storage cannot take all of it: shares of the way from
 # what the supply pays for it to what the storage gives back

@@ -8,12 +8,12 @@ found.
 
 from __future__ import annotations
 
-from joulepath.optimizer.methods.free_spline import FreeSpline
-from joulepath.optimizer.methods.method import Method, SolveResult
+from joulepath.optimizer.motion.spline import Spline, sampled
 from joulepath.optimizer.search.attempts import improve
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.incumbent import Incumbent
-from joulepath.optimizer.trajectories.spline import Spline, sampled
+from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods.method import Method, SolveResult
 
 # relative decrease of the cost that a further step of the first solve must promise
 FIRST_PROGRESS = 1e-3

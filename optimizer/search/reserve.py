@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from joulepath.optimizer.motion.quadrature import GRID_PERIOD
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.solution import Solution
-from joulepath.optimizer.trajectories.quadrature import GRID_PERIOD
 
 # share of the deadline kept for the end of a short motion, at most [s]; and the share that is kept
 # at most

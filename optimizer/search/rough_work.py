@@ -10,14 +10,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.methods.limit_repair import MARGIN
-from joulepath.optimizer.nlp.many_motions import ManyMotions
+from joulepath.optimizer.motion import bspline
+from joulepath.optimizer.motion.ruckig_motion import time_optimal_positions
+from joulepath.optimizer.motion.spline import Spline, spline_of
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.random_displacements import random_displacements
-from joulepath.optimizer.trajectories import bspline
-from joulepath.optimizer.trajectories.ruckig_motion import time_optimal_positions
-from joulepath.optimizer.trajectories.spline import Spline, spline_of
+from joulepath.optimizer.solve.methods.limit_repair import MARGIN
+from joulepath.optimizer.solve.nlp.many_motions import ManyMotions
 
 # width of corners that counts as none [W]
 SHARP = 1e-6

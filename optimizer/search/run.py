@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
-from joulepath.optimizer.energy.interval import Known, with_interval
+from joulepath.optimizer.dynamics.interval import Known, with_interval
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
-from joulepath.optimizer.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.motion.spline import Spline, lasting, sampled
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.problem import Problem
@@ -54,7 +54,7 @@ from joulepath.optimizer.search.sampled_ends import activate_deferred, between
 from joulepath.optimizer.search.second_attempt import reject
 from joulepath.optimizer.search.seeds import activate_seeds
 from joulepath.optimizer.search.sliding import slides
-from joulepath.optimizer.trajectories.spline import Spline, lasting, sampled
+from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
 
 # time after the deadline [s] at which a certificate is given up: better a little late than no
 # answer

@@ -22,18 +22,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.bounds.box_search import NEARLY
+from joulepath.optimizer.bounds.holding_cells import HoldingCells
+from joulepath.optimizer.bounds.least_displacement import least_displacement
+from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.deadline import NEVER, Deadline
-from joulepath.optimizer.kinematics.covering_sheets import CoveringSheet, boxes_on
-from joulepath.optimizer.kinematics.redundant_curve import CurveStack, RedundantCurve
+from joulepath.optimizer.kinematics.covers.covering_sheets import CoveringSheet, boxes_on
+from joulepath.optimizer.kinematics.covers.wrist_geometry import potential_rates
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
-from joulepath.optimizer.kinematics.wrist_geometry import potential_rates
+from joulepath.optimizer.kinematics.seven.redundant_curve import CurveStack, RedundantCurve
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.search.box_search import NEARLY
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.ends import EndConfiguration
-from joulepath.optimizer.search.holding_cells import HoldingCells
-from joulepath.optimizer.search.least_displacement import least_displacement
-from joulepath.optimizer.search.lower_bound import LeastBound
 
 # half side of the first cells, and of cells that are not halved again [rad]; most pairs halved in a
 # round, rounds

@@ -14,7 +14,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from joulepath.optimizer.kinematics.angles import nearest_turn
-from joulepath.optimizer.methods.free_spline import FreeSpline
 from joulepath.optimizer.problem.targets import Side
 from joulepath.optimizer.search.attempts import settled, solve
 from joulepath.optimizer.search.candidates import Candidate
@@ -23,6 +22,7 @@ from joulepath.optimizer.search.free_goal import REFINED, refine_goal
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
 from joulepath.optimizer.search.sliding import slides
+from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 
 # first step of a parameter, half the way between two samples on a whole circle, and the least one
 # [rad]

@@ -21,15 +21,18 @@ from functools import partial
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.energy.plant import SHARPER_WIDTHS, WIDTH, has_corners
-from joulepath.optimizer.methods.duration_intervals import DurationInterval, duration_intervals
+from joulepath.optimizer.dynamics.plant import SHARPER_WIDTHS, WIDTH, has_corners
+from joulepath.optimizer.motion.seven_segment import shortest_duration
+from joulepath.optimizer.motion.spline import Spline, lasting, sampled
+from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.search.attempts import in_time, solver_of
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.random_displacements import random_displacements
-from joulepath.optimizer.trajectories.seven_segment import shortest_duration
-from joulepath.optimizer.trajectories.spline import Spline, lasting, sampled
-from joulepath.optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.optimizer.solve.methods.duration_intervals import (
+    DurationInterval,
+    duration_intervals,
+)
 
 # random motions from which the coarse problem is solved, and how many of its solutions are solved
 # in the middle space

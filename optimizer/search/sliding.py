@@ -12,16 +12,16 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import wrapped
-from joulepath.optimizer.kinematics.held_pose import HeldPose
-from joulepath.optimizer.methods import method_of
-from joulepath.optimizer.methods.free_spline import FreeSpline
-from joulepath.optimizer.methods.method import Method
+from joulepath.optimizer.kinematics.tool_path.held_pose import HeldPose
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.targets import Side
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.ends import EndConfiguration
 from joulepath.optimizer.search.sampled_ends import with_ends
-from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.solve.methods import method_of
+from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods.method import Method
 
 # joints that a pose fixes
 FIXED = 6

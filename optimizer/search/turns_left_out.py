@@ -12,9 +12,9 @@ from itertools import product
 
 import numpy as np
 
+from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.candidates import SAME_TRAVEL, Candidate, joint_options
-from joulepath.optimizer.search.lower_bound import LeastBound
 
 
 def bound_of_turns_left_out(prepared: PreparedProblem, candidate: Candidate) -> float:

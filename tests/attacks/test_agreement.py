@@ -18,12 +18,12 @@ from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
-from joulepath.optimizer.methods import sqp_method
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.pareto import pareto
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.second_attempt import WITHIN_TIGHTER
+from joulepath.optimizer.solve.methods import sqp_method
 from tests.selection import long_but
 
 Json = dict[str, Any]

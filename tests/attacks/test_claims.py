@@ -13,10 +13,10 @@ from joulepath.optimizer.exceptions import UnreachablePose
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.reach import REACH
+from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.search.claims import CLAIMS
-from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 from tests.optimizer.moves import ROBOT, problem
 from tests.selection import long_but
 

@@ -24,8 +24,8 @@ from joulepath.optimizer.cycle.cycles_in_hand import simple_cycles
 from joulepath.optimizer.cycle.errors import CycleTooShort
 from joulepath.optimizer.cycle.order_search import OrderSearch
 from joulepath.optimizer.cycle.timed_cycle import TimedSearch
-from joulepath.optimizer.energy.dwell import holding_power
-from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.dynamics.dwell import holding_power
+from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.plan_cycle import plan_cycle

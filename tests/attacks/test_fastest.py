@@ -16,7 +16,6 @@ from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Robot
 from joulepath.optimizer.cycle.errors import CycleTooShort
-from joulepath.optimizer.methods.fastest_motion import FastestSettings
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.pareto import pareto
 from joulepath.optimizer.plan_cycle import plan_cycle
@@ -26,6 +25,7 @@ from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.problem import LEAST_DURATION, MethodName, Problem
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.search.errors import DurationTooShort
+from joulepath.optimizer.solve.methods.fastest_motion import FastestSettings
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import (
     CEILING,

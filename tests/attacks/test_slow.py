@@ -12,14 +12,14 @@ import pytest
 from benchmarks.slow_moves import MOST_EXCESS, NEAR, compare, other_searches, slow_problem
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
-from joulepath.optimizer.energy import kernel
-from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.dynamics import kernel
+from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
+from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.solution import Solution
-from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, fixed, limits, problem
 from tests.selection import long_but
 

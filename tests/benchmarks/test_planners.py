@@ -13,7 +13,7 @@ from benchmarks.planners.casadi_opti import derivative_points
 from benchmarks.planners.planner import versions
 from benchmarks.tasks import move
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.trajectories.bspline import DEGREE, uniform
+from joulepath.optimizer.motion.bspline import DEGREE, uniform
 from tests.optimizer.moves import problem_with
 from tests.selection import long_but
 

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
 
 POST = """([url, mode, key]) => fetch(url + "/studies", {
     method: "POST", mode, body: '{"name": "x", "threshold": 1}', headers: key ? {Authorization: "Bearer " + key} : {},
-}).then(answer => answer.type, error => "refused")"""
+}).then(answer => answer.type, error => "refused")"""  # noqa: E501
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +84,7 @@ def test_a_page_of_another_site_reaches_nothing(guarded: tuple[Server, str], pag
         assert page.evaluate(POST, [server.url, "cors", secret]) == "refused"
         page.set_content(
             f"<form method=post enctype=text/plain action={server.url}/studies>"
-            """<input name='{"name": "x", "threshold": 1, "a' value='": 1}'><button>go</button></form>"""
+            """<input name='{"name": "x", "threshold": 1, "a' value='": 1}'><button>go</button></form>"""  # noqa: E501
         )
         with page.expect_response(f"{server.url}/studies") as answer:
             page.locator("button").click()

@@ -43,7 +43,7 @@ CONTRASTS = """() => {
         found.push([text, (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05)]);
     }
     return found;
-}"""
+}"""  # noqa: E501
 # pairs of controls and headings of which one covers the other, and those that are cut at the edge
 # of the page
 CROWDED = """() => {
@@ -63,7 +63,7 @@ CROWDED = """() => {
         if (width > 1 && height > 1) over.push(`${name(a)} / ${name(b)}`);
     }
     return [...out.map(name), ...over];
-}"""
+}"""  # noqa: E501
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -28,7 +28,7 @@ ROUNDING = 1e-9  # m; sums of some ten products in double precision
 RECORDED = 2e-3
 MOST_BYTES = 1_000_000  # of a first visit, without the answer
 LOADED = """() => [...performance.getEntriesByType("navigation"), ...performance.getEntriesByType("resource")]
-    .filter(({ name }) => !name.endsWith("/optimize")).reduce((sum, { transferSize }) => sum + transferSize, 0)"""
+    .filter(({ name }) => !name.endsWith("/optimize")).reduce((sum, { transferSize }) => sum + transferSize, 0)"""  # noqa: E501
 PIXELS = """() => {
     const { view } = studio;
     view.setFineness(0.5);
@@ -108,7 +108,7 @@ def test_something_is_drawn_and_switches_change_it(page: Page) -> None:
 def test_the_nearest_points_are_those_of_the_certificate(page: Page) -> None:
     clearance = state(page, "answer.certificate.clearance")
     drawn = page.evaluate(
-        """() => [...studio.view.parts.nearest.children.at(-1).geometry.attributes.position.array]"""
+        """() => [...studio.view.parts.nearest.children.at(-1).geometry.attributes.position.array]"""  # noqa: E501
     )
     assert np.array(drawn).reshape(2, 3) == pytest.approx(np.array(clearance["points"]), abs=DRAWN)
     expect(page.locator(".label.near")).to_contain_text(" – ".join(clearance["pair"]))
@@ -326,7 +326,7 @@ def test_what_stands_before_the_arm_fades(page: Page) -> None:
         studio.state.show.fade = true;
         view.render();
         return faint.map(({ userData }) => userData.name);
-    }"""
+    }"""  # noqa: E501
     page.locator("#view").press("End")
     assert page.evaluate(faint, True) == ["shelf side"]
     assert page.evaluate(faint, False) == []
@@ -354,7 +354,7 @@ def test_an_obstacle_under_the_pointer_tells_its_name_and_margin(page: Page) -> 
         const at = top.children[0].getWorldPosition(view.camera.position.clone()).project(view.camera);
         const box = view.renderer.domElement.getBoundingClientRect();
         return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];
-    }""")
+    }""")  # noqa: E501
     assert page.evaluate(shells) == 0
     # a scene that was drawn anew meanwhile has its shell again when the pointer moves
     assert any(page.mouse.move(x + k % 2, y) or page.evaluate(shells) == 1 for k in range(10))  # type: ignore[func-returns-value]

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.scene import (
     Attachment,
@@ -22,7 +23,6 @@ from joulepath.optimizer.problem.scene import (
     Sphere,
     capsule_between,
 )
-from joulepath.optimizer.trajectories.spline import Spline
 from tests.optimizer.moves import ROBOT
 
 LOADS: tuple[Shape, ...] = (

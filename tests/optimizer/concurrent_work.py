@@ -19,12 +19,12 @@ from scipy.spatial.transform import Rotation
 from joulepath.models.robot import Array
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.collision.model import collision_model
-from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.evaluate.evaluate import evaluate
 from joulepath.optimizer.evaluate.recording import Recording, Waypoints
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
-from joulepath.optimizer.kinematics.path_following import follow
+from joulepath.optimizer.kinematics.tool_path.path_following import follow
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.pareto import pareto
 from joulepath.optimizer.problem.arm import Arm, Payload

@@ -10,8 +10,8 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.energy import kernel
-from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.dynamics import kernel
+from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 
 
 @pytest.fixture(scope="session", autouse=True)

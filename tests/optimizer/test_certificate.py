@@ -12,13 +12,13 @@ import pytest
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.certificate import certify
-from joulepath.optimizer.energy.losses import breakdown
+from joulepath.optimizer.dynamics.losses import breakdown
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.certificate import Certificate, Clearance
 from joulepath.optimizer.result.energy import Energy
-from joulepath.optimizer.trajectories.spline import Spline
 from tests.optimizer.moves import problem_with
 
 # relative; values met exactly on the grid, up to double precision through a few thousand operations

@@ -29,7 +29,7 @@ from joulepath.optimizer.deadline import (
     watch,
     watched_time_left,
 )
-from joulepath.optimizer.energy.kernel_functions import Evaluation
+from joulepath.optimizer.dynamics.kernel_functions import Evaluation
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem

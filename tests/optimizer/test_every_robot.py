@@ -12,7 +12,7 @@ from joulepath import Arm, Pose, Problem, optimize
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.collision.model import collision_model
-from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.kinematics.angles import nearest_turn
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from tests.selection import long_but

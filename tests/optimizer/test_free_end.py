@@ -13,11 +13,14 @@ from scipy.spatial.transform import Rotation
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem, JoulepathError
-from joulepath.optimizer.kinematics.course_tracing import chain_of
 from joulepath.optimizer.kinematics.orientation_tolerance import excess_angle, nearest_orientation
 from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
-from joulepath.optimizer.kinematics.turning_sheet import TurningSheet, shortest, turning_through
-from joulepath.optimizer.methods.end_angle import try_angles
+from joulepath.optimizer.kinematics.tool_path.course_tracing import chain_of
+from joulepath.optimizer.kinematics.tool_path.turning_sheet import (
+    TurningSheet,
+    shortest,
+    turning_through,
+)
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
@@ -28,6 +31,7 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.tool_path import ToolPath
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.errors import PathInfeasible
+from joulepath.optimizer.solve.methods.end_angle import try_angles
 from tests.optimizer.moves import ROBOT, tcp_pose
 from tests.optimizer.test_turning_path import ARM, Z, down, over_the_base
 from tests.optimizer.tool_paths import HOME, along, moved

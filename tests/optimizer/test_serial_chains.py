@@ -16,7 +16,6 @@ from scipy.interpolate import BSpline
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.kinematics.inverse import ClosedFormInverseKinematics
-from joulepath.optimizer.methods import METHODS
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.pareto import pareto
 from joulepath.optimizer.problem.arm import Arm, Payload
@@ -28,6 +27,7 @@ from joulepath.optimizer.problem.problem import MethodName, Problem
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.problem.tool_cone import ToolCone
 from joulepath.optimizer.result.solution import Solution
+from joulepath.optimizer.solve.methods import METHODS
 from joulepath.optimizer.what_if import what_if
 from tests.optimizer import moves
 from tests.optimizer.chains import move, serial_chain

@@ -12,13 +12,13 @@ import pytest
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.clearance_proof import GAP, proven_clearance
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.collision.path_planner import Effort, PlanningEnd
+from joulepath.optimizer.collision.planner.path_planner import Effort, PlanningEnd
 from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.motion.spline import sample
+from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
 from joulepath.optimizer.surroundings import ACTIVE, Surroundings
-from joulepath.optimizer.trajectories.spline import sample
-from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.cells import LOADS, arm_in_cell, at, cell
 from tests.optimizer.moves import ROBOT
 

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from joulepath.optimizer.collision import path_planner
+from joulepath.optimizer.collision.planner import path_planner
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.methods import polynomial_ga
+from joulepath.optimizer.solve.methods import polynomial_ga
 from tests.optimizer.concurrent_work import Work, all_work, behind_a_post, fingerprint
 
 THREADS = 8

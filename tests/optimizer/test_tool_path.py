@@ -13,9 +13,7 @@ from joulepath.models.registry import load_robot
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.exceptions import InvalidProblem, NoTrajectory
 from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
-from joulepath.optimizer.kinematics.tool_course import ToolCourse
-from joulepath.optimizer.methods.duration_intervals import duration_intervals
-from joulepath.optimizer.methods.path_retiming import PathRetiming, RetimingProgram
+from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
@@ -26,6 +24,8 @@ from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.problem.tool_path import ToolPath
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory, PathInfeasible
+from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
+from joulepath.optimizer.solve.methods.path_retiming import PathRetiming, RetimingProgram
 from tests.optimizer.moves import AMPLE, ROBOT, limits, tcp_pose
 from tests.optimizer.tool_paths import ARM, HOME, along, moved, poses_of
 from tests.selection import long_but

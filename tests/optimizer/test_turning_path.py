@@ -14,10 +14,10 @@ from scipy.spatial.transform import Rotation
 from joulepath.models.robot import Array
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.kinematics.course_tracing import chain_of
 from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
-from joulepath.optimizer.kinematics.tool_course import ToolCourse
-from joulepath.optimizer.kinematics.turning_sheet import TurningSheet, shortest
+from joulepath.optimizer.kinematics.tool_path.course_tracing import chain_of
+from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
+from joulepath.optimizer.kinematics.tool_path.turning_sheet import TurningSheet, shortest
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm

@@ -1,2 +1,1 @@
-"""What several routes share: parameters, what the service provides, and how requests are
-answered."""
+"""Parameters, dependencies and ways of answering that several routes share."""

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Protocol, Self
 
 from joulepath.app.answers.envelope import Answer
 from joulepath.optimizer.declared import Joules, NotEmpty, Ratio, Seconds, Watts
-from joulepath.optimizer.energy.losses import ENERGY_FLOOR
+from joulepath.optimizer.dynamics.losses import ENERGY_FLOOR
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.energy import ElectricalEnergy, Energy, Objective
 

@@ -30,7 +30,7 @@ URDF = """<robot name="example">
   </joint>
   <link name="tool"/>
 </robot>
-"""
+"""  # noqa: E501
 ARM: dict[str, Any] = {"urdf": URDF, "tip": "tool", "acceleration": 8.0, "payload": 2.0}
 NEW_ROBOT_EXAMPLES: dict[str, Example] = {
     "two_joints": {"summary": "An arm of two joints", "value": {"name": "my_arm", **ARM}},

@@ -15,7 +15,7 @@ import pinocchio as pin
 from scipy.linalg import qr, solve_triangular
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.energy.link_regressor import rigid_regressor
+from joulepath.optimizer.dynamics.link_regressor import rigid_regressor
 
 # of the largest diagonal entry of R; between independent and dependent columns lie many orders of
 # magnitude

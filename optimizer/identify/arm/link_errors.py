@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.energy.link_regressor import BODY, body_parameters
+from joulepath.optimizer.dynamics.link_regressor import BODY, body_parameters
 
 # standard deviations of a link: of mass over mass, of the centre of mass [m], of inertia over
 # inertia

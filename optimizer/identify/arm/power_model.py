@@ -3,7 +3,7 @@
 P = max(P_net, 0) - regeneration · max(-P_net, 0),
 P_net = idle + Σ_j (tau_j v_j + copper_j i_j² + inverter_linear_j |i_j|),  i = tau /
 torque_constant,
-tau = tau_rigid + rotor_inertia a + friction: the law of `joulepath.optimizer.energy.losses`.
+tau = tau_rigid + rotor_inertia a + friction: the law of `joulepath.optimizer.dynamics.losses`.
 
 What may differ from the figures that the motion was computed with: the masses of the arm's links,
 all by the factor `links`; rotors, dry and viscous friction by factors; friction by `load` more of

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.energy.link_regressor import BODY
+from joulepath.optimizer.dynamics.link_regressor import BODY
 
 # m; a body whose mass lies within such a ball or less is given that size, so that its matrix has an
 # inverse

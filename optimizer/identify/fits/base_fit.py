@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array, Mask, Robot
-from joulepath.optimizer.energy.link_regressor import BODY, body_parameters
+from joulepath.optimizer.dynamics.link_regressor import BODY, body_parameters
 from joulepath.optimizer.identify.arm.base_parameters import BaseParameters, base_parameters
 from joulepath.optimizer.identify.arm.friction_columns import lower_bounds
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name

@@ -13,7 +13,7 @@ import numpy as np
 
 from joulepath.models.robot import Array, Robot
 from joulepath.models.uncertainty.parameters import LINKS
-from joulepath.optimizer.energy.link_regressor import BODY, body_parameters
+from joulepath.optimizer.dynamics.link_regressor import BODY, body_parameters
 from joulepath.optimizer.identify.arm.pseudo_inertia import nearness
 from joulepath.optimizer.identify.estimates.estimate import Estimate
 from joulepath.optimizer.identify.estimates.grouped import Grouped, left_out

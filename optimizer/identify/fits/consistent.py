@@ -12,7 +12,7 @@ import numpy as np
 from scipy import sparse
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.energy.link_regressor import BODY
+from joulepath.optimizer.dynamics.link_regressor import BODY
 from joulepath.optimizer.identify.arm.pseudo_inertia import BASIS
 
 # of the mass: a body's least eigenvalue, in m² for its extent, so that no body has none

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.energy.link_regressor import body_parameters
+from joulepath.optimizer.dynamics.link_regressor import body_parameters
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm, own_arm, with_torques
 from joulepath.optimizer.identify.arm.power_model import Electrics, packed_size
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, joined

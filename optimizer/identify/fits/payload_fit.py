@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.energy.link_regressor import BODY, rigid_torques
+from joulepath.optimizer.dynamics.link_regressor import BODY, rigid_torques
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.arm.friction_columns import columns
 from joulepath.optimizer.identify.arm.link_errors import link_deviations

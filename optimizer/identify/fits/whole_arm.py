@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.energy.link_regressor import body_parameters
+from joulepath.optimizer.dynamics.link_regressor import body_parameters
 from joulepath.optimizer.identify.fits.block import Block, block_of, moving
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters

@@ -14,7 +14,7 @@ import numpy as np
 
 from joulepath.models.robot import Array, Robot
 from joulepath.models.uncertainty.parameters import LINKS
-from joulepath.optimizer.energy.link_regressor import BODY, body_parameters
+from joulepath.optimizer.dynamics.link_regressor import BODY, body_parameters
 from joulepath.optimizer.identify.arm.friction_columns import COUPLED
 from joulepath.optimizer.identify.arm.pseudo_inertia import nearness
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name

@@ -9,7 +9,7 @@ import numpy as np
 
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.collision.bodies import Indices
-from joulepath.optimizer.energy.link_regressor import rigid_torques
+from joulepath.optimizer.dynamics.link_regressor import rigid_torques
 from joulepath.optimizer.problem.arm import Payload
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.declared import Joules
-from joulepath.optimizer.energy.losses import breakdown
-from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.dynamics.losses import breakdown
+from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.evaluate.recording import BLOCK
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.problem.arm import Arm

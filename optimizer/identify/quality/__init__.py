@@ -1,2 +1,1 @@
-"""How good a fit is: intervals, errors on moves that it has not seen, what the logs tell,
-advice."""
+"""Quality of a fit: intervals, errors on held-out moves, excitation, advice."""

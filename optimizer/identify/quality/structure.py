@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.energy.link_regressor import BODY, body_parameters
+from joulepath.optimizer.dynamics.link_regressor import BODY, body_parameters
 from joulepath.optimizer.identify.arm.base_parameters import base_parameters
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm
 from joulepath.optimizer.identify.arm.pseudo_inertia import pseudo_inertias

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from joulepath.models.robot import Array, Mask, Robot
 from joulepath.optimizer.deadline import checkpoint
-from joulepath.optimizer.energy.link_regressor import (
+from joulepath.optimizer.dynamics.link_regressor import (
     base_wrench_regressor,
     body_parameters,
     rigid_regressor,

@@ -16,8 +16,8 @@ from starlette.testclient import TestClient
 from joulepath.app.convert.arm import to_arm
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.optimizer.collision.clearance_constraint import RESERVE
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.nlp.clearance_constraint import RESERVE
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.search.errors import (
     GoalInCollision,

@@ -21,7 +21,7 @@ from joulepath.app.api.identifications.models import (
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import UnknownIdentification, UnknownLog
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.energy.link_regressor import base_wrench_regressor, body_parameters
+from joulepath.optimizer.dynamics.link_regressor import base_wrench_regressor, body_parameters
 from joulepath.optimizer.exceptions import DeclaredError
 from joulepath.optimizer.identify.errors import (
     MethodNotApplicable,

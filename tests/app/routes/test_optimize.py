@@ -10,8 +10,8 @@ from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.optimize.task import OptimizeAnswer
+from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE
 from joulepath.optimizer.result.certificate import Certificate
-from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
 from tests.app.requests import EXAMPLES, move
 from tests.selection import long_but
 

@@ -17,7 +17,7 @@ from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import RobotExists, TooManyRobots
 from joulepath.app.schemas.examples.own_arm import ARM
 from joulepath.optimizer.exceptions import UnknownRobot
-from joulepath.optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
+from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE
 from tests.app.recorded import recorded_service
 from tests.app.requests import PATIENT
 from tests.app.routes.test_problems import refused

@@ -26,7 +26,7 @@ from joulepath.optimizer.exceptions import (
     UnknownRobot,
     UnreachablePose,
 )
-from joulepath.optimizer.kinematics.ur_closed_form import URClosedForm
+from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
 from joulepath.optimizer.search.errors import DurationTooShort, TorqueInfeasible
 from tests.app.live import LOCAL
 from tests.app.problems import checked

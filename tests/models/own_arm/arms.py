@@ -54,7 +54,7 @@ RICH = """<robot name="rich">
     <axis xyz="0 1 0"/><limit lower="0" upper="0.05" effort="20" velocity="0.1"/></joint>
   <link name="finger"><inertial><origin xyz="0 0 0.02"/><mass value="0.1"/>
     <inertia ixx="0.0001" ixy="0" ixz="0" iyy="0.0001" iyz="0" izz="0.00005"/></inertial></link>
-</robot>"""
+</robot>"""  # noqa: E501
 
 
 HELD = {"finger": 0.03}

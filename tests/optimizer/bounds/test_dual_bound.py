@@ -16,16 +16,16 @@ from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
 from joulepath.optimizer.bounds.dual_bound import DualBound, multiplier_rates
 from joulepath.optimizer.bounds.friction_conjugate import FrictionConjugate
 from joulepath.optimizer.bounds.grid_cells import Spacing
+from joulepath.optimizer.bounds.lower_bound import copper_multiplier
 from joulepath.optimizer.bounds.path_terms import path_terms
 from joulepath.optimizer.bounds.reference import Reference, half_sides
 from joulepath.optimizer.bounds.weights import Weights
+from joulepath.optimizer.motion.seven_segment import shortest_duration
+from joulepath.optimizer.motion.spline import sample
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LEAST_DURATION
 from joulepath.optimizer.search.baselines import guesses
-from joulepath.optimizer.search.lower_bound import copper_multiplier
-from joulepath.optimizer.trajectories.seven_segment import shortest_duration
-from joulepath.optimizer.trajectories.spline import sample
 from tests.optimizer.bounds.numpy_terms import greatest
 from tests.optimizer.bounds.test_holding import NAMES, NEAR, SAMPLED, SHIFT, asked, many_motions
 from tests.optimizer.moves import GOAL, ROBOT, START, problem

@@ -7,9 +7,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from joulepath.optimizer.collision.clearance_constraint import COUNTED, ClearanceConstraint
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.collision.pair_arrays import PairArrays
-from joulepath.optimizer.nlp.clearance_constraint import COUNTED, ClearanceConstraint
 from tests.optimizer.cells import LOADS, arm_in_cell, cell
 from tests.optimizer.collision.numpy_distances import NumpyDistances
 

@@ -12,6 +12,7 @@ import pytest
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.collision.clearance_proof import GAP, RELATIVE_GAP, proven_clearance
 from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.clouds import Points
 from joulepath.optimizer.problem.scene import (
@@ -26,7 +27,6 @@ from joulepath.optimizer.problem.scene import (
     Shape,
     Sphere,
 )
-from joulepath.optimizer.trajectories.spline import Spline
 from tests.optimizer.cells import LOADS, at, cell, positions, wander
 from tests.optimizer.moves import ROBOT
 from tests.selection import long_but

@@ -15,10 +15,10 @@ from joulepath.optimizer.collision.close_pass import CLOSE, close_pass
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.evaluate.evaluate import evaluate
 from joulepath.optimizer.evaluate.recording import Waypoints
+from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
 from joulepath.optimizer.result.certificate import Clearance
-from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.cells import at
 from tests.optimizer.moves import ROBOT
 

@@ -19,7 +19,7 @@ from joulepath.optimizer.collision.clouds import LONGEST_EDGE, Cloud, divided
 from joulepath.optimizer.collision.coal_distance import SKIN, coal_shape
 from joulepath.optimizer.collision.cores import Core
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.collision.state_validity import StateValidityChecker
+from joulepath.optimizer.collision.planner.state_validity import StateValidityChecker
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.clouds import MOST_POINTS, Points, TriangleMesh, Voxels

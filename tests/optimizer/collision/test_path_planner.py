@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from joulepath import optimize
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.collision.path_planner import (
+from joulepath.optimizer.collision.planner.path_planner import (
     REGIONS,
     STEP,
     PlannedPaths,
@@ -22,15 +22,13 @@ from joulepath.optimizer.collision.path_planner import (
     interpolation_is_free,
     plan_paths,
 )
-from joulepath.optimizer.collision.state_validity import StateValidityChecker
+from joulepath.optimizer.collision.planner.state_validity import StateValidityChecker
 from joulepath.optimizer.deadline import NEVER, Deadline
 from joulepath.optimizer.exceptions import NoTrajectory
 from joulepath.optimizer.kinematics.forward import joint_placements
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.path_constraints import PathConstraints, path_constraint_list
-from joulepath.optimizer.methods import planned_paths
-from joulepath.optimizer.methods.free_spline import FreeSpline
-from joulepath.optimizer.methods.planned_paths import FROM_PLANNED_PATH
+from joulepath.optimizer.motion.spline import sample
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
@@ -44,7 +42,9 @@ from joulepath.optimizer.problem.scene import (
 )
 from joulepath.optimizer.problem.tool_cone import ToolCone
 from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory
-from joulepath.optimizer.trajectories.spline import sample
+from joulepath.optimizer.solve.methods import planned_paths
+from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods.planned_paths import FROM_PLANNED_PATH
 from tests.optimizer.cells import LOADS, arm_in_cell, cell
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
 from tests.optimizer.moves import ROBOT, problem_with
@@ -288,7 +288,7 @@ def test_a_motion_deep_inside_an_obstacle_is_left_for_a_planned_path_once_one_is
     best_known: float, was_postponed: bool, planned: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # what got out at great cost is compared with planned paths, too
-    monkeypatch.setattr("joulepath.optimizer.methods.free_spline.WAY_OUT", np.inf)
+    monkeypatch.setattr("joulepath.optimizer.solve.methods.free_spline.WAY_OUT", np.inf)
     arm, q_start, q_goal = task("post")
     solver = FreeSpline(PreparedProblem.of(problem(arm, q_start, q_goal)), q_start, q_goal, NEVER)
     solver.best_known, solver.was_postponed = best_known, was_postponed

@@ -10,15 +10,15 @@ import pytest
 from joulepath.models.robot import Robot
 from joulepath.models.uncertainty.spread import spread_of
 from joulepath.optimizer.cycle.cycle_solution import CycleMove
-from joulepath.optimizer.energy.dwell import dwell_energy, holding_power
-from joulepath.optimizer.energy.losses import breakdown
-from joulepath.optimizer.energy.plant import REPORT_NODES
+from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power
+from joulepath.optimizer.dynamics.losses import breakdown
+from joulepath.optimizer.dynamics.plant import REPORT_NODES
+from joulepath.optimizer.motion.spline import fine_samples
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.stops import Stop
-from joulepath.optimizer.trajectories.spline import fine_samples
-from tests.optimizer.energy.test_interval import nominal, with_values
+from tests.optimizer.dynamics.test_interval import nominal, with_values
 from tests.optimizer.moves import AMPLE, GOAL, PAYLOAD, ROBOT, START, fixed, problem, torques
 
 # of the half-width: the energy is not quite linear in the figures, and both sides are drawn

@@ -13,7 +13,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.divided_paths import PLACES, _cheapest, _costs, with_divided_paths
 from joulepath.optimizer.cycle.strands import Strand, strands_of
 from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
-from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.branches import BranchFilter

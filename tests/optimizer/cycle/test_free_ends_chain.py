@@ -14,16 +14,17 @@ from scipy.spatial.transform import Rotation
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.cycle import free_orientations
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.free_ends_chain import FreeEndsChain
 from joulepath.optimizer.cycle.single_joint_bound import Boxes, SingleJointBound
 from joulepath.optimizer.deadline import NEVER
 from joulepath.optimizer.kinematics.angles import wrapped
-from joulepath.optimizer.kinematics.least_time import least_time, least_way
+from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
 from joulepath.optimizer.kinematics.tcp import flange_pose
-from joulepath.optimizer.kinematics.tool_course import ToolCourse
-from joulepath.optimizer.kinematics.ur_closed_form import URClosedForm
+from joulepath.optimizer.kinematics.tool_path.least_time import least_time, least_way
+from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -33,7 +34,6 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stop_path import StopPath
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.tool_path import ToolPath
-from joulepath.optimizer.search.lower_bound import LeastBound
 from tests.optimizer.cycle.cycles import HOME, PART
 from tests.optimizer.moves import AMPLE
 from tests.selection import long_but

@@ -17,7 +17,7 @@ from joulepath.optimizer.cycle.lazy_search import LazySearch
 from joulepath.optimizer.cycle.legs import Leg
 from joulepath.optimizer.deadline import NEVER
 from joulepath.optimizer.exceptions import DeadlineExceeded
-from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.motion.spline import Spline
 
 RANGE = 3.0
 ROUNDING = 1e-9

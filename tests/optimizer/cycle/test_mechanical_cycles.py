@@ -11,18 +11,18 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from joulepath.optimizer.bounds.mechanical_bound import mechanical_bounds
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.cycle.errors import CycleTooShort
 from joulepath.optimizer.cycle.ways import layers_of
 from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.motion.seven_segment import shortest_duration
+from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.free_order import FreeOrder
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.search.mechanical_bound import mechanical_bounds
 from joulepath.optimizer.search.priced_work import CELLS, WORKS, priced_work_bounds
-from joulepath.optimizer.trajectories.seven_segment import shortest_duration
-from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.cycle.cycles import HOME, pick_and_place
 from tests.optimizer.moves import ROBOT
 from tests.selection import long_but

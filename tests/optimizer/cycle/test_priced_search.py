@@ -13,7 +13,7 @@ from joulepath.optimizer.cycle.legs import Leg
 from joulepath.optimizer.cycle.priced_search import MoveOfALeg, PricedMotion
 from joulepath.optimizer.deadline import NEVER
 from joulepath.optimizer.exceptions import NoTrajectory
-from joulepath.optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.optimizer.motion.time_scalings import quintic_spline
 
 LONGEST = 4.0
 Q: Array = np.zeros(6)

@@ -19,7 +19,7 @@ from joulepath.optimizer.cycle.time_sharing import TimeSharing
 from joulepath.optimizer.cycle.time_sharing import duration_of as duration_of_all
 from joulepath.optimizer.cycle.timed_cycle import TimedSearch
 from joulepath.optimizer.cycle.ways import layers_of
-from joulepath.optimizer.energy.dwell import holding_power
+from joulepath.optimizer.dynamics.dwell import holding_power
 from joulepath.optimizer.exceptions import (
     DeadlineExceeded,
     InvalidProblem,

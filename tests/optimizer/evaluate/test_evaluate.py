@@ -12,15 +12,15 @@ import pinocchio as pin
 import pytest
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.evaluate.evaluate import MOST_SEGMENTS, Evaluation, evaluate
 from joulepath.optimizer.evaluate.recording import BLOCK, RecordedRows, Recording, Waypoints
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, InvalidTable
 from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.motion.time_scalings import quintic
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.trajectories.time_scalings import quintic
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem
 
 VIA = START + np.array([-0.4, 0.3, 0.5, -0.6, 0.8, 0.2])

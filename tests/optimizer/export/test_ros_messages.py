@@ -17,7 +17,7 @@ from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.program import Move, Program
 from joulepath.optimizer.export.quintic_points import POSITION_TOLERANCE, VELOCITY_TOLERANCE
 from joulepath.optimizer.export.ros_messages import MoveitOptions, Ros2Options, to_moveit, to_ros2
-from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.motion.spline import Spline
 from tests.optimizer.export.programs import cycle_with_payload
 from tests.optimizer.export.read_back.joint_trajectories import deviations, followed
 from tests.optimizer.export.read_back.random_motions import arm_of, one_move

@@ -14,7 +14,7 @@ from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.json_document import to_json
 from joulepath.optimizer.export.npz_arrays import to_npz
 from joulepath.optimizer.export.rows import TableOptions
-from joulepath.optimizer.trajectories.spline import Spline
+from joulepath.optimizer.motion.spline import Spline
 from tests.optimizer.export.programs import LOAD, cycle_with_payload
 from tests.optimizer.export.read_back.random_motions import one_move
 

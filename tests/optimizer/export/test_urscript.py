@@ -13,7 +13,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.program import Move, Program
 from joulepath.optimizer.export.urscript import SET_POINT_ERROR, UrscriptOptions, to_urscript
-from joulepath.optimizer.trajectories.spline import retimed
+from joulepath.optimizer.motion.spline import retimed
 from tests.optimizer.export.programs import LOAD, cycle_with_payload
 from tests.optimizer.export.read_back.random_motions import arm_of, one_move, random_spline
 from tests.optimizer.export.read_back.urscript_machine import Controller, Halt, translated

@@ -15,7 +15,7 @@ from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import Array, Robot
 from joulepath.models.uncertainty.document import covariance_of, with_document
 from joulepath.models.uncertainty.parameters import LINKS
-from joulepath.optimizer.energy.link_regressor import (
+from joulepath.optimizer.dynamics.link_regressor import (
     body_parameters,
     rigid_regressor,
     rigid_torques,

@@ -35,7 +35,7 @@ log = replace(short, **again, time=np.arange(rows * times) / short.rate, tempera
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 identify(robot, [log], IdentificationOptions(refit=True))
 print(len(log.time), (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024)
-"""
+"""  # noqa: E501
 
 # bytes of the whole process, from the file to the figures: with 26 columns on a uniform grid, and
 # with 33 whose times jitter, so that they are interpolated

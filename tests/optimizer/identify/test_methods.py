@@ -11,7 +11,7 @@ import pytest
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
-from joulepath.optimizer.energy.link_regressor import (
+from joulepath.optimizer.dynamics.link_regressor import (
     base_wrench_regressor,
     body_parameters,
     rigid_regressor,

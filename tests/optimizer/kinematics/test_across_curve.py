@@ -7,7 +7,8 @@ from __future__ import annotations
 import numpy as np
 
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.kinematics.across_curve import (
+from joulepath.optimizer.kinematics.chain import Chain, miss, pose_error
+from joulepath.optimizer.kinematics.seven.across_curve import (
     LEFT,
     MANY,
     led,
@@ -15,7 +16,6 @@ from joulepath.optimizer.kinematics.across_curve import (
     second_order,
     step_across,
 )
-from joulepath.optimizer.kinematics.chain import Chain, miss, pose_error
 from tests.optimizer.chains import serial_chain
 
 CHAINS = [Chain.of(load_robot("gen3").model), Chain.of(serial_chain(7).model)]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.kinematics import course_matching
-from joulepath.optimizer.kinematics.course_matching import matched
+from joulepath.optimizer.kinematics.tool_path import course_matching
+from joulepath.optimizer.kinematics.tool_path.course_matching import matched
 
 
 def _courses(rng: np.random.Generator) -> list[Array]:

@@ -13,8 +13,12 @@ from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
 from joulepath.optimizer.kinematics.chain import Chain
-from joulepath.optimizer.kinematics.covering_sheets import CoveringSheet, boxes_on, covering_sheets
-from joulepath.optimizer.kinematics.redundant_arm import RedundantArm
+from joulepath.optimizer.kinematics.covers.covering_sheets import (
+    CoveringSheet,
+    boxes_on,
+    covering_sheets,
+)
+from joulepath.optimizer.kinematics.seven.redundant_arm import RedundantArm
 from tests.optimizer.chains import serial_chain
 from tests.selection import long_but
 

@@ -12,9 +12,9 @@ import pytest
 
 from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import SingularPose
-from joulepath.optimizer.kinematics.decomposition import DecomposedArm
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
-from joulepath.optimizer.kinematics.ur_closed_form import URClosedForm
+from joulepath.optimizer.kinematics.six.decomposition import DecomposedArm
+from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
 from tests.optimizer.kinematics.six_joints import (
     ACCURACY,
     FOUND,

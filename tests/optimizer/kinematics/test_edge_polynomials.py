@@ -7,7 +7,13 @@ from __future__ import annotations
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.kinematics.redundant_pose import Polynomial, _angles, _product, _sum, _wave
+from joulepath.optimizer.kinematics.seven.redundant_pose import (
+    Polynomial,
+    _angles,
+    _product,
+    _sum,
+    _wave,
+)
 
 
 def test_polynomials_are_what_they_say() -> None:

@@ -12,10 +12,10 @@ import pytest
 from joulepath import Arm, Pose, Problem, optimize
 from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import UnreachablePose
-from joulepath.optimizer.kinematics.decomposition import DecomposedArm
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.multi_start import MOST_BRANCHES, MultiStart
-from joulepath.optimizer.kinematics.ur_closed_form import URClosedForm
+from joulepath.optimizer.kinematics.six.decomposition import DecomposedArm
+from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
 from tests.optimizer.chains import move, serial_chain
 from tests.optimizer.kinematics.six_joints import (
     ACCURACY,

@@ -11,11 +11,11 @@ import pytest
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import wrapped
-from joulepath.optimizer.kinematics.pose_boxes import PoseBoxes
+from joulepath.optimizer.kinematics.covers.pose_boxes import PoseBoxes
+from joulepath.optimizer.kinematics.covers.wrist_boxes import WristBoxes
+from joulepath.optimizer.kinematics.covers.wrist_geometry import WristGeometry
 from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.kinematics.wrist_boxes import WristBoxes
-from joulepath.optimizer.kinematics.wrist_geometry import WristGeometry
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose

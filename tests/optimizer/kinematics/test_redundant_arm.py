@@ -14,10 +14,10 @@ from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.exceptions import UnreachablePose
 from joulepath.optimizer.kinematics.angles import wrapped
-from joulepath.optimizer.kinematics.free_turn import LOOPS, FreeTurn
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
-from joulepath.optimizer.kinematics.redundant_arm import RedundantArm
-from joulepath.optimizer.kinematics.redundant_curve import RedundantCurve
+from joulepath.optimizer.kinematics.seven.free_turn import LOOPS, FreeTurn
+from joulepath.optimizer.kinematics.seven.redundant_arm import RedundantArm
+from joulepath.optimizer.kinematics.seven.redundant_curve import RedundantCurve
 from tests.optimizer.chains import serial_chain
 from tests.selection import long_but
 

@@ -14,7 +14,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.ik_solutions import LimitedSolution
 from joulepath.optimizer.kinematics.inverse import MEMBERS
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
-from joulepath.optimizer.kinematics.ur_closed_form import LEAST_AHEAD, URClosedForm
+from joulepath.optimizer.kinematics.six.ur_closed_form import LEAST_AHEAD, URClosedForm
 from joulepath.optimizer.problem.branches import BranchFilter
 from tests.optimizer.kinematics.flange import (
     ACCURACY,

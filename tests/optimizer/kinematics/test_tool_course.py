@@ -9,11 +9,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from joulepath.optimizer.certificate import certify
-from joulepath.optimizer.kinematics.tool_course import ToolCourse
+from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
+from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.tool_path import ToolPath
-from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.moves import tcp_pose
 from tests.optimizer.tool_paths import HOME, along, moved
 

@@ -14,16 +14,16 @@ from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.chain import Chain, miss, pose_error
-from joulepath.optimizer.kinematics.curve_tracing import cycles, traced
-from joulepath.optimizer.kinematics.hermite import hermite_weights
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
-from joulepath.optimizer.kinematics.nearby_arm import NearbyArm
-from joulepath.optimizer.kinematics.nearby_loops import LONG, SHORT, followed
 from joulepath.optimizer.kinematics.newton import solved
-from joulepath.optimizer.kinematics.redundant_arm import RedundantArm
-from joulepath.optimizer.kinematics.seed_table import SeedTable
-from joulepath.optimizer.kinematics.traced_arm import TracedArm
-from joulepath.optimizer.kinematics.traced_curve import TracedCurve
+from joulepath.optimizer.kinematics.seven.curve_tracing import cycles, traced
+from joulepath.optimizer.kinematics.seven.hermite import hermite_weights
+from joulepath.optimizer.kinematics.seven.nearby_arm import NearbyArm
+from joulepath.optimizer.kinematics.seven.nearby_loops import LONG, SHORT, followed
+from joulepath.optimizer.kinematics.seven.redundant_arm import RedundantArm
+from joulepath.optimizer.kinematics.seven.seed_table import SeedTable
+from joulepath.optimizer.kinematics.seven.traced_arm import TracedArm
+from joulepath.optimizer.kinematics.seven.traced_curve import TracedCurve
 from joulepath.optimizer.problem.branches import NumberedBranch
 from tests.optimizer.chains import move, serial_chain
 from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, flange, inside

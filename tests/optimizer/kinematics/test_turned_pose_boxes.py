@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.covers.turned_pose_boxes import BRANCHES, TurnedPose
 from joulepath.optimizer.kinematics.tcp import flange_pose, tcp_pose
-from joulepath.optimizer.kinematics.turned_pose_boxes import BRANCHES, TurnedPose
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose

@@ -16,8 +16,10 @@ import pytest
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.model import collision_model
-from joulepath.optimizer.energy.plant import Plant
+from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
+from joulepath.optimizer.motion.spline import Spline
+from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.dwell import Dwell
@@ -27,8 +29,6 @@ from joulepath.optimizer.replay.planned import PlannedMotion, PlannedTorques
 from joulepath.optimizer.replay.reference import MOST_STEPS, course_of
 from joulepath.optimizer.replay.replay import Replay, replay
 from joulepath.optimizer.result.solution import Solution
-from joulepath.optimizer.trajectories.spline import Spline
-from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import GOAL, PAYLOAD, START, problem, tcp_pose
 

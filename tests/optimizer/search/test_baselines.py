@@ -14,6 +14,13 @@ import ruckig
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.motion.ruckig_motion import time_optimal
+from joulepath.optimizer.motion.time_scalings import (
+    SampledMotion,
+    controller_default,
+    quintic,
+    trapezoid,
+)
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.solution import Baseline
@@ -25,13 +32,6 @@ from joulepath.optimizer.search.baselines import (
     motion_energy,
     nearest,
     saving,
-)
-from joulepath.optimizer.trajectories.ruckig_motion import time_optimal
-from joulepath.optimizer.trajectories.time_scalings import (
-    SampledMotion,
-    controller_default,
-    quintic,
-    trapezoid,
 )
 from tests.optimizer.moves import problem_with
 

@@ -13,11 +13,9 @@ import pytest
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import NEVER, Deadline
-from joulepath.optimizer.energy.kernel_cache import compile_kernel
+from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.exceptions import UnreachablePose
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
-from joulepath.optimizer.methods import solver_for
-from joulepath.optimizer.methods.method import SolveResult, SolveStatus
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Payload
@@ -28,6 +26,8 @@ from joulepath.optimizer.search.branch_and_bound import explore
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.ends import ends
 from joulepath.optimizer.search.errors import TorqueInfeasible
+from joulepath.optimizer.solve.methods import solver_for
+from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
 from joulepath.optimizer.surroundings import Surroundings
 from tests.optimizer.moves import (
     GOAL,

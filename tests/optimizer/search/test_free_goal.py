@@ -20,10 +20,7 @@ from joulepath.optimizer.kinematics.orientation_tolerance import (
     nearest_orientation,
     sample_orientations,
 )
-from joulepath.optimizer.methods.duration_intervals import duration_intervals
-from joulepath.optimizer.nlp.coordinates import Coordinates, GoalConstraints
-from joulepath.optimizer.nlp.nonlinear_program import NonlinearProgram
-from joulepath.optimizer.nlp.sqp import solve
+from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.pareto import pareto
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -39,7 +36,10 @@ from joulepath.optimizer.search.free_goal import goal_constraints
 from joulepath.optimizer.search.reserve import RESERVE
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sampled_ends import BATCH
-from joulepath.optimizer.trajectories import bspline
+from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
+from joulepath.optimizer.solve.nlp.coordinates import Coordinates, GoalConstraints
+from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
+from joulepath.optimizer.solve.nlp.sqp import solve
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
 from tests.optimizer.moves import (
     GOAL,
@@ -53,7 +53,7 @@ from tests.optimizer.moves import (
     problem,
     tcp_pose,
 )
-from tests.optimizer.nlp.second_differences import without_dry_friction
+from tests.optimizer.solve.nlp.second_differences import without_dry_friction
 from tests.selection import long_but
 
 # the certificate's, of positions [m] and angles [rad]

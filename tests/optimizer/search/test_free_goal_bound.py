@@ -10,19 +10,19 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives
+from joulepath.optimizer.bounds.box_search import FEW, NEARLY, ROUNDS
+from joulepath.optimizer.bounds.lower_bound import lower_bounds
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations
+from joulepath.optimizer.kinematics.six.full_turns import full_turn_alternatives
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.tool_cone import ToolCone
 from joulepath.optimizer.search import free_goal_bound
-from joulepath.optimizer.search.box_search import FEW, NEARLY, ROUNDS
 from joulepath.optimizer.search.ends import within_cone
 from joulepath.optimizer.search.free_goal_bound import MOST_FIRST, family_bound
-from joulepath.optimizer.search.lower_bound import lower_bounds
 from tests.optimizer.chains import serial_chain
 from tests.optimizer.moves import GOAL, HOME, PAYLOAD, ROBOT, TILTED, problem, tcp_pose
 from tests.selection import long_but

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from joulepath.models.robot import Array, Limits
-from joulepath.optimizer.search.least_displacement import ROUNDING, least_displacement
+from joulepath.optimizer.bounds.least_displacement import ROUNDING, least_displacement
 
 NQ, COUNT = 2, 200
 ONES = np.ones(NQ)

@@ -12,6 +12,7 @@ import pytest
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.result.candidates import CandidateStatus
@@ -20,7 +21,6 @@ from joulepath.optimizer.search.candidates import Reason
 from joulepath.optimizer.search.least_work import explore_least_work
 from joulepath.optimizer.search.rough_work import COARSE, RoughWork, best_of_each
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.trajectories import bspline
 from tests.optimizer.moves import GOAL, START, fixed, problem, tcp_pose
 
 DURATION = 3.0

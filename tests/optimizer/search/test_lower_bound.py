@@ -14,20 +14,20 @@ import pytest
 from scipy.interpolate import BSpline
 
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.energy.kernel_cache import compile_kernel
-from joulepath.optimizer.energy.losses import breakdown
+from joulepath.optimizer.bounds.lower_bound import lower_bounds, priced_bounds
+from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
+from joulepath.optimizer.dynamics.losses import breakdown
+from joulepath.optimizer.motion import bspline
+from joulepath.optimizer.motion.bspline import DEGREE
+from joulepath.optimizer.motion.quadrature import quadrature
+from joulepath.optimizer.motion.seven_segment import shortest_duration
+from joulepath.optimizer.motion.spline import peak_rates, spline_of
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
 from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.search.baselines import guesses, motion_energy
-from joulepath.optimizer.search.lower_bound import lower_bounds, priced_bounds
-from joulepath.optimizer.trajectories import bspline
-from joulepath.optimizer.trajectories.bspline import DEGREE
-from joulepath.optimizer.trajectories.quadrature import quadrature
-from joulepath.optimizer.trajectories.seven_segment import shortest_duration
-from joulepath.optimizer.trajectories.spline import peak_rates, spline_of
 from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, changed, fixed, limits, problem
 from tests.selection import long_but
 

@@ -12,14 +12,14 @@ import pinocchio as pin
 import pytest
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.mechanical_bound import EnergyRange, mechanical_bounds
 from joulepath.optimizer.deadline import NEVER
-from joulepath.optimizer.methods.free_spline import FreeSpline
+from joulepath.optimizer.motion import bspline
+from joulepath.optimizer.motion.seven_segment import shortest_duration
+from joulepath.optimizer.motion.spline import Spline, peak_rates, spline_of, time_scale
+from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.search.mechanical_bound import EnergyRange, mechanical_bounds
-from joulepath.optimizer.trajectories import bspline
-from joulepath.optimizer.trajectories.seven_segment import shortest_duration
-from joulepath.optimizer.trajectories.spline import Spline, peak_rates, spline_of, time_scale
-from joulepath.optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 from tests.optimizer.moves import PAYLOAD, TILTED, fixed, limits, problem
 from tests.selection import long_but
 

@@ -11,6 +11,7 @@ import pytest
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.lower_bound import lower_bounds
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
 from joulepath.optimizer.kinematics.chain import Chain
@@ -21,7 +22,6 @@ from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.candidates import Candidate, pairs
 from joulepath.optimizer.search.ends import ends
-from joulepath.optimizer.search.lower_bound import lower_bounds
 from joulepath.optimizer.search.missed_branches import all_known, bound_of_others
 from tests.optimizer.search.test_redundant_goals import asked, members, pose_of, tasks
 from tests.selection import long_but

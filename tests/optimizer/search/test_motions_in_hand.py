@@ -14,8 +14,8 @@ from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.deadline import DeadlinePassed
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.in_hand import least_certified
-from joulepath.optimizer.methods import METHODS
-from joulepath.optimizer.methods.method import Method, SolveResult, SolveStatus
+from joulepath.optimizer.motion.spline import Spline, lasting
+from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import MethodName
@@ -24,8 +24,8 @@ from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search import refinement
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.trajectories.spline import Spline, lasting
-from joulepath.optimizer.trajectories.time_scalings import quintic_spline
+from joulepath.optimizer.solve.methods import METHODS
+from joulepath.optimizer.solve.methods.method import Method, SolveResult, SolveStatus
 from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.moves import GOAL, PAYLOAD, START, fixed, problem
 from tests.selection import long_but

@@ -13,6 +13,7 @@ import pytest
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.branches import BranchFilter
@@ -27,7 +28,6 @@ from joulepath.optimizer.search.near_goals import APART, MOST, OTHERS, activate_
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sampled_ends import nearest_configuration
 from joulepath.optimizer.search.seeds import estimates
-from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.selection import long_but
 
 # s: no search comes near it, however busy the machine

@@ -12,6 +12,7 @@ import pytest
 
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -21,7 +22,6 @@ from joulepath.optimizer.search.candidates import FULL_TURN, Candidate
 from joulepath.optimizer.search.other_turns import MOST, NEAR, other_turns
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.seeds import estimates_between, expected
-from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.optimizer.methods.method import SolveResult, SolveStatus
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import FULL_TURN, Candidate, Reason
 from joulepath.optimizer.search.incumbent import Incumbent
@@ -22,6 +21,7 @@ from joulepath.optimizer.search.outer_turns import (
     families_of,
 )
 from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
 from tests.optimizer.moves import GOAL, fixed, problem, tcp_pose
 
 DURATION = 3.0

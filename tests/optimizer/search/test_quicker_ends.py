@@ -9,6 +9,7 @@ import pytest
 
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -18,7 +19,6 @@ from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.quicker_ends import with_quicker_ends
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sampled_ends import fastest_samples
-from joulepath.optimizer.trajectories.seven_segment import shortest_duration
 from tests.optimizer.moves import AMPLE, fixed
 
 # m, rad: what the certificate allows at an end

@@ -15,6 +15,7 @@ from benchmarks.tasks import collision_free
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.bus import Bus
@@ -29,7 +30,6 @@ from joulepath.optimizer.search.seeds import (
     activate_seeds,
     estimates,
 )
-from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0

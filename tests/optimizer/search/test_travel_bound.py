@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.lower_bound import lower_bounds, travel_bounds
+from joulepath.optimizer.motion import bspline
+from joulepath.optimizer.motion.spline import Spline, least_time_scale, retimed, spline_of
+from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.search.lower_bound import lower_bounds, travel_bounds
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.trajectories import bspline
-from joulepath.optimizer.trajectories.spline import Spline, least_time_scale, retimed, spline_of
-from joulepath.optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, problem
 from tests.selection import long_but
 

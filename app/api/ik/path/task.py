@@ -26,7 +26,7 @@ from joulepath.app.schemas.common import (
 from joulepath.app.schemas.examples.values import HOME
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.declared import PerSample, PerSampleAndJoint, Seconds, Unit
-from joulepath.optimizer.kinematics.path_following import PathPoint, follow
+from joulepath.optimizer.kinematics.tool_path.path_following import PathPoint, follow
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import LONGEST_DURATION
 

@@ -32,7 +32,7 @@ KRL = re.compile(
     rf"|(?P<block>PTP_SPLINE|ENDSPLINE)|TIME_BLOCK START"
     rf"|TIME_BLOCK PART = (?P<part>{NUMBER})|TIME_BLOCK END = (?P<total>{NUMBER})"
     rf"|WAIT SEC (?P<wait>{NUMBER})|\$OUT\[(?P<output>\d+)\]=(?P<value>TRUE|FALSE)"
-    rf"|\$LOAD=\{{M (?P<mass>{NUMBER}),CM \{{X {NUMBER},Y {NUMBER},Z (?P<z>{NUMBER}),A 0.0,B 0.0,C 0.0\}},"
+    rf"|\$LOAD=\{{M (?P<mass>{NUMBER}),CM \{{X {NUMBER},Y {NUMBER},Z (?P<z>{NUMBER}),A 0.0,B 0.0,C 0.0\}},"  # noqa: E501
     rf"J \{{X 0.0,Y 0.0,Z 0.0\}}\}}"
 )
 

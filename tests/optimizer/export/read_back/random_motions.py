@@ -9,9 +9,9 @@ import numpy as np
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.export.program import Move, Program
+from joulepath.optimizer.motion.bspline import DEGREE, clamped
+from joulepath.optimizer.motion.spline import Spline, least_time_scale, retimed
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.trajectories.bspline import DEGREE, clamped
-from joulepath.optimizer.trajectories.spline import Spline, least_time_scale, retimed
 
 OWN = "own_arm"
 

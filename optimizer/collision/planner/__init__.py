@@ -1,0 +1,1 @@
+"""Collision-free joint paths by a sampling planner."""

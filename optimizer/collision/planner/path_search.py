@@ -1,0 +1,210 @@
+"""One search for a collision-free joint path by OMPL, which can be continued: RRT-Connect in a box
+of configurations.
+
+J. J. Kuffner, S. M. LaValle, "RRT-Connect: an efficient approach to single-query path planning",
+IEEE ICRA 2000, in the implementation of OMPL; OMPL's path simplifier shortens the path.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from ompl import base as ob
+from ompl import geometric as og
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.collision.planner.state_validity import StateValidityChecker
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.problem.arm import Arm
+
+# OMPL's range: maximum length [rad] of an edge of the trees, in weighted joints
+RANGE = 0.4
+# shortcuts tried on a path, and distance [rad], in weighted joints, between the states at which it
+# is checked last
+SHORTCUTS, LAST_STEP = 40, 0.02
+# least weight of a joint
+LEAST_WEIGHT = 0.1
+
+
+@dataclass(frozen=True)
+class Box:
+    """The configurations (nq,) [rad] that a search samples, and the distance `step` [rad] between
+    checked states of an edge, in weighted joints."""
+
+    lower: Array
+    upper: Array
+    step: float
+
+    def inside(self, q: Array) -> Array:
+        """Those of the configurations (k, nq) [rad] that lie in the box."""
+        return q[((q >= self.lower) & (q <= self.upper)).all(axis=1)]
+
+
+def joint_weights(arm: Arm, model: CollisionModel) -> Array:
+    """Weights (nq,) of the joints in the distances between configurations: at most 1, at least
+    LEAST_WEIGHT.
+
+    The weight is the square root of a joint's longest lever over the longest of all joints: a lever
+    itself would make wrists turn at will, equal weights would check a turn of the wrist as densely
+    as one of the base. If a tool's axis has to stay within a cone, wrists count as much as any
+    joint.
+    """
+    levers = model.levers().max(axis=0, initial=0.0)
+    if arm.tool_cone is not None or not levers.any():
+        return np.ones(arm.robot.nq)
+    return np.asarray(np.maximum(np.sqrt(levers / levers.max()), LEAST_WEIGHT))
+
+
+class _Effort:
+    """State validity checks of one search, which pauses when its allowance is used up or at the
+    deadline.
+
+    It holds no reference to OMPL's objects, which hold one to it: a cycle through them would never
+    be freed.
+    """
+
+    def __init__(self, checker: StateValidityChecker, weights: Array, deadline: Deadline) -> None:
+        self._checker, self._deadline, self._weights = checker, deadline, weights.tolist()
+        self._q = np.empty(len(weights))
+        self.checked_states, self.allowed = 0, 0
+
+    def is_valid(self, state: ob.RealVectorStateType) -> bool:
+        """Whether a state of OMPL is valid."""
+        self.checked_states += 1
+        for joint, weight in enumerate(self._weights):
+            self._q[joint] = state[joint] / weight
+        return self._checker.is_valid(self._q)
+
+    def is_spent(self) -> bool:
+        """Whether the search must pause."""
+        return self.checked_states >= self.allowed or self._deadline.passed
+
+
+class PathSearch:
+    """A search in a box. `advance` goes on where it paused.
+
+    The path sought begins at the first point of `begin` (k, nq) [rad], which is a collision-free
+    path, and leaves it at any of its points. It ends at the last point of one of `ends`, and meets
+    this path, (m, nq) each, at any of its points. `last_checker` checks the path at short steps,
+    with less reserve: what long steps cut must not be more than that.
+    """
+
+    def __init__(
+        self,
+        checker: StateValidityChecker,
+        last_checker: StateValidityChecker,
+        weights: Array,
+        box: Box,
+        begin: Array,
+        ends: Sequence[Array],
+        deadline: Deadline,
+    ) -> None:
+        self._weights, self._begin, self._ends = weights, begin, ends
+        self._effort = _Effort(checker, weights, deadline)
+        space = ob.RealVectorStateSpace(len(weights))
+        bounds = ob.RealVectorBounds(len(weights))
+        for joint, (low, high) in enumerate(
+            zip(box.lower * weights, box.upper * weights, strict=True)
+        ):
+            bounds.setLow(joint, float(low))
+            bounds.setHigh(joint, float(high))
+        space.setBounds(bounds)
+        self._information = ob.SpaceInformation(space)
+        self._information.setStateValidityChecker(self._effort.is_valid)
+        self._information.setStateValidityCheckingResolution(box.step / space.getMaximumExtent())
+        self._information.setup()
+        self._problem = ob.ProblemDefinition(self._information)
+        self._space = space
+        for q in box.inside(begin):
+            self._problem.addStartState(self._state(q))
+        goals = ob.GoalStates(self._information)
+        for q in box.inside(np.vstack(ends)):
+            goals.addState(self._state(q))
+        self._problem.setGoal(goals)
+        self._last_checker = last_checker
+        self._planner = og.RRTConnect(self._information)
+        self._planner.setRange(RANGE)
+        self._planner.setProblemDefinition(self._problem)
+        self._planner.setup()
+
+    @property
+    def checked_states(self) -> int:
+        """States checked so far."""
+        return self._effort.checked_states
+
+    @property
+    def is_solved(self) -> bool:
+        """Whether there is a path."""
+        return bool(self._problem.hasExactSolution())
+
+    def advance(self, states: int) -> bool:
+        """Search on, for about `states` more checked states; whether there is a path now."""
+        self._effort.allowed = self._effort.checked_states + states
+        self._planner.solve(ob.PlannerTerminationCondition(self._effort.is_spent))
+        return self.is_solved
+
+    def path(self) -> Array | None:
+        """The path found (k, nq) [rad], shortened; None if a state of it is in collision when it is
+        checked densely.
+        """
+        path = self._whole(self._problem.getSolutionPath())
+        # limited by counts, not by the clock, so that the same seed gives the same path
+        simplifier = og.PathSimplifier(self._information)
+        simplifier.reduceVertices(path, SHORTCUTS, SHORTCUTS)
+        simplifier.partialShortcutPath(path, SHORTCUTS, SHORTCUTS)
+        simplifier.reduceVertices(path, SHORTCUTS, SHORTCUTS)
+        joints = range(len(self._weights))
+        points = (
+            np.array([[state[joint] for joint in joints] for state in path.getStates()])
+            / self._weights
+        )
+        points = points[np.append(True, np.abs(np.diff(points, axis=0)).max(axis=1) > 0)]
+        # without the rounding of the weights
+        chosen, _ = _nearest([end[-1:] for end in self._ends], points[-1])
+        points[0], points[-1] = self._begin[0], self._ends[chosen][-1]
+        return points if self._is_valid(points) else None
+
+    def _whole(self, path: og.PathGeometric) -> og.PathGeometric:
+        """The path found, with the part of `begin` before it and the part of one of `ends` after
+        it.
+        """
+        states = path.getStates()
+        first, last = (
+            np.array([state[j] for j in range(len(self._weights))]) / self._weights
+            for state in (states[0], states[-1])
+        )
+        _, left = _nearest([self._begin], first)
+        chosen, met = _nearest(self._ends, last)
+        for q in self._begin[:left][::-1]:
+            path.prepend(self._state(q))
+        for q in self._ends[chosen][met + 1 :]:
+            path.append(self._state(q))
+        return path
+
+    def _is_valid(self, points: Array) -> bool:
+        """Whether states LAST_STEP apart along a path (k, nq) are valid."""
+        for first, second in pairwise(points):
+            count = int(np.linalg.norm((second - first) * self._weights) / LAST_STEP) + 1
+            if not all(
+                self._last_checker.is_valid(q)
+                for q in np.linspace(first, second, count, endpoint=False)
+            ):
+                return False
+        return True
+
+    def _state(self, q: Array) -> ob.RealVectorStateType:
+        state = self._space.allocState()
+        for joint, value in enumerate((q * self._weights).tolist()):
+            state[joint] = value
+        return state
+
+
+def _nearest(paths: Sequence[Array], q: Array) -> tuple[int, int]:
+    """Which of the paths (k, nq), and which of its points, is nearest to q (nq,)."""
+    apart = [np.abs(path - q).max(axis=1) for path in paths]
+    chosen = min(range(len(paths)), key=lambda k: float(apart[k].min()))
+    return chosen, int(apart[chosen].argmin())

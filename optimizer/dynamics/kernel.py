@@ -1,0 +1,191 @@
+"""The per-node functions of the NLP, ready to be called: compiled once per robot, evaluated from
+any thread.
+
+`node` gives cost, limited torque and their first and second derivatives at one instant of a motion.
+Everything that a request may change (payload, gravity, drives, friction, objective) is a parameter.
+The functions are compiled by the system's C compiler and stored on disk: see `kernel_cache`. Until
+the compiled library exists, or if there is no compiler, CasADi's virtual machine evaluates the same
+expressions.
+
+`python -m joulepath.optimizer.dynamics.precompile` compiles the kernels of all robots, or of those
+named.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from joulepath.models.robot import MOST_ROBOTS, Array, Robot
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.dynamics.kernel_cache import compile_kernel, library_paths
+from joulepath.optimizer.dynamics.kernel_expressions import build
+from joulepath.optimizer.dynamics.kernel_functions import (
+    Compiled,
+    Evaluation,
+    Functions,
+    Interpreted,
+)
+from joulepath.optimizer.native.build import compiler
+from joulepath.optimizer.native.library_cache import is_intact, mark_used, seal_path
+
+log = logging.getLogger(__name__)
+
+# nodes per call of a function whose number of nodes varies from caller to caller
+CHUNK = 64
+# such chunks between two looks at the deadline: some ten milliseconds
+CHUNKS_PER_CHECK = 128
+
+
+class _Evaluations(threading.local):
+    """The calling thread's evaluations by function and number of nodes. They are freed when the
+    thread ends.
+    """
+
+    def __init__(self) -> None:
+        self.known: dict[tuple[str, int], Evaluation] = {}
+
+
+class Kernel:
+    """A robot's functions on arrays of nodes. Any number of threads may call one kernel at the same
+    time.
+
+    Every thread has its own memory for arguments and results, because functions run without
+    Python's global lock.
+    """
+
+    def __init__(self, robot: Robot, functions: Functions) -> None:
+        self.nq = robot.nq
+        self.compiled = functions.compiled
+        self._functions = functions
+        self._evaluations = _Evaluations()
+
+    def _evaluation(self, name: str, count: int) -> Evaluation:
+        known, key = self._evaluations.known, (name, count)
+        if key not in known:
+            known[key] = self._functions.evaluation(name, count)
+        return known[key]
+
+    def node(self, y: Array, multiplier: Array, weight: Array, p: Array) -> tuple[Array, ...]:
+        """Cost (N,), tau_limited (N, nq), gradient (N, 3nq), Jacobian (N, nq, 3nq), Hessian (N,
+        3nq, 3nq).
+
+        y (N, 3nq) = q, v, a; multiplier (N, nq); weight (N,); p packed `Parameters`. The results
+        are views: the thread's next call with as many nodes overwrites them.
+        """
+        count, nq = len(y), self.nq
+        cost, tau, gradient, jacobian, hessian = self._evaluation("node", count)(
+            y, multiplier, weight[:, None], p
+        )
+        return (
+            cost[:, 0],
+            tau,
+            gradient,
+            jacobian.reshape(count, 3 * nq, nq).transpose(0, 2, 1),
+            hessian.reshape(count, 3 * nq, 3 * nq),
+        )
+
+    def value(self, y: Array, p: Array) -> tuple[Array, Array]:
+        """Cost (N,) and tau_limited (N, nq) [N·m]. Views: the thread's next call with as many nodes
+        overwrites them.
+        """
+        cost, tau = self._evaluation("value", len(y))(y, p)
+        return cost[:, 0], tau
+
+    def values(self, y: Array, p: Array) -> tuple[Array, Array]:
+        """Cost (k,) and tau_limited (k, nq) [N·m] for any number of samples y (k, 3nq)."""
+        cost, tau = self._in_chunks("value", y, p, (1, self.nq))
+        return cost[:, 0], tau
+
+    def torque(self, q: Array, v: Array, a: Array, p: Array) -> Array:
+        """Rigid body and rotor torque tau (k, nq) [N·m] for any number of samples."""
+        (tau,) = self._in_chunks("torque", np.hstack([q, v, a]), p, (self.nq,))
+        return tau
+
+    def _in_chunks(self, name: str, given: Array, p: Array, sizes: Sequence[int]) -> list[Array]:
+        """The results (k, size) of a function of (y, p) for any number of samples y (k, 3nq)."""
+        count = len(given)
+        evaluation = self._evaluation(name, CHUNK)
+        y = np.zeros((-(-count // CHUNK) * CHUNK, 3 * self.nq))
+        y[:count] = given
+        results = [np.empty((len(y), size)) for size in sizes]
+        for k, i in enumerate(range(0, len(y), CHUNK)):
+            if k % CHUNKS_PER_CHECK == CHUNKS_PER_CHECK - 1:
+                checkpoint()
+            for result, value in zip(results, evaluation(y[i : i + CHUNK], p), strict=True):
+                result[i : i + CHUNK] = value
+        return [result[:count] for result in results]
+
+
+class _Loader:
+    """Loads a robot's kernel, for any number of threads: compiled as soon as the library exists,
+    else interpreted.
+
+    The interpreted kernel stays referenced after the compiled one has replaced it: other threads
+    may still use it, and expressions must be freed under `SYMBOLICS`.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self.paths = library_paths(robot)
+        self._lock = threading.Lock()
+        self._compiled: Kernel | None = None
+        self._interpreted: Kernel | None = None
+        self._compiling: threading.Thread | None = None
+
+    def get(self) -> Kernel:
+        # read once: other threads only ever set it
+        compiled = self._compiled
+        if compiled is not None:
+            return compiled
+        with self._lock:
+            return self._compiled or self._load()
+
+    def _load(self) -> Kernel:
+        if self._interpreted is not None and not any(
+            seal_path(path).exists() for path in self.paths
+        ):
+            return self._interpreted
+        found = next(filter(is_intact, self.paths), None)
+        if found is not None:
+            mark_used(found)
+            self._compiled = Kernel(self._robot, Compiled(found, self._robot.nq))
+            return self._compiled
+        if self._interpreted is None:
+            self._interpreted = Kernel(self._robot, Interpreted(build(self._robot)))
+        if self._compiling is None and compiler() is not None:
+            self._compiling = threading.Thread(
+                target=self._compile, name="kernel-compiler", daemon=True
+            )
+            self._compiling.start()
+        return self._interpreted
+
+    def _compile(self) -> None:
+        try:
+            compile_kernel(self._robot)
+        except (RuntimeError, OSError) as error:
+            log.warning(
+                "kernel of %s not compiled, the virtual machine serves: %s", self._robot.name, error
+            )
+
+
+_LOADERS = threading.Lock()
+
+
+@lru_cache(MOST_ROBOTS)
+def _loader(robot: Robot) -> _Loader:
+    return _Loader(robot)
+
+
+def kernel_for(robot: Robot) -> Kernel:
+    """The kernel of a robot: compiled if the library is on disk, else interpreted while the
+    compiler runs.
+    """
+    # the cache lets two threads that miss at the same time both build: only one loader may compile
+    with _LOADERS:
+        loader = _loader(robot)
+    return loader.get()

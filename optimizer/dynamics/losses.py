@@ -1,0 +1,177 @@
+"""Drive losses, power on the bus and the parts of a motion's energy: one definition for optimiser,
+report, certificate.
+
+tau_motor = tau + friction [N·m],  i = tau_motor / torque_constant [A]
+inverter  = constant + linear |i| + quadratic i² [W]  (Hansen, Öltjen, Meike, Ortmaier 2012)
+P_net     = base + Σ_j (tau_motor_j v_j + copper_j i_j² + inverter_j(i_j)) [W],  base = idle +
+controller
+P_drawn   = max(P_net, 0) - regeneration · max(-P_net, 0) [W] on a shared bus; for other buses see
+`bus_flow`
+
+The formulas take numpy arrays (report, certificate) or CasADi symbols (optimiser). `xp` is the
+module whose `sqrt` and `asinh` fit. The optimiser smooths |x| to sqrt(x² + width²); with width 0
+the same lines are exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from joulepath.models.robot import Array, Drives, FrictionLaw
+from joulepath.optimizer.dynamics.bus_flow import exchange
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.result.energy import (
+    ElectricalEnergy,
+    Energy,
+    JointEnergy,
+    MechanicalEnergy,
+    StorageUse,
+)
+
+ENERGY_FLOOR = 1e-6  # J; errors of energies below it are relative to it
+
+
+@dataclass(frozen=True)
+class PowerFlow:
+    """Power at an instant per joint (..., nq) [W], and the motor torque (..., nq) [N·m] at the
+    joint.
+
+    `friction` is lost in the gear, `copper` in the motor windings, `inverter` in the inverter;
+    `shaft` is tau_motor · v, negative while the joint brakes.
+    """
+
+    tau_motor: Any
+    friction: Any
+    copper: Any
+    inverter: Any
+    shaft: Any
+
+    @property
+    def joints(self) -> Any:
+        """Power that each joint takes from the bus (..., nq) [W]; negative if it feeds power
+        back."""
+        return self.shaft + self.copper + self.inverter
+
+
+def smooth_abs(x: Any, width: Any, xp: Any) -> Any:
+    """sqrt(x² + width²): |x| with its corner smoothed over about `width`."""
+    return xp.sqrt(x * x + width * width)
+
+
+def friction_torque(
+    law: FrictionLaw, drives: Drives, tau: Any, v: Any, a: Any, xp: Any = np
+) -> Any:
+    """Friction torque (..., nq) [N·m] of a motion; tau, v, a as in `power_flow`."""
+    return law.torque(v, None if law.load is None else tau - drives.rotor_inertia * a, xp)
+
+
+def power_flow(
+    tau: Any, v: Any, a: Any, drives: Drives, friction: FrictionLaw, width: Any = 0.0, xp: Any = np
+) -> PowerFlow:
+    """Losses and shaft power of every joint.
+
+    tau (..., nq) [N·m] are torques of rigid body and rotor, without friction; v [rad/s], a [rad/s²]
+    (..., nq). `width` [A] smooths the |i| of the inverter.
+    """
+    return flow_with(friction_torque(friction, drives, tau, v, a, xp), tau, v, drives, width, xp)
+
+
+def flow_with(
+    lost: Any, tau: Any, v: Any, drives: Drives, width: Any = 0.0, xp: Any = np
+) -> PowerFlow:
+    """Losses and shaft power of every joint at friction torques `lost` (..., nq) [N·m]; see
+    `power_flow`.
+    """
+    tau_motor = tau + lost
+    i = tau_motor / drives.torque_constant
+    inverter = (
+        drives.inverter_constant
+        + drives.inverter_linear * smooth_abs(i, width, xp)
+        + drives.inverter_quadratic * i * i
+    )
+    return PowerFlow(
+        tau_motor=tau_motor,
+        friction=lost * v,
+        copper=drives.copper * i * i,
+        inverter=inverter,
+        shaft=tau_motor * v,
+    )
+
+
+def drawn_power(net: Any, regeneration: Any, width: Any = 0.0, xp: Any = np) -> Any:
+    """Power that a shared bus draws from the supply for a net demand [W]; `width` [W] smooths the
+    corner at zero.
+    """
+    return ((1 - regeneration) * smooth_abs(net, width, xp) + (1 + regeneration) * net) / 2
+
+
+def breakdown(
+    weights: Array,
+    v: Array,
+    a: Array,
+    tau: Array,
+    potential: float,
+    arm: Arm,
+    kinetic: float = 0.0,
+    lost: Array | None = None,
+) -> Energy:
+    """Energy of a motion of an arm from its samples, in order of time.
+
+    `weights` (k,) [s] are those of the quadrature; they add up to the duration. v [rad/s], a
+    [rad/s²] and tau [N·m] (k, nq) are the samples; tau are torques of rigid body and rotor, without
+    friction. `potential` and `kinetic` [J] are the gains of energy from the first to the last
+    state, known without quadrature. `lost` (k, nq) [N·m] are the friction torques if they are
+    known. A part that is zero is 0.0, never -0.0.
+    """
+    duration = float(weights.sum())
+    if lost is None:
+        lost = friction_torque(arm.friction_law, arm.drives, tau, v, a)
+    flow = flow_with(lost, tau, v, arm.drives)
+    bus, joints = arm.bus, flow.joints
+    flows = exchange(bus, arm.regeneration, arm.base_power, joints, weights)
+    surplus, charged = float(flows.surplus.sum()), float(flows.charged.sum())
+    drawn, discharge = float(flows.drawn.sum()), float(flows.charge[0] - flows.charge[-1])
+    per_joint = JointEnergy(
+        friction=weights @ flow.friction,
+        copper=weights @ flow.copper,
+        inverter=weights @ flow.inverter,
+        shaft=weights @ flow.shaft,
+    )
+    mechanical = weights @ np.abs(tau * v)
+    return Energy(
+        electrical=ElectricalEnergy(
+            total=drawn + discharge,
+            idle=arm.base_power * duration,
+            potential=potential,
+            kinetic=kinetic,
+            friction=float(per_joint.friction.sum()),
+            copper=float(per_joint.copper.sum()),
+            inverter=float(per_joint.inverter.sum()),
+            braking=surplus,
+            # subtracted from 0.0, since a product of -1 and 0.0 is -0.0
+            recovered=0.0 - arm.regeneration * surplus,
+            storage_loss=(1 - bus.efficiency) * charged,
+        ),
+        mechanical=MechanicalEnergy(total=float(mechanical.sum()), per_joint=mechanical),
+        per_joint=per_joint,
+        peak_power=float(
+            np.divide(flows.drawn, weights, out=np.zeros_like(weights), where=weights > 0).max()
+        ),
+        mean_power=drawn / duration if duration > 0 else 0.0,
+        storage=None
+        if bus.mode != "storage"
+        else StorageUse(
+            initial=float(flows.charge[0]),
+            final=float(flows.charge[-1]),
+            charged=charged,
+            discharged=float(flows.discharged.sum()),
+        ),
+    )
+
+
+def relative_error(energy: float, reference: float) -> float:
+    """|energy - reference| / |reference| of two energies [J]."""
+    return abs(energy - reference) / max(abs(reference), ENERGY_FLOOR)

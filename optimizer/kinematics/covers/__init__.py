@@ -1,0 +1,1 @@
+"""Boxes that cover all configurations that reach a pose."""

@@ -1,0 +1,186 @@
+"""Boxes of joint positions, narrowed to what can reach a pose whose orientation is free in part.
+
+For q in a box with middle c and half sides h, δ = q - c: the TCP is at p(q) = p(c) + J δ + r with
+|r| ≤ 1/2 Σ_jk L_max(j,k) h_j h_k. The columns of J are z_j × (p - o_j), and L_j bounds the distance
+of the TCP from joint j's origin o_j: the second derivative of p by q_j and q_k, j ≤ k, is z_j ×
+(z_k × (p - o_k)). In the same way the tool's axis is a(q) = a(c) + A δ + s with columns z_j × a and
+|s| ≤ 1/2 (Σ_j h_j)², and lies within 2 sin(half_angle / 2) of the cone's direction.
+
+So J δ = e - r, with e the error of the middle, is a linear system with a bounded right-hand side.
+For any matrix P, with M = P J, M_jj δ_j = (P e)_j - (P r)_j - Σ_{k≠j} M_jk δ_k: an interval for δ_j
+(the Krawczyk operator without its restriction to square systems; Neumaier, Interval methods for
+systems of equations, 1990, chapter 5). A box whose intervals are empty holds no configuration that
+reaches the pose.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.kinematics.covers.wrist_geometry import potential_rates
+from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
+from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.kinematics.tcp import T_last_tcp
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+
+# what intervals are widened by, for rounding [rad]
+ROUNDING = 1e-9
+# added to the diagonal of J Jᵀ [m²]: P is near the pseudoinverse, and bounded where J loses its
+# rank
+DAMPING = 1e-6
+# least diagonal of M with which an interval is divided by it
+LEAST_DIAGONAL = 1e-6
+# a cone narrower than this is held by its axis, too [rad]; a wider one leaves the axis next to free
+WIDEST_CONE = np.pi / 2
+
+
+@dataclass(frozen=True)
+class Placed:
+    """An arm at the middles of b boxes: joint axes and origins (b, nq, 3), the TCP and the tool's
+    axis (b, 3) in the base frame, and the centre of mass (b, nq, 3) of each link."""
+
+    axes: Array
+    origins: Array
+    tcp: Array
+    tool_axis: Array
+    centres: Array
+
+
+@dataclass(frozen=True)
+class PoseBoxes:
+    """What of boxes of joint positions (b, nq) [rad] can reach a pose. Holds for every chain of
+    revolute joints.
+    """
+
+    arm: Arm
+    pose: ConeOrientedPose
+
+    @cached_property
+    def _placements(self) -> Array:
+        return joint_placements(rigid_body_model(self.arm))
+
+    @cached_property
+    def _rates(self) -> Array:
+        return potential_rates(rigid_body_model(self.arm), np.asarray(self.arm.gravity))
+
+    @cached_property
+    def _bodies(self) -> tuple[Array, Array]:
+        """Mass (nq,) [kg] and centre of mass (nq, 3) [m], in its own frame, of each link."""
+        bodies = list(rigid_body_model(self.arm).inertias)[1:]
+        return np.array([body.mass for body in bodies]), np.array([body.lever for body in bodies])
+
+    @cached_property
+    def _T_last_tcp(self) -> Array:
+        return T_last_tcp(self.arm)
+
+    @cached_property
+    def levers(self) -> Array:
+        """Greatest distance (nq,) [m] of the TCP from each joint's origin."""
+        lengths = np.linalg.norm(self._placements[1:, :3, 3], axis=1)
+        steps = np.append(lengths, np.linalg.norm(self._T_last_tcp[:3, 3]))
+        return np.asarray(np.cumsum(steps[::-1])[::-1])
+
+    @cached_property
+    def free(self) -> Mask:
+        """Joints (nq,) that move neither the TCP nor the tool's axis: the last one, if both lie on
+        its axis.
+        """
+        free = np.zeros(len(self.levers), dtype=bool)
+        across = np.hypot(*self._T_last_tcp[:2, 3])
+        tilted = np.hypot(*(self._T_last_tcp[:3, :3] @ self.pose.axis)[:2])
+        free[-1] = across < ROUNDING and (tilted < ROUNDING or self.pose.half_angle >= WIDEST_CONE)
+        return free
+
+    def placed(self, q: Array) -> Placed:
+        """The arm at q (b, nq) [rad]."""
+        frames = link_frames(self._placements, q)[:, 1:]
+        tcp = frames[:, -1] @ self._T_last_tcp
+        centres = (
+            np.einsum("bjxy,jy->bjx", frames[..., :3, :3], self._bodies[1]) + frames[..., :3, 3]
+        )
+        return Placed(
+            frames[..., :3, 2],
+            frames[..., :3, 3],
+            tcp[:, :3, 3],
+            tcp[:, :3, :3] @ self.pose.axis,
+            centres,
+        )
+
+    def narrowed(self, centre: Array, half: Array) -> tuple[Array, Array, Mask]:
+        """Middles and half sides (b, nq) [rad] of boxes that hold all that can reach the pose;
+        which (b,) are not empty.
+
+        A box is never wider than the one that it is made of.
+        """
+        at = self.placed(centre)
+        J, error, slack = self._system(at, half)
+        # damped pseudoinverse; the narrowing holds for any matrix
+        P = np.linalg.solve(J @ J.transpose(0, 2, 1) + DAMPING * np.eye(J.shape[1]), J).transpose(
+            0, 2, 1
+        )
+        M = P @ J
+        diagonal = np.einsum("bjj->bj", M)
+        safe = diagonal > LEAST_DIAGONAL
+        divisor = np.where(safe, diagonal, 1.0)
+        beside = np.einsum("bjk,bk->bj", np.abs(M), half) - np.abs(diagonal) * half
+        blurred = np.einsum("bjm,bm->bj", np.abs(P), slack)
+        middle = np.einsum("bjm,bm->bj", P, error) / divisor
+        reach = (beside + blurred) / divisor + ROUNDING
+        low = np.where(safe, np.maximum(-half, middle - reach), -half)
+        high = np.where(safe, np.minimum(half, middle + reach), half)
+        # each equation by itself, too
+        possible = (
+            np.abs(error) <= np.einsum("bmj,bj->bm", np.abs(J), half) + slack + ROUNDING
+        ).all(axis=1)
+        possible &= (low <= high).all(axis=1)
+        return centre + (low + high) / 2, np.maximum(high - low, 0.0) / 2, possible
+
+    def _system(self, at: Placed, half: Array) -> tuple[Array, Array, Array]:
+        """J (b, m, nq), the error (b, m) of the middles, and what bounds each row's remainder (b,
+        m).
+        """
+        arms = at.tcp[:, None] - at.origins
+        J = np.cross(at.axes, arms).transpose(0, 2, 1)
+        error = self.pose.position - at.tcp
+        slack = np.repeat(second_order(self.levers, half)[:, None], 3, axis=1)
+        if self.pose.half_angle >= WIDEST_CONE:
+            return J, error, slack
+        tilt = np.cross(at.axes, at.tool_axis[:, None]).transpose(0, 2, 1)
+        chord = 2 * np.sin(self.pose.half_angle / 2)
+        turned = second_order(np.ones(half.shape[1]), half) + chord
+        return (
+            np.concatenate([J, tilt], axis=1),
+            np.concatenate([error, self.pose.direction - at.tool_axis], axis=1),
+            np.concatenate([slack, np.repeat(turned[:, None], 3, axis=1)], axis=1),
+        )
+
+    def least_potential(self, centre: Array, half: Array) -> Array:
+        """A lower bound (b,) [J] on the potential energy in boxes: by the gradient in the middle,
+        or by the levers.
+        """
+        at, (masses, _) = self.placed(centre), self._bodies
+        g = np.asarray(self.arm.gravity)
+        potential = -(at.centres @ g) @ masses
+        # Σ_{i ≥ j} m_i (c_i - o_j), and -g · (z_j × that)
+        beyond = np.cumsum((masses[:, None] * at.centres)[:, ::-1], axis=1)[:, ::-1]
+        beyond = beyond - np.cumsum(masses[::-1])[::-1, None] * at.origins
+        gradient = -np.cross(at.axes, beyond) @ g
+        rates = self._rates
+        fall = np.minimum(
+            np.einsum("bj,bj->b", np.abs(gradient), half) + second_order(rates, half), half @ rates
+        )
+        return np.asarray(potential - fall)
+
+
+def second_order(levers: Array, half: Array) -> Array:
+    """1/2 Σ_jk lever_max(j,k) h_j h_k (b,) for boxes of half sides (b, nq): what first-order terms
+    leave out.
+    """
+    # Σ_j lever_j h_j (h_j + 2 Σ_{k<j} h_k)
+    before = np.cumsum(half, axis=1) - half
+    return np.asarray(0.5 * ((half + 2 * before) * half) @ levers)

@@ -1,0 +1,225 @@
+"""Boxes of joint positions that hold all configurations of a pose that is turned about an axis of
+the tool, for arms of Universal Robots' form.
+
+The turn is cut into cells of half width h [rad] about their middles. Within a cell, a direction of
+the tool is within h of its place for the middle, and a point of it within δ = 2 r sin(h / 2), r its
+distance from the axis. The closed form (`ur_closed_form`) is followed with these bounds. For two
+unit vectors that are e apart, one of them at the angle a from a pole, the azimuths about it differ
+by asin(sin e / sin a) at most, as a cap of radius e is seen from the pole; with e ≥ a, or ≥ π - a,
+they may be any. In the plane the same holds with lengths: asin(δ / ρ).
+
+- The last axis' origin is at the distance ρ from the first axis, ρ off by δ at most: q1 = φ +
+  asin(d4 / ρ), or φ + π
+  - asin(d4 / ρ), with φ its azimuth. asin is monotone. q1 is within r1 of its middle then.
+- The second axis n turns by r1. So the angle between n and the last axis z, which is abs(q5), is
+  within e = r1 + h; q6
+  is the azimuth of n about z, and ψ = q2 + q3 + q4 that of z about n, from the arm's plane: both
+  are off by asin(sin e
+  / sin a) at most.
+- The fourth axis is at (ahead, height) - d5 (sin ψ, -cos ψ) in the arm's plane, ahead = ±sqrt(ρ² -
+  d4²): within r4 of
+  its place for the middles, by what these and ψ may be off. If ψ may be any, it is on the whole
+  circle.
+- D is its distance from the second axis: cos q3 = (D² - a2² - a3²) / (2 a2 a3), which is monotone
+  in D. With q2 = η -
+  β(q3), η its azimuth: dβ / dq3 = 1 / 2 + (a3² - a2²) / (2 D²), greatest and least at the ends of
+  D's interval. So q2
+  changes by no more than η and this times q3, and q4 = ψ - η + β - q3 likewise, with 1 - dβ / dq3.
+
+Where an interval of ρ or D leaves the reach, it is cut; where it lies outside, the cell has no
+configuration on this branch. So branches that begin or end within a cell are in its boxes, and so
+are singular configurations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations
+from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
+from joulepath.optimizer.kinematics.tcp import flange_pose
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.pose import Pose
+
+# what intervals are widened by, for rounding: that of an arc cosine of nearly one [rad, m]
+ROUNDING = 2e-7
+# configurations of an arm at an angle at most
+BRANCHES = 8
+
+
+@dataclass(frozen=True)
+class _Interval:
+    """Middles `at` and half widths `off` (k,)."""
+
+    at: Array
+    off: Array
+
+    @staticmethod
+    def between(a: Array, b: Array) -> _Interval:
+        """From the lesser to the greater of two values (k,)."""
+        return _Interval((a + b) / 2, np.abs(b - a) / 2)
+
+
+@dataclass(frozen=True)
+class _Wrist:
+    """Of each cell (k,): whether there is a configuration, q1, q5, q6, and the fourth axis in the
+    arm's plane [m]: its place (k, 2), within `off`; and q2 + q3 + q4."""
+
+    held: Mask
+    q1: _Interval
+    q5: _Interval
+    q6: _Interval
+    place: Array
+    off: Array
+    heading: _Interval
+
+
+@dataclass(frozen=True)
+class TurnedPose:
+    """The configurations of a pose that leaves the rotation about its axis free, by the angle of
+    this turn [rad] from the orientation R (3, 3)."""
+
+    form: URClosedForm
+    arm: Arm
+    pose: ConeOrientedPose
+    R: Array
+
+    @classmethod
+    def of(cls, arm: Arm, pose: ConeOrientedPose, given: Pose | None = None) -> TurnedPose | None:
+        """From the orientation of a `given` pose, or any; None for an arm of another form, or a
+        pose that leaves more free."""
+        form = URClosedForm.of(arm.robot.model)
+        if form is None or pose.half_angle > 0:
+            return None
+        return cls(
+            form, arm, pose, sample_orientations(pose, 1)[0] if given is None else given.T[:3, :3]
+        )
+
+    def boxes(
+        self, angle: Array, h: Array, branch: npt.NDArray[np.intp]
+    ) -> tuple[Array, Array, Mask]:
+        """Middles and half sides (k, 6) [rad] of boxes that hold, but for full turns, all
+        configurations of a `branch` (k,), of BRANCHES, at angles within `h` of `angle` (k,) [rad];
+        and which (k,) may hold any."""
+        T = np.tile(np.eye(4), (len(angle), 1, 1))
+        T[:, :3, :3] = self.R @ Rotation.from_rotvec(angle[:, None] * self.pose.axis).as_matrix()
+        T[:, :3, 3] = self.pose.position
+        signs = np.array(list(product((1.0, -1.0), repeat=3)))[branch]
+        flange = flange_pose(T, self.arm.T_flange_tcp)
+        return _Turned(self.form, flange, self.pose, h + ROUNDING).boxes(*signs.T)
+
+
+@dataclass(frozen=True)
+class _Turned:
+    """Flange poses T (k, 4, 4) at the middles of cells, of half widths `h` (k,) [rad]."""
+
+    form: URClosedForm
+    T: Array
+    pose: ConeOrientedPose
+    h: Array
+
+    def boxes(self, shoulder: Array, wrist: Array, elbow: Array) -> tuple[Array, Array, Mask]:
+        """Boxes (k, 6) of the cells on branches that are given by their signs (k,), and which (k,)
+        may hold any.
+        """
+        form, at = self.form, self._wrist(shoulder, wrist)
+        reach = abs(abs(form.a2) - abs(form.a3)), abs(form.a2) + abs(form.a3)
+        distance = np.linalg.norm(at.place, axis=1)
+        near, far = distance - at.off - ROUNDING, distance + at.off + ROUNDING
+        held = at.held & (far >= reach[0]) & (near <= reach[1])
+        near, far = (np.clip(each, *reach) for each in (near, far))
+        squares, product2 = form.a2**2 + form.a3**2, 2 * form.a2 * form.a3
+        cosines = [np.clip((each**2 - squares) / product2, -1.0, 1.0) for each in (near, far)]
+        bent = _Interval.between(*(elbow * np.arccos(each) for each in cosines))
+        towards = _Interval(
+            np.arctan2(at.place[:, 1], at.place[:, 0]), _azimuth_off(at.off, distance)
+        )
+        with np.errstate(divide="ignore"):
+            rates = [0.5 + (form.a3**2 - form.a2**2) / (2 * each**2) for each in (near, far)]
+        first, second = (
+            np.maximum(*np.abs([offset - each for each in rates])) for offset in (0.0, 1.0)
+        )
+        inner = np.arctan2(form.a3 * np.sin(bent.at), form.a2 + form.a3 * np.cos(bent.at))
+        q2 = _Interval(towards.at - inner, towards.off + _times(first, bent.off))
+        q4 = _Interval(
+            at.heading.at - towards.at + inner - bent.at,
+            at.heading.off + towards.off + _times(second, bent.off),
+        )
+        joints = (at.q1, q2, bent, q4, at.q5, at.q6)
+        centre = np.stack([each.at for each in joints], axis=1)
+        half = np.stack([np.minimum(each.off + ROUNDING, np.pi) for each in joints], axis=1)
+        return centre, half, held
+
+    def _wrist(self, shoulder: Array, wrist: Array) -> _Wrist:
+        form, T, h = self.form, self.T, self.h
+        x_axis, y_axis, z_axis = (T[:, :3, k] for k in range(3))
+        centre = T[:, :3, 3] - form.d6 * z_axis
+        # the last axis' origin moves on a circle about the tool's axis
+        beside = centre - self.pose.position
+        radius = np.linalg.norm(np.cross(beside, self.pose.direction), axis=1)
+        moved = 2 * np.sin(h / 2) * radius + ROUNDING
+        rho = np.hypot(centre[:, 0], centre[:, 1])
+        low, high = np.maximum(rho - moved, abs(form.d4)), rho + moved
+        held = high >= abs(form.d4)
+        high = np.maximum(high, abs(form.d4))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            aside = _Interval.between(
+                *(np.arcsin(np.clip(form.d4 / each, -1.0, 1.0)) for each in (low, high))
+            )
+        towards = np.arctan2(centre[:, 1], centre[:, 0])
+        q1_at = towards + np.where(shoulder > 0, aside.at, np.pi - aside.at)
+        q1 = _Interval(q1_at, np.minimum(aside.off + _azimuth_off(moved, rho), np.pi))
+        ahead = _Interval.between(
+            *(shoulder * np.sqrt(np.maximum(each**2 - form.d4**2, 0.0)) for each in (low, high))
+        )
+        c1, s1, zero = np.cos(q1.at), np.sin(q1.at), np.zeros_like(q1.at)
+        n, outward = np.stack([s1, -c1, zero], axis=1), np.stack([c1, s1, zero], axis=1)
+        u, v, w = ((each * n).sum(axis=1) for each in (x_axis, y_axis, z_axis))
+        angle, off = np.arctan2(np.hypot(u, v), w), q1.off + h
+        q5 = _Interval.between(
+            *(wrist * np.clip(each, 0.0, np.pi) for each in (angle - off, angle + off))
+        )
+        seen = _seen_from_pole(off, angle)
+        q6 = _Interval(np.arctan2(-wrist * v, wrist * u), seen)
+        fifth = -(np.sin(q6.at)[:, None] * x_axis + np.cos(q6.at)[:, None] * y_axis)
+        along, above = (fifth * outward).sum(axis=1), fifth[:, 2]
+        heading = _Interval(np.arctan2(along, -above), seen)
+        anywhere = seen >= np.pi
+        arm = np.where(anywhere, 0.0, form.d5)[:, None]
+        level = np.stack([ahead.at, centre[:, 2] - form.d1], axis=1)
+        place = level - arm * np.stack([np.sin(heading.at), -np.cos(heading.at)], axis=1)
+        swung = np.where(anywhere, abs(form.d5), 2 * abs(form.d5) * np.sin(seen / 2))
+        return _Wrist(held, q1, q5, q6, place, np.hypot(ahead.off, moved) + swung, heading)
+
+
+def _seen_from_pole(off: Array, angle: Array) -> Array:
+    """By how much (k,) [rad] the azimuth of a unit vector at an `angle` from a pole changes at most
+    if it is `off`.
+    """
+    inside = off < np.minimum(angle, np.pi - angle)
+    sine = np.sin(np.minimum(off, np.pi / 2)) / np.where(inside, np.sin(angle), 1.0)
+    return np.where(inside, np.arcsin(np.minimum(sine, 1.0)), np.pi)
+
+
+def _azimuth_off(off: Array, distance: Array) -> Array:
+    """By how much (k,) [rad] the azimuth of a point at a `distance` from an axis changes at most if
+    it is `off` [m].
+    """
+    inside = off < distance
+    return np.where(
+        inside, np.arcsin(np.where(inside, off / np.maximum(distance, ROUNDING), 1.0)), np.pi
+    )
+
+
+def _times(rate: Array, off: Array) -> Array:
+    """Products (k,), zero where nothing changes, however fast."""
+    return np.where(
+        off > 0, np.where(np.isfinite(rate), rate, np.inf) * np.maximum(off, ROUNDING), 0.0
+    )

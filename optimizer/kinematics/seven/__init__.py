@@ -1,0 +1,1 @@
+"""Inverse kinematics of redundant arms with seven joints."""

@@ -1,0 +1,1 @@
+"""Inverse kinematics of arms with six joints."""

@@ -1,0 +1,1 @@
+"""Tool paths: their shape over time, and the joints that follow them."""

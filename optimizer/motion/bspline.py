@@ -1,0 +1,301 @@
+"""Clamped B-splines on [0, 1] with given knots: basis matrices, quadrature nodes, and the grid of
+the limits.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache, cached_property
+from itertools import pairwise
+from typing import ClassVar
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.interpolate import BSpline, make_interp_spline
+
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.motion import quintic
+from joulepath.optimizer.motion.quadrature import quadrature
+
+DEGREE = 5
+# at rest (v = a = 0) at both ends, the first three control points coincide, and the last three
+REST_POINTS = 3
+# least number of quadrature nodes of the cost, and of grid points at which the peaks of the rates
+# are searched
+LEAST_NODES = 31
+# least number of nodes per span: the power v · a of a constant inertia has degree 7, for which four
+# are exact. With three, the error of the quadrature gave the Hessian of the cost a negative
+# eigenvalue for each joint and end
+LEAST_PER_SPAN = 4
+GRID_POINTS = 512
+# points at which path constraints are bounded; an excess between them is found afterwards and
+# repaired
+PATH_POINTS = 96
+# points of a short span, its ends included, among evenly spaced ones that may miss it
+SPAN_POINTS, SHORT = 6, 0.25
+# weight of the third derivative by τ beside the positions in a smooth fit
+THIRD = 3e-3
+# a switch nearer to an end of [0, 1] is none
+NEXT_TO_END = 1e-3
+# parts into which the anchors of speed, acceleration and jerk divide a span, where these have
+# degree 4, 3 and 2
+ANCHORS = (2, 4, 4)
+
+
+def clamped(breaks: Array) -> Array:
+    """Clamped knots over [0, 1] from breakpoints (k,), of which the first is 0 and the last is
+    1."""
+    return np.concatenate([np.zeros(DEGREE), breaks, np.ones(DEGREE)])
+
+
+def basis_matrix(knots: Array, points: Array, derivative: int = 0) -> Array:
+    """Values (k, n) of the basis functions' derivative at `points` (k,) in [0, 1]."""
+    n = len(knots) - DEGREE - 1
+    # its checks take longer than the values
+    return np.ascontiguousarray(
+        BSpline.construct_fast(knots, np.eye(n), DEGREE)(points, derivative)
+    )
+
+
+def in_all_spans(knots: Array, count: int) -> Array:
+    """Points from 0 to the last knot, ascending: `count` evenly spaced ones, and SPAN_POINTS in
+    every span that is shorter than the distance between these and than the share SHORT of the
+    widest one."""
+    points, breaks = np.linspace(0.0, knots[-1], count), np.unique(knots)
+    spans = np.diff(breaks)
+    short = np.flatnonzero(spans < min(points[1], SHORT * spans.max()))
+    if not len(short):
+        return points
+    return np.unique(np.append(points, np.linspace(breaks[short], breaks[short + 1], SPAN_POINTS)))
+
+
+def greville(knots: Array) -> Array:
+    """Greville points (n,): the abscissae of the control values, at which interpolation by a spline
+    is unique.
+    """
+    return np.asarray(sliding_window_view(knots[1:-1], DEGREE).mean(axis=1))
+
+
+def fit(samples: Array, at: Array, knots: Array, resting: int = REST_POINTS) -> Array:
+    """Control points (n, r) of the least-squares fit to samples (k, r) at (k,) in [0, 1].
+
+    The first and the last sample are met exactly. As many control points as are `resting` coincide
+    at either end: with REST_POINTS the curve is at rest there, with one it is not.
+    """
+    matrix = basis_matrix(knots, at)
+    points = np.zeros((matrix.shape[1], samples.shape[1]))
+    points[:resting], points[-resting:] = samples[0], samples[-1]
+    inner = slice(resting, len(points) - resting)
+    points[inner] = np.linalg.lstsq(matrix[:, inner], samples - matrix @ points, rcond=None)[0]
+    return points
+
+
+def smooth_fit(samples: Array, at: Array, knots: Array) -> Array:
+    """Control points (n, r) of the least-squares fit to samples (k, r) of a smooth motion at (k,)
+    in [0, 1], and to the third derivative of the quintic spline through them; at rest at both ends,
+    where the samples are met exactly.
+
+    Next to repeated knots, a fit to the positions alone has a third derivative of many times the
+    samples'.
+    """
+    _, apart = np.unique(at, return_index=True)
+    motion = make_interp_spline(at[apart], samples[apart], k=DEGREE)
+    # samples may miss short spans
+    nodes, _ = quadrature(knots, 3)
+    matrix = np.concatenate([basis_matrix(knots, at), THIRD * basis_matrix(knots, nodes, 3)])
+    points = np.zeros((matrix.shape[1], samples.shape[1]))
+    points[:REST_POINTS], points[-REST_POINTS:] = samples[0], samples[-1]
+    wanted = np.concatenate([samples, THIRD * motion(nodes, 3)]) - matrix @ points
+    inner = slice(REST_POINTS, len(points) - REST_POINTS)
+    points[inner] = np.linalg.lstsq(matrix[:, inner], wanted, rcond=None)[0]
+    return points
+
+
+def smoothed(samples: Array, at: Array, knots: Array) -> Array:
+    """Control points (n, r) that are the values, at the Greville points, of the cubic spline
+    through samples (k, r) of a motion at (k,) in [0, 1]; at rest at both ends.
+
+    Such a curve varies less than the motion (Schoenberg), whatever the knots: it hardly exceeds the
+    motion's rates.
+    """
+    _, apart = np.unique(at, return_index=True)
+    points = np.asarray(make_interp_spline(at[apart], samples[apart], k=3)(greville(knots)))
+    points[:REST_POINTS], points[-REST_POINTS:] = samples[0], samples[-1]
+    return points
+
+
+def refit(points: Array, knots: Array, onto: Array) -> Array:
+    """Control points (n, r) over the knots `onto` that interpolate the spline of `points` (m, r)
+    over `knots`.
+
+    Exact if `onto` refines `knots`.
+    """
+    x = greville(onto)
+    return np.asarray(
+        np.linalg.solve(basis_matrix(onto, x), basis_matrix(knots, x) @ points), dtype=float
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """A spline space over [0, 1] with n control points, and all of it that does not depend on a
+    request.
+
+    `nodes`, `weights` (N,): Gauss-Legendre points of every knot span, at which cost and torque are
+    evaluated; `at_nodes` (3, N, n): basis functions and their first two derivatives there.
+    `at_grid` (3, M, n): first to third derivative on a grid fine enough for the peaks of speed,
+    acceleration and jerk. `anchors` (3, M) marks a few grid points per span; bounding these bounds
+    a derivative that stays at its limit for a while.
+    """
+
+    knots: Array
+    nodes: Array
+    weights: Array
+    at_nodes: Array
+    at_grid: Array
+    anchors: Mask
+
+    degree: ClassVar[int] = DEGREE
+    # number of control points that rest fixes at either end
+    resting: ClassVar[int] = REST_POINTS
+
+    @property
+    def n(self) -> int:
+        """Number of control points."""
+        return int(self.at_nodes.shape[2])
+
+    @property
+    def free(self) -> slice:
+        """The control points that rest at both ends does not fix."""
+        return slice(self.resting, self.n - self.resting)
+
+    def to_spline(self, points: Array) -> Array:
+        """Control points of the B-spline over `knots` for the points of this space: here the
+        same."""
+        return points
+
+    def fit(self, samples: Array, at: Array) -> Array:
+        """Points (n, r), at rest at both ends, of the least-squares fit to samples (k, r) at (k,)
+        in [0, 1].
+        """
+        return fit(samples, at, self.knots)
+
+    @cached_property
+    def at_path(self) -> Array:
+        """Basis functions and their first derivative (2, M, n) at M ≥ PATH_POINTS path points
+        inside (0, 1).
+        """
+        return np.stack([self.matrix(self.path_points, d) for d in range(2)])
+
+    @cached_property
+    def path_points(self) -> Array:
+        """The path points (M,), ascending."""
+        return in_all_spans(self.knots, PATH_POINTS + 2)[1:-1]
+
+    def matrix(self, points: Array, derivative: int = 0) -> Array:
+        """Values (k, n) of the basis functions' derivative at `points` (k,) in [0, 1]."""
+        return basis_matrix(self.knots, points, derivative)
+
+    @cached_property
+    def quintic(self) -> Array:
+        """Control values (n,) of the rest-to-rest quintic, which every space contains."""
+        x = greville(self.knots)
+        return np.asarray(
+            np.linalg.solve(basis_matrix(self.knots, x), quintic.fraction(x)), dtype=float
+        )
+
+    @staticmethod
+    def of(knots: Array, least_nodes: int = LEAST_NODES, grid_points: int = GRID_POINTS) -> Basis:
+        """The space of clamped knots (n + DEGREE + 1,) over [0, 1]; inner knots have multiplicity
+        three at most.
+
+        With no `grid_points`, the grid is too coarse for peaks.
+        """
+        spans = len(np.unique(knots)) - 1
+        nodes, weights = quadrature(knots, max(math.ceil(least_nodes / spans), LEAST_PER_SPAN))
+        edges = np.unique(knots)
+        # slightly inside the span: at a repeated knot jerk jumps, and both of its values count
+        per_span = 4 * max(math.ceil(grid_points / spans / 4), 4 if grid_points else 1)
+        grid = (
+            edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(1e-9, 1 - 1e-9, per_span + 1)
+        ).ravel()
+        step = np.arange(len(grid)) % (per_span + 1)
+        return Basis(
+            knots=knots,
+            nodes=nodes,
+            weights=weights,
+            at_nodes=np.stack([basis_matrix(knots, nodes, d) for d in range(3)]),
+            at_grid=np.stack([basis_matrix(knots, grid, d) for d in range(1, 4)]),
+            anchors=np.stack([step % (per_span // parts) == 0 for parts in ANCHORS]),
+        )
+
+
+@cache
+def uniform(n: int) -> Basis:
+    """The space of n ≥ 7 control points with evenly spaced knots."""
+    return Basis.of(clamped(np.linspace(0.0, 1.0, n - DEGREE + 1)))
+
+
+def graded(
+    switches: Array,
+    repeat: int,
+    widest: float = 0.13,
+    growth: float = np.inf,
+    next_to_end: float = NEXT_TO_END,
+) -> Basis:
+    """A space with knots of multiplicity `repeat` at the switches (k,), and further knots at most
+    `widest` apart.
+
+    At a knot of multiplicity two the slope of the third derivative may jump, at multiplicity three
+    the third derivative itself, as jerk does between its limits. No span between two switches is
+    wider than `growth` times the one before or after it. A switch is left out if it is no farther
+    than `next_to_end` from an end of [0, 1].
+    """
+    edges = np.concatenate([[0.0], _inner(switches, next_to_end), [1.0]])
+    spans = np.concatenate([[np.inf], np.diff(edges), [np.inf]])
+    breaks = [0.0]
+    for k, (a, b) in enumerate(pairwise(edges)):
+        breaks += _between(a, b, spans[k], spans[k + 2], widest, growth)
+        breaks += [b] * (repeat if b < 1.0 else 1)
+    return Basis.of(clamped(np.array(breaks)))
+
+
+def _between(
+    a: float, b: float, before: float, after: float, widest: float, growth: float
+) -> list[float]:
+    """Breakpoints between a and b, whose spans grow from those `before` and `after` them to
+    `widest`.
+    """
+    lower, upper = [a], [b]
+    while True:
+        up, down = min(growth * before, widest), min(growth * after, widest)
+        step, left = min(up, down), upper[-1] - lower[-1]
+        if step == widest or left <= 2 * step:
+            middle = np.linspace(lower[-1], upper[-1], math.ceil(left / step) + 1)[1:-1].tolist()
+            return [*lower[1:], *middle, *upper[:0:-1]]
+        if up <= down:
+            lower.append(lower[-1] + up)
+            before = up
+        else:
+            upper.append(upper[-1] - down)
+            after = down
+
+
+def moved(knots: Array, switches: Array, repeat: int) -> Array | None:
+    """Knots of a `graded` space, moved so that those of multiplicity `repeat` are at other switches
+    (k,).
+
+    The others keep their places between them. None if there are not as many switches.
+    """
+    breaks, counts = np.unique(knots, return_counts=True)
+    old, new = breaks[1:-1][counts[1:-1] == repeat], _inner(switches)
+    if len(old) != len(new):
+        return None
+    old, new = (np.concatenate([[0.0], at, [1.0]]) for at in (old, new))
+    return np.repeat(np.interp(breaks, old, new), counts)
+
+
+def _inner(switches: Array, next_to_end: float = NEXT_TO_END) -> Array:
+    """The switches that are not at either end."""
+    return switches[(switches > next_to_end) & (switches < 1 - next_to_end)]

@@ -1,0 +1,107 @@
+"""The spline of a motion whose joints each have phases of constant jerk, from rest to rest."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.motion import bspline
+from joulepath.optimizer.motion.spline import Spline
+
+# how much the jerk of a joint changes where it has none, beside where it has the greatest
+ELSEWHERE = 1e-3
+
+
+def spline_of_phases(
+    ends: Array, jerk: Array, q_start: Array, q_goal: Array, closest: float
+) -> Spline:
+    """The motion from q_start to q_goal (nq,) [rad] with jerk (nq, p) [rad/s³] in phases that last
+    to `ends` (nq, p).
+
+    The last end [s] is the duration. Knots are threefold where the jerk of a joint jumps. Jumps
+    closer than `closest`, as a fraction of the duration, become one, since rounding makes jerk of
+    its own between them; then the jerk changes a little, so that the motion still ends at rest at
+    its goal.
+    """
+    duration = float(ends.max())
+    breaks, ends = _joined(ends / duration, closest)
+    breaks, ends = breaks * duration, ends * duration
+    middle = (breaks[1:] + breaks[:-1]) / 2
+    spans = np.array(
+        [own[np.searchsorted(end, middle)] for end, own in zip(ends, jerk, strict=True)]
+    ).T
+    spans = _ending(np.diff(breaks), spans, np.abs(jerk).max(axis=1), q_goal - q_start)
+    knots = (
+        bspline.clamped(np.concatenate([[0.0], np.repeat(breaks[1:-1], 3), [duration]]) / duration)
+        * duration
+    )
+    points = _control_points(knots, breaks, _states(breaks, spans, q_start), spans)
+    points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = q_start, q_goal
+    return Spline(bspline.DEGREE, knots, points)
+
+
+def _joined(ends: Array, closest: float) -> tuple[Array, Array]:
+    """The breaks (b,) in [0, 1], those that are close as one, with both ends; and the phases' ends
+    at these breaks.
+    """
+    every, where = np.unique(np.append(ends, [0.0, 1.0]), return_inverse=True)
+    group = np.append(0, np.cumsum(np.diff(every) > closest))
+    breaks = np.bincount(group, every) / np.bincount(group)
+    breaks[0], breaks[-1] = 0.0, 1.0
+    return breaks, breaks[group[where[: ends.size]]].reshape(ends.shape)
+
+
+def _ending(lengths: Array, spans: Array, greatest: Array, step: Array) -> Array:
+    """The jerks (b - 1, nq) near `spans`, of these lengths (b - 1,) [s], that lead from rest to
+    rest over a step (nq,) [rad]. They change where a joint has jerk, and elsewhere only if that
+    does not do; `greatest` (nq,) is that of each.
+    """
+    left = lengths.sum() - np.cumsum(lengths)
+    speed = lengths * (lengths / 2 + left)
+    way = lengths * (lengths**2 / 6 + lengths * left / 2 + left**2 / 2)
+    rows = np.array([lengths, speed, way])
+    missing = np.outer([0.0, 0.0, 1.0], step) - rows @ spans
+    changed = spans.copy()
+    for joint, weight in enumerate((np.abs(spans) + ELSEWHERE * greatest).T):
+        own = rows * weight
+        scale = np.maximum(np.linalg.norm(own, axis=1), 1e-300)
+        changed[:, joint] += (
+            weight * np.linalg.lstsq(own / scale[:, None], missing[:, joint] / scale, rcond=None)[0]
+        )
+    return changed
+
+
+def _states(breaks: Array, spans: Array, q_start: Array) -> tuple[Array, Array, Array]:
+    """Positions, speeds and accelerations (b - 1, nq) at the beginning of every span, of jerk
+    `spans` (b - 1, nq).
+    """
+    length = np.diff(breaks)[:, None]
+
+    def summed(steps: Array) -> Array:
+        return np.concatenate([np.zeros((1, spans.shape[1])), np.cumsum(steps, axis=0)[:-1]])
+
+    a = summed(spans * length)
+    v = summed(a * length + spans * length**2 / 2)
+    q = q_start + summed(v * length + a * length**2 / 2 + spans * length**3 / 6)
+    return q, v, a
+
+
+def _control_points(
+    knots: Array, breaks: Array, states: tuple[Array, Array, Array], spans: Array
+) -> Array:
+    """Control points (n, nq): the blossom, at its inner knots, of the cubic in the widest span that
+    each one reaches.
+
+    The blossom of t^m at u_1 … u_5 is the mean of the products of m of them (Ramshaw 1989).
+    """
+    q, v, a = states
+    points = np.empty((len(knots) - bspline.DEGREE - 1, q.shape[1]))
+    length = np.diff(breaks)
+    for i in range(len(points)):
+        first = int(np.searchsorted(breaks, knots[i], side="right")) - 1
+        last = int(np.searchsorted(breaks, knots[i + bspline.DEGREE + 1], side="left"))
+        k = first + int(length[first:last].argmax())
+        u = knots[i + 1 : i + bspline.DEGREE + 1] - breaks[k]
+        _, one, two, three, *_ = np.poly(-u)
+        points[i] = q[k] + v[k] * one / 5 + a[k] * two / 20 + spans[k] * three / 60
+    return points

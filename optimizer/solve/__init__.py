@@ -1,0 +1,1 @@
+"""Solvers: the nonlinear programs, and the methods that pose them."""

@@ -1,0 +1,150 @@
+"""The motion of least cost through configurations at which it does not rest: one spline over all of
+them.
+
+One quintic B-spline per joint, as in `bspline`. It goes through each configuration at a time that
+is free: the times are chosen together with the control points and the duration. First there are few
+control points; then its knots are double where it passes, since the best motion's jerk may change
+quickly there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from itertools import pairwise
+from typing import ClassVar
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.motion import bspline
+from joulepath.optimizer.motion.bspline import Basis
+from joulepath.optimizer.motion.joined import joined
+from joulepath.optimizer.motion.passing import pass_times
+from joulepath.optimizer.motion.seven_segment import shortest_duration
+from joulepath.optimizer.motion.spline import FIT_SAMPLES, Spline, lasting, sampled
+from joulepath.optimizer.motion.through_samples import spline_through
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods.limit_repair import sampled_overshoot
+from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.sqp_method import Guess, SqpMethod, with_effort
+
+# control points of the first attempt: those of `bspline`, and so many for each pass
+COARSE, PER_PASS = 13, 3
+# multiplicity of the knots where it passes, and the widest span between knots as a share of an even
+# part
+REPEAT, WIDEST, FINE_WIDEST = 2, 1 / 6, 1 / 7
+# rad: a pass that is so near to the configuration before it is met with it
+SAME = 1e-9
+STOPPING = "the motions from rest to rest: none that passes was found"
+
+
+class PassingSpline(SqpMethod):
+    """Solves a candidate through the problem's passes."""
+
+    takes_long: ClassVar[bool] = True
+
+    def solve(self) -> SolveResult:
+        """From a smooth curve through all configurations; if that finds no motion, from one that
+        rests at each pass.
+
+        That one is the result if nothing better is found from it.
+        """
+        space = bspline.uniform(COARSE + PER_PASS * len(self.passes))
+        tried, rests = [self.improve(Guess(space, self._smooth(space), 0.0))], list[SolveResult]()
+        if tried[0].spline is not None and self.interval.minimum_time:
+            # few control points make a slow motion
+            tried.append(self.solve_from(*sampled(tried[0].spline), fine=True))
+        if tried[0].status is SolveStatus.FAILED:
+            rests = self._between_rests()
+            stopping = [result.spline for result in rests if result.spline is not None]
+            if len(stopping) < len(rests):
+                return with_effort(
+                    next(result for result in rests if result.spline is None), [*tried, *rests]
+                )
+            motion = joined(stopping)
+            known = lasting(motion, float(np.clip(motion.duration, self.t_min, self.t_max)))
+            tried.append(self.solve_from(*sampled(known), fine=False))
+            if known.duration >= motion.duration:
+                tried.append(SolveResult(SolveStatus.SOLVED, STOPPING, spline=known))
+        best = min(tried, key=lambda result: self.cost_of(result.spline))
+        return with_effort(best if best.spline is not None else tried[-1], [*tried, *rests])
+
+    @staticmethod
+    def may_refine(found: Spline) -> bool:
+        """Whether the knots are evenly spaced: `solve_from` places them where the motion passes."""
+        return bool(np.ptp(np.diff(np.unique(found.knots))) < 1e-9 * found.duration)
+
+    def solve_from(self, q: Array, t: Array, fine: bool) -> SolveResult:
+        """From samples q (k, nq) at times t (k,) of a motion through the passes; more control
+        points if `fine`.
+        """
+        duration = float(t[-1])
+        at = pass_times(make_interp_spline(t, q, k=3), self.passes) / duration
+        space = bspline.graded(
+            at, REPEAT, (FINE_WIDEST if fine else WIDEST) / (len(self.passes) + 1)
+        )
+        points = space.fit(q, t / duration)
+        near = self.prepared.surroundings.is_near_contact(q)
+        return self.improve(Guess(space, points, duration, collision_free=near))
+
+    def along_path(self, q: Array, t: Array) -> SolveResult:
+        """From samples q (k, nq) of a path at times t (k,), which end at 1."""
+        return self.solve_from(q, t, fine=False)
+
+    def overshoot(self, spline: Spline) -> tuple[Array, Array]:
+        """Excess (nq,) [rad] below and above the position limits: passes move control points beyond
+        the limits.
+        """
+        return sampled_overshoot(self.prepared, spline)
+
+    @cached_property
+    def passes(self) -> Array:
+        """Configurations (k, nq) [rad] that the motion passes through, without those at which it is
+        just then.
+        """
+        kept = [self.q_start]
+        for q in self.prepared.problem.passes:
+            if np.abs(q - kept[-1]).max() > SAME:
+                kept.append(q)
+        if len(kept) > 1 and np.abs(kept[-1] - self.q_goal).max() <= SAME:
+            kept.pop()
+        return np.array(kept[1:]).reshape(-1, len(self.q_start))
+
+    @property
+    def _configurations(self) -> Array:
+        """Start, passes and goal (k, nq) [rad]."""
+        return np.array([self.q_start, *self.passes, self.q_goal])
+
+    def _smooth(self, space: Basis) -> Array:
+        """Control points (n, nq) of a curve through all configurations.
+
+        At a pass a joint has the speed of the parabola through it and its neighbours, and none
+        where it turns.
+        """
+        q, limits = self._configurations, self.coordinates.limits
+        lengths = np.maximum(shortest_duration(np.diff(q, axis=0), limits), LEAST_DURATION)
+        t = np.concatenate([[0.0], np.cumsum(lengths)]) / lengths.sum()
+        width = np.diff(t)[:, None]
+        slopes, v = np.diff(q, axis=0) / width, np.zeros_like(q)
+        mean = (slopes[:-1] * width[1:] + slopes[1:] * width[:-1]) / (width[1:] + width[:-1])
+        v[1:-1] = np.where(slopes[:-1] * slopes[1:] > 0, mean, 0.0)
+        at = np.linspace(0.0, 1.0, FIT_SAMPLES)
+        return space.fit(spline_through(t, q, v, np.zeros_like(q)).curve(at), at)
+
+    def _between_rests(self) -> list[SolveResult]:
+        """Motions of any duration from rest to rest between the configurations, up to the first
+        that is not found.
+        """
+        problem = replace(self.prepared.problem, passes=(), duration_min=None, duration_max=None)
+        interval = replace(self.interval, t_min=LEAST_DURATION, t_max=LONGEST_DURATION)
+        results = list[SolveResult]()
+        for a, b in pairwise(self._configurations):
+            part = PreparedProblem.of(replace(problem, start=a, goal=b))
+            results.append(FreeSpline(part, a, b, self.deadline, interval).solve())
+            if results[-1].spline is None:
+                break
+        return results

@@ -1,0 +1,70 @@
+"""The time-optimal scaling of the straight line in joint space, by toppra (Pham, Pham 2018).
+
+toppra limits speed, acceleration and torque, but not jerk. Its duration is therefore a lower bound
+for every motion along the line. Its scaling says whether there is such a motion, and serves as
+initial guess.
+
+toppra is imported where it is called: it imports matplotlib, and only this method needs it.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.motion.bspline import greville
+from joulepath.optimizer.prepared_problem import PreparedProblem
+
+logging.getLogger("toppra").setLevel(logging.ERROR)
+
+GRID = np.linspace(0.0, 1.0, 31)
+# fraction of toppra's duration that counts as a lower bound: its constraints hold at the grid
+# points only
+TRUST = 0.98
+
+
+@dataclass(frozen=True)
+class TimeOptimalScaling:
+    """Fractions of the line GRID (31,) reached at `times` (31,) [s], from rest to rest."""
+
+    times: Array
+
+    @property
+    def duration_bound(self) -> float:
+        """Lower bound on the duration of every motion along the line [s]."""
+        return TRUST * float(self.times[-1])
+
+    def fractions(self, knots: Array) -> Array:
+        """Control values (n,) of a spline over clamped knots of [0, 1] that follows the scaling
+        from rest to rest.
+        """
+        values = np.interp(greville(knots) * self.times[-1], self.times, GRID)
+        values[:3], values[-3:] = 0.0, 1.0
+        return np.asarray(values)
+
+
+def time_optimal_on_line(
+    prepared: PreparedProblem, q_start: Array, q_goal: Array
+) -> TimeOptimalScaling | None:
+    """The time-optimal scaling under speed, acceleration and torque limits; None if there is none.
+
+    The limit of a motor's torque is relaxed by the greatest help of friction, so that the duration
+    stays a lower bound.
+    """
+    from toppra.algorithm import TOPPRA  # see the top of this file
+
+    from joulepath.optimizer.solve.methods.line_in_toppra import LineLimits, StraightLine
+
+    if not np.abs(q_goal - q_start).max() > 0:
+        return TimeOptimalScaling(np.linspace(0.0, 1e-9, len(GRID)))
+    scaling = TOPPRA(
+        [LineLimits(prepared)], StraightLine(q_start, q_goal), GRID, solver_wrapper="seidel"
+    )
+    _, speed, _ = scaling.compute_parameterization(0.0, 0.0)
+    if speed is None or not np.isfinite(speed).all():
+        return None
+    steps = 2 * np.diff(GRID) / (speed[1:] + speed[:-1])
+    return TimeOptimalScaling(np.concatenate([[0.0], np.cumsum(steps)]))

@@ -1,0 +1,88 @@
+"""`time_scaling`: the straight line in joint space with the time scaling s(t) of least energy.
+
+s(t), the fraction of the line, is a quintic B-spline; its control points and the duration are
+optimised together. If the line collides, s(t) runs along smooth planned paths instead.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import ClassVar
+
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.motion import bspline, seven_segment
+from joulepath.optimizer.motion.bspline import Basis
+from joulepath.optimizer.motion.spline import Spline
+from joulepath.optimizer.motion.time_scalings import quintic_spline
+from joulepath.optimizer.result.certificate import Clearance
+from joulepath.optimizer.result.solution import BaselineName
+from joulepath.optimizer.solve.methods.around_obstacles import along_path, around_obstacles
+from joulepath.optimizer.solve.methods.free_spline import COARSE, EXACT, FreeSpline
+from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.path_retiming import PathRetiming
+from joulepath.optimizer.solve.methods.sqp_method import Guess
+from joulepath.optimizer.solve.methods.time_optimal_scaling import time_optimal_on_line
+from joulepath.optimizer.solve.nlp.coordinates import Coordinates
+from joulepath.optimizer.solve.nlp.sqp import PROGRESS
+
+
+class TimeScaling(FreeSpline):
+    """Solves a candidate along its straight line, or along planned paths if the line collides."""
+
+    # only baselines along the straight line are initial guesses
+    guess_baselines: ClassVar[tuple[BaselineName, ...]] = ("trapezoid", "quintic")
+    accepted_baselines: ClassVar[tuple[BaselineName, ...]] = ("quintic",)
+
+    @cached_property
+    def _collision(self) -> Clearance | None:
+        """The collision on the straight line; None if there is none."""
+        return self.prepared.surroundings.worst_violation(
+            quintic_spline(self.q_start, self.q_goal, 1.0)
+        )
+
+    @property
+    def collides(self) -> bool:
+        """Whether the straight line collides."""
+        return self._collision is not None
+
+    def solve(self) -> SolveResult:
+        """From toppra's time-optimal scaling; along planned paths if the straight line collides."""
+        if self._collision is not None:
+            return around_obstacles(self, "the straight line", self._collision, self._retimed)
+        scaling = time_optimal_on_line(self.prepared, self.q_start, self.q_goal)
+        if scaling is None:
+            reason = "the straight line needs more torque than the joints have"
+            return SolveResult(SolveStatus.INFEASIBLE, reason)
+        if scaling.duration_bound > self.t_max:
+            reason = f"the straight line takes at least {scaling.duration_bound:.4f} s"
+            return SolveResult(SolveStatus.INFEASIBLE, reason)
+        self.t_min = max(self.t_min, scaling.duration_bound)
+        line = self.coordinates
+        space = self.graded(
+            float(seven_segment.shortest_duration(line.goal - line.start, line.limits)), EXACT
+        )
+        # toppra's acceleration jumps: a fit with few control points smooths it before it is refined
+        coarse = bspline.uniform(COARSE).knots
+        points = bspline.refit(scaling.fractions(coarse)[:, None], coarse, space.knots)
+        return self.improve(Guess(space, points, self.t_min))
+
+    def _solve_in(
+        self, space: Basis, q: Array, t: Array, progress: float = PROGRESS
+    ) -> SolveResult:
+        """From samples q (k, nq) at times t (k,): on the straight line, or along the samples if the
+        line collides.
+        """
+        if self._collision is None:
+            return super()._solve_in(space, q, t, progress)
+        if not self.prepared.surroundings.is_collision_free(q):
+            return SolveResult(
+                SolveStatus.FAILED, f"on the straight line, {self._collision.message}"
+            )
+        return along_path(self, q, self._retimed)
+
+    def _retimed(self, path: Spline) -> SolveResult:
+        """The motion of least cost along a path."""
+        return PathRetiming(self.prepared, path, self.interval).solve()
+
+    def _coordinates(self, limits: Limits) -> Coordinates:
+        return Coordinates.straight_line(self.q_start, self.q_goal, limits)

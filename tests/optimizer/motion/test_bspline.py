@@ -1,0 +1,316 @@
+"""Spline spaces: what they reproduce exactly, where their knots lie, and that motions in them rest
+at both ends.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.interpolate import BSpline
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.motion import bspline, quintic
+from joulepath.optimizer.motion.bspline import DEGREE, REST_POINTS, Basis
+from joulepath.optimizer.motion.quadrature import quadrature
+
+EXACT = 1e-11  # a few dozen operations in double precision, on basis functions of order 1
+# absolute, times (points per unit)^d: differentiating d times multiplies rounding by the inverse of
+# a span's length
+DERIVATIVE = 1e-11
+# relative to a speed's or acceleration's own peak; the grid's points are a hundredth of the time
+# apart at most, so a parabola's top lies above the nearest of them by less than (1/200)² · x'' / 2,
+# and x'' < 60 x for a spline of 8 spans
+GRID_MISS = 1e-3
+
+SWITCHES = np.array([0.05, 0.31, 0.4, 0.6, 0.69, 0.95])
+SPACES = {
+    "uniform, 7 points": bspline.uniform(7),
+    "uniform, 13 points": bspline.uniform(13),
+    "uniform, 30 points": bspline.uniform(30),
+    "graded once": bspline.graded(SWITCHES, 1),
+    "graded twice": bspline.graded(SWITCHES, 2),
+    "graded thrice": bspline.graded(SWITCHES, 3),
+    "graded without switches": bspline.graded(np.zeros(0), 2),
+}
+
+
+@pytest.fixture(params=list(SPACES))
+def space(request: pytest.FixtureRequest) -> Basis:
+    return SPACES[request.param]
+
+
+def spans(space: Basis) -> Array:
+    """Lengths of the knot spans."""
+    return np.diff(np.unique(space.knots))
+
+
+def test_basis_functions_share_out_unity(space: Basis) -> None:
+    """They are nonnegative and add up to one everywhere, so that a curve stays in the hull of its
+    control points.
+    """
+    values = bspline.basis_matrix(space.knots, np.linspace(0.0, 1.0, 997))
+    assert values.min() >= 0
+    assert np.abs(values.sum(axis=1) - 1).max() < EXACT
+    for d in range(3):
+        assert (
+            np.abs(space.at_nodes[d].sum(axis=1) - (d == 0)).max()
+            < DERIVATIVE / spans(space).min() ** d
+        )
+    for d in range(1, 4):
+        assert np.abs(space.at_grid[d - 1].sum(axis=1)).max() < DERIVATIVE / spans(space).min() ** d
+
+
+@pytest.mark.parametrize("power", range(DEGREE + 1))
+def test_polynomials_of_the_degree_are_reproduced(space: Basis, power: int) -> None:
+    """x^k has control points that interpolate it at the Greville points; its derivatives follow at
+    nodes and grid.
+    """
+    x = bspline.greville(space.knots)
+    points = np.linalg.solve(bspline.basis_matrix(space.knots, x), x**power)
+    polynomial = np.polynomial.Polynomial([0.0] * power + [1.0])
+    grid = grid_points(space)
+    for d in range(4):
+        derivative = polynomial.deriv(d)
+        tolerance = DERIVATIVE / spans(space).min() ** d
+        if d < 3:
+            assert np.abs(space.at_nodes[d] @ points - derivative(space.nodes)).max() < tolerance
+        if d > 0:
+            assert np.abs(space.at_grid[d - 1] @ points - derivative(grid)).max() < tolerance
+
+
+def grid_points(space: Basis) -> Array:
+    """Where the grid's points lie: where the derivative of x²/2 says they do."""
+    x = bspline.greville(space.knots)
+    points = np.linalg.solve(bspline.basis_matrix(space.knots, x), x**2 / 2)
+    return np.asarray(space.at_grid[0] @ points)
+
+
+def test_the_quintic_is_in_every_space(space: Basis) -> None:
+    """10τ³ - 15τ⁴ + 6τ⁵, the first guess of every motion."""
+    t = np.linspace(0.0, 1.0, 101)
+    law = bspline.basis_matrix(space.knots, t) @ space.quintic
+    assert law == pytest.approx(t**3 * (10 - 15 * t + 6 * t**2), abs=EXACT)
+    assert space.quintic[:REST_POINTS] == pytest.approx(np.zeros(3), abs=EXACT)
+    assert space.quintic[-REST_POINTS:] == pytest.approx(np.ones(3), abs=EXACT)
+
+
+def test_motions_rest_at_both_ends(space: Basis) -> None:
+    """Whatever the free control points, three that coincide at an end leave neither speed nor
+    acceleration there.
+    """
+    rng = np.random.default_rng(1)
+    points = np.full(space.n, 0.3)
+    points[-REST_POINTS:] = -1.2
+    points[space.free] = rng.normal(size=space.n)[space.free]
+    assert len(points[space.free]) == space.n - 2 * REST_POINTS
+    curve = BSpline(space.knots, points, DEGREE)
+    assert curve([0.0, 1.0]) == pytest.approx([0.3, -1.2], abs=EXACT)
+    for d in (1, 2):
+        assert np.abs(curve([0.0, 1.0], d)).max() < DERIVATIVE / spans(space).min() ** d
+    assert (
+        space.n == 7 or np.abs(curve([0.0, 1.0], 3)).min() > 1e-3
+    )  # jerk, and only jerk, is theirs to choose
+
+
+@pytest.mark.parametrize("per_span", [3, 5, 16])
+def test_quadrature_is_exact_for_polynomials(space: Basis, per_span: int) -> None:
+    """n Gauss points per span integrate degree 2n - 1: piecewise polynomials with kinks at the
+    knots, no others.
+    """
+    points, weights = quadrature(space.knots, per_span)
+    assert weights.min() > 0 and weights.sum() == pytest.approx(1.0, abs=EXACT)
+    assert points.min() > 0 and points.max() < 1 and (np.diff(points) > 0).all()
+    power = 2 * per_span - 1
+    assert weights @ points**power == pytest.approx(1 / (power + 1), rel=EXACT)
+    kink = np.unique(space.knots)[len(np.unique(space.knots)) // 2]
+    expected = ((1 - kink) ** (power + 1) + kink ** (power + 1)) / (power + 1)
+    assert weights @ np.abs(points - kink) ** power == pytest.approx(expected, rel=EXACT)
+
+
+def test_nodes_integrate_the_square_of_an_acceleration(space: Basis) -> None:
+    """Copper loss is nearly that: of degree 6 in a span."""
+    rng = np.random.default_rng(2)
+    curve = BSpline(space.knots, rng.normal(size=space.n), DEGREE)
+    points, weights = quadrature(space.knots, 12)
+    assert space.weights @ curve(space.nodes, 2) ** 2 == pytest.approx(
+        weights @ curve(points, 2) ** 2, rel=EXACT
+    )
+    assert len(space.nodes) >= bspline.LEAST_NODES
+
+
+def test_nodes_give_kinetic_energy_back(space: Basis) -> None:
+    """The work ∫ v M a dt of a constant inertia M is zero from rest to rest."""
+    rng = np.random.default_rng(4)
+    points = np.repeat(rng.normal(size=(1, 2)), space.n, axis=0)
+    points[space.free] = rng.normal(size=(space.n, 2))[space.free]
+    points[-REST_POINTS:] = rng.normal(size=2)
+    v, a = (BSpline(space.knots, points, DEGREE)(space.nodes, d) for d in (1, 2))
+    power = np.einsum("ki,ij,kj->k", v, np.array([[2.0, 0.7], [0.7, 1.0]]), a)
+    assert space.weights @ power == pytest.approx(0.0, abs=EXACT * (space.weights @ np.abs(power)))
+
+
+def test_the_grid_finds_peaks(space: Basis) -> None:
+    """Of speed, acceleration and jerk of random motions, against ten thousand samples; jerk jumps
+    at repeated knots.
+    """
+    rng = np.random.default_rng(3)
+    eps = 1e-12
+    t = np.union1d(
+        np.linspace(0.0, 1.0, 10_001),
+        np.concatenate([space.knots - eps, space.knots + eps]).clip(0, 1),
+    )
+    for _ in range(5):
+        curve = BSpline(space.knots, rng.normal(size=space.n), DEGREE)
+        for d in range(1, 4):
+            found, true = np.abs(space.at_grid[d - 1] @ curve.c).max(), np.abs(curve(t, d)).max()
+            assert found == pytest.approx(true, rel=GRID_MISS)
+
+
+def test_anchors_hold_the_ends_of_every_span(space: Basis) -> None:
+    """And points evenly in between, so that a derivative cannot leave its limit along a whole span
+    unnoticed.
+    """
+    grid = grid_points(space)
+    edges = np.unique(space.knots)
+    for anchors, parts in zip(space.anchors, bspline.ANCHORS, strict=True):
+        at = grid[anchors]
+        assert len(at) == (parts + 1) * (len(edges) - 1)
+        for edge in edges:
+            assert np.abs(at - edge).min() < 1e-6
+
+
+@pytest.mark.parametrize("repeat", [1, 2, 3])
+def test_graded_knots(repeat: int) -> None:
+    """Repeated at every switch as often as asked, and nowhere further apart than allowed."""
+    widest = 0.09
+    space = bspline.graded(SWITCHES, repeat, widest)
+    inner = space.knots[DEGREE + 1 : -DEGREE - 1]
+    values, counts = np.unique(inner, return_counts=True)
+    expected = np.where(np.isin(values, SWITCHES), repeat, 1)
+    assert counts.tolist() == expected.tolist() and np.isin(SWITCHES, values).all()
+    assert spans(space).max() <= widest + EXACT
+    assert (space.knots[: DEGREE + 1] == 0).all() and (space.knots[-DEGREE - 1 :] == 1).all()
+
+
+def test_switches_at_the_ends_make_no_knots() -> None:
+    """A knot within a thousandth of an end would make a span in which nothing can happen."""
+    space = bspline.graded(np.array([0.0, 1e-4, 0.5, 1 - 1e-4, 1.0]), 3)
+    assert spans(space).min() > 1e-3
+
+
+@pytest.mark.parametrize("repeat", [2, 3])
+def test_moved_knots_follow_the_switches(repeat: int) -> None:
+    """The others keep their places between them, and with the same control points the motion hardly
+    changes.
+    """
+    space, by = bspline.graded(SWITCHES, repeat), 1e-3
+    fewer = np.append(1e-4, SWITCHES[1:])
+    assert bspline.moved(space.knots, fewer, repeat) is None
+    moved = bspline.moved(space.knots, SWITCHES + by, repeat)
+    assert moved is not None
+    assert np.isin(SWITCHES + by, moved).all() and not np.isin(SWITCHES, moved).any()
+    before, after = (np.unique(knots, return_counts=True)[1] for knots in (space.knots, moved))
+    assert after.tolist() == before.tolist()
+    assert np.abs(moved - space.knots).max() <= by + EXACT
+    t = np.linspace(0.0, 1.0, 101)
+    points = space.fit(quintic.fraction(t)[:, None], t)
+    change = bspline.basis_matrix(moved, t) @ points - space.matrix(t) @ points
+    assert 0 < np.abs(change).max() < 3 * by
+
+
+@pytest.mark.parametrize(("repeat", "jumps"), [(1, False), (2, False), (3, True)])
+def test_jerk_jumps_at_a_knot_repeated_three_times(repeat: int, jumps: bool) -> None:
+    space = bspline.graded(np.array([0.4]), repeat)
+    rng = np.random.default_rng(4)
+    curve = BSpline(space.knots, rng.normal(size=space.n), DEGREE)
+    before, after = curve([0.4 - 1e-9, 0.4 + 1e-9], 3)
+    scale = np.abs(space.at_grid[2] @ curve.c).max()
+    assert (abs(after - before) > 1e-3 * scale) == jumps
+    for d in range(3):
+        assert (
+            np.ptp(curve([0.4 - 1e-12, 0.4 + 1e-12], d)) < 1e-6
+        )  # all that a motion needs stays continuous
+
+
+def test_refit_is_exact_on_a_refinement(space: Basis) -> None:
+    """More knots and knots repeated more often: the same curve, for several joints at once."""
+    rng = np.random.default_rng(5)
+    inner = space.knots[DEGREE + 1 : -DEGREE - 1]
+    once = np.unique(inner)
+    more = np.concatenate(
+        [rng.uniform(0.01, 0.99, 6), once[np.array([np.sum(inner == k) < 3 for k in once], bool)]]
+    )
+    onto = np.sort(np.concatenate([space.knots, more]))
+    points = rng.normal(size=(space.n, 6))
+    refined = bspline.refit(points, space.knots, onto)
+    t = np.linspace(0.0, 1.0, 501)
+    assert refined.shape == (len(onto) - DEGREE - 1, 6)
+    difference = (
+        bspline.basis_matrix(onto, t) @ refined - bspline.basis_matrix(space.knots, t) @ points
+    )
+    assert (
+        np.abs(difference).max() < 1e-9
+    )  # random knots may lie close together, which interpolation feels
+
+
+def test_fit_finds_the_spline_behind_its_samples(space: Basis) -> None:
+    rng = np.random.default_rng(6)
+    points = rng.normal(size=(space.n, 2))
+    points[:REST_POINTS], points[-REST_POINTS:] = points[0], points[-1]
+    t = np.linspace(0.0, 1.0, 401)
+    found = bspline.fit(bspline.basis_matrix(space.knots, t) @ points, t, space.knots)
+    assert (
+        np.abs(found - points).max() < 1e-8
+    )  # the condition of a least-squares fit, squared, times rounding
+
+
+def test_fit_is_the_nearest_motion_at_rest() -> None:
+    """Samples of a motion that is not at rest: the fit keeps the ends and rests there, and no other
+    comes closer.
+    """
+    space = bspline.uniform(13)
+    t = np.linspace(0.0, 1.0, 201)
+    samples = np.stack([np.sin(3 * t), t], axis=1)
+    points = bspline.fit(samples, t, space.knots)
+    assert points[:REST_POINTS] == pytest.approx(np.repeat(samples[:1], 3, axis=0))
+    assert points[-REST_POINTS:] == pytest.approx(np.repeat(samples[-1:], 3, axis=0))
+    matrix = bspline.basis_matrix(space.knots, t)
+    residual = matrix @ points - samples
+    assert (
+        np.abs(residual).max() > 1e-3
+    )  # samples that move at their ends are out of the space's reach
+    assert np.abs(matrix[:, space.free].T @ residual).max() < EXACT * len(
+        t
+    )  # orthogonal to every free direction
+
+
+def test_a_smooth_fit_keeps_positions_and_jerk_where_knots_are_repeated() -> None:
+    """Switches so near to the ends that no sample lies between: a fit to the positions alone has
+    any jerk there.
+    """
+    switches = np.array([0.002, 0.3, 0.302, 0.698, 0.7, 0.998])
+    space = bspline.graded(switches, 3)
+    at = np.linspace(0.0, 1.0, 201)
+    coarse = bspline.uniform(13)
+    points = np.random.default_rng(5).normal(size=(13, 2))
+    points[:REST_POINTS], points[-REST_POINTS:] = 0.0, 1.0
+    samples = BSpline(coarse.knots, points, DEGREE)(at)
+    fitted = bspline.smooth_fit(samples, at, space.knots)
+    assert (fitted[:REST_POINTS] == samples[0]).all() and (
+        fitted[-REST_POINTS:] == samples[-1]
+    ).all()
+    curve = BSpline(space.knots, fitted, DEGREE)
+    assert np.abs(curve(at) - samples).max() < 0.02 * np.ptp(samples)
+    peak = np.abs(coarse.at_grid[2] @ points).max()
+    assert np.abs(space.at_grid[2] @ fitted).max() < 1.5 * peak
+    alone = bspline.fit(samples, at, space.knots)
+    assert np.abs(space.at_grid[2] @ alone).max() > 10 * peak
+
+
+def test_a_smooth_fit_takes_samples_at_the_same_instant() -> None:
+    space = SPACES["graded twice"]
+    at = np.sort(np.append(np.linspace(0.0, 1.0, 51), [0.5, 1.0]))
+    samples = quintic.fraction(at)[:, None]
+    fitted = bspline.smooth_fit(samples, at, space.knots)
+    # every space contains the quintic
+    assert np.abs(BSpline(space.knots, fitted, DEGREE)(at) - samples).max() < 1e-9

@@ -1,0 +1,81 @@
+"""Ruckig's motion as a spline: as fast, through the same positions, however close the jumps of jerk
+are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.motion.ruckig_motion import (
+    time_optimal_positions,
+    time_optimal_spline,
+)
+from joulepath.optimizer.motion.spline import least_time_scale, sample
+
+MOVES = 40
+# relative: jumps of jerk that become one change the jerk of short phases
+MOSTLY, ALWAYS = {False: 1e-4, True: 1e-3}, 0.02
+# rad: a jump that is moved by a ten thousandth of the duration, at the greatest speed
+AWAY = 1e-3
+HARDLY = 0.5  # the same as ALWAYS, of moves of which some joints move by a billionth of others
+NEARLY = 1e-5  # relative, of limits that are nearly equal
+
+
+@pytest.mark.parametrize("name", ["ur5e", "kr10_r1100", "panda"])
+@pytest.mark.parametrize("nearly_equal", [False, True], ids=["own limits", "nearly equal limits"])
+def test_it_is_ruckigs_motion(name: str, nearly_equal: bool) -> None:
+    """Under nearly equal limits, jumps of all joints are too close to be apart, and too far to be
+    one.
+    """
+    limits, rng = load_robot(name).limits, np.random.default_rng(5)
+    lower, upper = np.maximum(limits.q_min, -np.pi), np.minimum(limits.q_max, np.pi)
+    scales = []
+    for _ in range(MOVES):
+        start, goal = rng.uniform(lower, upper, (2, len(lower)))
+        own = limits
+        if nearly_equal:
+            near = 1 + NEARLY * rng.normal(size=(3, len(lower)))
+            rates = limits.rates.min(axis=1, keepdims=True) * near
+            own = replace(limits, v_max=rates[0], a_max=rates[1], j_max=rates[2])
+            goal = start + np.where(
+                rng.random(len(lower)) < 0.8, 0.7 * near[0], rng.uniform(-0.7, 0.7, len(lower))
+            )
+        spline = time_optimal_spline(own, start, goal)
+        scales.append(least_time_scale(spline, own.rates))
+        at = np.linspace(0, 1, 60)
+        q, v, a = sample(spline, at * spline.duration)
+        assert np.abs(q - time_optimal_positions(own, start, goal, at)).max() < AWAY
+        assert np.abs(v[[0, -1]]).max() < 1e-9 and np.abs(a[[0, -1]]).max() < 1e-7
+        assert max(np.abs(q[0] - start).max(), np.abs(q[-1] - goal).max()) < 1e-12
+    assert np.percentile(scales, 90) < 1 + MOSTLY[nearly_equal]
+    assert max(scales) < 1 + ALWAYS
+
+
+@pytest.mark.parametrize("name", ["ur5e", "kr10_r1100", "panda"])
+def test_some_joints_hardly_move(name: str) -> None:
+    """Their phases of jerk are too short to be apart; each still ends where it should."""
+    limits, rng, scales = load_robot(name).limits, np.random.default_rng(1), []
+    for _ in range(MOVES):
+        goal = rng.uniform(-2, 2, len(limits.q_min)) * 10.0 ** rng.uniform(-9, 0, len(limits.q_min))
+        spline = time_optimal_spline(limits, np.zeros_like(goal), goal)
+        scales.append(least_time_scale(spline, limits.rates))
+        at = np.linspace(0, 1, 60)
+        away = sample(spline, at * spline.duration)[0] - time_optimal_positions(
+            limits, np.zeros_like(goal), goal, at
+        )
+        assert np.abs(away).max() < 10 * AWAY
+    assert np.percentile(scales, 80) < 1 + ALWAYS and max(scales) < 1 + HARDLY
+
+
+def test_joints_that_stay() -> None:
+    limits = load_robot("ur5e").limits
+    start = np.zeros(6)
+    goal = np.array([0.0, 0.5, 0.0, 0.0, -1e-7, 0.0])
+    spline = time_optimal_spline(limits, start, goal)
+    q = sample(spline, np.linspace(0, spline.duration, 50))[0]
+    assert np.abs(q[:, [0, 2, 3, 5]]).max() < 1e-12
+    assert least_time_scale(spline, limits.rates) < 1 + ALWAYS

@@ -1,0 +1,49 @@
+"""Retiming: durations that are met exactly, and rates that reach their limits exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from joulepath.optimizer.motion.ruckig_motion import time_optimal_spline
+from joulepath.optimizer.motion.spline import (
+    lasting,
+    least_time_scale,
+    peak_rates,
+    retimed,
+    time_scale,
+    time_scales,
+)
+from tests.optimizer.moves import GOAL, ROBOT, START, limits
+
+MOTION = time_optimal_spline(ROBOT.limits, START, GOAL)
+ROUNDING = 1e-12
+# relative; peaks of the jerk between samples, in spans that are not quintic at rest
+PEAK = 1e-6
+
+
+@pytest.mark.parametrize("duration", [0.3, 1.0, MOTION.duration, 7.1])
+def test_a_duration_is_met_exactly(duration: float) -> None:
+    slower = lasting(MOTION, duration)
+    assert slower.duration == duration
+    t = np.linspace(0.0, 1.0, 50)
+    assert slower.curve(t * duration) == pytest.approx(
+        MOTION.curve(t * MOTION.duration), abs=ROUNDING
+    )
+
+
+def test_rates_fall_with_powers_of_the_factor() -> None:
+    expected = peak_rates(MOTION) / np.array([2.0, 4.0, 8.0])[:, None]
+    assert peak_rates(retimed(MOTION, 2.0)) == pytest.approx(expected, rel=PEAK)
+
+
+@pytest.mark.parametrize("given", [{"v_max": 0.5}, {"a_max": 1.0}, {"j_max": 5.0}])
+def test_the_least_time_scale_brings_one_rate_to_its_limit(given: dict[str, float]) -> None:
+    own = limits(**given)
+    slower = retimed(MOTION, least_time_scale(MOTION, own.rates))
+    assert (peak_rates(slower) / own.rates).max() == pytest.approx(1.0, rel=PEAK)
+
+
+def test_time_scales_of_several_motions_are_those_of_each() -> None:
+    ratios = np.random.default_rng(5).uniform(0.1, 3.0, (4, 3, 6))
+    assert time_scales(ratios).tolist() == [time_scale(each) for each in ratios]

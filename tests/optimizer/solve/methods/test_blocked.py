@@ -1,0 +1,200 @@
+"""Obstacles on a method's own path: it goes around them, or its result carries the collision and
+the error names it.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
+from joulepath.optimizer.motion import bspline, quintic
+from joulepath.optimizer.motion.spline import least_time_scale, retimed, spline_of
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import MethodName, Problem
+from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
+from joulepath.optimizer.problem.tool_cone import ToolCone
+from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory
+from joulepath.optimizer.solve.methods import METHODS, planned_paths, solver_for
+from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
+from joulepath.optimizer.solve.methods.method import SolveStatus
+from joulepath.optimizer.solve.methods.path_retiming import PathRetiming, RetimingProgram
+from joulepath.optimizer.solve.methods.planned_paths import (
+    ALONG_PLANNED_PATH,
+    FROM_PLANNED_PATH,
+    plan,
+    smooth_path,
+    to_goal,
+)
+from tests.optimizer.moves import ROBOT, problem_with
+from tests.selection import long_but
+
+START = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
+GOAL = np.array([-1.8, -1.57, 1.57, -1.57, -1.57, 0.0])
+DEADLINE = 60.0
+# states that a planning checks where there is no way: more take time alone
+FEW_STATES = 2_000
+# distance [rad] between a motion and the path it follows: the error of the fit of a spline, and of
+# sampling the path
+FIT = 2e-3
+# step of central differences of the retiming's variables, and their relative error; friction bends
+# over some mrad/s
+STEP, DIFFERENCES = 1e-6, 2e-4
+# share of a limit, as the certificate's
+HELD = 1e-6
+
+
+def placed(x: float, y: float, z: float, yaw: float = 0.0) -> Array:
+    T = np.eye(4)
+    T[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
+    T[:3, 3] = x, y, z
+    return T
+
+
+# on the straight line in joint space
+POST = Obstacle("post", Sphere(0.06), placed(-0.45, 0.35, 0.5))
+# a wall that leads outwards from the base, between start and goal, and beside the upper arm at the
+# goal
+WALL = Obstacle(
+    "wall",
+    Box(np.array([1.2, 0.02, 2.4])),
+    placed(-0.8 * 0.8, 0.6 * 0.8, 0.0, np.arctan2(0.6, -0.8)),
+    margin=0.0,
+)
+
+
+def blocked(method: MethodName, obstacle: Obstacle) -> Problem:
+    return problem_with(START, GOAL, scene=Scene((obstacle,)), method=method, deadline=DEADLINE)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _compiled() -> None:
+    compile_kernel(ROBOT)
+
+
+def planned_path(prepared: PreparedProblem) -> Array:
+    """The shortest planned path (k, nq) [rad] from START to GOAL."""
+    method = solver_for(prepared, START, GOAL, Deadline.after(DEADLINE))
+    return to_goal(method, plan(method))[0]
+
+
+@pytest.mark.parametrize(
+    ("method", "states"),
+    long_but(
+        [(method, FEW_STATES) for method in ("time_scaling", "polynomial_ga")],
+        product(METHODS, (FEW_STATES, planned_paths.MOST_STATES)),
+    ),
+)
+def test_the_error_names_the_colliding_pair(
+    method: MethodName, states: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(planned_paths, "MOST_STATES", states)
+    problem = blocked(method, WALL)
+    with pytest.raises(NoCollisionFreeTrajectory) as caught:
+        optimize(problem)
+    assert WALL.name in caught.value.pair and caught.value.depth > 0
+    assert all(WALL.name in candidate.reason for candidate in caught.value.candidates)
+    result = solver_for(PreparedProblem.of(problem), START, GOAL, Deadline.after(DEADLINE)).solve()
+    assert result.status is SolveStatus.FAILED and result.spline is None
+    assert result.collision is not None and WALL.name in result.collision.pair
+
+
+@pytest.mark.parametrize("method", long_but(("bspline", "uniform_scaling"), METHODS))
+def test_every_method_passes_the_post(method: MethodName) -> None:
+    solution = optimize(blocked(method, POST))
+    assert solution.certificate.valid
+    assert (
+        solution.certificate.clearance is not None
+        and solution.certificate.clearance.min_clearance >= 0
+    )
+    along = method in ("time_scaling", "uniform_scaling")
+    assert solution.candidates[0].reason.endswith(ALONG_PLANNED_PATH) == along
+    assert solution.candidates[0].reason.endswith(FROM_PLANNED_PATH) == (method == "polynomial_ga")
+
+
+@pytest.mark.parametrize("method", ["time_scaling", "uniform_scaling"])
+def test_a_followed_path_is_the_smooth_one(method: MethodName) -> None:
+    """The motion stays on the smooth path along the planned one, apart from the fit of its
+    spline."""
+    prepared = PreparedProblem.of(blocked(method, POST))
+    result = solver_for(prepared, START, GOAL, Deadline.after(DEADLINE)).solve()
+    assert result.spline is not None
+    smooth = smooth_path(prepared, planned_path(prepared))
+    assert smooth is not None and prepared.surroundings.worst_violation(smooth) is None
+    nearby = KDTree(smooth.curve(np.linspace(0.0, 1.0, 20_001)))
+    assert (
+        nearby.query(result.spline.curve(np.linspace(0.0, result.spline.duration, 400)))[0].max()
+        < FIT
+    )
+
+
+def test_time_scaling_along_a_path_needs_no_more_energy_than_the_quintic_law() -> None:
+    """The exact energy, against the quintic law along the same path in any duration within its
+    limits.
+    """
+    prepared = PreparedProblem.of(blocked("time_scaling", POST))
+    result = solver_for(prepared, START, GOAL, Deadline.after(DEADLINE)).solve()
+    smooth = smooth_path(prepared, planned_path(prepared))
+    assert result.spline is not None and smooth is not None
+    space = bspline.uniform(60)
+    tau = np.linspace(0.0, 1.0, 400)
+    points = space.fit(smooth.curve(quintic.fraction(tau)), tau)
+    unit = spline_of(space, points, 1.0)
+    least = least_time_scale(unit, prepared.problem.arm.active_limits.rates)
+    energies = [
+        prepared.energy(retimed(unit, least * k)).electrical.total
+        for k in np.linspace(1.0, 3.0, 41)
+    ]
+    assert prepared.energy(result.spline).electrical.total < min(energies)
+
+
+def test_gradients_of_the_retiming() -> None:
+    """Cost and every constraint, tool cone and speed of the TCP included, against central
+    differences.
+    """
+    cone = ToolCone(np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0]), 1.5)
+    prepared = PreparedProblem.of(
+        problem_with(
+            START, GOAL, scene=Scene((POST,)), method="time_scaling", tool_cone=cone, tcp_speed=1.0
+        )
+    )
+    smooth = smooth_path(prepared, planned_path(prepared))
+    assert smooth is not None
+    retiming = PathRetiming(prepared, smooth, duration_intervals(prepared, GOAL)[0])
+    limits = prepared.problem.arm.active_limits
+    assert prepared.path is not None
+    first = np.append(retiming.scaling.quintic[retiming.scaling.free], np.log(2.0))
+    program = RetimingProgram(retiming, limits, np.ones(len(prepared.path.names)), first)
+    # away from the symmetric point, where some derivatives vanish
+    x = first + np.random.default_rng(5).uniform(-0.01, 0.01, len(first))
+    state = program.state(x)
+    for k in range(len(x)):
+        step = STEP * np.eye(len(x))[k]
+        ahead, behind = program.state(x + step), program.state(x - step)
+        slope = (ahead.cost - behind.cost) / (2 * STEP)
+        assert state.gradient[k] == pytest.approx(
+            slope, rel=DIFFERENCES, abs=DIFFERENCES * abs(state.cost)
+        )
+        slopes = (ahead.slack - behind.slack) / (2 * STEP)
+        scale = 1 + np.abs(slopes).max()
+        assert np.abs(state.slopes[:, k] - slopes).max() < DIFFERENCES * scale
+
+
+@pytest.mark.parametrize("method", ["time_scaling", "uniform_scaling"])
+def test_limits_along_the_motion_hold_on_a_planned_path(method: MethodName) -> None:
+    free = optimize(blocked(method, POST))
+    slower = optimize(problem_with(START, GOAL, scene=Scene((POST,)), method=method, tcp_speed=0.4))
+    assert slower.certificate.valid and slower.certificate.worst_ratio["tcp_speed"] <= 1 + HELD
+    assert slower.trajectory.spline.duration > free.trajectory.spline.duration
+    fixed = optimize(
+        problem_with(
+            START, GOAL, scene=Scene((POST,)), method=method, duration_min=2.5, duration_max=2.5
+        )
+    )
+    assert fixed.certificate.valid and fixed.trajectory.spline.duration == 2.5

@@ -1,0 +1,54 @@
+"""The fastest motion of one candidate: what counts, and when it ends."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from joulepath.optimizer.motion.ruckig_motion import time_optimal_spline
+from joulepath.optimizer.motion.spline import lasting
+from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.search.fastest import fastest_of
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval, fastest
+from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, problem
+
+SPLINE = lasting(time_optimal_spline(ROBOT.limits, START, GOAL), 2.0)
+
+
+def prepared(**given: object) -> Run:
+    run = Run(problem(payload=PAYLOAD, **given))
+    run.prepare()
+    return run
+
+
+def test_what_a_method_compares_is_what_its_interval_makes_least() -> None:
+    incumbent = prepared().incumbent
+    models = incumbent.prepared
+
+    def cost(interval: DurationInterval) -> float:
+        return FreeSpline(models, START, GOAL, incumbent.deadline, interval).cost_of(SPLINE)
+
+    energy = models.cost_of(SPLINE)
+    own = DurationInterval(models.objective_parameters, LEAST_DURATION, LONGEST_DURATION)
+    assert cost(own) == energy
+    assert cost(replace(own, price=30.0)) == pytest.approx(energy + 30.0 * SPLINE.duration)
+    assert cost(fastest(models)) == SPLINE.duration
+    assert FreeSpline(models, START, GOAL, incumbent.deadline, own).cost_of(None) == float("inf")
+
+
+def test_a_known_motion_counts_if_it_is_certified() -> None:
+    """A polynomial is slower than splines: one that is known is the fastest motion then, whole or
+    not at all.
+    """
+    splines, polynomials = prepared().incumbent, prepared(method="lagrange").incumbent
+    known = fastest_of(splines, splines.candidates[0])
+    candidate = polynomials.candidates[0]
+    own = fastest_of(polynomials, candidate)
+    assert known is not None and own is not None and known.duration < 0.99 * own.duration
+    assert fastest_of(polynomials, candidate, [known]) is known
+    too_fast = lasting(known, 0.9 * known.duration)
+    found = fastest_of(polynomials, candidate, [too_fast])
+    assert found is not None and found.duration >= known.duration

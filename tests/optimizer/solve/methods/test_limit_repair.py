@@ -1,0 +1,84 @@
+"""Torques far below their limits are checked at quadrature points alone: between them they stay
+within the limits.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.dynamics.limited_torque import limited_parts
+from joulepath.optimizer.dynamics.torque_bound import SHARPNESS
+from joulepath.optimizer.motion import bspline, seven_segment
+from joulepath.optimizer.motion.bspline import Basis
+from joulepath.optimizer.motion.spline import Spline, peak_rates, retimed, sample, time_scale
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.solve.methods.limit_repair import torque_peaks
+from tests.optimizer.moves import PAYLOAD, START, TILTED, limits, problem
+
+# finer than the certificate's grid of 1 ms
+POINTS = 6_001
+# relative; torques by the same kernel at other instants
+ROUNDING = 1e-12
+# how far the control points are from START [rad], smallest first: short motions have the steepest
+# torques
+SPREADS = (1e-3, 1e-2, 0.1, 1.0)
+TASKS: list[dict[str, Any]] = [
+    {},
+    {"payload": PAYLOAD, "gravity": TILTED},
+    {"friction": "coulomb_viscous"},
+]
+
+
+def spaces() -> list[Basis]:
+    """Few control points, many, and knots repeated where jerk switches."""
+    graded = bspline.graded(seven_segment.switches(np.full(6, 1.0), 1.0, limits()), 3)
+    return [bspline.uniform(13), bspline.uniform(40), graded]
+
+
+def random_motion(
+    prepared: PreparedProblem, space: Basis, spread: float, rng: np.random.Generator
+) -> Spline:
+    """A motion through random control points, at the greatest rates that the limits allow."""
+    points = START + spread * rng.uniform(-1, 1, (space.n, len(START)))
+    points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = points[0], points[-1]
+    spline = Spline(bspline.DEGREE, space.knots, points)
+    return retimed(
+        spline, time_scale(peak_rates(spline) / prepared.problem.arm.active_limits.rates)
+    )
+
+
+def estimate(prepared: PreparedProblem, spline: Spline) -> Array:
+    """What decides whether a motion is far below the torque limits (nq,): it must stay below
+    `far_below` of them.
+    """
+    _, _, v, a, tau, _ = prepared.report_samples(spline)
+    parts = limited_parts(prepared.arm, tau, v, a)
+    return np.asarray(sum(np.abs(part).max(axis=0) for part in parts))
+
+
+@pytest.mark.parametrize("given", TASKS)
+def test_what_is_far_below_the_torque_limits_is_within_them_everywhere(
+    given: dict[str, Any],
+) -> None:
+    prepared = PreparedProblem.of(problem(START, START + 0.5, **given))
+    tau_max = prepared.problem.arm.active_limits.tau_max
+    rng, worst, skipped = np.random.default_rng(5), 0.0, 0
+    for space in spaces():
+        for spread in SPREADS * 2:
+            spline = random_motion(prepared, space, spread, rng)
+            estimated = estimate(prepared, spline)
+            q, v, a = sample(spline, np.linspace(0.0, spline.duration, POINTS))
+            truth = np.abs(prepared.limited_torques(q, v, a)).max(axis=0)
+            worst = max(worst, float((truth / estimated).max()))
+            if (estimated <= SHARPNESS.far_below * tau_max).all():
+                skipped += 1
+                assert (truth <= tau_max).all()
+            else:
+                assert (torque_peaks(prepared, spline) >= truth * (1 - ROUNDING)).all()
+    # with limits made to measure, every one of the motions would have been taken as far below them
+    assert worst <= 1 / SHARPNESS.far_below
+    assert skipped

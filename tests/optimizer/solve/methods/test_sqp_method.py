@@ -1,0 +1,234 @@
+"""One candidate from guess to motion: it holds every limit between the nodes too, and says so when
+it cannot.
+"""
+
+from __future__ import annotations
+
+from itertools import count, product
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.interpolate import BSpline
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
+from joulepath.optimizer.motion.seven_segment import ramp, shortest_duration
+from joulepath.optimizer.motion.spline import Spline, sampled
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.solve.methods import METHODS, solver_for
+from joulepath.optimizer.solve.methods import duration_intervals as duration_intervals
+from joulepath.optimizer.solve.methods.free_spline import TIGHT, FreeSpline
+from joulepath.optimizer.solve.methods.method import Method, SolveResult, SolveStatus
+from tests.optimizer.moves import (
+    GOAL,
+    PAYLOAD,
+    ROBOT,
+    START,
+    TILTED,
+    fixed,
+    limits,
+    problem,
+    random_moves,
+    torques,
+)
+from tests.selection import long_but
+
+SAMPLES = 3001  # at primes and their like: on nobody's grid
+HELD = 1e-6  # share of a limit, as the certificate's
+ROUNDING = 1e-9
+
+CONDITIONS: list[dict[str, Any]] = [
+    {},
+    {"payload": PAYLOAD, "gravity": TILTED},
+    {"limits": limits(tau_max=[60, 120, 60, 14, 14, 14])},
+    {"limits": limits(v_max=1.0, a_max=3.0, j_max=15.0), "payload": PAYLOAD},
+    {"friction": "coulomb_viscous", "limits": limits(j_max=25.0)},
+]
+
+
+def solver(
+    start: Array, goal: Array, fastest: bool = False, wait: float = 60.0, **given: Any
+) -> Method:
+    compile_kernel(ROBOT)
+    task = PreparedProblem.of(problem(start, goal, **given))
+    interval = duration_intervals.fastest(task) if fastest else None
+    return solver_for(task, start, goal, Deadline.after(wait), interval)
+
+
+def spline(attempt: SolveResult) -> Spline:
+    assert attempt.status is SolveStatus.SOLVED and attempt.spline is not None, attempt.reason
+    return attempt.spline
+
+
+def assert_held(task: Problem, motion: Spline) -> None:
+    """Every limit, at samples apart from any grid of the optimiser's, with SciPy's spline and
+    Pinocchio's torques.
+    """
+    own = task.arm.active_limits
+    curve = BSpline(motion.knots, motion.control_points, motion.degree)
+    t = np.linspace(0.0, motion.duration, SAMPLES)
+    q, v, a, jerk = (curve(t, d) for d in range(4))
+    tau = torques(task, q, v, a) + task.arm.friction_law.torque(v)
+    for values, maxima in ((v, own.v_max), (a, own.a_max), (jerk, own.j_max), (tau, own.tau_max)):
+        assert (np.abs(values) <= maxima * (1 + HELD)).all()
+    assert (q >= own.q_min - ROUNDING).all() and (q <= own.q_max + ROUNDING).all()
+    assert np.abs(v[[0, -1]]).max() < 1e-8 and np.abs(a[[0, -1]]).max() < 1e-6
+    assert q[0] == pytest.approx(np.asarray(task.start), abs=ROUNDING)
+    assert q[-1] == pytest.approx(np.asarray(task.goal), abs=ROUNDING)
+
+
+@pytest.mark.parametrize(
+    ("method", "objective"),
+    long_but(
+        [("bspline", "mechanical"), ("time_scaling", "electrical")],
+        product(METHODS, ("electrical", "mechanical")),
+    ),
+)
+def test_limits_hold_between_the_nodes(method: str, objective: str) -> None:
+    for (start, goal), given in zip(random_moves(31, len(CONDITIONS)), CONDITIONS, strict=True):
+        own = given.get("limits", ROBOT.limits)
+        longest = (
+            None if objective == "electrical" else 2.0 * float(shortest_duration(goal - start, own))
+        )
+        mine = solver(
+            start, goal, method=method, objective=objective, duration_max=longest, **given
+        )
+        attempt = mine.solve()
+        if method == "time_scaling" and attempt.status is SolveStatus.INFEASIBLE:
+            continue  # a straight line may lead where the arm cannot be held
+        assert_held(mine.prepared.problem, spline(attempt))
+        assert attempt.iterations > 0 and attempt.solves > 0
+
+
+def test_a_time_scaled_motion_stays_on_its_line() -> None:
+    """Every control point, so every point; each a little further along."""
+    for start, goal in random_moves(32, 4):
+        points = spline(solver(start, goal, method="time_scaling").solve()).control_points
+        displacement = goal - start
+        fraction = (points - start) @ displacement / (displacement @ displacement)
+        assert np.abs(points - start - np.outer(fraction, displacement)).max() < ROUNDING
+        assert fraction[0] == pytest.approx(0, abs=ROUNDING) and fraction[-1] == pytest.approx(
+            1, abs=ROUNDING
+        )
+
+
+def test_minimum_time_ignores_the_duration_asked_for() -> None:
+    """It tells what would be possible."""
+    quick = spline(solver(START, GOAL, fastest=True).solve()).duration
+    for given in (fixed(0.1), fixed(5.0)):
+        assert spline(solver(START, GOAL, fastest=True, **given).solve()).duration == pytest.approx(
+            quick, rel=1e-9
+        )
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_deadline_that_has_passed_ends_the_attempt(method: str) -> None:
+    attempt = solver(START, GOAL, method=method, wait=-1.0).solve()
+    assert attempt.status is SolveStatus.OUT_OF_TIME and attempt.spline is None
+
+
+def test_a_motion_is_solved_again_from_itself_with_its_knots_where_jerk_switches_now() -> None:
+    """Its goal has moved since: in fewer steps than from fits, to no more energy, within every
+    limit.
+    """
+    steps = np.zeros(2, dtype=int)
+    for start, goal in ((START, GOAL), *random_moves(3, 1)):
+        own, moved = solver(start, goal + 0.02), solver(start, goal)
+        assert isinstance(own, FreeSpline) and isinstance(moved, FreeSpline)
+        tight = spline(own.solve_tightly(*sampled(spline(own.solve())), 1e-3))
+        again, fitted = moved.solve_regraded(tight), moved.solve_from(*sampled(tight), fine=True)
+        steps += again.iterations, fitted.iterations
+        cost = moved.prepared.cost_of
+        assert cost(spline(again)) <= cost(spline(fitted)) * (1 + 1e-3)
+        assert_held(problem(start, goal), spline(again))
+    assert steps[0] < steps[1]
+
+
+def test_a_sole_candidate_is_refined_at_once() -> None:
+    """Its coarse motion is only a guess: the result is that of two solves, one after the other, and
+    within limits.
+    """
+    at_once, twice = solver(START, GOAL), solver(START, GOAL)
+    at_once.is_sole = True
+    found = spline(at_once.solve())
+    coarse = spline(twice.solve())
+    assert FreeSpline.may_refine(coarse) and not FreeSpline.may_refine(found)
+    assert_held(at_once.prepared.problem, found)
+    tight = coarse.duration < TIGHT * shortest_duration(GOAL - START, ROBOT.limits)
+    cost = at_once.prepared.cost_of
+    assert cost(found) == pytest.approx(
+        cost(spline(twice.refined(coarse, fine=bool(tight)))), rel=1e-3
+    )
+
+
+@pytest.mark.parametrize("why", ["refining fails", "another candidate", "little time"])
+def test_else_the_coarse_motion_is_checked(why: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    own = solver(START, GOAL, wait=0.8 if why == "little time" else 60.0)
+    own.is_sole = why != "another candidate"
+    if why == "refining fails":
+        failed = SolveResult(SolveStatus.FAILED, "for a test", 5, 1)
+        monkeypatch.setattr(FreeSpline, "refined", lambda *_, **__: failed)
+    result = own.solve()
+    assert FreeSpline.may_refine(spline(result))
+    assert result.solves == (3 if why == "refining fails" else 1)
+    assert_held(own.prepared.problem, spline(result))
+
+
+@pytest.mark.parametrize(
+    ("readings", "refined"), [(25, False), (30, False), (34, False), (200, False), (1000, True)]
+)
+def test_on_a_slow_machine_a_checked_motion_comes_first(readings: int, refined: bool) -> None:
+    """Of the time that is left, a reading of the clock takes a share; coarse and refined motion
+    take 34 of them.
+    """
+    own, ticks = solver(START, GOAL), count()
+    own.is_sole, own.deadline = True, Deadline(2.0, clock=lambda: 2.0 * next(ticks) / readings)
+    found = spline(own.solve())
+    assert FreeSpline.may_refine(found) is not refined
+    assert_held(own.prepared.problem, found)
+
+
+def test_a_coarse_motion_that_collides_is_no_guess() -> None:
+    """Of this move it hits the arm itself: clearance constraints are added to it, as without a
+    refined motion.
+    """
+    start, goal = list(random_moves(5, 7))[6]
+    own, usual = (solver(start, goal, collisions=True) for _ in range(2))
+    own.is_sole = True
+    found, expected = own.solve(), usual.solve()
+    assert expected.unhindered is not None
+    assert found.unhindered == pytest.approx(expected.unhindered)
+    assert FreeSpline.may_refine(spline(found))
+
+
+def slowly(speed: float, **given: object) -> FreeSpline:
+    """The solver of a move whose joints are limited to a speed [rad/s]."""
+    own = solver(START, GOAL, **{"limits": limits(v_max=speed)} | given)
+    assert isinstance(own, FreeSpline)
+    return own
+
+
+def test_a_slow_motion_has_its_first_knots_at_the_ramps_and_is_refined_from_itself() -> None:
+    own = slowly(0.1)
+    coarse = own.solve()
+    motion, cost = spline(coarse), own.prepared.cost_of
+    breaks = np.unique(motion.knots) / motion.duration
+    shortest_span = breaks[1] * motion.duration
+    assert shortest_span < ramp(GOAL - START, own.coordinates.limits) and own.may_refine(motion)
+    finer = own.refined(motion, fine=True)
+    assert not own.may_refine(spline(finer))
+    assert cost(spline(finer)) < cost(motion)
+    assert_held(own.prepared.problem, spline(finer))
+
+
+@pytest.mark.parametrize(
+    "given", [{}, {"objective": "mechanical", "duration_max": 15.0}, {"limits": ROBOT.limits}]
+)
+def test_other_first_knots_are_evenly_spaced(given: dict[str, object]) -> None:
+    """At the robot's own limits of speed; and of least work, for which no time is too long."""
+    own = slowly(0.1, **given)
+    even = bool(np.ptp(np.diff(np.unique(spline(own.solve()).knots))) < 1e-9)
+    assert even is bool(given)

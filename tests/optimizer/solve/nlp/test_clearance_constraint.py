@@ -1,0 +1,205 @@
+"""Motions among obstacles: they keep away, they cost no less than without, and what is far costs
+nothing.
+"""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from joulepath import optimize
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.clearance_constraint import (
+    CHECKED,
+    COUNTED,
+    RESERVE,
+    SCALE,
+    ClearanceConstraint,
+)
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.deadline import NEVER
+from joulepath.optimizer.kinematics.forward import joint_placements
+from joulepath.optimizer.kinematics.path_constraints import PathConstraints
+from joulepath.optimizer.motion.spline import sample
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
+from joulepath.optimizer.problem.tool_cone import ToolCone
+from joulepath.optimizer.result.solution import Solution
+from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods.limit_repair import REPAIR_MARGIN
+from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.sqp_method import COSTLIER, NO_BETTER
+from joulepath.optimizer.solve.nlp.working_set_qp import NEAR_PATH
+from tests.optimizer.moves import fixed, problem_with
+
+ROBOT = load_robot("ur5e")
+HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
+GOAL = np.array([1.8, -1.1, 1.9, -2.4, -1.57, 0.4])
+# of the motion between the two without anything in the way: where the flange passes
+WAY = np.array([0.0, -0.57, 0.27])
+# replay, and where gradients are differenced [rad]; distances are smooth there to their own
+# curvature
+REPLAY, STEP, GRADIENT_TOLERANCE = 1e-4, 1e-6, 1e-4
+# a limit that binds is used up to the solver's own margins
+USED = 0.999
+# one whose peaks between the points of the program are repaired is tightened by one and a half
+# times their excess
+USED_AFTER_REPAIR = 0.997
+# above this a share is exact
+COUNTED_SHARE = 1 - (COUNTED - RESERVE) / SCALE
+# energies of the same motion solved apart
+SAME_ENERGY = 1e-3
+
+
+def at(*xyz: float) -> Array:
+    T = np.eye(4)
+    T[:3, 3] = xyz
+    return T
+
+
+def low_post(margin: float = 0.0) -> Obstacle:
+    return Obstacle("post", Box(np.array([0.08, 0.08, 0.25])), at(WAY[0], WAY[1], 0.125), margin)
+
+
+POST = Scene((low_post(),))
+Fields = dict[str, Any]
+
+
+def solved(*obstacles: Obstacle, **given: object) -> Solution:
+    problem = problem_with(HOME, GOAL, windings=False, scene=Scene(obstacles), **given)  # type: ignore[arg-type]
+    return optimize(problem)
+
+
+def least_distance(solution: Solution, *obstacles: Obstacle) -> float:
+    model = CollisionModel(problem_with(HOME, GOAL, scene=Scene(obstacles)).arm)
+    q = sample(solution.trajectory.spline, np.arange(0.0, solution.duration, REPLAY))[0]
+    return model.least_distance(q, np.inf)
+
+
+def test_a_post_in_the_way_is_passed() -> None:
+    free = solved()
+    assert least_distance(free, low_post()) < 0
+    around = solved(low_post())
+    assert (
+        around.certificate.clearance is not None and around.certificate.clearance.min_clearance >= 0
+    )
+    assert "post" in around.certificate.clearance.pair
+    assert least_distance(around, low_post()) >= around.certificate.clearance.min_clearance
+    assert around.energy.electrical.total > free.energy.electrical.total
+
+
+@pytest.mark.long
+def test_a_margin_is_kept_and_costs() -> None:
+    near, far = solved(low_post()), solved(low_post(margin=0.03))
+    assert least_distance(far, low_post()) >= 0.03
+    assert far.energy.electrical.total > near.energy.electrical.total
+
+
+def test_what_is_far_away_changes_nothing() -> None:
+    ball = Obstacle("ball", Sphere(0.1), at(-0.5, 0.8, 1.2))
+    with_ball, without = (
+        solved(ball).energy.electrical.total,
+        solved(collisions=False).energy.electrical.total,
+    )
+    assert with_ball == pytest.approx(without, rel=SAME_ENERGY)
+
+
+@pytest.mark.parametrize(
+    ("given", "reason"),
+    [
+        ({}, COSTLIER),
+        ({"objective": "mechanical"} | fixed(2.0), NO_BETTER),
+    ],  # no promise is made of work
+    ids=["electrical", "mechanical"],
+)
+def test_a_colliding_motion_that_needs_more_energy_than_a_known_one_is_pruned(
+    given: Fields, reason: str
+) -> None:
+    task, empty = (
+        PreparedProblem.of(problem_with(HOME, GOAL, scene=scene, **given))
+        for scene in (POST, Scene())
+    )
+
+    def attempt(on: PreparedProblem, best_known: float) -> SolveResult:
+        solver = FreeSpline(on, HOME, GOAL, NEVER)
+        solver.best_known = best_known
+        return solver.solve()
+
+    through = attempt(empty, np.inf).spline
+    assert through is not None
+    free = empty.cost_of(through)
+    assert attempt(task, np.inf).status is attempt(task, 1.2 * free).status is SolveStatus.SOLVED
+    pruned = attempt(task, 0.95 * free)
+    assert (pruned.status, pruned.reason, pruned.spline) == (SolveStatus.PRUNED, reason, None)
+
+
+def every_pair(model: CollisionModel) -> PathConstraints:
+    return PathConstraints(
+        joint_placements(ROBOT.model), [ClearanceConstraint(model, np.arange(len(model.pairs)))]
+    )
+
+
+def test_gradients_of_the_shares_are_those_of_finite_differences() -> None:
+    problem = problem_with(
+        HOME, GOAL, scene=Scene((low_post(), Obstacle("ball", Sphere(0.1), at(0.3, -0.3, 0.4))))
+    )
+    path = every_pair(CollisionModel(problem.arm))
+    q = np.linspace(HOME, GOAL, 25)
+    v = np.zeros_like(q)
+    found = path.linearised(q, v)
+    near = (found.value > COUNTED_SHARE) & (found.value < 1 + 0.01 / SCALE)
+    assert near.sum() > 10
+    for j in range(6):
+        d = STEP * np.eye(6)[j]
+        by_q = (path.linearised(q + d, v).value - path.linearised(q - d, v).value) / (2 * STEP)
+        np.testing.assert_allclose(
+            found.by_q[near][:, j], by_q[near], atol=GRADIENT_TOLERANCE / SCALE
+        )
+
+
+def test_a_share_is_one_a_reserve_beyond_the_margin() -> None:
+    model = CollisionModel(problem_with(HOME, GOAL, scene=Scene((low_post(),))).arm)
+    q = np.linspace(HOME, GOAL, 25)
+    expected = 1 - (model.signed_distances(q)[0] - RESERVE) / SCALE
+    path, v = every_pair(model), np.zeros_like(q)
+    for shares, counted, low in (
+        (path.linearised(q, v).value, COUNTED_SHARE, NEAR_PATH),
+        (path.ratios(q, v), CHECKED, 1 - REPAIR_MARGIN),
+    ):
+        near = expected > counted
+        assert 2 < near.sum() < near.size
+        np.testing.assert_allclose(shares[near], expected[near])
+        # of the others only a bound is known: too low for the solver to look at them, or for a
+        # motion to be repaired
+        assert (shares[~near] < low).all() and (shares >= expected - 1e-12).all()
+
+
+@pytest.mark.parametrize("given", [{"tcp_speed": 0.5}, {"elbow_speed": 0.2}])
+def test_a_limited_speed_is_used_and_held(given: dict[str, float]) -> None:
+    free, limited = solved(), solved(**given)
+    (name,) = given
+    assert USED < limited.certificate.worst_ratio[name] <= 1
+    assert limited.energy.electrical.total > free.energy.electrical.total
+
+
+def test_a_wide_cone_changes_nothing_and_a_narrow_one_binds() -> None:
+    # at both ends the tool points straight down: the three parallel joints add up to the same
+    goal = np.array([1.8, -0.6, 2.2, -3.17, -1.57, 0.4])
+
+    def upright(half_angle: float) -> Problem:
+        cone = ToolCone(np.array([0.0, 0, 1]), np.array([0.0, 0, -1]), half_angle)
+        return problem_with(HOME, goal, windings=False, tool_cone=cone)
+
+    free = optimize(problem_with(HOME, goal, windings=False))
+    path = PreparedProblem.of(upright(1.0)).path
+    assert path is not None
+    q, v, _ = sample(free.trajectory.spline, np.linspace(0, free.duration, 400))
+    tilt = float(path.ratios(q, v).max())
+    wide, narrow = optimize(upright(1.5 * tilt)), optimize(upright(0.4 * tilt))
+    assert wide.energy.electrical.total == pytest.approx(
+        free.energy.electrical.total, rel=SAME_ENERGY
+    )
+    assert USED_AFTER_REPAIR < narrow.certificate.worst_ratio["tool_cone"] <= 1
+    assert narrow.energy.electrical.total > free.energy.electrical.total

@@ -1,0 +1,250 @@
+"""The program of a candidate: its cost against an independent integral, its derivatives against
+differences.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from scipy.interpolate import BSpline
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
+from joulepath.optimizer.dynamics.losses import drawn_power, power_flow
+from joulepath.optimizer.dynamics.plant import KNEE, WIDTH
+from joulepath.optimizer.motion import bspline
+from joulepath.optimizer.motion.bspline import DEGREE, Basis
+from joulepath.optimizer.motion.quadrature import quadrature
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.solve.nlp.coordinates import Coordinates
+from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
+from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem, torques
+from tests.optimizer.solve.nlp.second_differences import without_dry_friction
+
+STEP = 1e-6  # of control points [rad, or of the line's fraction] and of the duration [s]
+# relative to the largest candidate: a central difference loses STEP² of the third derivative, which
+# friction's reversal at KNEE makes large, and rounding over STEP of the value
+FIRST, SECOND = 1e-6, 1e-5
+# relative; corners of |power| rounded over WIDTH, and friction's reversal at rest, lie between the
+# nodes
+QUADRATURE = 2e-3
+SUM = 1e-9  # relative; the same sum of powers by another route
+EXACT = 1e-12  # relative; the same linear maps in another order
+TORQUE = 1e-9  # N·m, as symbolic inverse dynamics against Pinocchio
+
+SPACES = {
+    "uniform": bspline.uniform(13),
+    "graded": bspline.graded(np.array([0.06, 0.3, 0.7, 0.94]), 3),
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """A program and a point that is neither optimal nor a straight line nor feasible."""
+
+    task: PreparedProblem
+    program: NonlinearProgram
+    free: Array
+    duration: float
+    multiplier: Array
+
+
+CASES = [
+    (o, c, s) for o in ("electrical", "mechanical") for c in ("joints", "line") for s in SPACES
+]
+
+
+@pytest.fixture(params=CASES, ids="-".join)
+def case(request: pytest.FixtureRequest) -> Case:
+    objective, kind, space = request.param
+    return make(objective, kind, SPACES[space])
+
+
+def make(objective: str, kind: str, basis: Basis) -> Case:
+    compile_kernel(ROBOT)
+    electronics = replace(ROBOT.electronics, regeneration=0.4)
+    task = PreparedProblem.of(
+        problem(
+            robot=replace(ROBOT, electronics=electronics),
+            payload=PAYLOAD,
+            gravity=TILTED,
+            objective=objective,
+            duration_max=2.0,
+        )
+    )
+    build = {"joints": Coordinates.joints, "line": Coordinates.straight_line}[kind]
+    coordinates = build(START, GOAL, ROBOT.limits)
+    kernel = PreparedProblem.of(problem()).kernel
+    program = NonlinearProgram(kernel, basis, task.objective_parameters, coordinates, 0.5, 2.0)
+    rng = np.random.default_rng(1)
+    points = coordinates.start + np.outer(basis.quintic, coordinates.goal - coordinates.start)
+    free = points[basis.free] + 0.05 * rng.normal(size=(program.free_count, program.r))
+    return Case(task, program, free, 0.8, 0.1 * rng.normal(size=(len(basis.nodes), 6)))
+
+
+def motion(case: Case) -> BSpline:
+    """q(t) by SciPy, from the control points of the joints."""
+    return BSpline(
+        case.program.basis.knots * case.duration, case.program.joint_points(case.free), DEGREE
+    )
+
+
+def power(case: Case, q: Array, v: Array, a: Array) -> Array:
+    """The smoothed power that is minimised (k,) [W], from Pinocchio's torques and the plain
+    formulas.
+    """
+    task = case.task.problem
+    tau = torques(task, q, v, a)
+    if task.objective == "mechanical":
+        return np.asarray(np.hypot(tau * v, WIDTH).sum(axis=1))
+    friction = replace(task.arm.friction_law, knee=KNEE)
+    net = 36.7 + power_flow(tau, v, a, ROBOT.drives, friction, 0.1 * WIDTH).joints.sum(axis=1)
+    return np.asarray(drawn_power(net, 0.4, WIDTH))
+
+
+def test_cost_is_the_sum_of_power_over_the_nodes(case: Case) -> None:
+    """Of SciPy's spline in real time: the chain rule v = s' / T, a = s'' / T², and dt = T dτ."""
+    curve, basis, T = motion(case), case.program.basis, case.duration
+    t = basis.nodes * T
+    expected = T * basis.weights @ power(case, curve(t), curve(t, 1), curve(t, 2))
+    assert case.program.value(case.free, T)[0] == pytest.approx(float(expected), rel=SUM)
+
+
+def test_cost_is_the_integral_of_power(case: Case) -> None:
+    """Along a straight motion, against sixteen times as many points."""
+    line = case.program.coordinates
+    points = line.start + np.outer(case.program.basis.quintic, line.goal - line.start)
+    smooth = replace(case, free=points[case.program.basis.free])
+    curve = motion(smooth)
+    t, weights = quadrature(curve.t, 64)
+    expected = weights @ power(case, curve(t), curve(t, 1), curve(t, 2))
+    assert case.program.value(smooth.free, case.duration)[0] == pytest.approx(
+        float(expected), rel=QUADRATURE
+    )
+
+
+def test_torques_are_those_of_the_motion(case: Case) -> None:
+    """At every node, friction included, from SciPy's spline in real time."""
+    curve, t = motion(case), case.program.basis.nodes * case.duration
+    q, v, a = curve(t), curve(t, 1), curve(t, 2)
+    friction = replace(case.task.friction, knee=KNEE)
+    expected = torques(case.task.problem, q, v, a) + friction.torque(v)
+    tau = case.program.value(case.free, case.duration)[1].copy()
+    assert np.abs(tau - expected).max() < TORQUE
+    line = case.program.derivatives(case.free, case.duration, case.multiplier)
+    assert np.abs(line.tau - expected).max() < TORQUE
+    assert line.cost == pytest.approx(case.program.value(case.free, case.duration)[0], rel=EXACT)
+
+
+def shifted(case: Case, i: int, by: float) -> tuple[Array, float]:
+    """The point with its i-th unknown shifted; the last one is the duration."""
+    x = np.append(case.free.ravel(), case.duration)
+    x[i] += by
+    return x[:-1].reshape(case.free.shape), float(x[-1])
+
+
+def test_gradient_is_the_slope_of_the_cost(case: Case) -> None:
+    n = case.free.size + 1
+    up, down = (
+        [case.program.value(*shifted(case, i, by))[0] for i in range(n)] for by in (STEP, -STEP)
+    )
+    slope = (np.array(up) - np.array(down)) / (2 * STEP)
+    gradient = case.program.derivatives(case.free, case.duration, case.multiplier).gradient
+    assert gradient.shape == (n,)
+    assert np.abs(gradient - slope).max() < FIRST * np.abs(slope).max()
+    assert gradient[-1] == pytest.approx(
+        slope[-1], rel=FIRST
+    )  # small beside those by control points
+
+
+def test_hessian_is_the_slope_of_the_lagrangians_gradient(case: Case) -> None:
+    """Of cost + multiplier · tau_motor, in all unknowns; the last row, by the duration, on its own
+    scale too.
+    """
+    program, n = without_dry_friction(case.program), case.free.size + 1
+    k, j = (index.ravel() for index in np.indices(case.multiplier.shape))
+
+    def gradient(i: int, by: float) -> Array:
+        free, T = shifted(case, i, by)
+        line = program.derivatives(free, T, case.multiplier)
+        rows = program.torque_rows(line, T, k, j)
+        return np.asarray(line.gradient + case.multiplier.ravel() @ rows)
+
+    slope = np.array([gradient(i, STEP) - gradient(i, -STEP) for i in range(n)]) / (2 * STEP)
+    hessian = program.derivatives(case.free, case.duration, case.multiplier).hessian
+    assert np.abs(hessian - hessian.T).max() < EXACT * np.abs(hessian).max()
+    assert np.abs(hessian - slope).max() < SECOND * np.abs(slope).max()
+    assert np.abs(hessian[-1] - slope[-1]).max() < SECOND * np.abs(slope[-1]).max()
+
+
+def test_torque_rows_are_the_slopes_of_torques(case: Case) -> None:
+    """Of chosen joints at chosen nodes, in any order."""
+    rng = np.random.default_rng(2)
+    k, j = rng.integers(0, len(case.program.basis.nodes), 40), rng.integers(0, 6, 40)
+    n = case.free.size + 1
+    up, down = (
+        np.array([case.program.value(*shifted(case, i, by))[1][k, j] for i in range(n)])
+        for by in (STEP, -STEP)
+    )
+    slope = (up - down).T / (2 * STEP)
+    line = case.program.derivatives(case.free, case.duration, case.multiplier)
+    rows = case.program.torque_rows(line, case.duration, k, j)
+    assert rows.shape == (40, n)
+    assert np.abs(rows - slope).max() < FIRST * np.abs(slope).max()
+
+
+def test_rates_are_those_of_the_motion(case: Case) -> None:
+    """|derivative by τ| ≤ limit · T^d is the limit on the joints themselves, jerk included."""
+    program, T = case.program, case.duration
+    derivatives = program.kinematics(case.free)
+    limit = program.limits.rates * T ** np.arange(1, 4)[:, None]
+    worst = (np.abs(derivatives).max(axis=2) / limit).max(axis=1)
+    curve, robot = motion(case), ROBOT.limits
+    eps = 1e-10
+    knots = curve.t
+    t = np.union1d(np.linspace(0, T, 20_001), np.concatenate([knots - eps, knots + eps]).clip(0, T))
+    for d, maxima in enumerate((robot.v_max, robot.a_max, robot.j_max)):
+        ratio = np.abs(curve(t, d + 1)).max(axis=0) / maxima
+        assert worst[d] == pytest.approx(ratio.max(), rel=1e-3)  # peaks between the grid's points
+
+
+def test_points_of_the_motion(case: Case) -> None:
+    """Three equal ones at either end, the free ones in between; back from joints to coordinates."""
+    program = case.program
+    q = program.joint_points(case.free)
+    assert q[:3] == pytest.approx(np.tile(START, (3, 1)), rel=EXACT)
+    assert q[-3:] == pytest.approx(np.tile(GOAL, (3, 1)), rel=EXACT)
+    assert program.coordinates.from_joints(q[3:-3]) == pytest.approx(
+        case.free, rel=1e-10, abs=1e-12
+    )
+
+
+def test_a_line_is_limited_by_its_slowest_joint() -> None:
+    """Fractions of the line per second: each joint's limit over its displacement; joints that stay
+    set no limit.
+    """
+    goal = START + np.array([1.0, -0.5, 0.0, 0.0, 0.0, 0.0])
+    own = limits(
+        v_max=[3.0, 0.6, 1, 1, 1, 1], a_max=[2.0, 5.0, 1, 1, 1, 1], j_max=[90.0, 50.0, 1, 1, 1, 1]
+    )
+    line = Coordinates.straight_line(START, goal, own)
+    assert [float(x[0]) for x in (line.limits.v_max, line.limits.a_max, line.limits.j_max)] == [
+        1.2,
+        2.0,
+        90.0,
+    ]
+    assert line.to_joints(np.array([[0.0], [0.5], [1.0]])) == pytest.approx(
+        np.array([START, (START + goal) / 2, goal]), rel=EXACT
+    )
+    off_line = START + np.array(
+        [0.5, 0.25, 0.3, 0.0, 0.0, 0.0]
+    )  # nearest point: (0.5 - 0.125) / 1.25 of the way
+    assert float(line.from_joints(off_line[None])[0, 0]) == pytest.approx(0.3, rel=1e-9)
+
+
+def test_a_line_of_no_length_keeps_its_limits_finite() -> None:
+    line = Coordinates.straight_line(START, START, ROBOT.limits)
+    assert np.isfinite([line.limits.v_max, line.limits.a_max, line.limits.j_max]).all()
+    assert line.to_joints(np.linspace(0, 1, 5)[:, None]) == pytest.approx(np.tile(START, (5, 1)))
