@@ -40,6 +40,7 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from joulepath.optimizer.solve.methods.sqp_method import Guess
 
 FILE = Path(__file__).with_name("reference_energies.json")
@@ -90,8 +91,10 @@ class Search:
         """
         interval = duration_intervals(self.prepared, self.move.q_goal)[0]
         deadline = Deadline.after(PATIENCE)
-        solver = FreeSpline(self.prepared, self.move.q_start, self.move.q_goal, deadline, interval)
-        spline = solver.improve(guess).spline
+        context = SolveContext(
+            self.prepared, self.move.q_start, self.move.q_goal, deadline, interval
+        )
+        spline = FreeSpline(context).improve(guess).spline
         if spline is None:
             return float("inf")
         energy = self.prepared.objective_of(self.prepared.energy(spline))

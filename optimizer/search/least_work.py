@@ -22,6 +22,7 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import DeadlinePassed, watch
 from joulepath.optimizer.dynamics.plant import SHARPER_WIDTHS, WIDTH
+from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.attempts import in_time, solver_of
 from joulepath.optimizer.search.candidates import Candidate, Reason
@@ -37,9 +38,9 @@ from joulepath.optimizer.search.sharpening import (
     follow_in_time,
 )
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
-from joulepath.optimizer.solve.methods.free_spline import TIGHT, FreeSpline
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.free_spline import TIGHT
 from joulepath.optimizer.solve.methods.sharp_motion import sharp_motion
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from joulepath.optimizer.solve.methods.sqp_method import above
 
 # time [s] that the search needs to be sure of a motion
@@ -323,16 +324,14 @@ class _LeastWork:
         of jerk."""
         incumbent, candidate = self.incumbent, rough.candidate
         interval = duration_intervals(incumbent.prepared, candidate.q_goal, width=width)[0]
-        solver = solver_of(incumbent, candidate, interval)
-        assert isinstance(solver, FreeSpline)
-        solver.best_known = below
-        result = SolveResult(
-            SolveStatus.FAILED, "time is too short for evenly spaced control points"
-        )
+        solver = solver_of(incumbent, candidate, interval, below)
+        result = SolveResult(SolveStatus.FAILED, SolveReason.TOO_SHORT_FOR_EVEN_KNOTS)
         if self.work.duration >= TIGHT * candidate.shortest or len(points) == DENSE:
-            result = in_time(
-                incumbent, partial(solver.solve_points, points, self.work.duration, progress)
+            space = bspline.uniform(len(points))
+            attempt = partial(
+                solver.solve_control_points, space, points, self.work.duration, progress
             )
+            result = in_time(incumbent, attempt)
         if result.status is SolveStatus.FAILED and len(points) != DENSE:
             result = in_time(incumbent, solver.solve)
         incumbent.cut_short |= result.cut_short
@@ -340,7 +339,7 @@ class _LeastWork:
             incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(result.spline))
         elif len(points) != DENSE and result.status in (SolveStatus.FAILED, SolveStatus.PRUNED):
             candidate.attempt = result
-            candidate.settle(CandidateStatus(result.status.value), Reason.METHOD, result.reason)
+            candidate.settle(CandidateStatus(result.status.value), Reason.METHOD, result.message)
         if candidate.status is not CandidateStatus.UNVISITED:
             incumbent.tell_tried(candidate)
         return result

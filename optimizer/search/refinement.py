@@ -26,7 +26,7 @@ from joulepath.optimizer.search.regrading import grade
 from joulepath.optimizer.search.sharpening import sharpen
 from joulepath.optimizer.search.sliding import slides
 from joulepath.optimizer.solve.methods.free_spline import EXACT_BELOW, TIGHT
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
 # assumed values of a joule of surplus if the storage cannot take all of it: shares of the way from
 # what the supply pays for it to what the storage gives back
@@ -250,7 +250,9 @@ def _accept_certified(
             if incumbent.certified(candidate, spline, energy).valid:
                 incumbent.accept_if_better(
                     candidate,
-                    SolveResult(SolveStatus.SOLVED, f"the {name} motion itself", spline=spline),
+                    SolveResult(
+                        SolveStatus.SOLVED, SolveReason.BASELINE, spline=spline, figures=(name,)
+                    ),
                     energy,
                     certified=True,
                 )

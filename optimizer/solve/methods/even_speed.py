@@ -25,7 +25,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.tool_path import SPEED_TOLERANCE
 from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval
 from joulepath.optimizer.solve.methods.limit_repair import path_excess, repair_factors
-from joulepath.optimizer.solve.methods.method import CONVERGED, SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
 # samples of the path per control point, to measure along it
 SAMPLED = 16
@@ -41,15 +41,6 @@ LEAST_SPAN = 0.05
 CHECKED, WITHIN = 8, 0.5
 # m per unit of the path: where the TCP moves less, it turns in place
 LEAST_PACE = 1e-9
-TURNS = "the tool turns in place on its way: no path.speed can be held there"
-TOO_FAST = (
-    "the joints' limits do not allow the fixed path.speed with ramps of path.speed.ramp: give a "
-    "lower speed, a longer "
-    "path.speed.ramp, or a larger path.blend"
-)
-NOT_HELD = (
-    "found no motion that holds the fixed path.speed: give a larger path.blend or path.tolerance"
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +74,7 @@ class EvenSpeed:
         is watched.
         """
         if self._pace.min() < LEAST_PACE:
-            return SolveResult(SolveStatus.INFEASIBLE, TURNS)
+            return SolveResult(SolveStatus.INFEASIBLE, SolveReason.TOOL_TURNS_IN_PLACE)
         tried = list[_Tried]()
         for pairs in (
             self._even_ramps(),
@@ -95,9 +86,15 @@ class EvenSpeed:
             motion = self._kept(each)
             if motion is not None:
                 return SolveResult(
-                    SolveStatus.SOLVED, CONVERGED, len(tried), len(tried), motion, stationarity=0.0
+                    SolveStatus.SOLVED,
+                    SolveReason.CONVERGED,
+                    len(tried),
+                    len(tried),
+                    motion,
+                    stationarity=0.0,
                 )
-        reason = TOO_FAST if any(each.too_fast for each in tried) else NOT_HELD
+        too_fast = any(each.too_fast for each in tried)
+        reason = SolveReason.FIXED_SPEED_TOO_FAST if too_fast else SolveReason.FIXED_SPEED_NOT_HELD
         return SolveResult(SolveStatus.FAILED, reason, len(tried), len(tried))
 
     def _tried(self, first: float, last: float) -> _Tried:

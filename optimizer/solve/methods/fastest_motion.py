@@ -25,7 +25,9 @@ from joulepath.optimizer.motion.spline import Spline, least_time_scale, sampled
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval, fastest
-from joulepath.optimizer.solve.methods.method import Method, SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.method import Method
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from joulepath.optimizer.solve.methods.time_scaling import TimeScaling
 from joulepath.optimizer.solve.methods.uniform_scaling import UniformScale
 
@@ -180,7 +182,7 @@ class FastestMotion(ABC):
         if self._is_free and "ruckig" in self._solver.accepted_baselines:
             yield self._scaled_ruckig
         for spline in self.known:
-            yield partial(SolveResult, SolveStatus.SOLVED, "a known motion", spline=spline)
+            yield partial(SolveResult, SolveStatus.SOLVED, SolveReason.KNOWN_MOTION, spline=spline)
 
     def _thorough(self) -> Iterator[Attempt]:
         for spline in (*self._on_line(), *self.known):
@@ -207,7 +209,7 @@ class FastestMotion(ABC):
         given = self._ruckig
         hit = self.prepared.surroundings.worst_violation(given)
         if hit is not None:
-            return SolveResult(SolveStatus.FAILED, hit.message, collision=hit)
+            return SolveResult(SolveStatus.FAILED, SolveReason.COLLISION, collision=hit)
         return UniformScale(self._solver, given).solve()
 
     @cached_property
@@ -235,7 +237,9 @@ class FastestMotion(ABC):
     def _on_line(self) -> Iterator[Spline]:
         """The fastest motion along the straight line, from toppra's; none if the line collides."""
         line = TimeScaling(
-            self.prepared, self.q_start, self.q_goal, self.deadline, fastest(self.prepared)
+            SolveContext(
+                self.prepared, self.q_start, self.q_goal, self.deadline, fastest(self.prepared)
+            )
         )
         if not self._takes_ruckig or line.collides:
             return

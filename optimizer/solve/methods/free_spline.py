@@ -22,8 +22,11 @@ from joulepath.optimizer.motion.ruckig_motion import time_optimal, time_optimal_
 from joulepath.optimizer.motion.spline import Spline, sampled, spline_of
 from joulepath.optimizer.problem.problem import LEAST_DURATION
 from joulepath.optimizer.result.solution import BaselineName
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
-from joulepath.optimizer.solve.methods.planned_paths import FROM_PLANNED_PATH
+from joulepath.optimizer.solve.methods.solve_result import (
+    MotionOrigin,
+    SolveResult,
+    SolveStatus,
+)
 from joulepath.optimizer.solve.methods.sqp_method import Guess, SqpMethod, above, with_effort
 from joulepath.optimizer.solve.nlp.sqp import PROGRESS
 
@@ -78,6 +81,7 @@ class FreeSpline(SqpMethod):
     )
     accepted_baselines: ClassVar[tuple[BaselineName, ...]] = ("quintic", "ruckig", "ruckig_slowed")
     evenly_spaced: ClassVar[bool] = True
+    free_control_points: ClassVar[bool] = True
 
     def solve(self) -> SolveResult:
         """From the smoothed time-optimal motion, on evenly spaced knots or on those at the ramps of
@@ -115,12 +119,15 @@ class FreeSpline(SqpMethod):
         """Whether the coarse motion is only the guess of the refined one: there is no other
         candidate, no obstacle, no end that slides, and ample time."""
         problem = self.prepared.problem
-        settled = self.start_curve is None and self.goal_curve is None and not len(self.passes)
+        context = self.context
+        settled = (
+            context.start_curve is None and context.goal_curve is None and not len(self.passes)
+        )
         plain = (
             not has_corners(problem.objective, problem.arm) and problem.arm.bus.mode != "storage"
         )
         return (
-            self.is_sole
+            context.is_sole
             and settled
             and plain
             and not problem.arm.scene.names
@@ -159,7 +166,7 @@ class FreeSpline(SqpMethod):
     def _compared_with_planned_paths(self, found: SolveResult) -> SolveResult:
         """A motion, or that of least energy from planned paths, if it needs less."""
         energy = self.cost_of(found.spline)
-        self.best_known = min(self.best_known, energy)
+        self.incumbent_cost = min(self.incumbent_cost, energy)
         planned = self.from_planned_paths(found)
         late = planned.cut_short or planned.status is SolveStatus.OUT_OF_TIME
         if planned.spline is found.spline:
@@ -182,7 +189,7 @@ class FreeSpline(SqpMethod):
         """The motion of least energy from planned paths, solved to the end; `failed` if there is
         none.
         """
-        known = self.best_known
+        known = self.incumbent_cost
         best = super().from_planned_paths(failed)
         if (
             best.spline is None
@@ -193,8 +200,8 @@ class FreeSpline(SqpMethod):
         polished = self._polished(best.spline)
         if polished.spline is None or self.cost_of(polished.spline) >= self.cost_of(best.spline):
             return with_effort(best, [best, polished])
-        reason = f"{polished.reason}{FROM_PLANNED_PATH}"
-        return with_effort(replace(polished, reason=reason), [best, polished])
+        polished = replace(polished, origin=MotionOrigin.FROM_PLANNED_PATH)
+        return with_effort(polished, [best, polished])
 
     def _polished(self, spline: Spline) -> SolveResult:
         """The end of a rough solve of more control points than `may_refine` takes."""
@@ -276,18 +283,16 @@ class FreeSpline(SqpMethod):
         """From samples q (k, nq) at times t (k,), with knots REFINED, or EXACT if `fine`."""
         return self._solve_in(self.graded(float(t[-1]), EXACT if fine else REFINED), q, t)
 
-    def solve_tightly(self, q: Array, t: Array, progress: float) -> SolveResult:
-        """From samples q (k, nq) at times t (k,), with knots EXACT."""
-        return self._solve_in(self.graded(float(t[-1]), EXACT), q, t, progress)
+    def solve_at_switches(self, spline: Spline, progress: float) -> SolveResult:
+        """From a motion, with knots EXACT at the switches of jerk between the present ends.
 
-    def solve_regraded(self, spline: Spline) -> SolveResult:
-        """From a motion with knots EXACT at the switches of jerk between ends that have moved
-        since.
-
-        The knots move to where the switches are now. The control points stay: so the motion hardly
-        changes, and jerk still jumps at its knots. If there are fewer switches now, or more,
-        another spline is fitted to the motion.
+        If the motion has such knots, they move to the present switches. The control points stay:
+        so the motion hardly changes, and jerk still jumps at its knots. If the number of switches
+        has changed, another spline is fitted to the motion.
         """
+        if self.may_refine(spline):
+            q, t = sampled(spline)
+            return self._solve_in(self.graded(float(t[-1]), EXACT), q, t, progress)
         duration, line = spline.duration, self.coordinates
         knots = bspline.moved(spline.knots / duration, self._switches(duration), EXACT)
         if knots is None:
@@ -305,10 +310,10 @@ class FreeSpline(SqpMethod):
         """
         return self._solve_in(self._space(count, float(t[-1])), q, t, progress)
 
-    def solve_points(self, points: Array, duration: float, progress: float) -> SolveResult:
-        """From control points (n, nq) [rad] over evenly spaced knots of a motion of `duration`
-        [s]."""
-        space = bspline.uniform(len(points))
+    def solve_control_points(
+        self, space: Basis, points: Array, duration: float, progress: float = PROGRESS
+    ) -> SolveResult:
+        """From control points (n, nq) [rad] of a motion of `duration` [s] in their own space."""
         return self.improve(
             Guess(space, self.coordinates.from_joints(points), duration, progress=progress)
         )
@@ -328,8 +333,8 @@ class FreeSpline(SqpMethod):
         near = self.prepared.surroundings.is_near_contact(q)
         progress = max(guess.progress, FINE_PROGRESS)
         result = self.improve(replace(guess, collision_free=near, progress=progress))
-        planned = result.spline is not None and self.is_from_planned_path
-        return replace(result, reason=f"{result.reason}{FROM_PLANNED_PATH}") if planned else result
+        planned = result.spline is not None and self.context.is_from_planned_path
+        return replace(result, origin=MotionOrigin.FROM_PLANNED_PATH) if planned else result
 
     def time_optimal_guess(self) -> Guess:
         """The time-optimal motion under limits on speed, acceleration and jerk, with knots at its

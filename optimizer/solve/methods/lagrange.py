@@ -18,8 +18,8 @@ from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.motion.time_scalings import quintic
 from joulepath.optimizer.result.solution import BaselineName
 from joulepath.optimizer.solve.methods.limit_repair import sampled_overshoot
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
 from joulepath.optimizer.solve.methods.planned_paths import no_polynomial_around
+from joulepath.optimizer.solve.methods.solve_result import SolveResult, SolveStatus
 from joulepath.optimizer.solve.methods.sqp_method import Guess, SqpMethod, with_effort
 
 # degree 15. Two more nodes save a UR5e some 0.15 % of the energy and take a fifth more time, at all

@@ -29,7 +29,8 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 from joulepath.optimizer.solve.methods.limit_repair import sampled_overshoot
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from joulepath.optimizer.solve.methods.sqp_method import Guess, SqpMethod, with_effort
 
 # control points of the first attempt: those of `bspline`, and so many for each pass
@@ -39,7 +40,6 @@ COARSE, PER_PASS = 13, 3
 REPEAT, WIDEST, FINE_WIDEST = 2, 1 / 6, 1 / 7
 # rad: a pass that is so near to the configuration before it is met with it
 SAME = 1e-9
-STOPPING = "the motions from rest to rest: none that passes was found"
 
 
 class PassingSpline(SqpMethod):
@@ -69,7 +69,9 @@ class PassingSpline(SqpMethod):
             known = lasting(motion, float(np.clip(motion.duration, self.t_min, self.t_max)))
             tried.append(self.solve_from(*sampled(known), fine=False))
             if known.duration >= motion.duration:
-                tried.append(SolveResult(SolveStatus.SOLVED, STOPPING, spline=known))
+                tried.append(
+                    SolveResult(SolveStatus.SOLVED, SolveReason.STOPS_AT_PASSES, spline=known)
+                )
         best = min(tried, key=lambda result: self.cost_of(result.spline))
         return with_effort(best if best.spline is not None else tried[-1], [*tried, *rests])
 
@@ -144,7 +146,7 @@ class PassingSpline(SqpMethod):
         results = list[SolveResult]()
         for a, b in pairwise(self._configurations):
             part = PreparedProblem.of(replace(problem, start=a, goal=b))
-            results.append(FreeSpline(part, a, b, self.deadline, interval).solve())
+            results.append(FreeSpline(SolveContext(part, a, b, self.deadline, interval)).solve())
             if results[-1].spline is None:
                 break
         return results

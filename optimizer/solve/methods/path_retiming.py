@@ -47,12 +47,8 @@ from joulepath.optimizer.solve.methods.limit_repair import (
     slightly_retimed,
     tightened,
 )
-from joulepath.optimizer.solve.methods.method import (
-    CONVERGED,
-    SolveResult,
-    SolveStatus,
-    with_excess,
-)
+from joulepath.optimizer.solve.methods.method import with_excess
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
 # control values of the time scaling, and how many more control points than the path the motion has,
 # up to a number
@@ -72,7 +68,6 @@ REPAIRS = 6
 # the largest excess of a constraint, as a ratio of the limit, that the repair between the nodes can
 # still undo
 FEASIBLE = 1e-3
-NONE = "found no motion along a planned collision-free path within the limits"
 
 
 @dataclass(frozen=True)
@@ -147,7 +142,9 @@ class PathRetiming:
             self.found = x
             iterations += spent
             if program.excess(x) > FEASIBLE:
-                return SolveResult(SolveStatus.FAILED, NONE, iterations, solves)
+                return SolveResult(
+                    SolveStatus.FAILED, SolveReason.NO_MOTION_ALONG_PATH, iterations, solves
+                )
             spline = self.motion(x)
             factors = repair_factors(prepared, spline, (none, none))
             if factors is not None:
@@ -158,12 +155,16 @@ class PathRetiming:
                 self._lacking(spline),
             )
             if factors is None and not excess.any() and lacking <= 0:
-                return SolveResult(SolveStatus.SOLVED, CONVERGED, iterations, solves, spline)
+                return SolveResult(
+                    SolveStatus.SOLVED, SolveReason.CONVERGED, iterations, solves, spline
+                )
             bounds = bounds - excess
             self.floor += max(lacking, 0.0)
             if factors is not None:
                 limits = tightened(limits, factors)
-        return SolveResult(SolveStatus.FAILED, NONE, iterations, REPAIRS)
+        return SolveResult(
+            SolveStatus.FAILED, SolveReason.NO_MOTION_ALONG_PATH, iterations, REPAIRS
+        )
 
     def _lacking(self, spline: Spline) -> float:
         """By how much the least speed that is aimed at, as a ratio, has to rise: between the points

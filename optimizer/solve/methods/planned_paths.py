@@ -20,7 +20,8 @@ from joulepath.optimizer.collision.planner.path_planner import (
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import RATIO_ROUNDING, PreparedProblem
-from joulepath.optimizer.solve.methods.method import Method, SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.method import Method
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
 # a planning may take this fraction of the time left: the rest is for the solves. The first one to a
 # goal, and all of them once a motion is known, may check so many states
@@ -34,10 +35,6 @@ OF_ANOTHER = Effort(more_states=1_000)
 PATIENCE = 0.3
 # planned paths longer than this multiple of the shortest one are skipped
 DETOUR = 1.3
-# appended to the reason of a motion with a planned path as initial guess, and of one that follows a
-# planned path
-FROM_PLANNED_PATH = ", from a planned collision-free path"
-ALONG_PLANNED_PATH = ", along a planned collision-free path"
 # control points of a smooth path, tried in turn: the fewer there are, the wider its corners are
 # rounded
 CONTROL_POINTS = (9, 13, 19, 28, 42, 64, 96)
@@ -51,14 +48,15 @@ def plan(method: Method) -> PlannedPaths:
     If that has failed, and no motion is known: in many states, and also to the goals of other
     candidates.
     """
-    left, surroundings, others = (
+    context, left, surroundings = (
+        method.context,
         method.deadline.left,
         method.prepared.surroundings,
-        method.other_goals(),
     )
-    tried = method.was_postponed or surroundings.seems_enclosed(method.q_start, method.q_goal)
-    thorough = np.isinf(method.best_known) and (tried or not others)
-    effort = OF_SOLE if method.is_sole else USUAL if np.isinf(method.best_known) else OF_ANOTHER
+    others, unknown = context.other_goals(), np.isinf(method.incumbent_cost)
+    tried = context.was_postponed or surroundings.seems_enclosed(method.q_start, method.q_goal)
+    thorough = unknown and (tried or not others)
+    effort = OF_SOLE if context.is_sole else USUAL if unknown else OF_ANOTHER
     return surroundings.planned_paths(
         method.q_start,
         method.q_goal,
@@ -87,27 +85,19 @@ def without_path(method: Method, failed: SolveResult, planned: PlannedPaths) -> 
     been checked.
     """
     few = planned.end is PlanningEnd.EXHAUSTED and planned.checked_states < MOST_STATES
-    if planned.paths or (few and np.isinf(method.best_known) and not method.was_postponed):
+    if planned.paths or (
+        few and np.isinf(method.incumbent_cost) and not method.context.was_postponed
+    ):
         return replace(failed, status=SolveStatus.POSTPONED)
     late = planned.end is PlanningEnd.CUT_SHORT
-    return replace(
-        failed,
-        status=SolveStatus.FAILED,
-        reason=f"{failed.reason}; {planned.message}",
-        cut_short=late,
-    )
+    return replace(failed, status=SolveStatus.FAILED, note=planned.message, cut_short=late)
 
 
 def no_polynomial_around(failed: SolveResult, degree: int) -> SolveResult:
     """A failed result of a method whose one polynomial per joint collides, with a reason that says
     so.
     """
-    assert failed.collision is not None
-    reason = (
-        f"no polynomial of degree {degree} was found around the obstacles: "
-        f"{failed.collision.message}"
-    )
-    return replace(failed, reason=reason)
+    return replace(failed, reason=SolveReason.NO_POLYNOMIAL_AROUND, figures=(degree,))
 
 
 def smooth_path(prepared: PreparedProblem, path: Array) -> Spline | None:

@@ -30,18 +30,18 @@ from joulepath.optimizer.motion.spline import (
 )
 from joulepath.optimizer.result.solution import BaselineName
 from joulepath.optimizer.solve.methods.limit_repair import torque_peaks
-from joulepath.optimizer.solve.methods.method import (
-    DEADLINE_PASSED,
-    Method,
-    SolveResult,
-    SolveStatus,
-)
+from joulepath.optimizer.solve.methods.method import Method
 from joulepath.optimizer.solve.methods.planned_paths import (
-    FROM_PLANNED_PATH,
     no_polynomial_around,
     plan,
     to_goal,
     without_path,
+)
+from joulepath.optimizer.solve.methods.solve_result import (
+    MotionOrigin,
+    SolveReason,
+    SolveResult,
+    SolveStatus,
 )
 
 # degree 9: with more values a few seconds are too short for the search
@@ -106,7 +106,7 @@ class PolynomialGA(Method):
         planned path.
         """
         if self.deadline.passed:
-            return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED)
+            return SolveResult(SolveStatus.OUT_OF_TIME, SolveReason.DEADLINE_PASSED)
         first = self._evolved()
         if first.collision is None or self.deadline.passed:
             return first
@@ -119,7 +119,7 @@ class PolynomialGA(Method):
         )[1:-1]
         second = self._evolved()
         if second.spline is not None:
-            return replace(second, reason=f"{second.reason}{FROM_PLANNED_PATH}", solves=2)
+            return replace(second, origin=MotionOrigin.FROM_PLANNED_PATH, solves=2)
         return replace(
             no_polynomial_around(first, self.space.degree), iterations=self.generations, solves=2
         )
@@ -245,11 +245,23 @@ class PolynomialGA(Method):
             spline.duration > self.t_max
             or (torque_peaks(self.prepared, spline) > limits.tau_max).any()
         ):
-            reason = "the genetic algorithm found no motion within the limits"
-            return SolveResult(SolveStatus.FAILED, reason, self.generations, 1)
+            return SolveResult(
+                SolveStatus.FAILED, SolveReason.NO_GENES_WITHIN_LIMITS, self.generations, 1
+            )
         collision = self.prepared.surroundings.worst_violation(spline)
         if collision is not None:
-            reason = f"found no collision-free motion: {collision.message}"
-            return SolveResult(SolveStatus.FAILED, reason, self.generations, 1, collision=collision)
-        reason = f"the best of {self.generations} generations"
-        return SolveResult(SolveStatus.SOLVED, reason, self.generations, 1, spline)
+            return SolveResult(
+                SolveStatus.FAILED,
+                SolveReason.NO_COLLISION_FREE_MOTION,
+                self.generations,
+                1,
+                collision=collision,
+            )
+        return SolveResult(
+            SolveStatus.SOLVED,
+            SolveReason.BEST_OF_GENERATIONS,
+            self.generations,
+            1,
+            spline,
+            figures=(self.generations,),
+        )

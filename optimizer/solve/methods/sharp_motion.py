@@ -19,8 +19,7 @@ from joulepath.optimizer.solve.methods.limit_repair import (
     WITHIN,
     repair_factors,
 )
-from joulepath.optimizer.solve.methods.method import CONVERGED, SolveResult, SolveStatus
-from joulepath.optimizer.solve.methods.sqp_method import COSTLIER
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from joulepath.optimizer.solve.nlp.interior_point import Interior, InteriorPoint
 
 # solves, each with limits tightened where the motion before exceeds them between the points
@@ -53,11 +52,13 @@ def sharp_motion(
     for solves in range(1, REPAIRS + 1):
         at = program.minimised(ends, at, SHARPER_WIDTHS[-1], bounds, PROGRESS, most)
         if at.costlier:
-            return SolveResult(SolveStatus.PRUNED, COSTLIER, at.iterations, solves), points
+            return SolveResult(
+                SolveStatus.PRUNED, SolveReason.PROMISES_NO_LESS, at.iterations, solves
+            ), points
         points = program.points(ends, at.free)
         if not at.converged:
             return SolveResult(
-                SolveStatus.FAILED, "it did not converge", at.iterations, solves
+                SolveStatus.FAILED, SolveReason.NOT_CONVERGED, at.iterations, solves
             ), points
         spline = spline_of(basis, points, duration)
         spans, torque = (
@@ -73,7 +74,7 @@ def sharp_motion(
             bounds, 1 / np.where(spans > WITHIN, spans + REPAIR_MARGIN, 1.0), torque
         )
     return SolveResult(
-        SolveStatus.FAILED, "the motion exceeds limits between the nodes", at.iterations, REPAIRS
+        SolveStatus.FAILED, SolveReason.LIMITS_BETWEEN_NODES, at.iterations, REPAIRS
     ), points
 
 
@@ -82,5 +83,7 @@ def _checked(prepared: PreparedProblem, spline: Spline, at: Interior, solves: in
     collision = prepared.surroundings.worst_violation(spline)
     effort = at.iterations, solves
     if collision is not None:
-        return SolveResult(SolveStatus.FAILED, "its motion collides", *effort, collision=collision)
-    return SolveResult(SolveStatus.SOLVED, CONVERGED, *effort, spline, at.stationarity)
+        return SolveResult(
+            SolveStatus.FAILED, SolveReason.MOTION_COLLIDES, *effort, collision=collision
+        )
+    return SolveResult(SolveStatus.SOLVED, SolveReason.CONVERGED, *effort, spline, at.stationarity)

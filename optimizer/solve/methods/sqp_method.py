@@ -16,7 +16,6 @@ from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.collision.planner.path_planner import along, interpolation_is_free
 from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
 from joulepath.optimizer.dynamics.plant import has_corners
-from joulepath.optimizer.kinematics.tool_path.held_pose import HeldPose
 from joulepath.optimizer.motion.bspline import Basis
 from joulepath.optimizer.motion.spline import Spline, sample, spline_of, time_scale
 from joulepath.optimizer.problem.problem import LONGEST_DURATION
@@ -31,19 +30,13 @@ from joulepath.optimizer.solve.methods.limit_repair import (
     tightened,
     with_repaired_path,
 )
-from joulepath.optimizer.solve.methods.method import (
-    CONVERGED,
-    DEADLINE_PASSED,
-    Method,
+from joulepath.optimizer.solve.methods.method import Method, with_excess
+from joulepath.optimizer.solve.methods.planned_paths import plan, to_goal, without_path
+from joulepath.optimizer.solve.methods.solve_result import (
+    MotionOrigin,
+    SolveReason,
     SolveResult,
     SolveStatus,
-    with_excess,
-)
-from joulepath.optimizer.solve.methods.planned_paths import (
-    FROM_PLANNED_PATH,
-    plan,
-    to_goal,
-    without_path,
 )
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates
 from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
@@ -70,12 +63,6 @@ FAR_COSTLIER = 2.5
 # penetration [m] of the motion without clearance constraints beyond which, once a motion is known,
 # they are added to a planned path alone: what is that deep inside an obstacle seldom gets out of it
 DEEP = 0.06
-STOPPED = "the deadline ended its optimisation"
-COSTLIER = "ended early: it comes to no less energy than the best motion found"
-NO_BETTER = (
-    "not solved further: its motion collides, and even so needs at least as much energy "
-    "as the best motion found"
-)
 
 
 @dataclass(frozen=True)
@@ -124,8 +111,6 @@ class SqpMethod(Method):
     start or goal.
     """
 
-    start_curve: HeldPose | None = None
-    goal_curve: HeldPose | None = None
     takes_guesses: ClassVar[bool] = True
     # whether the deadline may well end a solve: then what it has so far counts
     takes_long: ClassVar[bool] = False
@@ -151,16 +136,16 @@ class SqpMethod(Method):
             try:
                 return self._improved(guess, deadline)
             except DeadlinePassed:
-                return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED)
+                return SolveResult(SolveStatus.OUT_OF_TIME, SolveReason.DEADLINE_PASSED)
 
     def _improved(self, guess: Guess, deadline: Deadline) -> SolveResult:
         stage = self._first_stage(guess)
         if self._is_far_costlier(guess, stage):
-            return SolveResult(SolveStatus.PRUNED, COSTLIER)
+            return SolveResult(SolveStatus.PRUNED, SolveReason.PROMISES_NO_LESS)
         iterations, collision, unhindered = 0, None, None
         for solves in range(1, REPAIRS + 1):
             # while no motion is known, one that is not yet optimal is better than none
-            needed = self.takes_long or (len(stage.pairs) > 0 and np.isinf(self.best_known))
+            needed = self.takes_long or (len(stage.pairs) > 0 and np.isinf(self.incumbent_cost))
             until = deadline.earlier_by(CHECKING) if needed else deadline
             progress = (
                 max(guess.progress, ROUGH_PROGRESS)
@@ -174,16 +159,25 @@ class SqpMethod(Method):
             iterations += result.iterations
             late = result.status is SqpStatus.OUT_OF_TIME
             if late and not (needed and result.feasible):
-                return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED, iterations, solves)
+                return SolveResult(
+                    SolveStatus.OUT_OF_TIME, SolveReason.DEADLINE_PASSED, iterations, solves
+                )
             if not result.feasible:
-                reason = f"found no motion of {guess.space.n} control points within the limits"
-                return _failed(reason, collision, iterations, solves)
+                return _failed(
+                    SolveReason.NO_MOTION_WITHIN_LIMITS,
+                    collision,
+                    iterations,
+                    solves,
+                    (guess.space.n,),
+                )
             if result.status is SqpStatus.COSTLIER:
-                return SolveResult(SolveStatus.PRUNED, COSTLIER, iterations, solves)
+                return SolveResult(
+                    SolveStatus.PRUNED, SolveReason.PROMISES_NO_LESS, iterations, solves
+                )
             if guess.unchecked:
                 return SolveResult(
                     SolveStatus.SOLVED,
-                    CONVERGED,
+                    SolveReason.CONVERGED,
                     iterations,
                     solves,
                     _spline(stage.program, result),
@@ -191,7 +185,7 @@ class SqpMethod(Method):
             check = self._checked(stage.program, result)
             collision = check.collision
             if check.passed:
-                reason = STOPPED if late else CONVERGED
+                reason = SolveReason.STOPPED_BY_DEADLINE if late else SolveReason.CONVERGED
                 return SolveResult(
                     SolveStatus.SOLVED,
                     reason,
@@ -204,16 +198,16 @@ class SqpMethod(Method):
                 )
             if collision is not None and not len(stage.pairs):
                 unhindered = self.cost_of(check.spline)
-                if unhindered >= self.best_known:
-                    return SolveResult(SolveStatus.PRUNED, NO_BETTER, iterations, solves)
-                if self.was_postponed or (
-                    np.isfinite(self.best_known) and collision.min_clearance < -DEEP
+                if unhindered >= self.incumbent_cost:
+                    return SolveResult(
+                        SolveStatus.PRUNED, SolveReason.COLLIDES_AND_COSTS_MORE, iterations, solves
+                    )
+                if self.context.was_postponed or (
+                    np.isfinite(self.incumbent_cost) and collision.min_clearance < -DEEP
                 ):
-                    return _failed("its motion collides", collision, iterations, solves)
+                    return _failed(SolveReason.MOTION_COLLIDES, collision, iterations, solves)
             stage = self._repaired(stage, result, check)
-        return _failed(
-            "the motion exceeds limits between the nodes", collision, iterations, REPAIRS
-        )
+        return _failed(SolveReason.LIMITS_BETWEEN_NODES, collision, iterations, REPAIRS)
 
     def _must_be_below(self, stage: _Stage) -> float:
         """The energy [J] that a solve must promise to come below.
@@ -224,8 +218,10 @@ class SqpMethod(Method):
         if len(self.passes) or objective == "mechanical" or self.interval.minimum_time:
             return np.inf
         if has_corners(objective, self.prepared.arm):
-            return above(self.best_known, MUCH_COSTLIER)
-        return above(self.best_known, NOT_MUCH_BETTER) if len(stage.pairs) else self.best_known
+            return above(self.incumbent_cost, MUCH_COSTLIER)
+        return (
+            above(self.incumbent_cost, NOT_MUCH_BETTER) if len(stage.pairs) else self.incumbent_cost
+        )
 
     def _is_far_costlier(self, guess: Guess, stage: _Stage) -> bool:
         """Whether a planned path needs so much more energy than the best motion that solving from
@@ -240,7 +236,7 @@ class SqpMethod(Method):
         ):
             return False
         cost, _ = stage.program.value(stage.free, stage.duration)
-        return cost > above(self.best_known, FAR_COSTLIER)
+        return cost > above(self.incumbent_cost, FAR_COSTLIER)
 
     def from_planned_paths(self, failed: SolveResult) -> SolveResult:
         """The motion of least energy from planned paths as initial guesses; `failed` if there is
@@ -266,8 +262,8 @@ class SqpMethod(Method):
             ):
                 continue
             result = self.along_path(q, t)
-            found.append(replace(result, reason=f"{result.reason}{FROM_PLANNED_PATH}"))
-            self.best_known = min(self.best_known, self.cost_of(result.spline))
+            found.append(replace(result, origin=MotionOrigin.FROM_PLANNED_PATH))
+            self.incumbent_cost = min(self.incumbent_cost, self.cost_of(result.spline))
         if not found:
             return failed
         best = min(
@@ -315,8 +311,8 @@ class SqpMethod(Method):
             path=path,
             path_bounds=initial_bounds(path),
             passes=self.passes if len(self.passes) else None,
-            start_curve=self.start_curve,
-            goal_curve=self.goal_curve,
+            start_curve=self.context.start_curve,
+            goal_curve=self.context.goal_curve,
             goal_holding=interval.goal_holding,
         )
         free = program.free_points(guess.points)
@@ -403,8 +399,16 @@ def with_effort(result: SolveResult, tried: list[SolveResult]) -> SolveResult:
     )
 
 
-def _failed(reason: str, collision: Clearance | None, iterations: int, solves: int) -> SolveResult:
+def _failed(
+    reason: SolveReason,
+    collision: Clearance | None,
+    iterations: int,
+    solves: int,
+    figures: tuple[float, ...] = (),
+) -> SolveResult:
     """The result without a motion; a collision is its cause if there was one."""
     if collision is not None:
-        reason = f"found no collision-free motion: {collision.message}"
-    return SolveResult(SolveStatus.FAILED, reason, iterations, solves, collision=collision)
+        reason = SolveReason.NO_COLLISION_FREE_MOTION
+    return SolveResult(
+        SolveStatus.FAILED, reason, iterations, solves, collision=collision, figures=figures
+    )

@@ -22,13 +22,9 @@ from joulepath.optimizer.problem.tool_path import ToolPath
 from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval, fastest
 from joulepath.optimizer.solve.methods.end_angle import try_angles
 from joulepath.optimizer.solve.methods.even_speed import EvenSpeed
-from joulepath.optimizer.solve.methods.method import (
-    DEADLINE_PASSED,
-    Method,
-    SolveResult,
-    SolveStatus,
-)
+from joulepath.optimizer.solve.methods.method import Method
 from joulepath.optimizer.solve.methods.path_retiming import PathRetiming
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from joulepath.optimizer.solve.methods.sqp_method import with_effort
 from joulepath.optimizer.solve.methods.tool_turning import TurnedAtEnd, turned_paths
 
@@ -47,19 +43,6 @@ ON_RAMP = 0.8
 CHECKED, SAMPLED = 2000, 16
 # a finer time scaling makes no motion faster by so much
 NEARLY = 1.1
-NOT_FINER = "there is no other space of time scalings"
-TOO_SLOW = (
-    "found no motion within the limits that keeps path.speed.min between its ramps: give a smaller "
-    "one, a longer "
-    "path.speed.ramp, or a larger path.blend"
-)
-OUT_OF_REACH = (
-    "at {0:.1%} of the path the joints' speed limits allow the TCP {1:.3g} m/s, less than "
-    "path.speed.min: give a "
-    "smaller one"
-)
-NOT_KEPT = "found no motion within the path's tolerance: give a larger one, or a larger path.blend"
-TOO_SHARP = "the path turns too sharply for its tolerance: give a larger path.blend"
 
 
 class ToolPathMotion(Method):
@@ -78,18 +61,20 @@ class ToolPathMotion(Method):
             with watch(self.deadline):
                 return self._solve()
         except DeadlinePassed:
-            return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED)
+            return SolveResult(SolveStatus.OUT_OF_TIME, SolveReason.DEADLINE_PASSED)
 
     def _solve(self) -> SolveResult:
         path = self.prepared.joint_path(self.q_start)
         if path is None:
-            return SolveResult(SolveStatus.INFEASIBLE, TOO_SHARP)
+            return SolveResult(SolveStatus.INFEASIBLE, SolveReason.PATH_TOO_SHARP)
         if self.prepared.least_speed is not None:
             s = np.linspace(0.0, 1.0, SAMPLED * len(path.control_points))
             v_max = self.prepared.arm.active_limits.v_max
             slow = self.prepared.least_speed.out_of_reach(path.curve(s), path.curve(s, 1), v_max)
             if slow is not None:
-                return SolveResult(SolveStatus.INFEASIBLE, OUT_OF_REACH.format(*slow))
+                return SolveResult(
+                    SolveStatus.INFEASIBLE, SolveReason.LEAST_SPEED_OUT_OF_REACH, figures=slow
+                )
         results = [self._kept(path, interval, self._scaling(1)) for interval in self._intervals()]
         if all(result.spline is None for result in results) and not self._holds_speed:
             results += self._nearly_fastest(path)
@@ -111,10 +96,12 @@ class ToolPathMotion(Method):
             fast = self._kept(path, fastest(self.prepared), self._scaling(1))
             results.append(replace(fast, status=SolveStatus.FAILED, spline=None))
             if fast.spline is not None and fast.spline.duration > NEARLY * self.t_max:
-                reason = (
-                    f"along the path, the fastest motion found takes {fast.spline.duration:.4f} s"
+                too_slow = SolveResult(
+                    SolveStatus.INFEASIBLE,
+                    SolveReason.TOOL_PATH_TAKES_LONGER,
+                    figures=(fast.spline.duration,),
                 )
-                return [*results, SolveResult(SolveStatus.INFEASIBLE, reason)]
+                return [*results, too_slow]
             law = None if fast.spline is None else _on_path(path, *sampled(fast.spline))
         return [*results, self._kept(path, self.interval, self._scaling(FINER_SCALING), law)]
 
@@ -127,7 +114,7 @@ class ToolPathMotion(Method):
         )
         if hit is None:
             return found
-        return SolveResult(SolveStatus.FAILED, f"along the path, {hit.message}", collision=hit)
+        return SolveResult(SolveStatus.FAILED, SolveReason.TOOL_PATH_COLLIDES, collision=hit)
 
     @property
     def _tool_path(self) -> ToolPath:
@@ -219,8 +206,11 @@ class ToolPathMotion(Method):
         [s] of a motion along the path; and with other turnings of the tool, if it may turn."""
         path, scaling = self.prepared.joint_path(self.q_start), self._scaling(FINER_SCALING)
         if fine or path is None:
-            return SolveResult(SolveStatus.FAILED, NOT_FINER)
-        results, law = [SolveResult(SolveStatus.FAILED, NOT_FINER)], _on_path(path, q, t)
+            return SolveResult(SolveStatus.FAILED, SolveReason.NO_FINER_SCALING)
+        results, law = (
+            [SolveResult(SolveStatus.FAILED, SolveReason.NO_FINER_SCALING)],
+            _on_path(path, q, t),
+        )
         try:
             with watch(self.deadline):
                 if self._holds_speed:
@@ -233,7 +223,7 @@ class ToolPathMotion(Method):
                     least = min(self.cost_of(result.spline) for result in results)
                     self._turn(law, scaling, least, results)
         except DeadlinePassed:
-            results.append(SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED))
+            results.append(SolveResult(SolveStatus.OUT_OF_TIME, SolveReason.DEADLINE_PASSED))
         return with_effort(min(results, key=lambda result: self.cost_of(result.spline)), results)
 
     def _scaling(self, finer: int) -> Basis:
@@ -293,10 +283,15 @@ class ToolPathMotion(Method):
             results.append(retiming.solve(retiming.variables(s, t) if x is None else x))
             found, x = results[-1].spline, retiming.found
             if found is None and self.prepared.least_speed is not None:
-                results[-1] = replace(results[-1], reason=TOO_SLOW)
+                results[-1] = replace(results[-1], reason=SolveReason.LEAST_SPEED_NOT_KEPT)
             if found is None or self._keeps_to_path(found):
                 return with_effort(results[-1], results)
-        failed = replace(results[-1], status=SolveStatus.FAILED, reason=NOT_KEPT, spline=None)
+        failed = replace(
+            results[-1],
+            status=SolveStatus.FAILED,
+            reason=SolveReason.TOLERANCE_NOT_KEPT,
+            spline=None,
+        )
         return with_effort(failed, results)
 
     def _paced(self, path: Spline) -> tuple[Array, Array]:

@@ -24,14 +24,9 @@ from joulepath.optimizer.result.solution import BaselineName
 from joulepath.optimizer.solve.methods.around_obstacles import around_obstacles
 from joulepath.optimizer.solve.methods.duration_intervals import fastest
 from joulepath.optimizer.solve.methods.limit_repair import torque_peaks
-from joulepath.optimizer.solve.methods.method import (
-    CONVERGED,
-    DEADLINE_PASSED,
-    Method,
-    SolveResult,
-    SolveStatus,
-)
+from joulepath.optimizer.solve.methods.method import Method
 from joulepath.optimizer.solve.methods.path_retiming import PathRetiming
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from joulepath.optimizer.solve.methods.sqp_method import with_effort
 
 # ratio of successive factors, and the number of successive factors without a decrease that ends the
@@ -75,7 +70,7 @@ class UniformScaling(Method):
         )
         collision = self.prepared.surroundings.worst_violation(given)
         if collision is not None:
-            return around_obstacles(self, "the time-optimal motion", collision, self._along)
+            return around_obstacles(self, SolveReason.TIME_OPTIMAL_COLLIDES, collision, self._along)
         return UniformScale(self, given).solve()
 
     def _along(self, path: Spline) -> SolveResult:
@@ -114,22 +109,25 @@ class UniformScale:
         )
         least, most = max(needed, self.t_min / length), self.t_max / length
         if least > most:
-            reason = (
-                f"the time-optimal motion takes at least {least * length:.4f} s within the limits"
+            return SolveResult(
+                SolveStatus.INFEASIBLE,
+                SolveReason.TIME_OPTIMAL_TAKES_LONGER,
+                figures=(least * length,),
             )
-            return SolveResult(SolveStatus.INFEASIBLE, reason)
         factors, costs = [least], [self._cost(least)]
         while factors[-1] < most and (
             np.isinf(costs).all() or len(costs) - int(np.argmin(costs)) <= PATIENCE
         ):
             if self.deadline.passed:
-                return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED, self.evaluations)
+                return SolveResult(
+                    SolveStatus.OUT_OF_TIME, SolveReason.DEADLINE_PASSED, self.evaluations
+                )
             factors.append(min(factors[-1] * RATIO, most))
             costs.append(self._cost(factors[-1]))
         best = int(np.argmin(costs))
         if np.isinf(costs[best]):
             return SolveResult(
-                SolveStatus.FAILED, "found no time scale within the limits", self.evaluations
+                SolveStatus.FAILED, SolveReason.NO_TIME_SCALE_WITHIN_LIMITS, self.evaluations
             )
         factor, low, high = (
             factors[best],
@@ -151,7 +149,7 @@ class UniformScale:
             if found.fun < costs[best]:
                 factor = float(found.x)
         return SolveResult(
-            SolveStatus.SOLVED, CONVERGED, self.evaluations, 1, self._retimed(factor)
+            SolveStatus.SOLVED, SolveReason.CONVERGED, self.evaluations, 1, self._retimed(factor)
         )
 
     def _retimed(self, factor: float) -> Spline:

@@ -23,15 +23,10 @@ from joulepath.optimizer.problem.tool_cone import ToolCone
 from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory
 from joulepath.optimizer.solve.methods import METHODS, planned_paths, solver_for
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
-from joulepath.optimizer.solve.methods.method import SolveStatus
 from joulepath.optimizer.solve.methods.path_retiming import PathRetiming, RetimingProgram
-from joulepath.optimizer.solve.methods.planned_paths import (
-    ALONG_PLANNED_PATH,
-    FROM_PLANNED_PATH,
-    plan,
-    smooth_path,
-    to_goal,
-)
+from joulepath.optimizer.solve.methods.planned_paths import plan, smooth_path, to_goal
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import MotionOrigin, SolveStatus
 from tests.optimizer.moves import ROBOT, problem_with
 from tests.selection import long_but
 
@@ -80,7 +75,7 @@ def _compiled() -> None:
 
 def planned_path(prepared: PreparedProblem) -> Array:
     """The shortest planned path (k, nq) [rad] from START to GOAL."""
-    method = solver_for(prepared, START, GOAL, Deadline.after(DEADLINE))
+    method = solver_for(SolveContext.of(prepared, START, GOAL, Deadline.after(DEADLINE)))
     return to_goal(method, plan(method))[0]
 
 
@@ -100,7 +95,9 @@ def test_the_error_names_the_colliding_pair(
         optimize(problem)
     assert WALL.name in caught.value.pair and caught.value.depth > 0
     assert all(WALL.name in candidate.reason for candidate in caught.value.candidates)
-    result = solver_for(PreparedProblem.of(problem), START, GOAL, Deadline.after(DEADLINE)).solve()
+    result = solver_for(
+        SolveContext.of(PreparedProblem.of(problem), START, GOAL, Deadline.after(DEADLINE))
+    ).solve()
     assert result.status is SolveStatus.FAILED and result.spline is None
     assert result.collision is not None and WALL.name in result.collision.pair
 
@@ -113,9 +110,14 @@ def test_every_method_passes_the_post(method: MethodName) -> None:
         solution.certificate.clearance is not None
         and solution.certificate.clearance.min_clearance >= 0
     )
-    along = method in ("time_scaling", "uniform_scaling")
-    assert solution.candidates[0].reason.endswith(ALONG_PLANNED_PATH) == along
-    assert solution.candidates[0].reason.endswith(FROM_PLANNED_PATH) == (method == "polynomial_ga")
+    origins = {
+        "time_scaling": MotionOrigin.ALONG_PLANNED_PATH,
+        "uniform_scaling": MotionOrigin.ALONG_PLANNED_PATH,
+        "polynomial_ga": MotionOrigin.FROM_PLANNED_PATH,
+    }
+    reason, expected = solution.candidates[0].reason, origins.get(method)
+    for origin in (MotionOrigin.ALONG_PLANNED_PATH, MotionOrigin.FROM_PLANNED_PATH):
+        assert reason.endswith(origin.value) == (origin is expected)
 
 
 @pytest.mark.parametrize("method", ["time_scaling", "uniform_scaling"])
@@ -123,7 +125,7 @@ def test_a_followed_path_is_the_smooth_one(method: MethodName) -> None:
     """The motion stays on the smooth path along the planned one, apart from the fit of its
     spline."""
     prepared = PreparedProblem.of(blocked(method, POST))
-    result = solver_for(prepared, START, GOAL, Deadline.after(DEADLINE)).solve()
+    result = solver_for(SolveContext.of(prepared, START, GOAL, Deadline.after(DEADLINE))).solve()
     assert result.spline is not None
     smooth = smooth_path(prepared, planned_path(prepared))
     assert smooth is not None and prepared.surroundings.worst_violation(smooth) is None
@@ -139,7 +141,7 @@ def test_time_scaling_along_a_path_needs_no_more_energy_than_the_quintic_law() -
     limits.
     """
     prepared = PreparedProblem.of(blocked("time_scaling", POST))
-    result = solver_for(prepared, START, GOAL, Deadline.after(DEADLINE)).solve()
+    result = solver_for(SolveContext.of(prepared, START, GOAL, Deadline.after(DEADLINE))).solve()
     smooth = smooth_path(prepared, planned_path(prepared))
     assert result.spline is not None and smooth is not None
     space = bspline.uniform(60)

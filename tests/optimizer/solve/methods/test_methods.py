@@ -23,8 +23,10 @@ from joulepath.optimizer.search.candidates import bound, pairs
 from joulepath.optimizer.search.ends import ends
 from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.solve.methods import METHODS, polynomial_ga
-from joulepath.optimizer.solve.methods.method import SolveResult, with_excess
+from joulepath.optimizer.solve.methods.method import with_excess
 from joulepath.optimizer.solve.methods.polynomial_ga import PolynomialGA
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import SolveResult
 from tests.optimizer.clocks import LAST_READINGS, CountingClock
 from tests.optimizer.moves import (
     GOAL,
@@ -182,7 +184,7 @@ def by_genetic_algorithm(
     start: Any = START, goal: Any = GOAL, **given: Any
 ) -> tuple[PolynomialGA, SolveResult]:
     task = PreparedProblem.of(problem(start, goal, method="polynomial_ga", **given))
-    solver = PolynomialGA(task, start, goal, NEVER)
+    solver = PolynomialGA(SolveContext.of(task, start, goal, NEVER))
     return solver, solver.solve()
 
 

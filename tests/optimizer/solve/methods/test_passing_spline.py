@@ -23,6 +23,7 @@ from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.solve.methods.duration_intervals import fastest
 from joulepath.optimizer.solve.methods.passing_spline import PassingSpline
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from tests.optimizer.moves import AMPLE, GOAL, START, fixed, problem
 
 # rad; rounding of a spline at a time that is known to rounding
@@ -116,7 +117,9 @@ def test_a_given_duration_is_kept_and_the_fastest_is_faster_than_stopping() -> N
     assert slow.duration == pytest.approx(1.4 * own.duration, rel=1e-12) and slow.certificate.valid
     assert slow.energy.electrical.total > own.energy.electrical.total
     prepared = PreparedProblem.of(through(q))
-    solver = PassingSpline(prepared, q[0], q[-1], Deadline.after(AMPLE), fastest(prepared))
+    solver = PassingSpline(
+        SolveContext.of(prepared, q[0], q[-1], Deadline.after(AMPLE), fastest(prepared))
+    )
     motion = solver.solve().spline
     assert motion is not None and motion.duration < own.duration
 

@@ -25,8 +25,13 @@ from joulepath.optimizer.problem.bus import Bus, BusMode
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.solve.methods import free_spline, planned_paths
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
-from joulepath.optimizer.solve.methods.planned_paths import FROM_PLANNED_PATH
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import (
+    MotionOrigin,
+    SolveReason,
+    SolveResult,
+    SolveStatus,
+)
 from joulepath.optimizer.solve.methods.sqp_method import NOT_MUCH_BETTER, above
 from joulepath.optimizer.surroundings import Surroundings
 from tests.optimizer.collision.test_path_planner import (
@@ -85,24 +90,26 @@ def test_more_paths_are_planned_for_the_only_candidate(
 
 def test_a_solve_among_obstacles_ends_once_it_cannot_come_near_the_best_motion() -> None:
     arm, q_start, q_goal = task("post")
-    solver = FreeSpline(PreparedProblem.of(problem(arm, q_start, q_goal)), q_start, q_goal, NEVER)
+    prepared = PreparedProblem.of(problem(arm, q_start, q_goal))
     (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
     path, t = along(path, 1.0, arm.active_limits.v_max)
-    alone = solver.along_path(path, t)
-    energy = solver.prepared.cost_of(alone.spline)
-    solver.best_known = energy / NOT_MUCH_BETTER * 1.01
-    np.testing.assert_array_equal(
-        solver.along_path(path, t).spline.control_points, alone.spline.control_points
-    )  # type: ignore[union-attr]
-    solver.best_known = energy / 1.3
-    assert 0 < solver.along_path(path, t).iterations < alone.iterations
-    solver.best_known = energy / 10
-    skipped = solver.along_path(path, t)
+
+    def solved(incumbent_cost: float) -> SolveResult:
+        context = SolveContext.of(prepared, q_start, q_goal, NEVER)
+        return FreeSpline(replace(context, incumbent_cost=incumbent_cost)).along_path(path, t)
+
+    alone = solved(np.inf)
+    energy = prepared.cost_of(alone.spline)
+    near = solved(energy / NOT_MUCH_BETTER * 1.01)
+    assert alone.spline is not None and near.spline is not None
+    np.testing.assert_array_equal(near.spline.control_points, alone.spline.control_points)
+    assert 0 < solved(energy / 1.3).iterations < alone.iterations
+    skipped = solved(energy / 10)
     assert skipped.status is SolveStatus.PRUNED and skipped.iterations == 0
 
 
 @pytest.mark.parametrize(
-    ("best_known", "was_postponed", "others", "thorough"),
+    ("incumbent_cost", "was_postponed", "others", "thorough"),
     [
         (np.inf, False, 1, False),
         (np.inf, True, 1, True),
@@ -111,7 +118,7 @@ def test_a_solve_among_obstacles_ends_once_it_cannot_come_near_the_best_motion()
     ],
 )
 def test_many_states_are_checked_only_where_few_were_in_vain(
-    best_known: float,
+    incumbent_cost: float,
     was_postponed: bool,
     others: int,
     thorough: bool,
@@ -123,16 +130,21 @@ def test_many_states_are_checked_only_where_few_were_in_vain(
     monkeypatch.setattr(planned_paths, "FEW_STATES", 100)
     monkeypatch.setattr(planned_paths, "MOST_STATES", 1_000)
     arm, q_start, q_goal = walled_in()
-    solver = FreeSpline(PreparedProblem.of(problem(arm, q_start, q_goal)), q_start, q_goal, NEVER)
-    solver.best_known, solver.was_postponed = best_known, was_postponed
-    solver.other_goals = lambda: [q_goal] * others
+    prepared = PreparedProblem.of(problem(arm, q_start, q_goal))
+    context = replace(
+        SolveContext.of(prepared, q_start, q_goal, NEVER),
+        incumbent_cost=incumbent_cost,
+        was_postponed=was_postponed,
+        other_goals=lambda: [q_goal] * others,
+    )
+    solver = FreeSpline(context)
     found = planned_paths.plan(solver)
     assert found.end is PlanningEnd.EXHAUSTED
     assert (found.checked_states >= 1_000) == thorough
     failed = planned_paths.without_path(
-        solver, SolveResult(SolveStatus.FAILED, "it collides"), found
+        solver, SolveResult(SolveStatus.FAILED, SolveReason.MOTION_COLLIDES), found
     )
-    few = np.isinf(best_known) and not thorough
+    few = np.isinf(incumbent_cost) and not thorough
     assert failed.status is (SolveStatus.POSTPONED if few else SolveStatus.FAILED)
 
 
@@ -152,9 +164,9 @@ def test_far_costlier_paths_are_skipped_only_where_no_energy_comes_back(
     arm, q_start, q_goal = task("post")
     asked = problem(arm, q_start, q_goal)
     prepared = PreparedProblem.of(replace(asked, arm=replace(asked.arm, bus=Bus(mode))))
-    solver = FreeSpline(prepared, q_start, q_goal, NEVER)
+    context = SolveContext.of(prepared, q_start, q_goal, NEVER)
+    solver = FreeSpline(replace(context, incumbent_cost=0.1))
     (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
-    solver.best_known = 0.1
     assert (
         solver.along_path(*along(path, 1.0, arm.active_limits.v_max)).iterations == 0
     ) == skipped
@@ -168,31 +180,33 @@ def test_a_motion_that_left_an_obstacle_at_great_cost_is_compared_with_planned_p
     """
     arm, q_start, q_goal = task("post")
     prepared = PreparedProblem.of(problem(arm, q_start, q_goal))
+    context = SolveContext.of(prepared, q_start, q_goal, NEVER)
     with monkeypatch.context() as alone:
         alone.setattr(free_spline, "WAY_OUT", np.inf)
-        direct = FreeSpline(prepared, q_start, q_goal, NEVER).solve()
+        direct = FreeSpline(context).solve()
     energy = prepared.cost_of(direct.spline)
     assert direct.unhindered is not None and energy > free_spline.WAY_OUT * direct.unhindered
-    compared = FreeSpline(prepared, q_start, q_goal, NEVER).solve()
+    compared = FreeSpline(context).solve()
     assert prepared.cost_of(compared.spline) <= energy and compared.solves > direct.solves
-    assert (FROM_PLANNED_PATH in compared.reason) == (prepared.cost_of(compared.spline) < energy)
+    planned = MotionOrigin.FROM_PLANNED_PATH
+    assert (compared.origin is planned) == (prepared.cost_of(compared.spline) < energy)
     # a path that leads nowhere better
-    costlier = replace(compared, spline=direct.spline, reason=FROM_PLANNED_PATH)
+    costlier = replace(compared, spline=direct.spline, origin=planned)
     monkeypatch.setattr(FreeSpline, "from_planned_paths", lambda *_: costlier)
-    kept = FreeSpline(prepared, q_start, q_goal, NEVER).solve()
+    kept = FreeSpline(context).solve()
     assert (
-        kept.reason == direct.reason
+        kept.message == direct.message
         and prepared.cost_of(kept.spline) == energy
         and not kept.cut_short
     )
     # a deadline that ends the comparison ends the solution of the candidate: nobody may call it
     # optimal
     for late in (
-        SolveResult(SolveStatus.OUT_OF_TIME, ""),
+        SolveResult(SolveStatus.OUT_OF_TIME, SolveReason.DEADLINE_PASSED),
         replace(direct, status=SolveStatus.FAILED, cut_short=True),
     ):
         monkeypatch.setattr(FreeSpline, "from_planned_paths", lambda *_, late=late: late)
-        kept = FreeSpline(prepared, q_start, q_goal, NEVER).solve()
+        kept = FreeSpline(context).solve()
         assert (
             kept.cut_short
             and kept.status is SolveStatus.SOLVED

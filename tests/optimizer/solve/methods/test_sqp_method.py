@@ -4,6 +4,7 @@ it cannot.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import count, product
 from typing import Any
 
@@ -21,7 +22,9 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.solve.methods import METHODS, solver_for
 from joulepath.optimizer.solve.methods import duration_intervals as duration_intervals
 from joulepath.optimizer.solve.methods.free_spline import TIGHT, FreeSpline
-from joulepath.optimizer.solve.methods.method import Method, SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.method import Method
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from tests.optimizer.moves import (
     GOAL,
     PAYLOAD,
@@ -50,16 +53,23 @@ CONDITIONS: list[dict[str, Any]] = [
 
 
 def solver(
-    start: Array, goal: Array, fastest: bool = False, wait: float = 60.0, **given: Any
+    start: Array,
+    goal: Array,
+    fastest: bool = False,
+    wait: float = 60.0,
+    is_sole: bool = False,
+    deadline: Deadline | None = None,
+    **given: Any,
 ) -> Method:
     compile_kernel(ROBOT)
     task = PreparedProblem.of(problem(start, goal, **given))
     interval = duration_intervals.fastest(task) if fastest else None
-    return solver_for(task, start, goal, Deadline.after(wait), interval)
+    context = SolveContext.of(task, start, goal, deadline or Deadline.after(wait), interval)
+    return solver_for(replace(context, is_sole=is_sole))
 
 
 def spline(attempt: SolveResult) -> Spline:
-    assert attempt.status is SolveStatus.SOLVED and attempt.spline is not None, attempt.reason
+    assert attempt.status is SolveStatus.SOLVED and attempt.spline is not None, attempt.message
     return attempt.spline
 
 
@@ -137,9 +147,9 @@ def test_a_motion_is_solved_again_from_itself_with_its_knots_where_jerk_switches
     steps = np.zeros(2, dtype=int)
     for start, goal in ((START, GOAL), *random_moves(3, 1)):
         own, moved = solver(start, goal + 0.02), solver(start, goal)
-        assert isinstance(own, FreeSpline) and isinstance(moved, FreeSpline)
-        tight = spline(own.solve_tightly(*sampled(spline(own.solve())), 1e-3))
-        again, fitted = moved.solve_regraded(tight), moved.solve_from(*sampled(tight), fine=True)
+        tight = spline(own.solve_at_switches(spline(own.solve()), 1e-3))
+        again = moved.solve_at_switches(tight, 1e-3)
+        fitted = moved.solve_from(*sampled(tight), fine=True)
         steps += again.iterations, fitted.iterations
         cost = moved.prepared.cost_of
         assert cost(spline(again)) <= cost(spline(fitted)) * (1 + 1e-3)
@@ -151,8 +161,7 @@ def test_a_sole_candidate_is_refined_at_once() -> None:
     """Its coarse motion is only a guess: the result is that of two solves, one after the other, and
     within limits.
     """
-    at_once, twice = solver(START, GOAL), solver(START, GOAL)
-    at_once.is_sole = True
+    at_once, twice = solver(START, GOAL, is_sole=True), solver(START, GOAL)
     found = spline(at_once.solve())
     coarse = spline(twice.solve())
     assert FreeSpline.may_refine(coarse) and not FreeSpline.may_refine(found)
@@ -166,10 +175,10 @@ def test_a_sole_candidate_is_refined_at_once() -> None:
 
 @pytest.mark.parametrize("why", ["refining fails", "another candidate", "little time"])
 def test_else_the_coarse_motion_is_checked(why: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    own = solver(START, GOAL, wait=0.8 if why == "little time" else 60.0)
-    own.is_sole = why != "another candidate"
+    wait, is_sole = 0.8 if why == "little time" else 60.0, why != "another candidate"
+    own = solver(START, GOAL, wait=wait, is_sole=is_sole)
     if why == "refining fails":
-        failed = SolveResult(SolveStatus.FAILED, "for a test", 5, 1)
+        failed = SolveResult(SolveStatus.FAILED, SolveReason.NOT_CONVERGED, 5, 1)
         monkeypatch.setattr(FreeSpline, "refined", lambda *_, **__: failed)
     result = own.solve()
     assert FreeSpline.may_refine(spline(result))
@@ -184,8 +193,9 @@ def test_on_a_slow_machine_a_checked_motion_comes_first(readings: int, refined: 
     """Of the time that is left, a reading of the clock takes a share; coarse and refined motion
     take 34 of them.
     """
-    own, ticks = solver(START, GOAL), count()
-    own.is_sole, own.deadline = True, Deadline(2.0, clock=lambda: 2.0 * next(ticks) / readings)
+    ticks = count()
+    deadline = Deadline(2.0, clock=lambda: 2.0 * next(ticks) / readings)
+    own = solver(START, GOAL, is_sole=True, deadline=deadline)
     found = spline(own.solve())
     assert FreeSpline.may_refine(found) is not refined
     assert_held(own.prepared.problem, found)
@@ -196,8 +206,9 @@ def test_a_coarse_motion_that_collides_is_no_guess() -> None:
     refined motion.
     """
     start, goal = list(random_moves(5, 7))[6]
-    own, usual = (solver(start, goal, collisions=True) for _ in range(2))
-    own.is_sole = True
+    own, usual = (
+        solver(start, goal, collisions=True, is_sole=is_sole) for is_sole in (True, False)
+    )
     found, expected = own.solve(), usual.solve()
     assert expected.unhindered is not None
     assert found.unhindered == pytest.approx(expected.unhindered)

@@ -2,6 +2,7 @@
 nothing.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -29,8 +30,8 @@ from joulepath.optimizer.problem.tool_cone import ToolCone
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 from joulepath.optimizer.solve.methods.limit_repair import REPAIR_MARGIN
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
-from joulepath.optimizer.solve.methods.sqp_method import COSTLIER, NO_BETTER
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from joulepath.optimizer.solve.nlp.working_set_qp import NEAR_PATH
 from tests.optimizer.moves import fixed, problem_with
 
@@ -109,23 +110,22 @@ def test_what_is_far_away_changes_nothing() -> None:
 @pytest.mark.parametrize(
     ("given", "reason"),
     [
-        ({}, COSTLIER),
-        ({"objective": "mechanical"} | fixed(2.0), NO_BETTER),
+        ({}, SolveReason.PROMISES_NO_LESS),
+        ({"objective": "mechanical"} | fixed(2.0), SolveReason.COLLIDES_AND_COSTS_MORE),
     ],  # no promise is made of work
     ids=["electrical", "mechanical"],
 )
 def test_a_colliding_motion_that_needs_more_energy_than_a_known_one_is_pruned(
-    given: Fields, reason: str
+    given: Fields, reason: SolveReason
 ) -> None:
     task, empty = (
         PreparedProblem.of(problem_with(HOME, GOAL, scene=scene, **given))
         for scene in (POST, Scene())
     )
 
-    def attempt(on: PreparedProblem, best_known: float) -> SolveResult:
-        solver = FreeSpline(on, HOME, GOAL, NEVER)
-        solver.best_known = best_known
-        return solver.solve()
+    def attempt(on: PreparedProblem, incumbent_cost: float) -> SolveResult:
+        context = SolveContext.of(on, HOME, GOAL, NEVER)
+        return FreeSpline(replace(context, incumbent_cost=incumbent_cost)).solve()
 
     through = attempt(empty, np.inf).spline
     assert through is not None
