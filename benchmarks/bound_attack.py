@@ -45,8 +45,8 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.ends import label_of
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods.guess import Guess
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
-from joulepath.optimizer.solve.methods.sqp_method import Guess
 
 POINTS = 40
 # members of each self-motion, and orientations of each free goal, among which the attack draws

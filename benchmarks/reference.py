@@ -40,8 +40,8 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods.guess import Guess
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
-from joulepath.optimizer.solve.methods.sqp_method import Guess
 
 FILE = Path(__file__).with_name("reference_energies.json")
 SEED, TASKS = 1, 100

@@ -37,9 +37,9 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods.guess import Guess
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from joulepath.optimizer.solve.methods.solve_result import SolveResult
-from joulepath.optimizer.solve.methods.sqp_method import Guess
 
 SlowKind = Literal["all joints", "one joint", "tenth"]
 SLOW_KINDS: tuple[SlowKind, ...] = ("all joints", "one joint", "tenth")

@@ -29,9 +29,9 @@ from joulepath.optimizer.solve.methods.duration_intervals import (
     DurationInterval,
     duration_intervals,
 )
-from joulepath.optimizer.solve.methods.free_spline import COARSE
+from joulepath.optimizer.solve.methods.guess import Guess
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
-from joulepath.optimizer.solve.methods.sqp_method import Guess
+from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates, GoalConstraints
 from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
 from joulepath.optimizer.solve.nlp.sqp import solve
@@ -169,7 +169,7 @@ def _proposal(
     """The motion of least energy to any goal in the tangent space of the goal set, at most `radius`
     [rad] away, and its energy [J]; inf without a motion."""
     prepared, spline = incumbent.prepared, candidate.spline
-    space = bspline.uniform(COARSE)
+    space = bspline.uniform(SPLINE_SPACES.coarse_points)
     if incumbent.method.free_control_points and spline.degree == space.degree:
         space, points = bspline.Basis.of(spline.knots / spline.duration), spline.control_points
     else:

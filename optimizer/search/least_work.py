@@ -38,10 +38,10 @@ from joulepath.optimizer.search.sharpening import (
     follow_in_time,
 )
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
-from joulepath.optimizer.solve.methods.free_spline import TIGHT
-from joulepath.optimizer.solve.methods.sharp_motion import sharp_motion
+from joulepath.optimizer.solve.methods.method import above
+from joulepath.optimizer.solve.methods.refined_work import refine_work
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
-from joulepath.optimizer.solve.methods.sqp_method import above
+from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
 
 # time [s] that the search needs to be sure of a motion
 LEAST_TIME = 3.0
@@ -272,7 +272,7 @@ class _LeastWork:
 
         def sharpen() -> SolveResult:
             points, first = rough.on(DENSE), FIRST_WIDTH
-            result, points = sharp_motion(
+            result, points = refine_work(
                 incumbent.prepared, points, self.work.duration, first, self._least_known
             )
             found.append(points)
@@ -326,7 +326,7 @@ class _LeastWork:
         interval = duration_intervals(incumbent.prepared, candidate.q_goal, width=width)[0]
         solver = solver_of(incumbent, candidate, interval, below)
         result = SolveResult(SolveStatus.FAILED, SolveReason.TOO_SHORT_FOR_EVEN_KNOTS)
-        if self.work.duration >= TIGHT * candidate.shortest or len(points) == DENSE:
+        if self.work.duration >= SPLINE_SPACES.tight * candidate.shortest or len(points) == DENSE:
             space = bspline.uniform(len(points))
             attempt = partial(
                 solver.solve_control_points, space, points, self.work.duration, progress

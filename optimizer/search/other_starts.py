@@ -20,11 +20,10 @@ from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.sampled_ends import with_ends
 from joulepath.optimizer.search.sliding import slides
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
-from joulepath.optimizer.solve.methods.free_spline import COARSE
-from joulepath.optimizer.solve.methods.method import Method
+from joulepath.optimizer.solve.methods.method import Method, above
 from joulepath.optimizer.solve.methods.solve_result import SolveResult
-from joulepath.optimizer.solve.methods.sqp_method import above
-from joulepath.optimizer.solve.nlp.sqp import PROGRESS
+from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
+from joulepath.optimizer.solve.nlp.sqp_state import SQP
 
 # length of the step along a curve [rad]
 STEP = 0.15
@@ -79,4 +78,5 @@ def _solved(incumbent: Incumbent, candidate: Candidate, below: float) -> bool:
 def _again(found: SolveResult, solver: Method) -> SolveResult:
     """Solve from a motion that was found with its ends fixed."""
     assert found.spline is not None
-    return solver.solve_evenly(*sampled(found.spline), COARSE, PROGRESS)
+    q, t = sampled(found.spline)
+    return solver.solve_evenly(q, t, SPLINE_SPACES.coarse_points, SQP.progress)

@@ -16,7 +16,7 @@ from joulepath.optimizer.motion.spline import Spline, spline_of
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.random_displacements import random_displacements
-from joulepath.optimizer.solve.methods.limit_repair import MARGIN
+from joulepath.optimizer.solve.methods.limit_repair import LIMIT_REPAIR
 from joulepath.optimizer.solve.nlp.many_motions import ManyMotions
 
 # width of corners that counts as none [W]
@@ -121,7 +121,7 @@ class RoughWork:
         key = count, width
         if key not in self._programs:
             prepared = self.prepared
-            limits = prepared.problem.arm.active_limits.scaled(1 - MARGIN)
+            limits = prepared.problem.arm.active_limits.scaled(1 - LIMIT_REPAIR.margin)
             p = prepared.parameters(mechanical=1.0, width=width)
             self._programs[key] = ManyMotions(
                 prepared.kernel, bspline.uniform(count), limits, self.duration, p

@@ -17,10 +17,11 @@ from joulepath.optimizer.motion.ruckig_motion import time_optimal
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.motion.time_scalings import quintic
 from joulepath.optimizer.result.solution import BaselineName
+from joulepath.optimizer.solve.methods.guess import Guess
 from joulepath.optimizer.solve.methods.limit_repair import sampled_overshoot
 from joulepath.optimizer.solve.methods.planned_paths import no_polynomial_around
-from joulepath.optimizer.solve.methods.solve_result import SolveResult, SolveStatus
-from joulepath.optimizer.solve.methods.sqp_method import Guess, SqpMethod, with_effort
+from joulepath.optimizer.solve.methods.solve_result import SolveResult, SolveStatus, with_effort
+from joulepath.optimizer.solve.methods.sqp_method import SqpMethod
 
 # degree 15. Two more nodes save a UR5e some 0.15 % of the energy and take a fifth more time, at all
 # degrees from 9 to 19; Bernstein's coefficients lose a digit with every three nodes

@@ -13,7 +13,7 @@ from joulepath.optimizer.motion.spline import Spline, sampled
 from joulepath.optimizer.result.solution import BaselineName
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
-from joulepath.optimizer.solve.nlp.sqp import PROGRESS
+from joulepath.optimizer.solve.nlp.sqp_state import SQP
 
 
 def with_excess(cost: float, tau: Array, limits: Limits) -> float:
@@ -31,6 +31,14 @@ def with_excess(cost: float, tau: Array, limits: Limits) -> float:
         The raised cost [J].
     """
     return cost + abs(cost) * float(np.maximum(np.abs(tau) / limits.tau_max - 1, 0).max())
+
+
+def above(cost: float, multiple: float) -> float:
+    """Cost raised by (multiple - 1) times its absolute value, for a multiple ≥ 1.
+
+    This is the multiple of a positive cost, and lies above a negative cost too.
+    """
+    return cost if np.isinf(cost) else cost + (multiple - 1) * abs(cost)
 
 
 class Method(ABC):
@@ -123,7 +131,7 @@ class Method(ABC):
         return SolveResult(SolveStatus.FAILED, SolveReason.NO_EVEN_CONTROL_POINTS)
 
     def solve_control_points(
-        self, space: Basis, points: Array, duration: float, progress: float = PROGRESS
+        self, space: Basis, points: Array, duration: float, progress: float = SQP.progress
     ) -> SolveResult:
         """Solve from the control points of a motion, in their own spline space.
 

@@ -28,10 +28,16 @@ from joulepath.optimizer.motion.through_samples import spline_through
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods.guess import Guess
 from joulepath.optimizer.solve.methods.limit_repair import sampled_overshoot
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
-from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
-from joulepath.optimizer.solve.methods.sqp_method import Guess, SqpMethod, with_effort
+from joulepath.optimizer.solve.methods.solve_result import (
+    SolveReason,
+    SolveResult,
+    SolveStatus,
+    with_effort,
+)
+from joulepath.optimizer.solve.methods.sqp_method import SqpMethod
 
 # control points of the first attempt: those of `bspline`, and so many for each pass
 COARSE, PER_PASS = 13, 3

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from enum import Enum, StrEnum
 
 from joulepath.optimizer.motion.spline import Spline
@@ -169,3 +170,12 @@ class SolveResult:
         if self.note:
             text += f"; {self.note}"
         return text + ENDS_SLID if self.ends_slid else text
+
+
+def with_effort(result: SolveResult, attempts: Sequence[SolveResult]) -> SolveResult:
+    """The result, with the iterations and solves of all attempts."""
+    return replace(
+        result,
+        iterations=sum(each.iterations for each in attempts),
+        solves=sum(each.solves for each in attempts),
+    )

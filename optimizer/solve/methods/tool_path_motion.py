@@ -24,8 +24,12 @@ from joulepath.optimizer.solve.methods.end_angle import try_angles
 from joulepath.optimizer.solve.methods.even_speed import EvenSpeed
 from joulepath.optimizer.solve.methods.method import Method
 from joulepath.optimizer.solve.methods.path_retiming import PathRetiming
-from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
-from joulepath.optimizer.solve.methods.sqp_method import with_effort
+from joulepath.optimizer.solve.methods.solve_result import (
+    SolveReason,
+    SolveResult,
+    SolveStatus,
+    with_effort,
+)
 from joulepath.optimizer.solve.methods.tool_turning import TurnedAtEnd, turned_paths
 
 # spans of the first time scaling, and more of them for each bend; how much finer the second one is,

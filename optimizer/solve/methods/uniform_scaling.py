@@ -26,8 +26,12 @@ from joulepath.optimizer.solve.methods.duration_intervals import fastest
 from joulepath.optimizer.solve.methods.limit_repair import torque_peaks
 from joulepath.optimizer.solve.methods.method import Method
 from joulepath.optimizer.solve.methods.path_retiming import PathRetiming
-from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
-from joulepath.optimizer.solve.methods.sqp_method import with_effort
+from joulepath.optimizer.solve.methods.solve_result import (
+    SolveReason,
+    SolveResult,
+    SolveStatus,
+    with_effort,
+)
 
 # ratio of successive factors, and the number of successive factors without a decrease that ends the
 # search

@@ -42,8 +42,9 @@ from joulepath.optimizer.problem.scene import (
 )
 from joulepath.optimizer.problem.tool_cone import ToolCone
 from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory
-from joulepath.optimizer.solve.methods import planned_paths
-from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods import free_spline, planned_paths
+from joulepath.optimizer.solve.methods.free_spline import FREE_SPLINE, FreeSpline
+from joulepath.optimizer.solve.methods.planned_paths import PLANNED_PATHS
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from joulepath.optimizer.solve.methods.solve_result import MotionOrigin
 from tests.optimizer.cells import LOADS, arm_in_cell, cell
@@ -289,7 +290,7 @@ def test_a_motion_deep_inside_an_obstacle_is_left_for_a_planned_path_once_one_is
     incumbent_cost: float, was_postponed: bool, planned: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # what got out at great cost is compared with planned paths, too
-    monkeypatch.setattr("joulepath.optimizer.solve.methods.free_spline.WAY_OUT", np.inf)
+    monkeypatch.setattr(free_spline, "FREE_SPLINE", replace(FREE_SPLINE, detour_cost=np.inf))
     arm, q_start, q_goal = task("post")
     prepared = PreparedProblem.of(problem(arm, q_start, q_goal))
     context = replace(
@@ -317,7 +318,8 @@ def test_a_failed_candidate_says_whether_the_deadline_ended_the_planning(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     asked = problem(*walled_in())
-    monkeypatch.setattr(planned_paths, "MOST_STATES", 2_000)
+    limited = replace(PLANNED_PATHS, most_states=2_000)
+    monkeypatch.setattr(planned_paths, "PLANNED_PATHS", limited)
     with pytest.raises(NoTrajectory) as exhausted:
         optimize(asked, clock=still)
     (candidate,) = exhausted.value.candidates
@@ -335,11 +337,12 @@ def test_a_failed_candidate_says_whether_the_deadline_ended_the_planning(
     assert "allow a longer deadline" in str(cut_short.value)
 
 
-@pytest.mark.parametrize("states", long_but((2_000,), (2_000, planned_paths.MOST_STATES)))
+@pytest.mark.parametrize("states", long_but((2_000,), (2_000, PLANNED_PATHS.most_states)))
 def test_a_failed_candidate_names_the_colliding_bodies(
     states: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(planned_paths, "MOST_STATES", states)
+    limited = replace(PLANNED_PATHS, most_states=states)
+    monkeypatch.setattr(planned_paths, "PLANNED_PATHS", limited)
     with pytest.raises(NoTrajectory) as raised:
         optimize(problem(*walled_in()))
     (candidate,) = raised.value.candidates

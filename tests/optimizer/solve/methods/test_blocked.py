@@ -4,6 +4,7 @@ the error names it.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -23,8 +24,14 @@ from joulepath.optimizer.problem.tool_cone import ToolCone
 from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory
 from joulepath.optimizer.solve.methods import METHODS, planned_paths, solver_for
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
-from joulepath.optimizer.solve.methods.path_retiming import PathRetiming, RetimingProgram
-from joulepath.optimizer.solve.methods.planned_paths import plan, smooth_path, to_goal
+from joulepath.optimizer.solve.methods.path_retiming import PathRetiming
+from joulepath.optimizer.solve.methods.planned_paths import (
+    PLANNED_PATHS,
+    plan,
+    smooth_path,
+    to_goal,
+)
+from joulepath.optimizer.solve.methods.retiming_program import RetimingProgram
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from joulepath.optimizer.solve.methods.solve_result import MotionOrigin, SolveStatus
 from tests.optimizer.moves import ROBOT, problem_with
@@ -83,13 +90,14 @@ def planned_path(prepared: PreparedProblem) -> Array:
     ("method", "states"),
     long_but(
         [(method, FEW_STATES) for method in ("time_scaling", "polynomial_ga")],
-        product(METHODS, (FEW_STATES, planned_paths.MOST_STATES)),
+        product(METHODS, (FEW_STATES, PLANNED_PATHS.most_states)),
     ),
 )
 def test_the_error_names_the_colliding_pair(
     method: MethodName, states: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(planned_paths, "MOST_STATES", states)
+    limited = replace(PLANNED_PATHS, most_states=states)
+    monkeypatch.setattr(planned_paths, "PLANNED_PATHS", limited)
     problem = blocked(method, WALL)
     with pytest.raises(NoCollisionFreeTrajectory) as caught:
         optimize(problem)

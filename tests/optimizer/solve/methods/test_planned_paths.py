@@ -25,6 +25,7 @@ from joulepath.optimizer.problem.bus import Bus, BusMode
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.solve.methods import free_spline, planned_paths
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods.method import above
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from joulepath.optimizer.solve.methods.solve_result import (
     MotionOrigin,
@@ -32,7 +33,7 @@ from joulepath.optimizer.solve.methods.solve_result import (
     SolveResult,
     SolveStatus,
 )
-from joulepath.optimizer.solve.methods.sqp_method import NOT_MUCH_BETTER, above
+from joulepath.optimizer.solve.methods.sqp_method import SQP_METHOD
 from joulepath.optimizer.surroundings import Surroundings
 from tests.optimizer.collision.test_path_planner import (
     AMPLE,
@@ -100,7 +101,7 @@ def test_a_solve_among_obstacles_ends_once_it_cannot_come_near_the_best_motion()
 
     alone = solved(np.inf)
     energy = prepared.cost_of(alone.spline)
-    near = solved(energy / NOT_MUCH_BETTER * 1.01)
+    near = solved(energy / SQP_METHOD.obstacle_margin * 1.01)
     assert alone.spline is not None and near.spline is not None
     np.testing.assert_array_equal(near.spline.control_points, alone.spline.control_points)
     assert 0 < solved(energy / 1.3).iterations < alone.iterations
@@ -127,8 +128,8 @@ def test_many_states_are_checked_only_where_few_were_in_vain(
     """Walled in, the planning uses all states that it may; so long as others are open, the
     candidate is postponed.
     """
-    monkeypatch.setattr(planned_paths, "FEW_STATES", 100)
-    monkeypatch.setattr(planned_paths, "MOST_STATES", 1_000)
+    limited = replace(planned_paths.PLANNED_PATHS, few_states=100, most_states=1_000)
+    monkeypatch.setattr(planned_paths, "PLANNED_PATHS", limited)
     arm, q_start, q_goal = walled_in()
     prepared = PreparedProblem.of(problem(arm, q_start, q_goal))
     context = replace(
@@ -182,10 +183,11 @@ def test_a_motion_that_left_an_obstacle_at_great_cost_is_compared_with_planned_p
     prepared = PreparedProblem.of(problem(arm, q_start, q_goal))
     context = SolveContext.of(prepared, q_start, q_goal, NEVER)
     with monkeypatch.context() as alone:
-        alone.setattr(free_spline, "WAY_OUT", np.inf)
+        settings = free_spline.FREE_SPLINE
+        alone.setattr(free_spline, "FREE_SPLINE", replace(settings, detour_cost=np.inf))
         direct = FreeSpline(context).solve()
     energy = prepared.cost_of(direct.spline)
-    assert direct.unhindered is not None and energy > free_spline.WAY_OUT * direct.unhindered
+    assert direct.unhindered is not None and energy > settings.detour_cost * direct.unhindered
     compared = FreeSpline(context).solve()
     assert prepared.cost_of(compared.spline) <= energy and compared.solves > direct.solves
     planned = MotionOrigin.FROM_PLANNED_PATH

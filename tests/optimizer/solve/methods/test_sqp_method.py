@@ -21,10 +21,11 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.solve.methods import METHODS, solver_for
 from joulepath.optimizer.solve.methods import duration_intervals as duration_intervals
-from joulepath.optimizer.solve.methods.free_spline import TIGHT, FreeSpline
+from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 from joulepath.optimizer.solve.methods.method import Method
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
 from tests.optimizer.moves import (
     GOAL,
     PAYLOAD,
@@ -166,7 +167,7 @@ def test_a_sole_candidate_is_refined_at_once() -> None:
     coarse = spline(twice.solve())
     assert FreeSpline.may_refine(coarse) and not FreeSpline.may_refine(found)
     assert_held(at_once.prepared.problem, found)
-    tight = coarse.duration < TIGHT * shortest_duration(GOAL - START, ROBOT.limits)
+    tight = coarse.duration < SPLINE_SPACES.tight * shortest_duration(GOAL - START, ROBOT.limits)
     cost = at_once.prepared.cost_of
     assert cost(found) == pytest.approx(
         cost(spline(twice.refined(coarse, fine=bool(tight)))), rel=1e-3

@@ -29,10 +29,10 @@ from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
 from joulepath.optimizer.problem.tool_cone import ToolCone
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
-from joulepath.optimizer.solve.methods.limit_repair import REPAIR_MARGIN
+from joulepath.optimizer.solve.methods.limit_repair import LIMIT_REPAIR
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
-from joulepath.optimizer.solve.nlp.working_set_qp import NEAR_PATH
+from joulepath.optimizer.solve.nlp.working_set_qp import WORKING_SET
 from tests.optimizer.moves import fixed, problem_with
 
 ROBOT = load_robot("ur5e")
@@ -165,8 +165,8 @@ def test_a_share_is_one_a_reserve_beyond_the_margin() -> None:
     expected = 1 - (model.signed_distances(q)[0] - RESERVE) / SCALE
     path, v = every_pair(model), np.zeros_like(q)
     for shares, counted, low in (
-        (path.linearised(q, v).value, COUNTED_SHARE, NEAR_PATH),
-        (path.ratios(q, v), CHECKED, 1 - REPAIR_MARGIN),
+        (path.linearised(q, v).value, COUNTED_SHARE, WORKING_SET.near_path),
+        (path.ratios(q, v), CHECKED, 1 - LIMIT_REPAIR.tightening),
     ):
         near = expected > counted
         assert 2 < near.sum() < near.size

@@ -15,7 +15,7 @@ from joulepath.optimizer.dynamics.plant import SHARPER_WIDTHS
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.spline import peak_rates, spline_of
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.solve.methods.sharp_motion import sharp_motion
+from joulepath.optimizer.solve.methods.refined_work import refine_work
 from joulepath.optimizer.solve.nlp.interior_point import InteriorPoint
 from tests.optimizer.moves import GOAL, START, fixed, limits, problem
 
@@ -120,11 +120,11 @@ def test_bounds_are_tightened_per_span(prepared: PreparedProblem) -> None:
 
 def test_sharp_motion_is_within_every_limit(prepared: PreparedProblem) -> None:
     points = START + np.outer(bspline.uniform(40).quintic, GOAL - START)
-    result, own = sharp_motion(prepared, points, DURATION, WIDTH)
+    result, own = refine_work(prepared, points, DURATION, WIDTH)
     assert result.spline is not None
     assert (peak_rates(result.spline) <= prepared.problem.arm.active_limits.rates).all()
     assert own == pytest.approx(result.spline.control_points)
-    costlier, _ = sharp_motion(
+    costlier, _ = refine_work(
         prepared, points, DURATION, WIDTH, 0.5 * prepared.cost_of(result.spline)
     )
     assert costlier.spline is None

@@ -14,7 +14,8 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates
 from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
 from joulepath.optimizer.solve.nlp.passing import Passes
-from joulepath.optimizer.solve.nlp.sqp import SqpStatus, solve
+from joulepath.optimizer.solve.nlp.sqp import solve
+from joulepath.optimizer.solve.nlp.sqp_state import SqpStatus
 from tests.optimizer.moves import GOAL, ROBOT, START, problem
 from tests.optimizer.solve.nlp.second_differences import assert_curvature, without_dry_friction
 

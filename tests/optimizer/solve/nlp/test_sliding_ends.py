@@ -21,7 +21,8 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates
 from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
 from joulepath.optimizer.solve.nlp.sliding_ends import Slide, SlidingEnds
-from joulepath.optimizer.solve.nlp.sqp import SqpStatus, solve
+from joulepath.optimizer.solve.nlp.sqp import solve
+from joulepath.optimizer.solve.nlp.sqp_state import SqpStatus
 from tests.optimizer.solve.nlp.second_differences import assert_curvature, without_dry_friction
 
 PANDA = load_robot("panda")
@@ -135,5 +136,5 @@ def test_a_guess_far_from_its_curve_is_refused() -> None:
     unreachable = curve(GOAL)
     unreachable.T[:3, 3] *= 5.0
     own = replace(program(False, True), goal_curve=unreachable)
-    with pytest.raises(ValueError, match="not near the curve"):
+    with pytest.raises(ValueError, match="not near its curve"):
         solve(own, straight(own), 2.0)

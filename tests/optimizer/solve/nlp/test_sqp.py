@@ -20,7 +20,8 @@ from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates
 from joulepath.optimizer.solve.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
-from joulepath.optimizer.solve.nlp.sqp import PROGRESS, Result, SqpStatus, solve
+from joulepath.optimizer.solve.nlp.sqp import solve
+from joulepath.optimizer.solve.nlp.sqp_state import SQP, SqpResult, SqpStatus
 from tests.optimizer.moves import (
     GOAL,
     PAYLOAD,
@@ -45,7 +46,7 @@ REST = 1e-3
 # accounts for. The solver stops where a further step promises TO_THE_END of the cost: with a
 # curvature h of the cost, (2 h · TO_THE_END)^½ may be left, and h is some tens along the softest
 # directions. Where it usually stops, the processor's rounding decides how much is left
-STATIONARY, TO_THE_END = 0.04, PROGRESS / 10
+STATIONARY, TO_THE_END = 0.04, SQP.progress / 10
 SAME = 1e-4  # relative; cost at one optimum reached along different ways
 GRID = 1e-3  # relative; a rate's peak between the points of the grid
 COARSE = bspline.uniform(11)
@@ -140,7 +141,7 @@ def test_mechanical_optimum_leaves_ipopt_little(peer: Peer, k: int) -> None:
     assert ours.cost < mine.value(quintic(mine), mine.t_max)[0]
 
 
-def unexplained(of: NonlinearProgram, found: Result) -> float:
+def unexplained(of: NonlinearProgram, found: SqpResult) -> float:
     """What is left of the cost's gradient, over the cost, when active limits take what nonnegative
     multipliers can.
 
@@ -197,7 +198,7 @@ def test_active_limits_explain_the_gradient(objective: str, kind: str) -> None:
 def test_the_conditions_are_not_met_elsewhere() -> None:
     """The measure above does tell: a straight quintic at leisure is far from optimal."""
     mine = program(START, GOAL)
-    guess = Result(
+    guess = SqpResult(
         SqpStatus.SOLVED, quintic(mine), 1.5, 0.0, 0, 0.0, 0.0, np.zeros((len(COARSE.nodes), 6))
     )
     assert unexplained(mine, guess) > 0.5

@@ -9,8 +9,9 @@ import pytest
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.solve.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
-from joulepath.optimizer.solve.nlp.qp_rows import ROOM, QPRows
-from joulepath.optimizer.solve.nlp.working_set_qp import MOST_ROUNDS, NEAR, QPInputs, WorkingSetQP
+from joulepath.optimizer.solve.nlp.qp_data import QPInputs
+from joulepath.optimizer.solve.nlp.qp_rows import QP_ROWS, QPRows
+from joulepath.optimizer.solve.nlp.working_set_qp import WORKING_SET, WorkingSetQP
 from tests.optimizer.moves import GOAL, START
 from tests.optimizer.solve.nlp.test_sqp import program, quintic, shortest
 
@@ -53,12 +54,13 @@ def test_a_step_breaks_no_limit_on_the_other_side() -> None:
             scale *= 0.9
         free = free + scale * noise
         inputs = inputs_at(p, qp, free, rng)
-        ratio, step = inputs.ratio, qp.solve(inputs, MOST_ROUNDS)
+        ratio, step = inputs.ratio, qp.solve(inputs, WORKING_SET.max_rounds)
         assert step is not None
         assert not step.relaxed
         after = p.kinematics(free + step.x.reshape(free.shape)) / rates
         assert np.abs(after).max() <= 1 + FEASIBILITY
-        turned += int(((np.abs(ratio) > NEAR) & (-np.sign(ratio) * after > 0.99)).any())
+        near = np.abs(ratio) > WORKING_SET.near_rate
+        turned += int((near & (-np.sign(ratio) * after > 0.99)).any())
     assert turned
 
 
@@ -71,7 +73,7 @@ def test_no_limit_has_two_rows(share: float) -> None:
         qp = WorkingSetQP(p, p.t_max)
         step = qp.solve(
             inputs_at(p, qp, quintic(p) + 0.05 * rng.normal(size=(p.free_count, p.r)), rng),
-            MOST_ROUNDS,
+            WORKING_SET.max_rounds,
         )
         assert step is not None and (share > 1 or step.relaxed)
         # the lower and the upper one of a point
@@ -95,17 +97,18 @@ def test_further_constraints_let_a_step_promise_less() -> None:
             assert step is not None and not step.relaxed
             return -float(inputs.gradient @ step.x) - 0.5 * float(step.x @ inputs.hessian(step.x))
 
-        first, last = promised(1), promised(MOST_ROUNDS)
+        most = WORKING_SET.max_rounds
+        first, last = promised(1), promised(most)
         assert last <= first + ROUNDING
-        assert promised(MOST_ROUNDS, enough=last - ROUNDING) == pytest.approx(last, abs=ROUNDING)
-        assert promised(MOST_ROUNDS, enough=first + ROUNDING) == pytest.approx(first, abs=ROUNDING)
+        assert promised(most, enough=last - ROUNDING) == pytest.approx(last, abs=ROUNDING)
+        assert promised(most, enough=first + ROUNDING) == pytest.approx(first, abs=ROUNDING)
         ended += last < 0.9 * first
     assert ended
 
 
 def test_rows_added_one_by_one_are_those_added_at_once() -> None:
     """Several times as many as there is room for at first; half of them before a first solve."""
-    rng, n, count = np.random.default_rng(6), 12, 3 * ROOM
+    rng, n, count = np.random.default_rng(6), 12, 3 * QP_ROWS.initial_rows
     A, most, gradient = (
         rng.normal(size=(count, n)),
         rng.uniform(0.05, 1.0, count),

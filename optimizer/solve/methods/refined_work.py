@@ -1,9 +1,11 @@
-"""Motions of least mechanical work with sharp corners, by the interior-point method, from motions
-that are near.
+"""Refined solves of least mechanical work, by the interior-point method, from coarse motions.
+
+The cost smooths the corner of each joint's |power| at zero. Refined solves have narrow corners.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -14,43 +16,66 @@ from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.spline import Spline, span_peak_rates, spline_of
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.solve.methods.limit_repair import (
-    MARGIN,
-    REPAIR_MARGIN,
-    WITHIN,
+    LIMIT_REPAIR,
     repair_factors,
 )
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from joulepath.optimizer.solve.nlp.interior_point import Interior, InteriorPoint
 
-# solves, each with limits tightened where the motion before exceeds them between the points
-REPAIRS = 8
-# relative decrease of the work that a further step must promise
-PROGRESS = 2e-4
-# part of the width of its corner by which a joint's smooth power is above its power, on the mean
-ROUNDED = 0.5
+
+@dataclass(frozen=True)
+class RefinedWorkSettings:
+    """Settings of a refined solve of least mechanical work."""
+
+    repairs: int = 8
+    """Largest number of solves, each with the limits tightened that the motion before exceeds
+    between the nodes."""
+
+    progress: float = 2e-4
+    """Relative decrease of the work below which a solve ends."""
+
+    smoothing_share: float = 0.5
+    """Mean excess of a joint's smoothed power over its power, as a share of the corner width."""
 
 
-def sharp_motion(
-    prepared: PreparedProblem, points: Array, duration: float, first: float, below: float = np.inf
+REFINED_WORK = RefinedWorkSettings()
+
+
+def refine_work(
+    prepared: PreparedProblem,
+    points: Array,
+    duration: float,
+    first_width: float,
+    incumbent_cost: float = np.inf,
+    settings: RefinedWorkSettings = REFINED_WORK,
 ) -> tuple[SolveResult, Array]:
-    """The motion from control points (n, nq) [rad] over evenly spaced knots, with corners of
-    `first` [W] at first.
+    """Solve for the motion of least work at a fixed duration, with narrow corners of power.
 
-    It lasts `duration` [s]. It may collide: then the result has the collision, but no motion.
-    Returned with its control points (n, nq) [rad]. It is given up if it is not expected to need
-    less than `below` [J].
+    Args:
+        prepared: the problem.
+        points: control points over evenly spaced knots, shape (n, nq) [rad].
+        duration: duration of the motion [s].
+        first_width: width of the corners in the first iterations [W].
+        incumbent_cost: work that the motion must come below [J]; the solve ends early otherwise.
+        settings: settings of the solve.
+
+    Returns:
+        The result, without a motion if the motion collides, and the control points reached, shape
+        (n, nq) [rad].
     """
-    limits = prepared.problem.arm.active_limits.scaled(1 - MARGIN)
+    limits = prepared.problem.arm.active_limits.scaled(1 - LIMIT_REPAIR.margin)
     basis, nq = bspline.uniform(len(points)), points.shape[1]
     parameters = lru_cache(lambda width: prepared.parameters(mechanical=1.0, width=width))
     program = InteriorPoint(
         prepared.kernel, basis, limits, duration, parameters, prepared.frictionless_parameters
     )
     ends, bounds = points[[0, -1]], program.unbounded()
-    at = program.first(ends, np.clip(points[basis.free], limits.q_min, limits.q_max), first, bounds)
-    most = below + ROUNDED * SHARPER_WIDTHS[-1] * duration * nq
-    for solves in range(1, REPAIRS + 1):
-        at = program.minimised(ends, at, SHARPER_WIDTHS[-1], bounds, PROGRESS, most)
+    width, within = SHARPER_WIDTHS[-1], LIMIT_REPAIR.within
+    free = np.clip(points[basis.free], limits.q_min, limits.q_max)
+    at = program.first(ends, free, first_width, bounds)
+    most = incumbent_cost + settings.smoothing_share * width * duration * nq
+    for solves in range(1, settings.repairs + 1):
+        at = program.minimised(ends, at, width, bounds, settings.progress, most)
         if at.costlier:
             return SolveResult(
                 SolveStatus.PRUNED, SolveReason.PROMISES_NO_LESS, at.iterations, solves
@@ -65,21 +90,21 @@ def sharp_motion(
             span_peak_rates(spline) / prepared.problem.arm.active_limits.rates[:, None],
             np.ones(nq),
         )
-        if (spans <= WITHIN).all():
+        if (spans <= within).all():
             factors = repair_factors(prepared, spline, (np.zeros(nq), np.zeros(nq)))
             if factors is None:
                 return _checked(prepared, spline, at, solves), points
             torque = factors.tau_max
         bounds = program.tightened(
-            bounds, 1 / np.where(spans > WITHIN, spans + REPAIR_MARGIN, 1.0), torque
+            bounds, 1 / np.where(spans > within, spans + LIMIT_REPAIR.tightening, 1.0), torque
         )
     return SolveResult(
-        SolveStatus.FAILED, SolveReason.LIMITS_BETWEEN_NODES, at.iterations, REPAIRS
+        SolveStatus.FAILED, SolveReason.LIMITS_BETWEEN_NODES, at.iterations, settings.repairs
     ), points
 
 
 def _checked(prepared: PreparedProblem, spline: Spline, at: Interior, solves: int) -> SolveResult:
-    """The result of a motion within the limits."""
+    """The result of a motion within the limits, checked for collisions."""
     collision = prepared.surroundings.worst_violation(spline)
     effort = at.iterations, solves
     if collision is not None:
