@@ -2,10 +2,10 @@
 solved.
 
 The bound on mechanical work rules out little, and a motion has many local optima. Rough motions
-take a fifth of the time of solves (`many_motions`): those of tens of candidates, then of the best
-on more control points and from random guesses. They may collide, and exceed a limit by a little. So
-the motion of least work among those that do not collide is solved, with sharp corners. Then every
-candidate is solved whose rough motion promises less than what is found.
+take a fifth of the time of solves (`batched_motions`): those of tens of candidates, then of the
+best on more control points and from random guesses. They may collide, and exceed a limit by a
+little. So the motion of least work among those that do not collide is solved, with sharp corners.
+Then every candidate is solved whose rough motion promises less than what is found.
 
 Where no motion is found here, all candidates are solved as with other objectives: by `outer_turns`
 and `sharpening`.

@@ -20,7 +20,8 @@ from joulepath.optimizer.solve.methods.limit_repair import (
     repair_factors,
 )
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
-from joulepath.optimizer.solve.nlp.interior_point import Interior, InteriorPoint
+from joulepath.optimizer.solve.nlp.interior_point import InteriorPoint
+from joulepath.optimizer.solve.nlp.interior_state import Interior
 
 
 @dataclass(frozen=True)

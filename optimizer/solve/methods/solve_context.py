@@ -1,4 +1,4 @@
-"""Input of a solve: one candidate of a problem, and what a search knows about it."""
+"""Input of a solve: one candidate of a problem, with the knowledge of the search about it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from joulepath.optimizer.solve.methods.duration_intervals import (
 
 @dataclass(frozen=True, eq=False)
 class SolveContext:
-    """A candidate, the durations allowed to its motion, and what the search knows about it."""
+    """A candidate, its allowed durations, and the knowledge of the search about it."""
 
     prepared: PreparedProblem
 
@@ -67,7 +67,7 @@ class SolveContext:
         deadline: Deadline,
         interval: DurationInterval | None = None,
     ) -> SolveContext:
-        """Context of a candidate about which nothing is known.
+        """Context of a candidate, without knowledge of a search.
 
         Args:
             prepared: the problem.

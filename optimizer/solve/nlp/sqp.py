@@ -13,6 +13,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import NEVER, Deadline
 from joulepath.optimizer.solve.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
 from joulepath.optimizer.solve.nlp.passing import Passes, Passing
+from joulepath.optimizer.solve.nlp.qp_data import QPInputs
 from joulepath.optimizer.solve.nlp.sliding_ends import Slide, SlidingEnds
 from joulepath.optimizer.solve.nlp.sqp_state import (
     SQP,
@@ -24,7 +25,6 @@ from joulepath.optimizer.solve.nlp.sqp_state import (
 from joulepath.optimizer.solve.nlp.whitening import whitened
 from joulepath.optimizer.solve.nlp.working_set_qp import (
     WORKING_SET,
-    QPInputs,
     WorkingSetQP,
 )
 

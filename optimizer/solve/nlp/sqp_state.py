@@ -11,10 +11,8 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.solve.nlp.active_path_constraints import PathConstraintValues
 from joulepath.optimizer.solve.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
 from joulepath.optimizer.solve.nlp.passing import Passing
+from joulepath.optimizer.solve.nlp.qp_data import QPStep
 from joulepath.optimizer.solve.nlp.sliding_ends import Slide
-from joulepath.optimizer.solve.nlp.working_set_qp import (
-    QPStep,
-)
 
 
 @dataclass(frozen=True)

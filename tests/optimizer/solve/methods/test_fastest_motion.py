@@ -1,4 +1,4 @@
-"""The fastest motion of one candidate: what counts, and when it ends."""
+"""The search for the fastest motion of one candidate."""
 
 from __future__ import annotations
 
@@ -45,9 +45,7 @@ def test_what_a_method_compares_is_what_its_interval_makes_least() -> None:
 
 
 def test_a_known_motion_counts_if_it_is_certified() -> None:
-    """A polynomial is slower than splines: one that is known is the fastest motion then, whole or
-    not at all.
-    """
+    """A polynomial is slower than a known spline, which is then the fastest motion unchanged."""
     splines, polynomials = prepared().incumbent, prepared(method="lagrange").incumbent
     known = fastest_of(splines, splines.candidates[0])
     candidate = polynomials.candidates[0]

@@ -1,6 +1,4 @@
-"""Planned paths of candidates: to goals that differ by full turns, in how many states, and when
-their solves end.
-"""
+"""Planned paths of candidates: goals by full turns, checked states, and early ends of solves."""
 
 from __future__ import annotations
 
@@ -46,7 +44,7 @@ from tests.optimizer.collision.test_path_planner import (
 
 
 def test_a_known_path_leads_to_goals_that_differ_by_full_turns() -> None:
-    """The first bars are passed once: what comes after is the same, a full turn of a wrist away."""
+    """A path to a goal is reused for the goal after a full turn of a wrist."""
     arm, q_start, q_goal = task("cage")
     (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
     turned = q_goal - 2 * np.pi * np.sign(q_goal) * np.eye(6)[3]
@@ -59,9 +57,7 @@ def test_a_known_path_leads_to_goals_that_differ_by_full_turns() -> None:
 
 
 def test_more_paths_are_planned_only_where_the_first_is_hard_to_find() -> None:
-    """Around the post there are more than two; a first path that counts as easy leads to the usual
-    ones.
-    """
+    """There are more than two paths around the post; an easy first path gives the usual paths."""
     ends, more = task("post"), Effort(paths=4, more_states=12_000)
     usual, many, easy = (
         plan_paths(*ends, Deadline.after(AMPLE), effort).paths
@@ -125,9 +121,7 @@ def test_many_states_are_checked_only_where_few_were_in_vain(
     thorough: bool,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Walled in, the planning uses all states that it may; so long as others are open, the
-    candidate is postponed.
-    """
+    """Walled in, the planning uses all its states; with other candidates open, it is postponed."""
     limited = replace(planned_paths.PLANNED_PATHS, few_states=100, most_states=1_000)
     monkeypatch.setattr(planned_paths, "PLANNED_PATHS", limited)
     arm, q_start, q_goal = walled_in()
@@ -176,9 +170,7 @@ def test_far_costlier_paths_are_skipped_only_where_no_energy_comes_back(
 def test_a_motion_that_left_an_obstacle_at_great_cost_is_compared_with_planned_paths(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """It may have left it on the wrong side; of both motions, the one of least energy is kept, with
-    its own reason.
-    """
+    """The motion may have left the obstacle on the wrong side: the cheaper motion is kept."""
     arm, q_start, q_goal = task("post")
     prepared = PreparedProblem.of(problem(arm, q_start, q_goal))
     context = SolveContext.of(prepared, q_start, q_goal, NEVER)
@@ -192,7 +184,7 @@ def test_a_motion_that_left_an_obstacle_at_great_cost_is_compared_with_planned_p
     assert prepared.cost_of(compared.spline) <= energy and compared.solves > direct.solves
     planned = MotionOrigin.FROM_PLANNED_PATH
     assert (compared.origin is planned) == (prepared.cost_of(compared.spline) < energy)
-    # a path that leads nowhere better
+    # a planned path without a better motion
     costlier = replace(compared, spline=direct.spline, origin=planned)
     monkeypatch.setattr(FreeSpline, "from_planned_paths", lambda *_: costlier)
     kept = FreeSpline(context).solve()
@@ -201,8 +193,7 @@ def test_a_motion_that_left_an_obstacle_at_great_cost_is_compared_with_planned_p
         and prepared.cost_of(kept.spline) == energy
         and not kept.cut_short
     )
-    # a deadline that ends the comparison ends the solution of the candidate: nobody may call it
-    # optimal
+    # if the deadline ends the comparison, the result must not count as optimal
     for late in (
         SolveResult(SolveStatus.OUT_OF_TIME, SolveReason.DEADLINE_PASSED),
         replace(direct, status=SolveStatus.FAILED, cut_short=True),

@@ -1,6 +1,4 @@
-"""One candidate from guess to motion: it holds every limit between the nodes too, and says so when
-it cannot.
-"""
+"""Solves of one candidate from guess to motion, within all limits between the nodes too."""
 
 from __future__ import annotations
 
@@ -40,8 +38,10 @@ from tests.optimizer.moves import (
 )
 from tests.selection import long_but
 
-SAMPLES = 3001  # at primes and their like: on nobody's grid
-HELD = 1e-6  # share of a limit, as the certificate's
+# samples of a motion, apart from all grids of the optimiser
+SAMPLES = 3001
+# relative excess over a limit, as of the certificate
+LIMIT_TOLERANCE = 1e-6
 ROUNDING = 1e-9
 
 CONDITIONS: list[dict[str, Any]] = [
@@ -75,16 +75,14 @@ def spline(attempt: SolveResult) -> Spline:
 
 
 def assert_held(task: Problem, motion: Spline) -> None:
-    """Every limit, at samples apart from any grid of the optimiser's, with SciPy's spline and
-    Pinocchio's torques.
-    """
+    """All limits at samples apart from the optimiser's grids, by SciPy and Pinocchio."""
     own = task.arm.active_limits
     curve = BSpline(motion.knots, motion.control_points, motion.degree)
     t = np.linspace(0.0, motion.duration, SAMPLES)
     q, v, a, jerk = (curve(t, d) for d in range(4))
     tau = torques(task, q, v, a) + task.arm.friction_law.torque(v)
     for values, maxima in ((v, own.v_max), (a, own.a_max), (jerk, own.j_max), (tau, own.tau_max)):
-        assert (np.abs(values) <= maxima * (1 + HELD)).all()
+        assert (np.abs(values) <= maxima * (1 + LIMIT_TOLERANCE)).all()
     assert (q >= own.q_min - ROUNDING).all() and (q <= own.q_max + ROUNDING).all()
     assert np.abs(v[[0, -1]]).max() < 1e-8 and np.abs(a[[0, -1]]).max() < 1e-6
     assert q[0] == pytest.approx(np.asarray(task.start), abs=ROUNDING)
@@ -115,7 +113,7 @@ def test_limits_hold_between_the_nodes(method: str, objective: str) -> None:
 
 
 def test_a_time_scaled_motion_stays_on_its_line() -> None:
-    """Every control point, so every point; each a little further along."""
+    """All control points, hence all points, lie on the line in order."""
     for start, goal in random_moves(32, 4):
         points = spline(solver(start, goal, method="time_scaling").solve()).control_points
         displacement = goal - start
@@ -142,9 +140,7 @@ def test_a_deadline_that_has_passed_ends_the_attempt(method: str) -> None:
 
 
 def test_a_motion_is_solved_again_from_itself_with_its_knots_where_jerk_switches_now() -> None:
-    """Its goal has moved since: in fewer steps than from fits, to no more energy, within every
-    limit.
-    """
+    """After the goal moved: in fewer steps than from a fit, at no more energy, within limits."""
     steps = np.zeros(2, dtype=int)
     for start, goal in ((START, GOAL), *random_moves(3, 1)):
         own, moved = solver(start, goal + 0.02), solver(start, goal)
@@ -159,9 +155,7 @@ def test_a_motion_is_solved_again_from_itself_with_its_knots_where_jerk_switches
 
 
 def test_a_sole_candidate_is_refined_at_once() -> None:
-    """Its coarse motion is only a guess: the result is that of two solves, one after the other, and
-    within limits.
-    """
+    """The coarse motion is only a guess: the result is that of two solves, within limits."""
     at_once, twice = solver(START, GOAL, is_sole=True), solver(START, GOAL)
     found = spline(at_once.solve())
     coarse = spline(twice.solve())
@@ -191,9 +185,7 @@ def test_else_the_coarse_motion_is_checked(why: str, monkeypatch: pytest.MonkeyP
     ("readings", "refined"), [(25, False), (30, False), (34, False), (200, False), (1000, True)]
 )
 def test_on_a_slow_machine_a_checked_motion_comes_first(readings: int, refined: bool) -> None:
-    """Of the time that is left, a reading of the clock takes a share; coarse and refined motion
-    take 34 of them.
-    """
+    """Every reading of the clock takes a share of the time; both solves take 34 readings."""
     ticks = count()
     deadline = Deadline(2.0, clock=lambda: 2.0 * next(ticks) / readings)
     own = solver(START, GOAL, is_sole=True, deadline=deadline)
@@ -203,9 +195,7 @@ def test_on_a_slow_machine_a_checked_motion_comes_first(readings: int, refined: 
 
 
 def test_a_coarse_motion_that_collides_is_no_guess() -> None:
-    """Of this move it hits the arm itself: clearance constraints are added to it, as without a
-    refined motion.
-    """
+    """The coarse motion hits the arm itself: clearance constraints are added, as usual."""
     start, goal = list(random_moves(5, 7))[6]
     own, usual = (
         solver(start, goal, collisions=True, is_sole=is_sole) for is_sole in (True, False)
@@ -217,7 +207,7 @@ def test_a_coarse_motion_that_collides_is_no_guess() -> None:
 
 
 def slowly(speed: float, **given: object) -> FreeSpline:
-    """The solver of a move whose joints are limited to a speed [rad/s]."""
+    """Method of a move with joints limited to a speed [rad/s]."""
     own = solver(START, GOAL, **{"limits": limits(v_max=speed)} | given)
     assert isinstance(own, FreeSpline)
     return own
@@ -240,7 +230,7 @@ def test_a_slow_motion_has_its_first_knots_at_the_ramps_and_is_refined_from_itse
     "given", [{}, {"objective": "mechanical", "duration_max": 15.0}, {"limits": ROBOT.limits}]
 )
 def test_other_first_knots_are_evenly_spaced(given: dict[str, object]) -> None:
-    """At the robot's own limits of speed; and of least work, for which no time is too long."""
+    """At the speed limits of the robot, and for least work, which has no longest useful time."""
     own = slowly(0.1, **given)
     even = bool(np.ptp(np.diff(np.unique(spline(own.solve()).knots))) < 1e-9)
     assert even is bool(given)

@@ -1,6 +1,4 @@
-"""Motions among obstacles: they keep away, they cost no less than without, and what is far costs
-nothing.
-"""
+"""Clearance constraints: distance of motions to obstacles, cost, and gradients."""
 
 from dataclasses import replace
 from typing import Any
@@ -38,19 +36,21 @@ from tests.optimizer.moves import fixed, problem_with
 ROBOT = load_robot("ur5e")
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 GOAL = np.array([1.8, -1.1, 1.9, -2.4, -1.57, 0.4])
-# of the motion between the two without anything in the way: where the flange passes
-WAY = np.array([0.0, -0.57, 0.27])
-# replay, and where gradients are differenced [rad]; distances are smooth there to their own
-# curvature
-REPLAY, STEP, GRADIENT_TOLERANCE = 1e-4, 1e-6, 1e-4
-# a limit that binds is used up to the solver's own margins
+# point of the flange on the motion from HOME to GOAL without obstacles [m]
+WAYPOINT = np.array([0.0, -0.57, 0.27])
+# tolerance of replayed distances [m]
+REPLAY = 1e-4
+# step of joint positions in differences of distances, which are smooth there [rad]
+EPS = 1e-6
+# relative tolerance of gradients
+GRADIENT_TOLERANCE = 1e-4
+# share of an active limit that is used within the margins of the solver
 USED = 0.999
-# one whose peaks between the points of the program are repaired is tightened by one and a half
-# times their excess
+# the same after peaks between the path points were repaired by one and a half times their excess
 USED_AFTER_REPAIR = 0.997
-# above this a share is exact
+# ratio of a clearance above which it is exact
 COUNTED_SHARE = 1 - (COUNTED - RESERVE) / SCALE
-# energies of the same motion solved apart
+# relative tolerance of energies of one motion solved twice
 SAME_ENERGY = 1e-3
 
 
@@ -61,7 +61,8 @@ def at(*xyz: float) -> Array:
 
 
 def low_post(margin: float = 0.0) -> Obstacle:
-    return Obstacle("post", Box(np.array([0.08, 0.08, 0.25])), at(WAY[0], WAY[1], 0.125), margin)
+    shape = Box(np.array([0.08, 0.08, 0.25]))
+    return Obstacle("post", shape, at(WAYPOINT[0], WAYPOINT[1], 0.125), margin)
 
 
 POST = Scene((low_post(),))
@@ -152,8 +153,8 @@ def test_gradients_of_the_shares_are_those_of_finite_differences() -> None:
     near = (found.value > COUNTED_SHARE) & (found.value < 1 + 0.01 / SCALE)
     assert near.sum() > 10
     for j in range(6):
-        d = STEP * np.eye(6)[j]
-        by_q = (path.linearised(q + d, v).value - path.linearised(q - d, v).value) / (2 * STEP)
+        d = EPS * np.eye(6)[j]
+        by_q = (path.linearised(q + d, v).value - path.linearised(q - d, v).value) / (2 * EPS)
         np.testing.assert_allclose(
             found.by_q[near][:, j], by_q[near], atol=GRADIENT_TOLERANCE / SCALE
         )
@@ -171,8 +172,7 @@ def test_a_share_is_one_a_reserve_beyond_the_margin() -> None:
         near = expected > counted
         assert 2 < near.sum() < near.size
         np.testing.assert_allclose(shares[near], expected[near])
-        # of the others only a bound is known: too low for the solver to look at them, or for a
-        # motion to be repaired
+        # the others have a lower bound alone, too low to become active
         assert (shares[~near] < low).all() and (shares >= expected - 1e-12).all()
 
 
