@@ -42,7 +42,7 @@ class ToolPathMotionSettings:
     """Largest number of spans of the second time scaling."""
 
     further_spans: int = 12
-    """Spans that the motion has more than its path."""
+    """Spans of the motion in addition to the spans of its path."""
 
     most_first_spans: int = 67
     """Largest number of spans of the motion at first."""
@@ -264,7 +264,7 @@ class ToolPathMotion(Method):
         return with_effort(min(results, key=lambda result: self.cost_of(result.spline)), results)
 
     def _intervals(self) -> list[DurationInterval]:
-        """Intervals of durations that are tried.
+        """Intervals of durations to solve in.
 
         Mechanical work falls with the duration, but its smoothed corners do not: the longest
         duration is tried too.

@@ -161,7 +161,11 @@ class WorkingSetQP:
     ) -> QPStep:
         """The step with its multipliers; active constraints are kept for the next QP."""
         mu = np.maximum(multipliers, 0.0)
-        pull = multipliers @ np.concatenate(rows.gradients) if self.p.held else np.zeros(self.n)
+        pull = (
+            multipliers @ np.concatenate(rows.gradients)
+            if self.p.has_equations
+            else np.zeros(self.n)
+        )
         (kinematic, places), (bounded, sides), (near, passed) = (
             each.joined() for each in (rows.rates, rows.bounds, rows.path)
         )
