@@ -11,12 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array, Limits
-from joulepath.optimizer.motion.spline import (
-    Spline,
-    least_time_scale,
-    sample,
-    spline_of,
-)
+from joulepath.optimizer.motion.spline import Spline, least_time_scale, sample, spline_of
 from joulepath.optimizer.solve.methods.limit_repair import (
     LIMIT_REPAIR,
     initial_bounds,

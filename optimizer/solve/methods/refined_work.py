@@ -15,10 +15,7 @@ from joulepath.optimizer.dynamics.plant import SHARPER_WIDTHS
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.spline import Spline, span_peak_rates, spline_of
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.solve.methods.limit_repair import (
-    LIMIT_REPAIR,
-    repair_factors,
-)
+from joulepath.optimizer.solve.methods.limit_repair import LIMIT_REPAIR, repair_factors
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from joulepath.optimizer.solve.nlp.interior_point import InteriorPoint
 from joulepath.optimizer.solve.nlp.interior_state import Interior

@@ -22,16 +22,10 @@ from scipy.linalg import solve
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.motion import bspline
-from joulepath.optimizer.motion.spline import (
-    Spline,
-    lasting,
-    spline_of,
-)
+from joulepath.optimizer.motion.spline import Spline, lasting, spline_of
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval
-from joulepath.optimizer.solve.methods.limit_repair import (
-    LIMIT_REPAIR,
-)
+from joulepath.optimizer.solve.methods.limit_repair import LIMIT_REPAIR
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
-from joulepath.optimizer.solve.nlp.active_path_constraints import (
-    Index,
-    PathConstraintValues,
-)
-from joulepath.optimizer.solve.nlp.nonlinear_program import (
-    Linearisation,
-)
+from joulepath.optimizer.solve.nlp.active_path_constraints import Index, PathConstraintValues
+from joulepath.optimizer.solve.nlp.nonlinear_program import Linearisation
 from joulepath.optimizer.solve.nlp.qp_rows import Places
 
 

@@ -15,18 +15,9 @@ from joulepath.optimizer.solve.nlp.nonlinear_program import FEASIBILITY, Nonline
 from joulepath.optimizer.solve.nlp.passing import Passes, Passing
 from joulepath.optimizer.solve.nlp.qp_data import QPInputs
 from joulepath.optimizer.solve.nlp.sliding_ends import Slide, SlidingEnds
-from joulepath.optimizer.solve.nlp.sqp_state import (
-    SQP,
-    Iterate,
-    Multipliers,
-    SqpResult,
-    SqpStatus,
-)
+from joulepath.optimizer.solve.nlp.sqp_state import SQP, Iterate, Multipliers, SqpResult, SqpStatus
 from joulepath.optimizer.solve.nlp.whitening import whitened
-from joulepath.optimizer.solve.nlp.working_set_qp import (
-    WORKING_SET,
-    WorkingSetQP,
-)
+from joulepath.optimizer.solve.nlp.working_set_qp import WORKING_SET, WorkingSetQP
 
 
 class _Solver:

@@ -14,14 +14,8 @@ import numpy as np
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.deadline import checkpoint
-from joulepath.optimizer.solve.nlp.active_path_constraints import (
-    Index,
-    NearPathConstraints,
-)
-from joulepath.optimizer.solve.nlp.nonlinear_program import (
-    FEASIBILITY,
-    NonlinearProgram,
-)
+from joulepath.optimizer.solve.nlp.active_path_constraints import Index, NearPathConstraints
+from joulepath.optimizer.solve.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
 from joulepath.optimizer.solve.nlp.qp_data import (
     QPInputs,
     QPStep,
