@@ -153,10 +153,8 @@ class FreeSpline(SplineMethod):
         coarse = self.improve(replace(guess, unchecked=True))
         if coarse.spline is None:
             return [coarse], guess
-        points, duration = (
-            self.coordinates.from_joints(coarse.spline.control_points),
-            coarse.spline.duration,
-        )
+        points = self.coordinates.from_joints(coarse.spline.control_points)
+        duration = coarse.spline.duration
         found = replace(guess, points=points, duration=duration, nearly_feasible=True)
         late = self.deadline.left < FREE_SPLINE.time_multiple * (left - self.deadline.left)
         if late or self.prepared.surroundings.worst_violation(coarse.spline) is not None:
@@ -205,10 +203,8 @@ class FreeSpline(SplineMethod):
 
     def _polished(self, spline: Spline) -> SolveResult:
         """Finish a coarse solve with more control points than `may_refine` accepts."""
-        space, points = (
-            Basis.of(spline.knots / spline.duration),
-            self.coordinates.from_joints(spline.control_points),
-        )
+        space = Basis.of(spline.knots / spline.duration)
+        points = self.coordinates.from_joints(spline.control_points)
         return self.improve(
             Guess(space, points, spline.duration, collision_free=True, progress=self._progress)
         )

@@ -84,10 +84,8 @@ def refine_work(
                 SolveStatus.FAILED, SolveReason.NOT_CONVERGED, at.iterations, solves
             ), points
         spline = spline_of(basis, points, duration)
-        spans, torque = (
-            span_peak_rates(spline) / prepared.problem.arm.active_limits.rates[:, None],
-            np.ones(nq),
-        )
+        spans = span_peak_rates(spline) / prepared.problem.arm.active_limits.rates[:, None]
+        torque = np.ones(nq)
         if (spans <= within).all():
             factors = repair_factors(prepared, spline, (np.zeros(nq), np.zeros(nq)))
             if factors is None:

@@ -135,10 +135,8 @@ class WorkingSetQP:
                 break
             if self._adds_bounds(rows, bounds, x):
                 continue
-            adds_rates, (adds_path, path) = (
-                self._adds_rates(rows, at, x),
-                self._adds_path(rows, at, path, x),
-            )
+            adds_rates = self._adds_rates(rows, at, x)
+            (adds_path, path) = self._adds_path(rows, at, path, x)
             if not (adds_rates or adds_path):
                 break
         x = shortened(x, bounds, WORKING_SET.bound_tolerance)
