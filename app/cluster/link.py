@@ -177,8 +177,7 @@ class Cluster:
         if found != version():
             raise _Unsuitable(
                 "the scheduler has another version of this package: install the same one on all "
-                "machines "
-                f"(there {found}, here {version()})"
+                f"machines (there {found}, here {version()})"
             )
 
     async def _watch(self, client: Client) -> None:

@@ -14,8 +14,8 @@ from joulepath.optimizer.exceptions import InvalidProblem
 def own_times() -> InvalidProblem:
     """The error for times that are given beside a log."""
     message = (
-        "A CSV file with a column of times has its own times: leave out time_per_segment "
-        "and interpolation."
+        "A CSV file with a column of times has its own times: leave out time_per_segment and "
+        "interpolation."
     )
     return InvalidProblem("time_per_segment", message)
 

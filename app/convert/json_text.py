@@ -17,8 +17,7 @@ PLAIN_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
 """A name that an answer may repeat: nothing but letters, digits, `_` and `-`."""
 _VALUE = (
     "a value is expected here: a number, a text in double quotes, or true, false or null in small "
-    "letters. JSON has no "
-    "comments"
+    "letters. JSON has no comments"
 )
 _REMEDIES = {
     "trailing comma": "delete the comma before the closing bracket",

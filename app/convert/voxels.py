@@ -29,8 +29,7 @@ def _from_bits(bits: VoxelBits) -> npt.NDArray[np.int64]:
         raise InvalidProblem(
             "bits.data",
             f"bits.data holds {len(data)} bytes, but {count} cells need {-(-count // 8)}: one bit "
-            "per cell, eight to a "
-            "byte.",
+            "per cell, eight to a byte.",
         )
     numbers = np.flatnonzero(
         np.unpackbits(np.frombuffer(data, dtype=np.uint8), count=count, bitorder="little")

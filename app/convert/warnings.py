@@ -20,13 +20,12 @@ LITTLE_LEFT = 0.9
 """Part of a torque limit above which a plan leaves a controller too little."""
 MISSED = (
     "The inverse kinematics of this arm may have missed arm configurations: the answer is the best "
-    "of those found, its "
-    "status is not `optimal`, and its lower bound covers those that may be missing."
+    "of those found, its status is not `optimal`, and its lower bound covers those that may be "
+    "missing."
 )
 DIVIDED = (
     "{} is where the path is divided, at {:.1%} of its length: no arm configuration follows it "
-    "whole. `status` and "
-    "`lower_bound` are for this division."
+    "whole. `status` and `lower_bound` are for this division."
 )
 STAND_INS = {
     TOOL: f"a rod of {1e3 * StandInSettings.tool_radius:g} mm radius from the flange to the TCP",
@@ -82,8 +81,8 @@ def _of_run(what: str, planned: PlannedMotion, found: Replay, run: Outcome) -> l
         if time > 0:
             advice = ": plan with a tighter limits.torque." if ratio > LITTLE_LEFT else "."
             said.append(
-                f"{what}, {joint} asks for more than its torque limit for {time:.4g} s. "
-                f"It is planned at {ratio:.1%} of this limit{advice}"
+                f"{what}, {joint} asks for more than its torque limit for {time:.4g} s. It is "
+                f"planned at {ratio:.1%} of this limit{advice}"
             )
     if run.collides and run.contact is not None:
         first, second = run.contact.pair
@@ -99,8 +98,8 @@ def _close(pair: tuple[str, str], distance: float, time: float, proven: str) -> 
     # the proven distance may be below CLOSE, and the sampled one a little above it
     how = f"{_mm(distance)} mm apart" if distance > 0 else f"overlapping by {_mm(-distance)} mm"
     return (
-        f"Closer than {CLOSE * 1e3:g} mm: {first} and {second} are {how} at {time:.3f} "
-        f"s{proven}. {ADVICE}"
+        f"Closer than {CLOSE * 1e3:g} mm: {first} and {second} are {how} at {time:.3f} s{proven}. "
+        f"{ADVICE}"
     )
 
 
@@ -108,10 +107,8 @@ def _unmodelled(contact: Clearance) -> str:
     obstacle, carried = contact.pair
     return (
         f"The {carried} has no shape, and nothing keeps it out of the obstacles: "
-        f"{STAND_INS[carried]} would be "
-        f"{-1e3 * contact.sampled:.0f} mm deep in {obstacle} at {contact.time:.3f} s. Give its "
-        "shape in "
-        f"`{SHAPES[carried]}`."
+        f"{STAND_INS[carried]} would be {-1e3 * contact.sampled:.0f} mm deep in {obstacle} at "
+        f"{contact.time:.3f} s. Give its shape in `{SHAPES[carried]}`."
     )
 
 

@@ -18,8 +18,7 @@ class Unauthenticated(ServiceError):
     title = "API key needed"
     remedy = (
         "Send the key in the header `Authorization: Bearer KEY`. The operator of the service makes "
-        "keys with "
-        "`joulepath keys add`. A key that was removed is no longer valid."
+        "keys with `joulepath keys add`. A key that was removed is no longer valid."
     )
     detail = "This service needs an API key: send it in the header Authorization, as `Bearer KEY`."
 
@@ -48,8 +47,8 @@ class RoleTooLow(ServiceError):
 
     def __str__(self) -> str:
         return (
-            f"Your API key has the role {self.role}, and this needs {self.needed}: use a key "
-            "of that role."
+            f"Your API key has the role {self.role}, and this needs {self.needed}: use a key of "
+            "that role."
         )
 
 
@@ -69,8 +68,8 @@ class NotOwner(ServiceError):
     def __str__(self) -> str:
         whose = "nobody with a key" if self.owner is None else f"another client, {self.owner},"
         return (
-            f"This was created by {whose} and only its owner or an admin may change it: use "
-            "such a key."
+            f"This was created by {whose} and only its owner or an admin may change it: use such a "
+            "key."
         )
 
 
@@ -83,13 +82,12 @@ class CrossSite(ServiceError):
     title = "Cross-site request"
     remedy = (
         "Call the service from its own pages or without a browser. The operator can allow the "
-        "origin of another page "
-        "with `JOULEPATH_CORS_ORIGINS`. A reverse proxy must pass on the header `Host`."
+        "origin of another page with `JOULEPATH_CORS_ORIGINS`. A reverse proxy must pass on the "
+        "header `Host`."
     )
     detail = (
         "A web page of another site sent this request: call the service from its own pages or "
-        "without a browser, or "
-        "have the page's origin added to JOULEPATH_CORS_ORIGINS."
+        "without a browser, or have the page's origin added to JOULEPATH_CORS_ORIGINS."
     )
 
 
@@ -106,6 +104,5 @@ class WrongHost(ServiceError):
     )
     detail = (
         "The name in the header Host is none of this service: use its address, or have the name "
-        "added to "
-        "JOULEPATH_ALLOWED_HOSTS."
+        "added to JOULEPATH_ALLOWED_HOSTS."
     )

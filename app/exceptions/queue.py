@@ -26,8 +26,8 @@ class TooManyBytes(Busy):
     """Bodies and answers in flight have as many bytes as the service may hold."""
 
     detail = (
-        "The service holds as many bytes of requests and answers as it may: try again after "
-        "a few seconds."
+        "The service holds as many bytes of requests and answers as it may: try again after a few "
+        "seconds."
     )
 
 
@@ -35,8 +35,8 @@ class TooManyWaiting(Busy):
     """Too many requests of jobs wait."""
 
     detail = (
-        "Too many requests of jobs wait: send this job again when others have ended, or send "
-        "a smaller one."
+        "Too many requests of jobs wait: send this job again when others have ended, or send a "
+        "smaller one."
     )
 
 
@@ -48,13 +48,11 @@ class TooManyRequests(Busy):
     title = "Too many requests"
     remedy = (
         "Wait for your answers, read them, and send fewer requests at a time. Try again after the "
-        "time [s] in the "
-        "header `Retry-After`."
+        "time [s] in the header `Retry-After`."
     )
     detail = (
         "You have as many requests in flight as one client may: wait for their answers before you "
-        "send more, or send "
-        "them one after another."
+        "send more, or send them one after another."
     )
 
 
@@ -63,8 +61,8 @@ class TooManyConnectionsOfClient(TooManyRequests):
 
     detail = (
         "You have as many connections, or as many requests ahead on one of them, as one client "
-        "may: close those that "
-        "you do not need, and use one for several requests, one after another."
+        "may: close those that you do not need, and use one for several requests, one after "
+        "another."
     )
 
 
@@ -73,8 +71,7 @@ class TooManyBytesOfClient(TooManyRequests):
 
     detail = (
         "The bodies and answers of your requests in flight have as many bytes as one client may: "
-        "wait for their "
-        "answers, read them, and send fewer at a time."
+        "wait for their answers, read them, and send fewer at a time."
     )
 
 
@@ -89,10 +86,8 @@ class ClusterUnavailable(ServiceError):
     remedy = "Try again after the time [s] in the header `Retry-After`."
     detail = (
         "The scheduler of the cluster does not answer, or does not have the same version of "
-        "joulepath as this service, "
-        "whose log says which: jobs wait until it does. Requests that are answered at once are "
-        "computed by this "
-        "service meanwhile."
+        "joulepath as this service, whose log says which: jobs wait until it does. Requests that "
+        "are answered at once are computed by this service meanwhile."
     )
 
 
@@ -114,8 +109,8 @@ class ShuttingDown(ServiceError):
     retry_after = 5
     title = "Shutting down"
     remedy = (
-        "Send it again after the time [s] in the header `Retry-After`: another instance, or "
-        "the restarted one, answers."
+        "Send it again after the time [s] in the header `Retry-After`: another instance, or the "
+        "restarted one, answers."
     )
     detail = "The service is stopping: send the request again."
 
@@ -129,14 +124,12 @@ class WorkerLost(ServiceError):
     title = "Worker lost"
     remedy = (
         "Try again after the time [s] in the header `Retry-After`; if that does not help, make the "
-        "request smaller, or "
-        "report it with the value of `instance`."
+        "request smaller, or report it with the value of `instance`."
     )
     detail = (
         "Two processes that worked on this request died, for example because the machine ran out "
-        "of memory: try again "
-        "after some seconds, make the request smaller if that does not help, or report it with the "
-        "id in `instance`."
+        "of memory: try again after some seconds, make the request smaller if that does not help, "
+        "or report it with the id in `instance`."
     )
 
 
@@ -148,13 +141,11 @@ class WorkerDied(ServiceError):
     title = "Worker died"
     remedy = (
         "Make the request smaller, and send it again; if that does not help, please report it with "
-        "the value of "
-        "`instance`."
+        "the value of `instance`."
     )
     detail = (
         "Each process that worked on this request died: make the request smaller, or report it "
-        "with the id in "
-        "`instance`."
+        "with the id in `instance`."
     )
 
 

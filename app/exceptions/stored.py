@@ -63,8 +63,8 @@ class PartsNeeded(UnknownAnswer):
     """An export refers to kept answers that are not at hand."""
 
     detail = (
-        "The answer refers to kept answers that are not at hand: export it where the service "
-        "keeps them."
+        "The answer refers to kept answers that are not at hand: export it where the service keeps "
+        "them."
     )
 
     names: Annotated[list[str], Internal]
@@ -123,8 +123,8 @@ class JobNotCancellable(ServiceError):
     title = "Job not cancellable"
     remedy = "Its answers stay until it is deleted with `DELETE /jobs/{id}`."
     detail = (
-        "The job has ended: there is nothing left to cancel. DELETE /jobs/{id} deletes it "
-        "with its answers."
+        "The job has ended: there is nothing left to cancel. DELETE /jobs/{id} deletes it with its "
+        "answers."
     )
 
 
@@ -135,12 +135,11 @@ class RobotExists(ServiceError):
     title = "Robot exists"
     remedy = (
         "Use another name, or `PUT /robots/{name}` to replace a robot that was added. The robots "
-        "that come with the "
-        "service can be neither replaced nor deleted."
+        "that come with the service can be neither replaced nor deleted."
     )
     detail = (
-        "A robot has this name: use another name, or replace the robot (`PUT`, on the "
-        "command line `--replace`)."
+        "A robot has this name: use another name, or replace the robot (`PUT`, on the command line "
+        "`--replace`)."
     )
 
 
@@ -149,8 +148,7 @@ class BundledRobot(RobotExists):
 
     detail = (
         "This robot comes with the service and can be neither replaced nor deleted: only robots "
-        "that were added can. "
-        "Give a robot of your own another name."
+        "that were added can. Give a robot of your own another name."
     )
 
 
@@ -170,8 +168,7 @@ class NoMeshes(ServiceError):
     title = "No meshes"
     remedy = (
         "Those of ur3e and ur5e come with `pip install 'joulepath[meshes]'`. The capsules of `GET "
-        "/robots/{name}` show "
-        "every robot."
+        "/robots/{name}` show every robot."
     )
     detail = "No meshes of this robot are installed: the extra `meshes` has those of ur3e and ur5e."
 
@@ -196,8 +193,8 @@ class TooManyLogs(ServiceError):
     status = 409
     title = "Too many logs"
     remedy = (
-        "Delete logs that are not needed with `DELETE /logs/{id}`; what was identified from "
-        "them stays."
+        "Delete logs that are not needed with `DELETE /logs/{id}`; what was identified from them "
+        "stays."
     )
 
     limit: Annotated[int, Unit("byte")]
@@ -205,8 +202,8 @@ class TooManyLogs(ServiceError):
 
     def __str__(self) -> str:
         return (
-            f"The stored logs would exceed {self.limit} bytes, compressed: delete some that "
-            "are not needed."
+            f"The stored logs would exceed {self.limit} bytes, compressed: delete some that are "
+            "not needed."
         )
 
 
@@ -262,6 +259,6 @@ class KeyReused(ServiceError):
     title = "Idempotency-Key reused"
     remedy = "Use a new key for each new request."
     detail = (
-        "This Idempotency-Key was already used for a different request: use a new key for "
-        "each new request."
+        "This Idempotency-Key was already used for a different request: use a new key for each new "
+        "request."
     )

@@ -45,8 +45,8 @@ class HeadTooLarge(ServiceError):
     status = 431
     title = "Request head too large"
     remedy = (
-        "Requests to this service need few headers: leave out cookies and headers that it "
-        "does not use."
+        "Requests to this service need few headers: leave out cookies and headers that it does not "
+        "use."
     )
 
     limit: Annotated[int, Unit("byte"), Internal]
@@ -74,8 +74,7 @@ class RequestTimeout(ServiceError):
     def __str__(self) -> str:
         return (
             f"The request did not arrive whole within {self.limit:g} s: send it again, over a "
-            "faster connection or "
-            "with a smaller body."
+            "faster connection or with a smaller body."
         )
 
 
@@ -86,17 +85,14 @@ class UnsupportedMediaType(ServiceError):
     title = "Unsupported media type"
     remedy = (
         "JSON is `application/json`; the CSV of `POST /evaluate` and `POST /logs` is `text/csv`. "
-        "`text/plain`, a form, "
-        "and no header at all are read as JSON, too, where a path takes JSON. The body is the "
-        "document itself: "
-        "`curl --data-binary @file`, not `curl -F file=@file`."
+        "`text/plain`, a form, and no header at all are read as JSON, too, where a path takes "
+        "JSON. The body is the document itself: `curl --data-binary @file`, not `curl -F "
+        "file=@file`."
     )
     detail = (
         "The header Content-Type declares something else than this path takes: send JSON as "
-        "application/json, and to "
-        "POST /evaluate also CSV as text/csv, to POST /logs CSV only. The body is the document "
-        "itself, not a form with "
-        "a file."
+        "application/json, and to POST /evaluate also CSV as text/csv, to POST /logs CSV only. The "
+        "body is the document itself, not a form with a file."
     )
 
 
@@ -111,8 +107,8 @@ class UnsupportedCoding(ServiceError):
         "Pack the body with `gzip`, `deflate` or `zstd`, or send it as it is, without this header."
     )
     detail = (
-        "The header Content-Encoding names something else than gzip, deflate or zstd: use "
-        "one of them, or none."
+        "The header Content-Encoding names something else than gzip, deflate or zstd: use one of "
+        "them, or none."
     )
 
 
@@ -126,8 +122,7 @@ class MalformedHttp(ServiceError):
     remedy = "Speak HTTP to this port, or HTTPS to the proxy before it."
     detail = (
         "What arrived is no HTTP/1.1 request: check the address and that the client speaks HTTP, "
-        "not HTTPS, to this "
-        "port, and the request line, the headers and the chunks of the body."
+        "not HTTPS, to this port, and the request line, the headers and the chunks of the body."
     )
 
 

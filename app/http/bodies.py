@@ -23,8 +23,8 @@ from joulepath.app.http.bytes_in_flight import Held
 from joulepath.app.settings import Settings
 
 _DAMAGED = (
-    "The body is not complete or not what its `Content-Encoding` says: send it again, or "
-    "leave the header out"
+    "The body is not complete or not what its `Content-Encoding` says: send it again, or leave the "
+    "header out"
 )
 
 

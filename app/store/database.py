@@ -45,10 +45,8 @@ class OtherVersion(CommandError):
     def __init__(self, revision: str, url: URL) -> None:
         super().__init__(
             f"Another version of the service made the tables of {url.render_as_string()} (revision "
-            f"{revision}), and "
-            "this one cannot migrate them: start that version, or move the database away (or set "
-            "another "
-            "JOULEPATH_DATABASE_URL), and a new one is made."
+            f"{revision}), and this one cannot migrate them: start that version, or move the "
+            "database away (or set another JOULEPATH_DATABASE_URL), and a new one is made."
         )
 
 

@@ -94,8 +94,7 @@ class Store:
                 self._told = error.cause
                 logger.error(
                     "the database cannot be used: requests that need studies or stored answers "
-                    "return 503 until it "
-                    "can; all other requests work",
+                    "return 503 until it can; all other requests work",
                     extra={"database": str(self), "cause": error.cause},
                 )
         else:

@@ -164,8 +164,7 @@ def _orientation(base: Base, here: Fields, tilted: list[Fields]) -> Iterator[Pro
     yield Proposal(
         "orientation",
         "Tilt the tool by 10 degrees at the goal, about its x or y axis, in the direction that "
-        "needs the least energy"
-        " (four directions compared).",
+        "needs the least energy (four directions compared).",
         base.request | {"goal": {"any_of": tilted}},
     )
 

@@ -87,8 +87,8 @@ def _kinematics(
     description: Description, chain: Chain, upright: UprightChain, links: list[str]
 ) -> dict[str, Any]:
     frame = (
-        f"{_PLACEMENT} of each joint's frame in that of the link before, turned so that the "
-        "joint turns about z."
+        f"{_PLACEMENT} of each joint's frame in that of the link before, turned so that the joint "
+        "turns about z."
     )
     figures = {
         "joint_names": stated(description, list(chain.joints), "1", "From base to flange."),
@@ -166,8 +166,7 @@ def _check_body(link: str, body: pin.Inertia, length: float, warnings: list[str]
         raise InvalidArm(
             "urdf",
             f"Link {link!r} has an impossible inertia: the principal moment {moments[2]:.3g} kg·m² "
-            "is more than the "
-            f"sum of the others, {moments[0] + moments[1]:.3g} kg·m².",
+            f"is more than the sum of the others, {moments[0] + moments[1]:.3g} kg·m².",
         )
     if moments[2] > 0 and excess > rules.ROUNDED:
         warnings.append(
@@ -178,14 +177,13 @@ def _check_body(link: str, body: pin.Inertia, length: float, warnings: list[str]
     if gyration < least:
         warnings.append(
             f"Link {link!r}: its radius of gyration of {gyration:.3g} m is less than {least:.3g} "
-            "m, 0.7 of that of a "
-            "rod to the next joint."
+            "m, 0.7 of that of a rod to the next joint."
         )
 
 
 _SIDE = (
-    "What the torque limit is for: the motor, friction and rotor included, or the link, "
-    "without them."
+    "What the torque limit is for: the motor, friction and rotor included, or the link, without "
+    "them."
 )
 
 

@@ -130,8 +130,7 @@ def replaced_in(robot: str, figures: dict[str, Any], document: Any) -> dict[str,
         else:
             raise InvalidFigures(
                 section,
-                "differs from the robot's own. Identified figures may replace only "
-                "friction_laws, "
+                "differs from the robot's own. Identified figures may replace only friction_laws, "
                 f"{', '.join(REPLACEABLE)}.",
             )
     whole = merged(figures, replaced)
@@ -279,10 +278,8 @@ def _uncertainty(document: dict[str, Any], figures: dict[str, Any], nq: int) -> 
             raise InvalidFigures(
                 f"covariance.names.{k}",
                 "is no parameter of these figures: use paths like friction_laws.LAW.coulomb.0, "
-                "drives.copper.2 or "
-                f"electronics.idle_power, of {', '.join((*FRICTION, *DRIVES))} and idle_power, or "
-                "inertials.m.1 with "
-                f"one of {', '.join(LINKS)}.",
+                f"drives.copper.2 or electronics.idle_power, of {', '.join((*FRICTION, *DRIVES))} "
+                f"and idle_power, or inertials.m.1 with one of {', '.join(LINKS)}.",
             )
     matrix = numbers("covariance.matrix", given["matrix"], (len(names), len(names)))
     scale = float(np.abs(matrix).max())

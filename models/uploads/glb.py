@@ -47,8 +47,7 @@ def check_glb(content: bytes, most: MeshSize) -> None:
     ):
         raise UnreadableFile(
             "is no plain glb file (accessors without data, repeated or deeply nested nodes, too "
-            "many entries): export "
-            "the mesh alone, without compression, animation or materials."
+            "many entries): export the mesh alone, without compression, animation or materials."
         )
 
 

@@ -82,8 +82,8 @@ def _check_header(columns: list[str], nq: int) -> None:
         f"t,q1,…,q{nq}, then v1,…,v{nq} and a1,…,a{nq} if they were logged, or q1,…,q{nq} alone"
     )
     wanted += (
-        ", or those of a log as POST /logs takes it. Separate columns by commas, semicolons "
-        "or tabs."
+        ", or those of a log as POST /logs takes it. Separate columns by commas, semicolons or "
+        "tabs."
     )
     if all(_NUMBER.match(name) for name in columns):
         raise InvalidTable(

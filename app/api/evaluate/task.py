@@ -211,8 +211,8 @@ class EvaluateTask:
         """
         if asked.deadline is not None and asked.deadline > self.longest:
             msg = (
-                f"deadline must be at most {self.longest:g} s: the operator of the service has "
-                "set this."
+                f"deadline must be at most {self.longest:g} s: the operator of the service has set "
+                "this."
             )
             raise InvalidRequest([{"loc": [where, "deadline"], "msg": msg}])
         return began.earlier_by(-(asked.deadline or self.longest))

@@ -43,8 +43,8 @@ class ExcitationRequest(ArmRequest):
 
     parameters: Annotated[list[Part], Field(min_length=1, max_length=3)] = described(
         "Parameters that the motion is to tell apart: `inertials` (base parameters of the links), "
-        "`rotor` (rotor "
-        "inertias), `friction` (Coulomb, viscous, offset, and load where a joint carries enough).",
+        "`rotor` (rotor inertias), `friction` (Coulomb, viscous, offset, and load where a joint "
+        "carries enough).",
         None,
         ["rotor", "friction"],
         default=_ALL,
@@ -53,8 +53,7 @@ class ExcitationRequest(ArmRequest):
     harmonics: int = described("Number of harmonics.", "1", 3, default=5, ge=2, le=10)
     criterion: Criterion = described(
         "`d`: the determinant of the information is maximised. `condition`: the condition of the "
-        "columns, scaled to "
-        "one length, is lowered.",
+        "columns, scaled to one length, is lowered.",
         None,
         "d",
         default="d",
@@ -101,8 +100,7 @@ class ExcitationRequest(ArmRequest):
     )
     deadline: float = described(
         "Wall time from the arrival of the request, including the wait for a worker. When it "
-        "passes, the service "
-        "returns the best certified motion found so far.",
+        "passes, the service returns the best certified motion found so far.",
         "s",
         5.0,
         default=60.0,

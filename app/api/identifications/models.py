@@ -174,8 +174,8 @@ class IdentificationSummary(Response):
     )
     figures: str | None = described(
         "Id of the figures that were found: every request about a motion takes it as `figures`. "
-        "Null before the end, "
-        "where the service has no room for more figures, and after they were deleted.",
+        "Null before the end, where the service has no room for more figures, and after they were "
+        "deleted.",
         None,
         FIGURES_ID,
     )
@@ -260,8 +260,7 @@ class ResidualCurves(Response):
     id: str = described("Id of the identification.", None, IDENTIFICATION_ID)
     moves: list[ResidualMove] | None = part(
         "All moves, those that are held out last: some 3000 instants in all, evenly among the "
-        "rows. Null before it is "
-        "done, and for identifications of an earlier version."
+        "rows. Null before it is done, and for identifications of an earlier version."
     )
 
 
@@ -284,10 +283,8 @@ class IdentificationResult(Response):
     robot: str = described("Name of the robot.", None, "ur5e")
     document: dict[str, Any] = described(
         "The identified figures, which `PUT /figures` of another server takes, too: in the form of "
-        "the robot's own, "
-        "with value, unit, source, trust and `sd`; `covariance`, "
-        "`session_sd` (relative, of friction from day to day) and `move_sd` (W, of the mean power "
-        "of a move).",
+        "the robot's own, with value, unit, source, trust and `sd`; `covariance`, `session_sd` "
+        "(relative, of friction from day to day) and `move_sd` (W, of the mean power of a move).",
         None,
         {"robot": "ur5e", "electronics": {"idle_power": {"value": 36.4, "unit": "W", "sd": 0.3}}},
     )

@@ -54,8 +54,7 @@ class IdentifyRequest(Request):
     logs: LogIds = described("Ids of logs, all of one robot.", None, [LOG_ID])
     validate_: LogIds | Fraction | Literal["moves"] = described(
         "What the figures are validated on, which no fit sees: other logs, a fraction of the "
-        "moves, or `moves`: each "
-        "motion in its turn. Moves along the same motion stay together.",
+        "moves, or `moves`: each motion in its turn. Moves along the same motion stay together.",
         None,
         {"fraction": 0.3},
         default=Fraction(),
@@ -63,19 +62,16 @@ class IdentifyRequest(Request):
     )
     fit: Annotated[list[Target], Field(min_length=1, max_length=5)] = described(
         "What is found. Power is added by itself where the logs have it; asking for it refuses "
-        "logs without. "
-        "`payload`: mass and centre of mass of what the last of `logs` carried and the others did "
-        "not; friction and "
-        "rotors are found with it.",
+        "logs without. `payload`: mass and centre of mass of what the last of `logs` carried and "
+        "the others did not; friction and rotors are found with it.",
         None,
         ["friction", "rotor"],
         default=["friction", "rotor"],
     )
     method: Method = described(
         "How it is found. `automatic`: friction and rotors with the robot's own links where the "
-        "logs "
-        "have currents or torques, and power where they have it. The others are methods of the "
-        "literature, each for its own kind of log: one that does not fit is "
+        "logs have currents or torques, and power where they have it. The others are methods of "
+        "the literature, each for its own kind of log: one that does not fit is "
         "`method-not-applicable`.",
         None,
         "automatic",

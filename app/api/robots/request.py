@@ -62,8 +62,7 @@ class OwnCollision(Request):
 
     capsules: dict[Named, Annotated[list[Capsule], Field(max_length=50)]] | None = described(
         "Capsules by the name of a link: [x1, y1, z1, x2, y2, z2, radius], both ends of the axis "
-        "in the link's URDF "
-        "frame.",
+        "in the link's URDF frame.",
         "m",
         {"forearm": [[0.0, 0.0, 0.05, 0.0, 0.0, 0.3, 0.05]]},
         default=None,
@@ -96,8 +95,7 @@ class OwnArm(Request):
 
     urdf: str = described(
         "Text of the URDF: a tree of links. Of its joints, those from `base` to `tip` move; they "
-        "must be revolute or "
-        "continuous. All else that hangs on them must be fixed, or `locked`.",
+        "must be revolute or continuous. All else that hangs on them must be fixed, or `locked`.",
         None,
         URDF,
         min_length=1,
@@ -139,9 +137,8 @@ class OwnArm(Request):
     )
     torque_side: Literal["motor", "link"] | None = described(
         "What the limits on the torque are for: the `motor` behind its gear, friction and rotor "
-        "included; or the "
-        "`link`, without them, as with torque sensors. Null: the motor, nearly always the tighter "
-        "reading.",
+        "included; or the `link`, without them, as with torque sensors. Null: the motor, nearly "
+        "always the tighter reading.",
         None,
         "link",
         default=None,
@@ -178,8 +175,7 @@ class OwnArm(Request):
     )
     meshes: str | None = described(
         "Mesh files (STL, OBJ) that the URDF names, as a zip in base64. Null: a link whose shape "
-        "is a mesh has a "
-        "capsule from joint to joint.",
+        "is a mesh has a capsule from joint to joint.",
         None,
         "UEsFBgAAAAAAAAAAAAAAAAAAAAAAAA==",
         default=None,
