@@ -10,7 +10,7 @@ from pydantic import Field
 from joulepath.app.schemas.common import NO_CONTROLS, PLAIN, Request, described
 from joulepath.app.schemas.examples.own_arm import URDF
 from joulepath.app.schemas.lengths import NAME_LENGTH, ROBOT_LENGTH
-from joulepath.models.own_arm.description import WIDEST
+from joulepath.models.own_arm.description import PLAUSIBLE
 from joulepath.models.shape_sizes import SIZES
 
 Positive = Annotated[float, Field(ge=1e-6, le=1e6)]
@@ -68,7 +68,7 @@ class OwnCollision(Request):
         default=None,
         max_length=200,
     )
-    radius: Annotated[float, Field(ge=SIZES.smallest, le=WIDEST)] | None = described(
+    radius: Annotated[float, Field(ge=SIZES.smallest, le=PLAUSIBLE.radius)] | None = described(
         "Radius of the capsules from joint to joint. Null: 4.5 % of the arm's length.",
         "m",
         0.05,
