@@ -1,4 +1,4 @@
-"""What an answer warns of, in words."""
+"""Warnings of answers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ADVICE = "Make sure that the arm and its cell are known as accurately, or ask fo
 
 
 LITTLE_LEFT = 0.9
-"""Part of a torque limit above which a plan leaves a controller too little."""
+"""Share of a torque limit above which a motion leaves too little reserve for a controller."""
 MISSED = (
     "The inverse kinematics of this arm may have missed arm configurations: the answer is the best "
     "of those found, its status is not `optimal`, and its lower bound covers those that may be "
@@ -32,7 +32,7 @@ STAND_INS = {
     PAYLOAD: f"a ball of its mass at {StandInSettings.payload_density:g} kg/m³ about its centre of "
     "mass",
 }
-"""What stands in for a body of the arm that has no shape."""
+"""Descriptions of the stand-ins for bodies without a shape."""
 SHAPES = {TOOL: "tool.capsules", PAYLOAD: "payload.shape"}
 NO_DEFAULT_MOTION = (
     "No default motion of the robot's controller is known: `controller_default` is left out."
@@ -52,7 +52,7 @@ def certified_warnings(solution: Solution) -> list[str]:
 
 
 def sampled_warnings(result: Evaluation) -> list[str]:
-    """The warnings of a motion whose distances were sampled."""
+    """The warnings of a motion with sampled distances."""
     close = result.close_pass
     found = [] if close is None else [_close(close.pair, close.distance, close.time, "")]
     return found + [_unmodelled(contact) for contact in result.unmodelled]

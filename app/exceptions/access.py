@@ -1,4 +1,4 @@
-"""Errors of who may do what."""
+"""Errors of access."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Literal
 from joulepath.app.exceptions.base import ServiceError
 
 Role = Literal["read", "compute", "admin"]
-"""What a client may do. Each role includes those before it."""
+"""Roles of clients; a role includes all previous ones."""
 
 
 class Unauthenticated(ServiceError):
-    """The service needs an API key, and the request has none, or one that is not valid."""
+    """The service needs an API key, and the request has none or an invalid one."""
 
     status = 401
     title = "API key needed"
@@ -34,7 +34,7 @@ class WrongKey(Unauthenticated):
 @dataclass(eq=False)
 class RoleTooLow(ServiceError):
     """The API key may not do this. A key of the role `read` may look at everything, `compute` may
-    also compute and create, and change what it created, and `admin` may change everything."""
+    also compute, create, and change its own objects, and `admin` may change everything."""
 
     status = 403
     title = "Role too low"
@@ -43,7 +43,7 @@ class RoleTooLow(ServiceError):
     role: Role
     """Role of the API key."""
     needed: Role
-    """Role that the request needs."""
+    """Role required by the request."""
 
     def __str__(self) -> str:
         return (
@@ -54,16 +54,15 @@ class RoleTooLow(ServiceError):
 
 @dataclass(eq=False)
 class NotOwner(ServiceError):
-    """Another client created this study, robot or answer. Only the client that created it, or an
-    API key of the role `admin`, may change or delete it. What was created while the service had no
-    API keys has no owner."""
+    """Another client created this study, robot or answer. Only its creator, or an API key of the
+    role `admin`, may change or delete it. Objects created without API keys have no owner."""
 
     status = 403
     title = "Not the owner"
     remedy = "Use the key of its owner, or one of the role `admin`."
 
     owner: str | None
-    """Name of the API key that created it; null without one."""
+    """Name of the creator's API key; null without one."""
 
     def __str__(self) -> str:
         whose = "nobody with a key" if self.owner is None else f"another client, {self.owner},"
@@ -75,7 +74,7 @@ class NotOwner(ServiceError):
 
 class CrossSite(ServiceError):
     """A browser sent this request for a web page of another site (headers `Origin` and
-    `Sec-Fetch-Site`). The service refuses this, because any page that a user opens could otherwise
+    `Sec-Fetch-Site`). The service refuses this, because any page opened by a user could otherwise
     post and delete."""
 
     status = 403

@@ -1,4 +1,4 @@
-"""Errors of workers, of the queue in front of them, and of what clients hold."""
+"""Errors of workers, of their queue, and of the shares of clients."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ class TooManyWaiting(Busy):
 
 
 class TooManyRequests(Busy):
-    """You have your share of the service: of requests in flight and waiting, of connections, or of
-    bytes of bodies and answers in flight; `detail` says of which. Others are served meanwhile."""
+    """You have used your share of the service: requests in flight and waiting, connections, or
+    bytes of bodies and answers in flight, as `detail` says. Other clients are served meanwhile."""
 
     status = 429
     title = "Too many requests"
@@ -76,9 +76,9 @@ class TooManyBytesOfClient(TooManyRequests):
 
 
 class ClusterUnavailable(ServiceError):
-    """The scheduler of the cluster that works on jobs cannot be reached, or does not have the same
-    version of joulepath as the service, whose log says which. Jobs are accepted, and wait until it
-    can be used. Requests that are answered at once are computed by the service itself."""
+    """The scheduler of the cluster for jobs cannot be reached, or has another version of joulepath
+    than the service; the log of the service says more. Jobs are accepted and wait for the cluster.
+    The service itself computes the answers to other requests."""
 
     status = 503
     retry_after = 5
@@ -93,7 +93,7 @@ class ClusterUnavailable(ServiceError):
 
 class NotReady(ServiceError):
     """The workers are still starting, or all of them have ended and are being replaced: requests
-    wait, and none is at work."""
+    wait, and none is running."""
 
     status = 503
     retry_after = 2
@@ -116,8 +116,8 @@ class ShuttingDown(ServiceError):
 
 
 class WorkerLost(ServiceError):
-    """Two processes that worked on this request died, one after the other, most often because the
-    machine ran out of memory. The service does not try it a third time by itself."""
+    """Two worker processes died during this request, one after the other, most often because the
+    machine ran out of memory. The service does not try a third time."""
 
     status = 503
     retry_after = 5
@@ -134,8 +134,8 @@ class WorkerLost(ServiceError):
 
 
 class WorkerDied(ServiceError):
-    """Each of the three processes that worked on this request of a job died, for example because it
-    ran out of memory. The service does not try it again by itself."""
+    """Three worker processes died during this request of a job, for example because of a lack of
+    memory. The service does not try again."""
 
     status = 500
     title = "Worker died"
@@ -150,8 +150,8 @@ class WorkerDied(ServiceError):
 
 
 class ClientDisconnected(Exception):
-    """The client closed the connection: nobody is left to answer."""
+    """The client closed the connection."""
 
 
 class Preempted(Exception):
-    """Work that can wait had to give its worker to a caller that waits: it is to be run again."""
+    """Deferrable work had to give its worker to a waiting caller, and must run again."""

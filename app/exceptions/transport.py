@@ -69,7 +69,7 @@ class RequestTimeout(ServiceError):
     remedy = "Send it again, over a faster connection or with a smaller body."
 
     limit: Annotated[Seconds, Internal]
-    """Time in which the request had to arrive."""
+    """Longest time until the arrival of the request."""
 
     def __str__(self) -> str:
         return (
@@ -79,7 +79,7 @@ class RequestTimeout(ServiceError):
 
 
 class UnsupportedMediaType(ServiceError):
-    """The header `Content-Type` declares a body that this path does not take."""
+    """The header `Content-Type` declares a body not accepted by this path."""
 
     status = 415
     title = "Unsupported media type"
@@ -97,9 +97,7 @@ class UnsupportedMediaType(ServiceError):
 
 
 class UnsupportedCoding(ServiceError):
-    """The header `Content-Encoding` names a coding that the service cannot unpack, or several at
-    once.
-    """
+    """The header `Content-Encoding` names an unsupported coding, or several at once."""
 
     status = 415
     title = "Unsupported content coding"
@@ -113,9 +111,9 @@ class UnsupportedCoding(ServiceError):
 
 
 class MalformedHttp(ServiceError):
-    """What arrived at the port is no HTTP/1.1 request, or contradicts itself: a TLS handshake, a
-    request line or header with other characters, two lengths of the body, or a chunk without a
-    length. The service closes the connection."""
+    """The received bytes are no valid HTTP/1.1 request: a TLS handshake, a request line or header
+    with invalid characters, two lengths of the body, or a chunk without a length. The service
+    closes the connection."""
 
     status = 400
     title = "Malformed HTTP"
@@ -127,8 +125,8 @@ class MalformedHttp(ServiceError):
 
 
 class NotAcceptable(ServiceError):
-    """The header `Accept-Encoding` allows no coding in which the service could answer: it has
-    `zstd`, `gzip` and `identity`, which is no coding. Nothing was computed."""
+    """The header `Accept-Encoding` allows none of the codings of the service: `zstd`, `gzip` and
+    `identity` (no compression). Nothing was computed."""
 
     status = 406
     title = "No acceptable coding"
