@@ -1,4 +1,4 @@
-"""What `POST /cycle` takes."""
+"""Request of `POST /cycle`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ LongTime = Annotated[float, Field(gt=0, le=LONGEST_ROUND)]
 
 
 class TimeRange(DurationRange):
-    """Bounds on the duration of a cycle; each is optional."""
+    """Optional bounds on the duration of a cycle."""
 
     min: LongTime | None = described("Smallest duration. Null: no bound.", "s", 10.0, default=None)
     max: LongTime | None = described("Largest duration. Null: no bound.", "s", 12.0, default=None)
@@ -45,7 +45,7 @@ CycleTime = Annotated[
 
 
 class CycleRequest(ArmRequest):
-    """A cycle of stops. `payload` is what the arm carries to the first stop that changes it."""
+    """A cycle of stops. `payload` is carried until the first stop with another payload."""
 
     start: Target = described(
         "Where the arm rests before the first move: joint positions, a pose of the TCP, or one of "

@@ -1,4 +1,4 @@
-"""What `POST /identifications` takes."""
+"""Request of `POST /identifications`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DEADLINE = 60.0
 
 
 class Fraction(Request):
-    """The part of the moves that is held out."""
+    """The share of held-out moves."""
 
     fraction: float = described(
         "Fraction of the moving time; whole motions are held out.",
@@ -29,7 +29,7 @@ class Fraction(Request):
 
 
 class FrictionTerms(Request):
-    """The friction law that is fitted."""
+    """The fitted friction law."""
 
     terms: Annotated[list[Term], Field(min_length=1, max_length=5)] = described(
         "Terms of the law. `curved` is the concave rise of strain-wave gears, at the speed that "
@@ -49,7 +49,7 @@ class FrictionTerms(Request):
 
 
 class IdentifyRequest(Request):
-    """Logs of one robot, and what is to be found from them."""
+    """Logs of one robot, and the parameters to identify."""
 
     logs: LogIds = described("Ids of logs, all of one robot.", None, [LOG_ID])
     validate_: LogIds | Fraction | Literal["moves"] = described(
@@ -123,5 +123,5 @@ class IdentifyRequest(Request):
 
     @property
     def all_logs(self) -> list[str]:
-        """Ids of the logs of the fit, then of those of the validation."""
+        """Ids of the logs of the fit, then of the validation."""
         return [*self.logs, *(self.validate_ if isinstance(self.validate_, list) else [])]
