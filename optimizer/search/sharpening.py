@@ -214,8 +214,8 @@ class _Follower:
         interval = self._interval(float(t[-1]), width)
         if fixed:
             interval = replace(interval, t_min=float(t[-1]), t_max=float(t[-1]))
-        solver = solver_of(incumbent, candidate, interval)
-        solver.best_known = np.inf if candidate.energy is None else candidate.energy
+        known = np.inf if candidate.energy is None else candidate.energy
+        solver = solver_of(incumbent, candidate, interval, known)
         result = in_time(incumbent, partial(solver.solve_evenly, q, t, count, progress))
         if result.spline is not None:
             incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(result.spline))
