@@ -1,4 +1,4 @@
-"""What names the branches of an arm, and numbers for those of an arm that has no names."""
+"""Names of the branches of an arm, and numbers for an arm whose branches have no names."""
 
 from __future__ import annotations
 
@@ -10,36 +10,36 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.problem.branches import Label, NumberedBranch
 
-# digits of joint positions [rad] that order branches
-DIGITS = 6
+DECIMALS = 6
+"""Decimals of the joint positions [rad] that order branches; coarser than rounding."""
 
 
 class NamedBranches(Protocol):
-    """The geometry of an arm, as far as it names branches."""
+    """Geometry of an arm that names its branches."""
 
     def label(self, q: Array) -> Label:
-        """The branch of a configuration q (nq,) [rad]."""
+        """Branch of a configuration q (nq,) [rad]."""
         ...
 
     def singular_parts(self, q: Array) -> tuple[str, ...]:
-        """The parts of the label that are singular at q (nq,) [rad]."""
+        """Singular parts of the label at q (nq,) [rad]."""
         ...
 
 
 def in_order(q: Array) -> Array:
-    """Solutions (n, nq) [rad] in the order of their numbers.
+    """Solutions (n, nq) [rad], sorted by joint positions, in the order of their numbers.
 
-    Joints of branches that share them differ by rounding, and half a turn may have either sign:
-    neither counts.
+    Positions are rounded first, and -π counts as π: shared joint positions of two branches differ
+    by rounding, and a half turn may have either sign.
     """
-    keys = np.round(q, DIGITS)
-    keys[keys <= np.round(-np.pi, DIGITS)] = np.round(np.pi, DIGITS)
+    keys = np.round(q, DECIMALS)
+    keys[keys <= np.round(-np.pi, DECIMALS)] = np.round(np.pi, DECIMALS)
     return np.asarray(q[np.lexsort(keys.T[::-1])])
 
 
 def numbered(q: Array, solutions: Array) -> NumberedBranch:
-    """The number of q (nq,) [rad] among the solutions (n, nq) [rad] of its pose, by the nearest of
-    them.
+    """Number of q (nq,) [rad]: the index of the nearest of the solutions (n, nq) [rad] of its pose,
+    from 1.
     """
     if not len(solutions):
         return NumberedBranch(1)

@@ -1,9 +1,8 @@
-"""Self-motions: curves of configurations that hold one and the same pose, as a singular arm has
-them.
+"""Self-motions: curves of configurations that hold one pose.
 
-`SelfMotion` is the interface. `StretchedWrist` is that of Universal Robots' arms: with sin(q5) = 0
-the sixth axis is parallel to the second, third and fourth. The last joint may then turn while these
-three keep the flange in place.
+`SelfMotion` is the interface. `StretchedWrist` is the self-motion of Universal Robots' arms: with
+sin(q5) = 0 the sixth axis is parallel to the second, third and fourth, and the last joint may turn
+while these three keep the flange in place.
 """
 
 from __future__ import annotations
@@ -16,74 +15,88 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
+from joulepath.optimizer.kinematics.reach import REACH
 from joulepath.optimizer.problem.branches import BranchLabel, Label
 
-# distance [m] beyond the reach at which the fourth axis may lie by rounding alone
-ROUNDING = 1e-10
-# an arc shorter than this is one configuration, up to rounding [rad]
-POINT = 1e-4
-# distance of a joint between two members of a curve that leaves room for others [rad], and halvings
-# of the way between them
-FAR_APART, OUTLYING, HALVINGS = 0.5, 3.0, 6
+
+@dataclass(frozen=True)
+class SelfMotionSettings:
+    """Sampling of self-motions."""
+
+    point_arc: float = 1e-4
+    """Length of an arc below which it counts as one configuration [rad]."""
+    largest_gap: float = 0.5
+    """Joint distance of neighbouring members above which a gap is filled [rad]."""
+    gap_ratio: float = 3.0
+    """Ratio of a gap to the median distance above which it is filled."""
+    gap_halvings: int = 6
+    """Largest number of times a gap is halved."""
+
+
+SELF_MOTION = SelfMotionSettings()
 
 
 class SelfMotion(Protocol):
-    """A curve of configurations that hold one pose, over a parameter on some arcs of the circle."""
+    """Curve of configurations that hold one pose, over a parameter on arcs of the circle."""
 
     @property
     def label(self) -> BranchLabel:
-        """The branch; the part that is singular has no meaning."""
+        """Branch of the curve; the singular part of the label has no meaning."""
         ...
 
     @property
     def free(self) -> tuple[int, ...]:
-        """Indices of the joints that move."""
+        """Indices of the moving joints."""
         ...
 
     @property
     def arcs(self) -> list[tuple[float, float]]:
-        """The intervals [rad] of the parameter."""
+        """Intervals of the parameter [rad]."""
         ...
 
     def parameter(self, q: Array) -> float:
-        """The parameter of the member nearest to q (nq,) [rad]."""
+        """Parameter [rad] of the member nearest to q (nq,) [rad]."""
         ...
 
     def clipped(self, parameter: float) -> float:
-        """The nearest parameter on an arc."""
+        """Nearest parameter [rad] on an arc."""
         ...
 
     def at(self, parameter: Array) -> Array:
-        """The configurations (n, nq) [rad], in [-pi, pi], at parameters (n,) on the arcs."""
+        """Configurations (n, nq) [rad], in [-pi, pi], at parameters (n,) on the arcs."""
         ...
 
     def boxes(self, parameter: Array, half: Array) -> tuple[Array, Array]:
-        """Middle (n, nq) and half sides (n, nq) [rad] of boxes that hold every configuration of the
-        curve whose parameter lies within `half` (n,) of `parameter` (n,). A full turn of a joint
-        counts as none."""
+        """Boxes in joint space that cover the curve within `half` (n,) of the parameters (n,).
+
+        Full turns of a joint are ignored.
+
+        Returns:
+            Centres (n, nq) and half sides (n, nq) [rad] of the boxes.
+        """
         ...
 
 
 def is_point(motion: SelfMotion) -> bool:
-    """Whether the curve is one configuration, up to rounding."""
-    return sum(upper - lower for lower, upper in motion.arcs) < POINT
+    """Whether the curve is a single configuration, up to rounding."""
+    return sum(upper - lower for lower, upper in motion.arcs) < SELF_MOTION.point_arc
 
 
 def spread(motion: SelfMotion, count: int) -> Array:
-    """At least `count` parameters, evenly spread over the arcs, both ends of each arc among them.
+    """At least `count` parameters, evenly spread over the arcs, with both ends of each arc.
 
-    Of an arc shorter than POINT there is one parameter, its middle; of a whole circle, both ends
-    are one.
+    An arc below `point_arc` contributes its middle alone; the coinciding ends of a full circle
+    count once.
     """
     length = sum(upper - lower for lower, upper in motion.arcs)
     found = list[float]()
     for lower, upper in motion.arcs:
-        if upper - lower < POINT:
+        if upper - lower < SELF_MOTION.point_arc:
             found.append((lower + upper) / 2)
             continue
         pieces = max(2, ceil(count * (upper - lower) / length))
-        step, closed = (upper - lower) / pieces, upper - lower > 2 * np.pi - POINT
-        # plain numbers: several times as fast as arrays of so few
+        step, closed = (upper - lower) / pieces, upper - lower > 2 * np.pi - SELF_MOTION.point_arc
+        # Floats are several times faster than NumPy arrays of a few elements.
         found += [lower + step * k for k in range(pieces)]
         if not closed:
             found.append(upper)
@@ -91,16 +104,27 @@ def spread(motion: SelfMotion, count: int) -> Array:
 
 
 def without_gaps(motion: SelfMotion, parameters: Array, q: Array) -> Array:
-    """The members q (n, nq) [rad] of a self-motion at parameters (n,), in the order of its arcs,
-    with members between neighbours on an arc that are FAR_APART, and OUTLYING times as far as most
-    are.
+    """Members of a self-motion, with further members inserted into wide gaps.
 
-    Next to a singularity the arm moves far while the parameter hardly does.
+    Next to a singularity the arm moves far while the parameter hardly changes. A gap is filled if
+    it exceeds both `largest_gap` and `gap_ratio` times the median distance of neighbours.
+
+    Args:
+        motion: self-motion.
+        parameters: parameters of the members, shape (n,), in the order of the arcs [rad].
+        q: members, shape (n, nq) [rad].
+
+    Returns:
+        All members, shape (m, nq) [rad].
     """
     lower = np.sort([arc[0] for arc in motion.arcs])
     apart = np.abs(wrapped(np.diff(q, axis=0))).max(axis=1)
-    far = max(FAR_APART, OUTLYING * float(np.median(apart))) if len(apart) else np.inf
-    for _ in range(HALVINGS):
+    far = (
+        max(SELF_MOTION.largest_gap, SELF_MOTION.gap_ratio * float(np.median(apart)))
+        if len(apart)
+        else np.inf
+    )
+    for _ in range(SELF_MOTION.gap_halvings):
         arc = np.searchsorted(lower, parameters, "right")
         apart = np.abs(wrapped(np.diff(q, axis=0))).max(axis=1) > far
         gaps = np.flatnonzero(apart & (np.diff(arc) == 0) & (np.diff(parameters) > 0))
@@ -114,13 +138,13 @@ def without_gaps(motion: SelfMotion, parameters: Array, q: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class StretchedWrist:
-    """The self-motion of an arm of Universal Robots' form whose wrist is stretched or folded,
-    sin(q5) = 0.
+    """Self-motion of an arm of Universal Robots' form with a stretched or folded wrist, sin(q5) =
+    0.
 
     The parameter is the angle h = q2 + q3 + q4 of the fifth axis in the arm's plane. The fourth
-    axis lies at (x, z) = (ahead - d5 sin h, above + d5 cos h) [m] in this plane, seen from the
+    axis lies at (x, z) = (ahead - d5 sin h, above + d5 cos h) [m] in this plane, relative to the
     second. With its distance D from the second axis, the law of cosines gives q3 on the elbow's
-    `side` (1 or -1) and q2. q6 = turn (h - h0).
+    `side` (1 or -1) and q2. The last joint is q6 = turn (h - h0).
     """
 
     label: Label
@@ -139,7 +163,7 @@ class StretchedWrist:
 
     @property
     def arcs(self) -> list[tuple[float, float]]:
-        """Where the fourth axis is within reach of the second: least² <= A + B cos(h - phase) <=
+        """Arcs with the fourth axis within reach of the second: least² <= A + B cos(h - phase) <=
         most².
         """
         radius = float(np.hypot(self.ahead, self.above))
@@ -147,11 +171,11 @@ class StretchedWrist:
         phase = -float(np.arctan2(self.ahead, self.above))
         if B < 0:
             phase, B = phase + np.pi, -B
-        least = max(abs(abs(self.a2) - abs(self.a3)) - ROUNDING, 0.0)
-        most = abs(self.a2) + abs(self.a3) + ROUNDING
+        least = max(abs(abs(self.a2) - abs(self.a3)) - REACH.rounding, 0.0)
+        most = abs(self.a2) + abs(self.a3) + REACH.rounding
         if least**2 > A + B or most**2 < A - B:
             return []
-        # the cosine's range, and the arcs on which it has it
+        # Range of the cosine, and the arcs over it.
         lower, upper = (
             max((least**2 - A) / B, -1.0) if B else -1.0,
             min((most**2 - A) / B, 1.0) if B else 1.0,
@@ -164,11 +188,11 @@ class StretchedWrist:
         return [(phase + near, phase + far), (phase - far, phase - near)]
 
     def parameter(self, q: Array) -> float:
-        """h [rad] of q (6,), at the end of an arc if it is on none."""
+        """Parameter h [rad] of q (6,), clipped to the nearest end if it is on no arc."""
         return self.clipped(float(q[1] + q[2] + q[3]))
 
     def clipped(self, parameter: float) -> float:
-        """The nearest parameter [rad] on an arc."""
+        """Nearest parameter [rad] on an arc."""
         found = []
         for lower, upper in self.arcs:
             near = float(nearest_turn(np.asarray(parameter), np.asarray((lower + upper) / 2)))
@@ -177,7 +201,7 @@ class StretchedWrist:
         return min(found)[1]
 
     def at(self, parameter: Array) -> Array:
-        """The configurations (n, 6) [rad] at parameters (n,) on the arcs."""
+        """Configurations (n, 6) [rad] at parameters (n,) on the arcs."""
         h = np.asarray(parameter, dtype=float)
         x, z = self._fourth_axis(h)
         elbow, shoulder = self._triangle(np.hypot(x, z))
@@ -191,8 +215,11 @@ class StretchedWrist:
         return np.clip(wrapped(q), -np.pi, np.pi)
 
     def boxes(self, parameter: Array, half: Array) -> tuple[Array, Array]:
-        """See `SelfMotion`. The fourth axis moves by at most |d5| per radian; both angles of the
-        triangle are bounded over the interval of its distance."""
+        """Boxes that cover the curve, see `SelfMotion.boxes`.
+
+        The fourth axis moves by at most |d5| per radian. Both angles of the triangle are bounded
+        over the resulting interval of distances.
+        """
         h, half = np.asarray(parameter, dtype=float), np.asarray(half, dtype=float)
         x, z = self._fourth_axis(h)
         middle, blur = np.hypot(x, z), np.abs(self.d5) * half
@@ -203,7 +230,7 @@ class StretchedWrist:
             np.pi,
         )
         elbows = np.stack([self._triangle(distance)[0] for distance in (near, far)])
-        # between the ends, the angle at the shoulder has at most one extremum
+        # Between the ends, the shoulder angle has at most one extremum.
         turning = np.sqrt(max(self.a2**2 - self.a3**2, 0.0))
         shoulders = np.stack(
             [self._triangle(d)[1] for d in (near, far, np.clip(turning, near, far))]
@@ -228,15 +255,15 @@ class StretchedWrist:
         return self.a2 * self.a3 < 0
 
     def _fourth_axis(self, h: Array) -> tuple[Array, Array]:
-        """Place (x, z) [m] of the fourth axis in the arm's plane, seen from the second."""
+        """Position (x, z) [m] of the fourth axis in the arm's plane, relative to the second."""
         return self.ahead - self.d5 * np.sin(h), self.above + self.d5 * np.cos(h)
 
     def _triangle(self, distance: Array) -> tuple[Array, Array]:
-        """Angles [rad] of elbow and shoulder of a triangle with sides |a2|, |a3| and `distance`
-        [m], clipped to it.
+        """Angles [rad] at elbow and shoulder of the triangle with sides |a2|, |a3| and `distance`
+        [m].
 
-        By the half-angle law of cosines, which is exact next to the stretched and to the folded
-        arm.
+        The distance is clipped to the possible triangles. The half-angle law of cosines is accurate
+        next to the stretched and the folded arm.
         """
         a, b = abs(self.a2), abs(self.a3)
         d = np.clip(distance, abs(a - b), a + b)

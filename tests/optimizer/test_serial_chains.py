@@ -15,7 +15,7 @@ from scipy.interpolate import BSpline
 
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.kinematics.inverse import ClosedFormInverseKinematics
+from joulepath.optimizer.kinematics.closed_form import ClosedFormInverseKinematics
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.pareto import pareto
 from joulepath.optimizer.problem.arm import Arm, Payload

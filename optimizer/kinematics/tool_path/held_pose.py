@@ -1,7 +1,7 @@
-"""The curve of configurations of a redundant or singular arm that hold one pose of the TCP.
+"""Self-motion of a redundant or singular arm that holds a TCP pose, found by Newton's method on the
+arm itself.
 
-It is found by Newton's method on the arm itself. So it does not end where the charts of a closed
-form do.
+Unlike the curves of a closed form, it does not end at the limits of a parametrisation.
 """
 
 from __future__ import annotations
@@ -16,22 +16,32 @@ from joulepath.optimizer.kinematics.chain import pose_error
 from joulepath.optimizer.kinematics.tcp import T_last_tcp, tcp_pose
 from joulepath.optimizer.problem.arm import Arm
 
-# the pose is held to this error [m, rad]; Newton steps, of which a few suffice near the curve
-HELD, STEPS = 1e-11, 12
-# a joint that would leave its range by more than rounding stays on its limit instead [rad]
-INSIDE = 1e-9
-# of the curve's length [rad] for differences of its tangent
-STEP = 1e-4
-# a singular value of the Jacobian below this share of the largest is zero: the arm is singular
-SINGULAR = 1e-8
+
+@dataclass(frozen=True)
+class HeldPoseSettings:
+    """Settings of Newton's method and of the singularity test."""
+
+    tolerance: float = 1e-11
+    """Largest pose error of a configuration on the curve [m, rad]."""
+    newton_steps: int = 12
+    """Largest number of Newton steps; a few suffice near the curve."""
+    limit_rounding: float = 1e-9
+    """Angle beyond a limit that is due to rounding [rad]."""
+    difference: float = 1e-4
+    """Arc length of the curve for differences of its tangent [rad]."""
+    singular: float = 1e-8
+    """Singular value of the Jacobian, relative to the largest, below which it is zero."""
+
+
+HELD_POSE = HeldPoseSettings()
 
 
 @dataclass(frozen=True)
 class HeldPose:
-    """What holds the TCP at T (4, 4), base frame, within joint limits (nq,) [rad].
+    """Self-motion with the TCP at T (4, 4) in the base frame, within joint limits (nq,) [rad].
 
-    The TCP is at `T_last` (4, 4) in the frame of the last link. The arm has one joint more than a
-    pose fixes, or is singular. `data` is Pinocchio's memory for its `model`: for one thread.
+    `T_last` (4, 4) is the TCP in the frame of the last link. The arm has one redundant joint, or is
+    singular. `data` is Pinocchio's work space of `model`, for a single thread.
     """
 
     model: pin.Model
@@ -43,16 +53,19 @@ class HeldPose:
 
     @staticmethod
     def of(arm: Arm, q: Array) -> HeldPose:
-        """The curve of an arm through q (nq,) [rad], within the limits in force."""
+        """Curve of an arm through q (nq,) [rad], within its active limits."""
         model, limits = arm.robot.model, arm.active_limits
         return HeldPose(
             model, model.createData(), T_last_tcp(arm), tcp_pose(arm, q), limits.q_min, limits.q_max
         )
 
     def put(self, q: Array) -> Array | None:
-        """The configuration (nq,) on the curve that Newton's method finds from q (nq,); None if it
-        finds none within the limits. If a joint would be beyond its limit, the one on which it is
-        on the limit."""
+        """Projects q (nq,) [rad] onto the curve by Newton's method.
+
+        Returns:
+            The configuration (nq,) [rad]; if a joint would be beyond its limit, the one with this
+                joint on the limit; None if there is none within the limits.
+        """
         found = self._solved(q, None)
         if found is None:
             return None
@@ -61,42 +74,49 @@ class HeldPose:
         if beyond[worst] <= 0:
             return found
         found = self._solved(np.clip(found, self.q_min, self.q_max), worst)
-        if found is None or (np.maximum(self.q_min - found, found - self.q_max) > INSIDE).any():
+        if (
+            found is None
+            or (np.maximum(self.q_min - found, found - self.q_max) > HELD_POSE.limit_rounding).any()
+        ):
             return None
         return np.asarray(np.clip(found, self.q_min, self.q_max))
 
     def tangent(self, q: Array) -> Array:
-        """The direction (nq,) of the curve at q (nq,), of length 1."""
+        """Unit tangent (nq,) of the curve at q (nq,) [rad]."""
         return np.asarray(np.linalg.svd(self._tcp_and_jacobian(q)[1])[2][-1])
 
     def moves(self, q: Array) -> bool:
         """Whether the arm can move at q (nq,) [rad] while it holds the pose, to first order."""
         values = np.linalg.svd(self._tcp_and_jacobian(q)[1], compute_uv=False)
-        return len(q) > len(values) or bool(values[-1] < SINGULAR * values[0])
+        return len(q) > len(values) or bool(values[-1] < HELD_POSE.singular * values[0])
 
     def bend(self, q: Array, tangent: Array) -> Array:
-        """The change (nq,) of the tangent per length of the curve [1/rad]."""
-        before, after = (self.tangent(q + step * tangent) for step in (-STEP, STEP))
+        """Derivative (nq,) of the tangent by arc length [1/rad]."""
+        before, after = (
+            self.tangent(q + step * tangent)
+            for step in (-HELD_POSE.difference, HELD_POSE.difference)
+        )
         return np.asarray(
-            (after * np.sign(after @ tangent) - before * np.sign(before @ tangent)) / (2 * STEP)
+            (after * np.sign(after @ tangent) - before * np.sign(before @ tangent))
+            / (2 * HELD_POSE.difference)
         )
 
     def _solved(self, q: Array, fixed: int | None) -> Array | None:
-        """The configuration that holds the pose, with one joint `fixed`; None if Newton's method
-        finds none.
+        """Configuration that holds the pose, with one joint `fixed`; None if Newton's method finds
+        none.
         """
         moving = np.arange(len(q)) != fixed
         q = q.copy()
-        for _ in range(STEPS):
+        for _ in range(HELD_POSE.newton_steps):
             T, jacobian = self._tcp_and_jacobian(q)
             error = pose_error(T[None], self.T)[0]
-            if np.abs(error).max() < HELD:
+            if np.abs(error).max() < HELD_POSE.tolerance:
                 return q
-            q[moving] += np.linalg.lstsq(jacobian[:, moving], error, rcond=SINGULAR)[0]
+            q[moving] += np.linalg.lstsq(jacobian[:, moving], error, rcond=HELD_POSE.singular)[0]
         return None
 
     def _tcp_and_jacobian(self, q: Array) -> tuple[Array, Array]:
-        """Pose (4, 4) of the TCP at q (nq,), and its geometric Jacobian (6, nq) in base axes."""
+        """TCP pose (4, 4) at q (nq,), and geometric Jacobian (6, nq) in base axes."""
         about_base = pin.computeJointJacobians(self.model, self.data, q)
         T = self.data.oMi[self.model.njoints - 1].homogeneous @ self.T_last
         jacobian = about_base.copy()

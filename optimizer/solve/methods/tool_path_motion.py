@@ -13,7 +13,8 @@ from scipy.integrate import cumulative_trapezoid
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import DeadlinePassed, watch
-from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace, path_ratios
+from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace
+from joulepath.optimizer.kinematics.tool_path.joint_path import path_ratios
 from joulepath.optimizer.motion import quintic, ramped
 from joulepath.optimizer.motion.bspline import DEGREE, Basis, clamped
 from joulepath.optimizer.motion.spline import Spline, sample, sampled

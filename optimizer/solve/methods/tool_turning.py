@@ -1,7 +1,7 @@
 """The turning of a tool about the free axis of its path: the one of least cost for a time law, and
 then a better one.
 
-First dynamic programming over the sheet of configurations, in which a step costs what the arm draws
+First dynamic programming over the grid of configurations, in which a step costs what the arm draws
 at an even speed. Then the values of a smooth turning are optimised for the cost of the whole motion
 with this time law (L-BFGS).
 """
@@ -26,14 +26,14 @@ from joulepath.optimizer.kinematics.tcp import flange_pose
 from joulepath.optimizer.kinematics.tool_path.course_tracing import (
     Trace,
     chain_of,
-    joint_path,
     traces,
     turned_start,
     within,
 )
-from joulepath.optimizer.kinematics.tool_path.turning_sheet import (
-    REACHED,
-    TurningSheet,
+from joulepath.optimizer.kinematics.tool_path.joint_path import joint_path
+from joulepath.optimizer.kinematics.tool_path.turning_grid import (
+    TURNING_GRID,
+    TurningGrid,
     turning_of,
     turning_through,
     values_of,
@@ -46,7 +46,7 @@ from joulepath.optimizer.problem.targets import Side
 # values of a smooth turning between and at the ends, and instants at which its cost is measured (an
 # odd number)
 KNOTS, INSTANTS = 10, 81
-# points of the sheet along the way, and more of them for each bend
+# points of the grid along the way, and more of them for each bend
 FIRST_STEPS, BEND_STEPS = 17, 6
 # step [rad] of a difference quotient, iterations, and the share by which the cost must fall in each
 STEP, ITERATIONS, PROGRESS = 1e-5, 25, 1e-4
@@ -166,20 +166,20 @@ class _TimeLaw:
         )
         steps = FIRST_STEPS + BEND_STEPS * self.course.shape.bends
         turned = float(_known(self.prepared, self.q_start)(0.0))
-        sheet = TurningSheet.of(
+        grid = TurningGrid.of(
             self.prepared.arm, self.chain, self.course, self.q_start, steps, most, turned
         )
-        sheet = sheet.without(self._excluded)
-        lengths = np.diff(np.interp(sheet.at, self.s, self.t))
+        grid = grid.without(self._excluded)
+        lengths = np.diff(np.interp(grid.at, self.s, self.t))
 
         def cost(first: Array, second: Array, k: npt.NDArray[np.intp]) -> Array:
             v = (second - first) / np.maximum(lengths[k], 1e-9)[:, None]
             return lengths[k] * self._drawn((first + second) / 2, v, np.zeros_like(v))
 
-        chosen = sheet.least(cost, *free)
+        chosen = grid.least(cost, *free)
         if chosen is None or (not self.course.free_start and (chosen == chosen[0]).all()):
             return None
-        return turning_through(sheet.at, sheet.angles[chosen], KNOTS, *free)
+        return turning_through(grid.at, grid.angles[chosen], KNOTS, *free)
 
     def refined(self, turning: CubicSpline) -> CubicSpline:
         """The turning near another one that needs the least with this time law."""
@@ -231,7 +231,7 @@ class _TimeLaw:
             self.prepared.arm.T_flange_tcp,
         )
         q, missed = newton.solved(self.chain, np.tile(near, (count, 1)), T, steps=20)
-        q[missed > REACHED] = np.nan
+        q[missed > TURNING_GRID.reached] = np.nan
         return q.reshape(count, INSTANTS, nq)
 
     def _costs(self, q: Array) -> Array:

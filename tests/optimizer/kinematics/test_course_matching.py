@@ -9,7 +9,7 @@ import pytest
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.tool_path import course_matching
-from joulepath.optimizer.kinematics.tool_path.course_matching import matched
+from joulepath.optimizer.kinematics.tool_path.course_matching import MatchingSettings, matched
 
 
 def _courses(rng: np.random.Generator) -> list[Array]:
@@ -39,7 +39,7 @@ def test_all_at_once_are_those_one_by_one(seed: int, monkeypatch: pytest.MonkeyP
             asked = np.stack([np.interp(shares, at, each) for each in known.T], axis=1)
             asked += rng.normal(0.0, rng.choice([0.0, 1e-5, 1e-2]), asked.shape)
             at_once = matched(at, known, asked, 5e-4)
-            monkeypatch.setattr(course_matching, "AT_ONCE", 0)
+            monkeypatch.setattr(course_matching, "SETTINGS", MatchingSettings(rounds=0))
             for found, wanted in zip(at_once, matched(at, known, asked, 5e-4), strict=True):
                 np.testing.assert_array_equal(found, wanted)
             monkeypatch.undo()

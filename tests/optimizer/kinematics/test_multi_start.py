@@ -13,7 +13,7 @@ from joulepath import Arm, Pose, Problem, optimize
 from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import UnreachablePose
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
-from joulepath.optimizer.kinematics.multi_start import MOST_BRANCHES, MultiStart
+from joulepath.optimizer.kinematics.multi_start import MULTI_START, MultiStart
 from joulepath.optimizer.kinematics.six.decomposition import DecomposedArm
 from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
 from tests.optimizer.chains import move, serial_chain
@@ -45,7 +45,7 @@ def test_the_configuration_is_found(number: int, count: int) -> None:
         found = solved(robot, inside(robot, rng))
         missed += found.away > FOUND
         assert found.error < ACCURACY and not found.twice
-        assert len(found.branches) <= MOST_BRANCHES and len(found.branches) % 2 == 0, (
+        assert len(found.branches) <= MULTI_START.most_branches and len(found.branches) % 2 == 0, (
             "branches come in pairs"
         )
     assert missed <= 0.001 * count

@@ -13,10 +13,8 @@ from scipy.optimize import minimize
 
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
-from joulepath.optimizer.kinematics.inverse import (
-    ClosedFormInverseKinematics,
-    required_inverse_kinematics,
-)
+from joulepath.optimizer.kinematics.closed_form import ClosedFormInverseKinematics
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
 from joulepath.optimizer.problem.branches import Label
 from tests.optimizer.kinematics.flange import (

@@ -15,7 +15,7 @@ from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.exceptions import UnreachablePose
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
-from joulepath.optimizer.kinematics.seven.free_turn import LOOPS, FreeTurn
+from joulepath.optimizer.kinematics.seven.free_turn import SETTINGS, FreeTurn
 from joulepath.optimizer.kinematics.seven.redundant_arm import RedundantArm
 from joulepath.optimizer.kinematics.seven.redundant_curve import RedundantCurve
 from tests.optimizer.chains import serial_chain
@@ -217,7 +217,7 @@ def test_arcs_are_what_the_limits_leave(robot: Robot, arm: RedundantArm) -> None
             arcs = [
                 arc
                 for each in kept
-                if (each.sheet == curve.sheet).all()
+                if (each.signs == curve.signs).all()
                 for arc in each.arcs
                 if each.interval == curve.interval
             ]
@@ -277,7 +277,7 @@ def test_a_pose_on_a_singularity_or_next_to_it_is_reached(
             # an arm that is stretched but for this holds its pose on loops as small, which rounding
             # of the pose hides
             curves = arm.self_motions(T, robot.limits)
-            assert away(curves, q) < LOOPS
+            assert away(curves, q) < SETTINGS.loop_half_width
             inside = []
             for curve in curves:
                 centre, sides = curve.boxes(np.array([curve.parameter(q)]), np.array([1e-6]))

@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.closed_form import INVERSE
 from joulepath.optimizer.kinematics.ik_solutions import LimitedSolution
-from joulepath.optimizer.kinematics.inverse import MEMBERS
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
-from joulepath.optimizer.kinematics.six.ur_closed_form import LEAST_AHEAD, URClosedForm
+from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
+from joulepath.optimizer.kinematics.six.ur_geometry import UR
 from joulepath.optimizer.problem.branches import BranchFilter
 from tests.optimizer.kinematics.flange import (
     ACCURACY,
@@ -69,7 +70,7 @@ def test_a_singular_elbow_is_a_solution_like_any_other(q: Array, elbow: float) -
         return  # wrist and elbow at once: the tests of self-motions
     # next to a stretched wrist, or a singular shoulder, the same rounding turns the fifth axis the
     # more
-    ahead = min(1.0, max(abs(FORM._ahead(q)), LEAST_AHEAD))
+    ahead = min(1.0, max(abs(FORM.ahead(q)), UR.least_ahead))
     assert apart(nearest.q, q) < max(FOUND_ON_AN_EDGE, 5e-7 / np.sqrt(abs(np.sin(q[4])) * ahead))
     assert "elbow" in nearest.singular
     assert nearest.self_motion is None
@@ -88,13 +89,13 @@ def test_next_to_three_singularities_at_once_a_pose_is_answered() -> None:
         # lift angles at which the last axis meets the first one, to within a micrometre and a
         # decimetre
         lifts = np.linspace(-3, 3, 41)
-        ahead = [FORM._ahead(np.array([q[0], lift, *q[2:]])) for lift in lifts]
+        ahead = [FORM.ahead(np.array([q[0], lift, *q[2:]])) for lift in lifts]
         crossings = [k for k in range(40) if ahead[k] * ahead[k + 1] < 0]
         if not crossings:
             continue
         k = crossings[0]
         root = brentq(
-            lambda lift, q=q: FORM._ahead(np.array([q[0], lift, *q[2:]])), lifts[k], lifts[k + 1]
+            lambda lift, q=q: FORM.ahead(np.array([q[0], lift, *q[2:]])), lifts[k], lifts[k + 1]
         )
         q[1] = root + 10 ** rng.uniform(-6, -1) * rng.choice([-1, 1])
         T = forward(q)
@@ -166,7 +167,7 @@ def test_a_stretched_wrist_holds_its_pose_on_a_curve(q: Array, wrist: float) -> 
     for motion in curves:
         own = [each for each in solutions if each.self_motion is motion]
         # where the curves of both elbows meet, they share a member
-        assert len(own) >= MEMBERS - 2
+        assert len(own) >= INVERSE.members - 2
         for each in own:
             assert max(errors(T, each.q)) < ACCURACY
             assert "wrist" in each.singular

@@ -16,10 +16,10 @@ from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.chain import Chain, miss, pose_error
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.newton import solved
-from joulepath.optimizer.kinematics.seven.curve_tracing import cycles, traced
+from joulepath.optimizer.kinematics.seven.curve_tracing import cycles, trace
 from joulepath.optimizer.kinematics.seven.hermite import hermite_weights
 from joulepath.optimizer.kinematics.seven.nearby_arm import NearbyArm
-from joulepath.optimizer.kinematics.seven.nearby_loops import LONG, SHORT, followed
+from joulepath.optimizer.kinematics.seven.nearby_loops import SETTINGS, project_loops
 from joulepath.optimizer.kinematics.seven.redundant_arm import RedundantArm
 from joulepath.optimizer.kinematics.seven.seed_table import SeedTable
 from joulepath.optimizer.kinematics.seven.traced_arm import TracedArm
@@ -163,14 +163,14 @@ def test_curves_found_all_points_at_once_are_those_followed_point_by_point() -> 
     assert nearby is not None
     for _ in range(4):
         T = flange(GEN3, inside(GEN3, rng))
-        stack, good = followed(chain, nearby.loops(T)[0], T)
+        stack, good = project_loops(chain, nearby.loops(T)[0], T)
         assert len(stack.first) == good.sum()
         for first, last in zip(stack.first, stack.last, strict=True):
             start, _ = solved(chain, stack.nodes[[first]], T)
-            (other,) = traced(chain, start, T)
+            (other,) = trace(chain, start, T)
             curve = TracedCurve.of(chain, T, other, NumberedBranch(1))
             assert other.closed and all(
-                away(curve, q) < SHORT for q in stack.nodes[first : last + 1]
+                away(curve, q) < SETTINGS.short_newton_step for q in stack.nodes[first : last + 1]
             )
             count += 1
     assert count > 15
@@ -187,9 +187,10 @@ def test_nearly_all_poses_have_points_enough_along_their_curves() -> None:
         T = flange(GEN3, inside(GEN3, rng))
         loops, rest = nearby.loops(T)
         assert all(
-            np.linalg.norm(np.diff(each, axis=0), axis=1).max() < 2 * LONG for each in loops.each()
+            np.linalg.norm(np.diff(each, axis=0), axis=1).max() < 2 * SETTINGS.long_step
+            for each in loops.each()
         )
-        count += not rest and followed(chain, loops, T)[1].all()
+        count += not rest and project_loops(chain, loops, T)[1].all()
     assert count >= AT_ONCE * poses
 
 
@@ -206,7 +207,7 @@ def test_a_loop_is_followed_once_however_many_starts_it_has(robot: Robot, arm: T
     for curve in arm.self_motions(T)[:3]:
         for count in (1, 9):
             starts = curve.at(rng.uniform(-np.pi, np.pi, count))
-            (path,) = traced(chain, np.vstack([starts, starts[:1]]), T)
+            (path,) = trace(chain, np.vstack([starts, starts[:1]]), T)
             assert path.closed == curve.closed
             ends = wrapped(path.q[-1] - path.q[0])
             assert not path.closed or np.abs(ends).max() < FOUND

@@ -13,10 +13,10 @@ from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
 from joulepath.optimizer.kinematics.chain import Chain
-from joulepath.optimizer.kinematics.covers.covering_sheets import (
-    CoveringSheet,
+from joulepath.optimizer.kinematics.covers.branch_covers import (
+    BranchCover,
     boxes_on,
-    covering_sheets,
+    branch_covers,
 )
 from joulepath.optimizer.kinematics.seven.redundant_arm import RedundantArm
 from tests.optimizer.chains import serial_chain
@@ -55,7 +55,7 @@ def configurations(robot: Robot, count: int, seed: int) -> Array:
     return q
 
 
-def holding(sheets: list[CoveringSheet], q: Array, half: float, shift: float) -> list[float]:
+def holding(sheets: list[BranchCover], q: Array, half: float, shift: float) -> list[float]:
     """The widest sides [rad] of the boxes, of this half side of the parameter, that hold q (7,)."""
     found = []
     for sheet in sheets:
@@ -76,7 +76,7 @@ def test_every_configuration_is_in_a_box_of_its_pose(robot: Robot, count: int) -
     assert RedundantArm.of(robot.model) is None
     chain, rng, widths = Chain.of(robot.model), np.random.default_rng(7), []
     for k, q in enumerate(configurations(robot, count, seed=6)):
-        sheets = covering_sheets(robot, chain.flange(q[None])[0])
+        sheets = branch_covers(robot, chain.flange(q[None])[0])
         assert sheets is not None
         for half in (0.0, 1e-4, 1e-2, 0.3, 3.0):
             held = holding(sheets, q, half, float(rng.uniform(-1, 1)))
@@ -93,14 +93,14 @@ def test_the_deviation_is_reached_and_not_exceeded() -> None:
     """
     robot = ROBOTS["gen3"]
     chain, rng = Chain.of(robot.model), np.random.default_rng(8)
-    sheets = covering_sheets(robot, chain.flange(np.zeros((1, 7)))[0])
+    sheets = branch_covers(robot, chain.flange(np.zeros((1, 7)))[0])
     assert sheets is not None and sheets[0].mirrored and sheets[0].blur < GEN3_OFF
     form = sheets[0].pose.form
     nearby = Chain(form.placements, form.T_last_flange)
     q = rng.uniform(-np.pi, np.pi, (4000, 7))
     apart = []
     for ours, theirs in zip(chain.flange(q)[::40], nearby.flange(-q[:, ::-1])[::40], strict=True):
-        found = covering_sheets(robot, ours)
+        found = branch_covers(robot, ours)
         assert found is not None
         # where S is, seen from the last link
         seen = found[0].pose.shoulder
@@ -110,11 +110,11 @@ def test_the_deviation_is_reached_and_not_exceeded() -> None:
 
 def test_there_are_none_of_an_arm_that_is_near_no_form() -> None:
     chain = serial_chain(7)
-    assert covering_sheets(chain, np.eye(4)) is None
-    assert covering_sheets(load_robot("ur5e"), np.eye(4)) is None
+    assert branch_covers(chain, np.eye(4)) is None
+    assert branch_covers(load_robot("ur5e"), np.eye(4)) is None
 
 
 def test_a_pose_out_of_reach_has_none() -> None:
     T = np.eye(4)
     T[2, 3] = 3.0
-    assert covering_sheets(ROBOTS["gen3"], T) == []
+    assert branch_covers(ROBOTS["gen3"], T) == []
