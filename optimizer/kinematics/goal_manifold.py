@@ -74,7 +74,7 @@ class GoalManifold:
 
         Returns:
             The projected configurations (n, nq) [rad], and a mask (n,) of the successful
-                projections within the limits.
+            projections within the limits.
         """
         q = np.clip(q, self.q_min, self.q_max)
         for _ in range(SETTINGS.newton_steps):
@@ -104,7 +104,7 @@ class GoalManifold:
 
         Returns:
             The configurations (n, nq) [rad], and a mask (n,) of the rows that reach the pose within
-                the limits.
+            the limits.
         """
         for _ in range(SETTINGS.approach_steps):
             error, rows = self._error_and_rows(q)

@@ -68,7 +68,7 @@ def at_the_edge(
 
     Returns:
         The configurations and their pose errors; the error is infinite if an exact configuration of
-            the same branch is known.
+        the same branch is known.
     """
     beside = np.flatnonzero(inexact & (missed < REACH.near))
     if not len(beside):

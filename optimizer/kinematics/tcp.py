@@ -52,7 +52,7 @@ def rotated_poses(arm: Arm, q: Array, rotvecs: Sequence[Array]) -> list[tuple[Ar
 
     Returns:
         Position (3,) [m] and quaternion x, y, z, w (4,) in the base frame for each rotation. The
-            position is the same for all.
+        position is the same for all.
     """
     T = tcp_pose(arm, q)
     orientation = Rotation.from_matrix(T[:3, :3])

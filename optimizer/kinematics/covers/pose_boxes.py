@@ -138,7 +138,7 @@ class PoseBoxes:
 
         Returns:
             Middles and half sides (b, nq) [rad] of boxes within the given ones that hold all these
-                configurations, and a mask (b,) of the non-empty boxes.
+            configurations, and a mask (b,) of the non-empty boxes.
         """
         at = self.placed(centre)
         J, error, slack = self._system(at, half)
@@ -168,7 +168,7 @@ class PoseBoxes:
 
         Returns:
             J (b, m, nq), the error (b, m) of the middles, and a bound (b, m) of the remainder of
-                each row.
+            each row.
         """
         arms = at.tcp[:, None] - at.origins
         J = np.cross(at.axes, arms).transpose(0, 2, 1)

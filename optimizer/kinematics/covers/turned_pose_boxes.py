@@ -119,7 +119,7 @@ class TurnedPose:
 
         Returns:
             Middles and half sides (k, 6) [rad], and a mask (k,) of the boxes that may hold
-                configurations.
+            configurations.
         """
         T = np.tile(np.eye(4), (len(angle), 1, 1))
         T[:, :3, :3] = self.R @ Rotation.from_rotvec(angle[:, None] * self.pose.axis).as_matrix()

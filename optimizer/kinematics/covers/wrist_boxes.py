@@ -170,7 +170,7 @@ class WristBoxes:
 
         Returns:
             Middles and half sides (b, nq) [rad] of boxes that hold all these configurations, and a
-                mask (b,) of the boxes that may hold any.
+            mask (b,) of the boxes that may hold any.
         """
         w = self.geometry.inner
         frames = link_frames(self.geometry.placements[:w], centre[:, :w])
@@ -251,7 +251,7 @@ def _at_angle(at: _Places, lowest: float, highest: float) -> tuple[Array, Array,
 
     Returns:
         Azimuth, smallest and largest difference of q_w from it, and a mask of the cells where it is
-            possible.
+        possible.
     """
     across, along = at.rho_goal * at.rho_tool, at.z_goal * at.z_tool
     low, high = lowest - at.e - along, highest + at.e - along

@@ -140,7 +140,7 @@ def _step(
 
     Returns:
         The step (n, nq) [rad], the estimated error (n,) after it, the ratio (n,) of the
-            second-order term to the first-order step, and the inverse matrices (n, nq, nq).
+        second-order term to the first-order step, and the inverse matrices (n, nq, nq).
     """
     reached, jacobian = chain.flange_and_columns(q)
     inverse, sides = (

@@ -186,7 +186,7 @@ class _Tracing:
 
         Returns:
             The new positions (n, nq) [rad], the tangents (n, nq) there, and a mask (n,) of the
-                steps that stay near the curve.
+            steps that stay near the curve.
         """
         before, step = self.tangent[rows], self.step[rows]
         q = self.q[rows] + step[:, None] * (before + step[:, None] / 2 * self.bend[rows])

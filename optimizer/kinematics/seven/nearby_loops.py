@@ -89,7 +89,7 @@ def loops(pose: RedundantPose) -> tuple[Loops, list[Array]]:
 
     Returns:
         The closed curves, and points (m, 7) [rad] along each curve that is in none, because its
-            ends meet several ends or none.
+        ends meet several ends or none.
     """
     curves = right_curves(pose)
     if curves is None:
@@ -132,7 +132,7 @@ def _grid(whole: tuple[bool, ...]) -> tuple[Array, NDArray[np.intp], NDArray[np.
 
     Returns:
         The parameters (m,), the curve (m,) of each, and the rows (2n,) of the first and the last
-            point of every curve.
+        point of every curve.
     """
     # A whole turn has twice the range of parameters.
     counts = np.where(whole, 2 * SETTINGS.steps, SETTINGS.steps)
@@ -148,7 +148,7 @@ def _points(curves: CurveStack) -> tuple[Array, list[int], Array]:
 
     Returns:
         The points (m, 7) [rad]; the first row of each curve, and m; and the configurations (2n, 7)
-            at the first and the last point of each curve.
+        at the first and the last point of each curve.
     """
     u, rows, outer = _grid(tuple(curves.whole.tolist()))
     q = _at(curves, u, rows)
@@ -189,7 +189,7 @@ def _steps(q: Array, rows: NDArray[np.intp]) -> tuple[Array, Array]:
 
     Returns:
         The lengths (n - 1,) [rad], 0 from one curve to the next, and the approximate bends (n - 1,)
-            [rad].
+        [rad].
     """
     steps = wrapped(q[1:] - q[:-1])
     length = np.sqrt(np.einsum("ij,ij->i", steps, steps))

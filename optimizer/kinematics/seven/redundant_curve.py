@@ -171,7 +171,7 @@ def within(
 
     Returns:
         The curves that may be within the limits, cut to arcs that hold every member inside; and the
-            given curves that may pass the shoulder's singularity within the limits.
+        given curves that may pass the shoulder's singularity within the limits.
     """
     if not curves:
         return [], []
@@ -206,7 +206,7 @@ def _kept(
 
     Returns:
         Rows (k,) of the 2 m curves and k arcs; and a mask (2, m) of the curves that may pass the
-            shoulder's singularity within the limits.
+        shoulder's singularity within the limits.
     """
     m, (coarse, fine) = len(arcs), (SETTINGS.coarse_parts, SETTINGS.fine_parts)
     whole, ends = _cut(arcs, coarse), np.empty((m, coarse * fine + 1))
@@ -313,8 +313,8 @@ def _judged(pose: RedundantPose, cells: Cells, room: _LimitRanges) -> tuple[Mask
 
     Returns:
         Masks (2, n), right shoulder first, of the cells that may have members within the limits,
-            and of the cells with all members inside; and a mask (n,) of the cells that may pass the
-            shoulder's singularity.
+        and of the cells with all members inside; and a mask (n,) of the cells that may pass the
+        shoulder's singularity.
     """
     right, half = boxes_of(pose, cells)
     q, sides = np.empty((10, len(half))), np.empty((2, 10, len(half)))

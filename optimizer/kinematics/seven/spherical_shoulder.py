@@ -267,9 +267,9 @@ def harmonic_parts(coefficients: Array, others: Array) -> tuple[Array, Array, Ar
 
     Returns:
         Means (m, 2, 1), negative and positive, widened for rounding; amplitudes |(b, c)| (m, 1, 1);
-            and coefficients (3m + k, 3). With a sinusoid written as a + size cos y, the
-            coefficients are those of -size cos y and size cos y, sinusoid by sinusoid, then those
-            of size sin y, then `others`.
+        and coefficients (3m + k, 3). With a sinusoid written as a + size cos y, the coefficients
+        are those of -size cos y and size cos y, sinusoid by sinusoid, then those of size sin y,
+        then `others`.
     """
     m = len(coefficients)
     parts = np.zeros((3 * m + len(others), 3))

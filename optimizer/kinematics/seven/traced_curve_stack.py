@@ -118,7 +118,7 @@ class TracedCurveStack:
 
         Returns:
             The rows (n,) of the points that begin the segments, and the shares (n,) of the
-                segments.
+            segments.
         """
         wide = 4 * SETTINGS.open_half
         turn = 2 * np.pi * np.round(u / (2 * np.pi))
@@ -212,7 +212,7 @@ class TracedCurveStack:
 
         Returns:
             The numbers (m,), and a mask (m, m) of the curves that may pass the first point of each
-                curve.
+            curve.
         """
         # One phase per joint, so that mirrored curves differ.
         m, nq = self.nodes.shape

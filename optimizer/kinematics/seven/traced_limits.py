@@ -219,7 +219,7 @@ def _zeros(beyond: Callable[[Array], Array], share: Array, inside: Mask) -> Arra
 
     Returns:
         The zeros, to half of the rounding tolerance, or the inner ends of the brackets if the
-            search fails.
+        search fails.
     """
     low, high = share
     f_low, f_high = beyond(low), beyond(high)

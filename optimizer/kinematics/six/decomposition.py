@@ -301,7 +301,7 @@ class DecomposedArm:
 
         Returns:
             The configurations (n, 6) [rad], their pose errors (n,), and their smallest singular
-                values (n,), infinite for rows that cannot be singular.
+            values (n,), infinite for rows that cannot be singular.
         """
         T_reached = frames[:, -1] @ self._chain.T_last_flange
         missed = miss(pose_error(T_reached, T))

@@ -33,7 +33,7 @@ class URClosedForm(URGeometry):
 
         Returns:
             At most eight configurations (n, 6) [rad] in [-pi, pi], none if T is out of reach by
-                more than `Reach` allows, and their n labels.
+            more than `Reach` allows, and their n labels.
         """
         rows, labels = [], []
         for q1, ahead in self.shoulders(T):
@@ -54,7 +54,7 @@ class URClosedForm(URGeometry):
 
         Returns:
             Fifth and sixth angle [rad], sin(q5), position of the fourth axis ahead of the first and
-                above the second [m], and q2 + q3 + q4 [rad] of each wrist.
+            above the second [m], and q2 + q3 + q4 [rad] of each wrist.
         """
         (r11, r12, r13, _), (r21, r22, r23, _), (r31, r32, r33, pz), _ = T.tolist()
         c1, s1 = cos(q1), sin(q1)

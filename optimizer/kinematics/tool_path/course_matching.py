@@ -144,7 +144,7 @@ def matched(at: Array, known: Array, asked: Array, reach: float) -> tuple[Array,
 
     Returns:
         The fractions (k,) of the matches, the omitted length (k,) [m] before each, and the length
-            [m] after the last one.
+        [m] after the last one.
     """
     course = _Course(known, SETTINGS.look_ahead * reach)
     moved = np.linalg.norm(np.diff(asked, axis=0, prepend=asked[:1]), axis=1)

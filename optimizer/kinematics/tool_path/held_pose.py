@@ -64,7 +64,7 @@ class HeldPose:
 
         Returns:
             The configuration (nq,) [rad]; if a joint would be beyond its limit, the one with this
-                joint on the limit; None if there is none within the limits.
+            joint on the limit; None if there is none within the limits.
         """
         found = self._solved(q, None)
         if found is None:

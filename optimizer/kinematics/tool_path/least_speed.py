@@ -97,7 +97,7 @@ class LeastSpeed:
 
         Returns:
             The fraction and the speed; None if the least speed is possible everywhere between the
-                ramps.
+            ramps.
         """
         allowed = self.speed.ratios(q, tangent)[:, 0] / (np.abs(tangent) / v_max).max(axis=1)
         at = np.linspace(0.0, 1.0, len(q))

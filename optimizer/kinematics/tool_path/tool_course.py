@@ -191,7 +191,7 @@ class ToolCourse:
 
         Returns:
             Distances (k,) [m] and angles (k,) [rad]; infinite if the motion does not end at the end
-                of the course.
+            of the course.
         """
         at = self.grid(SETTINGS.compared_poses, SETTINGS.compared_distance)
         known = self._embedded(self.poses(at))
