@@ -13,6 +13,7 @@ import numpy as np
 from joulepath.models.robot import Array, Limits, Robot
 from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
 from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives, nearest_turns
 from joulepath.optimizer.kinematics.ik_solutions import (
     LimitedSolution,
     PrincipalSolution,
@@ -24,7 +25,6 @@ from joulepath.optimizer.kinematics.self_motion import SelfMotion, is_point, spr
 from joulepath.optimizer.kinematics.seven import redundant_curve, traced_curve
 from joulepath.optimizer.kinematics.seven.redundant_curve import RedundantCurve
 from joulepath.optimizer.kinematics.seven.traced_curve import TracedCurve
-from joulepath.optimizer.kinematics.six.full_turns import full_turn_alternatives, nearest_turns
 from joulepath.optimizer.kinematics.tcp import flange_pose
 from joulepath.optimizer.problem.branches import BranchLabel
 

@@ -22,10 +22,10 @@ from joulepath.models.robot import MOST_ROBOTS, Array, Limits, Robot
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.kinematics.closed_form import INVERSE, ClosedFormInverseKinematics
 from joulepath.optimizer.kinematics.ik_solutions import LimitedSolution, PrincipalSolution
-from joulepath.optimizer.kinematics.multi_start import MultiStart
 from joulepath.optimizer.kinematics.seven.redundant_arm import RedundantArm
 from joulepath.optimizer.kinematics.seven.traced_arm import TracedArm
 from joulepath.optimizer.kinematics.six.decomposition import DecomposedArm
+from joulepath.optimizer.kinematics.six.multi_start import MultiStart
 from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
 from joulepath.optimizer.problem.branches import BranchLabel
 

@@ -30,10 +30,10 @@ from joulepath.optimizer.kinematics.forward import link_frames
 from joulepath.optimizer.kinematics.isolated import ISOLATED, distinct, lies_on_a_curve
 from joulepath.optimizer.kinematics.jacobians import geometric_jacobian
 from joulepath.optimizer.kinematics.joint_axes import JointAxes
-from joulepath.optimizer.kinematics.named_branches import NamedBranches, in_order, numbered
 from joulepath.optimizer.kinematics.newton import NEWTON, solved
 from joulepath.optimizer.kinematics.reach import REACH
 from joulepath.optimizer.kinematics.six.aligned_wrist import AlignedWrist
+from joulepath.optimizer.kinematics.six.named_branches import NamedBranches, in_order, numbered
 from joulepath.optimizer.kinematics.six.nearly_singular_seeds import SEEDS, seeds_around
 from joulepath.optimizer.kinematics.six.spherical_wrist import (
     LABELS,

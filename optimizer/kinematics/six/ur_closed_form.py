@@ -15,7 +15,8 @@ from scipy.optimize import minimize_scalar
 
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.kinematics.reach import REACH
-from joulepath.optimizer.kinematics.self_motion import StretchedWrist, is_point
+from joulepath.optimizer.kinematics.self_motion import is_point
+from joulepath.optimizer.kinematics.six.stretched_wrist import StretchedWrist
 from joulepath.optimizer.kinematics.six.ur_geometry import UR, URGeometry, heading_uncertainty
 from joulepath.optimizer.problem.branches import Label
 

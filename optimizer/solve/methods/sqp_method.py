@@ -16,7 +16,7 @@ from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.collision.planner.path_planner import along, interpolation_is_free
 from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
 from joulepath.optimizer.dynamics.plant import has_corners
-from joulepath.optimizer.kinematics.tool_path.held_pose import HeldPose
+from joulepath.optimizer.kinematics.held_pose import HeldPose
 from joulepath.optimizer.motion.bspline import Basis
 from joulepath.optimizer.motion.spline import Spline, sample, spline_of, time_scale
 from joulepath.optimizer.problem.problem import LONGEST_DURATION

@@ -1,5 +1,5 @@
-"""Boxes around all that reaches a pose, of arms with seven joints that are nearly of a form with
-known curves.
+"""Boxes around all configurations of a pose, for seven-joint arms that nearly have a closed
+form.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from tests.selection import long_but
 
 # rounding of a parameter at the end of an arc, and of a joint position at the side of a box [rad]
 ROUNDING = 1e-12
-# of the Gen3's axes from those of the form [m]
+# deviation of the Gen3's axes from the closed form [m]
 GEN3_OFF = 0.36e-3
 
 
 def skewed() -> Robot:
-    """A Panda whose axes are off by some tenths of a millimetre, as calibration finds them."""
+    """Panda with axes displaced by some tenths of a millimetre, as calibration finds them."""
     robot, rng = load_robot("panda"), np.random.default_rng(5)
     model = robot.model.copy()
     for joint in range(2, 8):
@@ -46,7 +46,9 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 
 
 def configurations(robot: Robot, count: int, seed: int) -> Array:
-    """Random ones, every other with some joints on a singularity of the form or next to it."""
+    """Random configurations, every other one with some joints at a singularity of the form or next
+    to it.
+    """
     rng = np.random.default_rng(seed)
     q = rng.uniform(-np.pi, np.pi, (count, 7))
     for k in range(0, count, 2):
@@ -56,7 +58,7 @@ def configurations(robot: Robot, count: int, seed: int) -> Array:
 
 
 def holding(sheets: list[BranchCover], q: Array, half: float, shift: float) -> list[float]:
-    """The widest sides [rad] of the boxes, of this half side of the parameter, that hold q (7,)."""
+    """Largest side [rad] of each box that holds q (7,), for this half side of the parameter."""
     found = []
     for sheet in sheets:
         u = -q[0] if sheet.mirrored else q[6]
@@ -83,13 +85,13 @@ def test_every_configuration_is_in_a_box_of_its_pose(robot: Robot, count: int) -
             assert held, (k, half)
             if half == 0 and k % 2:
                 widths.append(min(held))
-    # a cover worth having: of half a millimetre, away from singularities
+    # A useful cover of half a millimetre, away from singularities.
     assert np.median(widths) < 0.2
 
 
 def test_the_deviation_is_reached_and_not_exceeded() -> None:
-    """The flange of the arm nearby, against that of the Gen3: as far from it as is said, and no
-    farther.
+    """The flanges of the simple arm and of the Gen3 are at most `deviation` apart, and nearly
+    so.
     """
     robot = ROBOTS["gen3"]
     chain, rng = Chain.of(robot.model), np.random.default_rng(8)
@@ -102,7 +104,7 @@ def test_the_deviation_is_reached_and_not_exceeded() -> None:
     for ours, theirs in zip(chain.flange(q)[::40], nearby.flange(-q[:, ::-1])[::40], strict=True):
         found = branch_covers(robot, ours)
         assert found is not None
-        # where S is, seen from the last link
+        # Position of S in the frame of the last link.
         seen = found[0].pose.shoulder
         apart.append(float(np.linalg.norm(seen - form.shoulder_in_7(theirs))))
     assert 0.9 * sheets[0].blur < max(apart) <= sheets[0].blur + ROUNDING

@@ -1,6 +1,4 @@
-"""Points of a course that a motion is compared with: looked for all at once, they are those found
-one by one.
-"""
+"""Matches between a motion and a course: found all at once, they equal those found one by one."""
 
 from __future__ import annotations
 
@@ -13,7 +11,7 @@ from joulepath.optimizer.kinematics.tool_path.course_matching import MatchingSet
 
 
 def _courses(rng: np.random.Generator) -> list[Array]:
-    """Points (m, d) of a line, there and back, a knot that crosses itself, a random walk."""
+    """Points (m, d) of a line, there and back, a knot that crosses itself, and a random walk."""
     t = np.linspace(0.0, 1.0, 200)
     line = np.stack([0.4 * t, 0 * t, 0 * t], axis=1)
     knot = 0.2 * np.stack([np.sin(4 * np.pi * t), np.sin(6 * np.pi * t), 0 * t], axis=1)
@@ -27,7 +25,7 @@ def _courses(rng: np.random.Generator) -> list[Array]:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_all_at_once_are_those_one_by_one(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also of motions that stop early, come back, or are far off the course."""
+    """Also for motions that stop early, turn back, or are far off the course."""
     rng = np.random.default_rng(seed)
     for known in _courses(rng):
         at, share = np.linspace(0.0, 1.0, len(known)), np.sort(rng.random(80))

@@ -16,9 +16,7 @@ COUNT = 24
 
 
 class Corner:
-    """A curve whose joints stand still but for a step of 3 rad within a thousandth of the
-    parameter.
-    """
+    """Curve whose joints rest except for a step of 3 rad within a thousandth of the parameter."""
 
     label, free, arcs = None, (0,), [(0.0, 1.0)]
 

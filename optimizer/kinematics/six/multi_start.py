@@ -20,10 +20,10 @@ from joulepath.optimizer.exceptions import SingularPose
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.isolated import ISOLATED, distinct, lies_on_a_curve
-from joulepath.optimizer.kinematics.named_branches import in_order, numbered
 from joulepath.optimizer.kinematics.newton import solved
 from joulepath.optimizer.kinematics.reach import REACH
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
+from joulepath.optimizer.kinematics.six.named_branches import in_order, numbered
 from joulepath.optimizer.problem.branches import BranchLabel, NumberedBranch
 
 
