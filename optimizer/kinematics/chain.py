@@ -165,7 +165,7 @@ def pose_error(T_reached: Array, T: Array) -> Array:
     return error
 
 
-def miss(error: Array) -> Array:
+def twist_size(error: Array) -> Array:
     """Size (n,) of twists (n, 6): the larger of the distance [m] and the angle [rad]."""
     squares = error * error
     return np.asarray(np.sqrt(np.maximum(squares[:, :3].sum(axis=1), squares[:, 3:].sum(axis=1))))

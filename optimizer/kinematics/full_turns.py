@@ -23,10 +23,8 @@ def full_turn_alternatives(q: Array, q_min: Array, q_max: Array) -> list[list[fl
     """
     choices = []
     for angle, lower, upper in zip(q.tolist(), q_min.tolist(), q_max.tolist(), strict=True):
-        least, most = (
-            ceil((lower - REACH.rounding_angle - angle) / tau),
-            floor((upper + REACH.rounding_angle - angle) / tau),
-        )
+        least = ceil((lower - REACH.rounding_angle - angle) / tau)
+        most = floor((upper + REACH.rounding_angle - angle) / tau)
         inside = (min(max(angle + tau * k, lower), upper) for k in range(least, most + 1))
         choices.append(sorted(inside, key=abs))
     return choices

@@ -20,7 +20,7 @@ from typing import Protocol
 
 from joulepath.models.robot import MOST_ROBOTS, Array, Limits, Robot
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.kinematics.closed_form import INVERSE, ClosedFormInverseKinematics
+from joulepath.optimizer.kinematics.confirmed_inverse import INVERSE, ConfirmedInverseKinematics
 from joulepath.optimizer.kinematics.ik_solutions import LimitedSolution, PrincipalSolution
 from joulepath.optimizer.kinematics.seven.redundant_arm import RedundantArm
 from joulepath.optimizer.kinematics.seven.traced_arm import TracedArm
@@ -96,8 +96,8 @@ def inverse_kinematics_for(robot: Robot) -> InverseKinematics | None:
     """Inverse kinematics of a robot, built once; None for an arm without one."""
     model = robot.model
     exact = URClosedForm.of(model) or DecomposedArm.of(model) or RedundantArm.of(model)
-    form = exact or MultiStart.of(model) or TracedArm.of(model)
-    return None if form is None else ClosedFormInverseKinematics(robot, form)
+    solver = exact or MultiStart.of(model) or TracedArm.of(model)
+    return None if solver is None else ConfirmedInverseKinematics(robot, solver)
 
 
 def required_inverse_kinematics(robot: Robot, field: str) -> InverseKinematics:

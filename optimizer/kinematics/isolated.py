@@ -32,6 +32,10 @@ class IsolatedSettings:
     """Smallest singular value below which a configuration may lie on a self-motion."""
     probe_step: float = 0.3
     """Step along the null direction that tests for a self-motion [rad]."""
+    probe_newton_steps: int = 25
+    """Newton steps back onto the pose after this step."""
+    least_probe_share: float = 0.1
+    """Smallest joint distance of the result from the configuration, relative to the step."""
     probe_damping: float = 1e-12
     """Damping that keeps the component of the step along the null direction."""
     probe_tolerance: float = 5e-10
@@ -41,26 +45,24 @@ class IsolatedSettings:
 ISOLATED = IsolatedSettings()
 
 
-def distinct(q: Array, missed: Array, smallest: Array | None = None) -> list[int]:
+def distinct(q: Array, residual: Array, smallest: Array | None = None) -> list[int]:
     """Indices of distinct configurations of one pose; of duplicates, the one with the least pose
     error.
 
     Args:
         q: configurations (n, nq) [rad].
-        missed: pose error of each, shape (n,) [m, rad].
+        residual: pose error of each, shape (n,) [m, rad].
         smallest: smallest singular value of each, shape (n,); if given, near a singularity the
             tolerance grows.
     """
     # At a fold, an error e moves the configuration by about √e.
-    same = np.maximum(ISOLATED.same, ISOLATED.fold * np.sqrt(missed))
+    same = np.maximum(ISOLATED.same, ISOLATED.fold * np.sqrt(residual))
     if smallest is not None:
         same = np.maximum(same, ISOLATED.rounding / np.maximum(smallest, 1e-12))
     # The sum of shifted sines changes by no more than the sum of the joint distances, and leaves
     # few pairs to compare.
-    sine_sum, near = (
-        np.sin(q + np.arange(q.shape[1])).sum(axis=1),
-        q.shape[1] * same.max(initial=0.0),
-    )
+    sine_sum = np.sin(q + np.arange(q.shape[1])).sum(axis=1)
+    near = q.shape[1] * same.max(initial=0.0)
     if np.diff(np.sort(sine_sum)).min(initial=np.inf) > near:
         return list(range(len(q)))
     i, j = np.nonzero(np.triu(np.abs(sine_sum[:, None] - sine_sum) <= near, 1))
@@ -72,7 +74,7 @@ def distinct(q: Array, missed: Array, smallest: Array | None = None) -> list[int
         others[first].add(second)
         others[second].add(first)
     chosen = set[int]()
-    for k in np.argsort(missed, kind="stable").tolist():
+    for k in np.argsort(residual, kind="stable").tolist():
         if not others[k] & chosen:
             chosen.add(k)
     return sorted(chosen)
@@ -86,12 +88,12 @@ def lies_on_a_curve(chain: Chain, q: Array, T: Array) -> bool:
     sides; on a self-motion it reaches the pose again.
     """
     null = np.linalg.svd(chain.flange_and_jacobian(q[None])[1][0])[2][-1]
-    tried, missed = solved(
+    tried, residual = solved(
         chain,
         q + np.array([[ISOLATED.probe_step], [-ISOLATED.probe_step]]) * null,
         T,
-        steps=25,
+        steps=ISOLATED.probe_newton_steps,
         least_damping=ISOLATED.probe_damping,
     )
-    far = np.abs(wrapped(tried - q)).max(axis=1) > ISOLATED.probe_step / 10
-    return bool((far & (missed < ISOLATED.probe_tolerance)).any())
+    far = np.abs(wrapped(tried - q)).max(axis=1) > ISOLATED.least_probe_share * ISOLATED.probe_step
+    return bool((far & (residual < ISOLATED.probe_tolerance)).any())

@@ -24,6 +24,8 @@ class JointAxesSettings:
     """Sine of the angle between neighbouring axes below which they count as parallel; far above the
     error of rounded angles.
     """
+    most_condition: float = 1e6
+    """Condition number of the normal equations above which axes have no meeting point."""
     meeting: float = 5e-4
     """Distance of axes below which they count as meeting [m]; far above the shifts of a
     calibration.
@@ -101,7 +103,7 @@ def meeting_point(directions: Array, points: Array) -> tuple[Array, float]:
     """
     across = np.eye(3) - directions[:, :, None] * directions[:, None, :]
     total = across.sum(axis=0)
-    if np.linalg.cond(total) > 1e6:
+    if np.linalg.cond(total) > AXES.most_condition:
         return points[0], np.inf
     centre = np.linalg.solve(total, (across @ points[:, :, None]).sum(axis=0)[:, 0])
     return centre, float(

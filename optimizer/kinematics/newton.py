@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.kinematics.chain import Chain, miss, pose_error
+from joulepath.optimizer.kinematics.chain import Chain, pose_error, twist_size
 
 
 @dataclass(frozen=True)
@@ -21,6 +21,8 @@ class NewtonSettings:
 
     exact: float = 2e-15
     """Pose error below which a step would only follow rounding [m, rad]."""
+    last_digits: float = 1e-13
+    """Pose error below which a failed step ends the iteration: only rounding is left [m, rad]."""
     first_damping: float = 1e-6
     """Additional damping after a first failed step, relative to the squared error."""
     damping_growth: float = 8.0
@@ -64,8 +66,8 @@ def solved(
     q = q.copy()
     T_reached, jacobian = chain.flange_and_jacobian(q)
     error = pose_error(T_reached, T)
-    missed, extra = miss(error), np.zeros(len(q))
-    active = np.flatnonzero(missed > NEWTON.exact)
+    residual, extra = twist_size(error), np.zeros(len(q))
+    active = np.flatnonzero(residual > NEWTON.exact)
     for step in range(steps):
         if not len(active):
             break
@@ -74,25 +76,25 @@ def solved(
         tried = q[active] + _damped_steps(jacobian[active], error[active], damping)
         T_tried, jacobian_tried = chain.flange_and_jacobian(tried)
         error_tried = pose_error(T_tried, T if T.ndim == 2 else T[active])
-        missed_tried = miss(error_tried)
+        residual_tried = twist_size(error_tried)
         better = (error_tried**2).sum(axis=1) < squared
         taken = active[better]
-        q[taken], jacobian[taken], error[taken] = (
-            tried[better],
-            jacobian_tried[better],
-            error_tried[better],
-        )
-        missed[taken] = missed_tried[better]
+        q[taken] = tried[better]
+        jacobian[taken] = jacobian_tried[better]
+        error[taken] = error_tried[better]
+        residual[taken] = residual_tried[better]
         extra[taken] *= NEWTON.damping_decay
         extra[active[~better]] = np.maximum(
             extra[active[~better]] * NEWTON.damping_growth, NEWTON.first_damping * squared[~better]
         )
-        stuck = (~better) & ((extra[active] > NEWTON.most_damping) | (missed[active] < 1e-13))
+        stuck = (~better) & ((extra[active] > NEWTON.most_damping) | (residual[active] < NEWTON.last_digits))
         late = (
-            (missed[active] > hopeless) if step >= steps // 3 else np.zeros(len(active), dtype=bool)
+            (residual[active] > hopeless)
+            if step >= steps // 3
+            else np.zeros(len(active), dtype=bool)
         )
-        active = active[(missed[active] > NEWTON.exact) & ~stuck & ~late]
-    return q, missed
+        active = active[(residual[active] > NEWTON.exact) & ~stuck & ~late]
+    return q, residual
 
 
 def _damped_steps(jacobian: Array, error: Array, damping: Array) -> Array:

@@ -25,7 +25,7 @@ class Reach:
     """Distance out of reach up to which a pose keeps its branches at the edge [m]; below the 1e-6 m
     that the certificate allows at an end, with room for rounding.
     """
-    missed: float = 9e-7
+    residual: float = 9e-7
     """Largest pose error of a configuration at the edge [m, rad]; two simultaneous edges may add up
     to a larger error, and are refused.
     """
@@ -55,14 +55,14 @@ REACH = Reach()
 
 
 def at_the_edge(
-    chain: Chain, q: Array, missed: Array, inexact: Mask, T: Array
+    chain: Chain, q: Array, residual: Array, inexact: Mask, T: Array
 ) -> tuple[Array, Array]:
     """Refines inexact configurations towards the pose, and drops duplicates of exact ones.
 
     Args:
         chain: chain of the arm.
         q: configurations (n, nq) [rad].
-        missed: pose error of each, shape (n,) [m, rad].
+        residual: pose error of each, shape (n,) [m, rad].
         inexact: mask (n,) of the configurations to refine.
         T: flange pose (4, 4).
 
@@ -70,15 +70,15 @@ def at_the_edge(
         The configurations and their pose errors; the error is infinite if an exact configuration of
         the same branch is known.
     """
-    beside = np.flatnonzero(inexact & (missed < REACH.near))
+    beside = np.flatnonzero(inexact & (residual < REACH.near))
     if not len(beside):
-        return q, missed
-    exact, q, missed = q[~inexact], q.copy(), missed.copy()
-    q[beside], missed[beside] = solved(chain, q[beside], T)
+        return q, residual
+    exact, q, residual = q[~inexact], q.copy(), residual.copy()
+    q[beside], residual[beside] = solved(chain, q[beside], T)
     for k in beside.tolist():
         if (np.abs(wrapped(exact - q[k])).max(axis=1) < REACH.apart).any():
-            missed[k] = np.inf
-    return q, missed
+            residual[k] = np.inf
+    return q, residual
 
 
 def out_of_reach(distance: float | None, target: str) -> UnreachablePose | SingularPose:
@@ -93,8 +93,7 @@ def out_of_reach(distance: float | None, target: str) -> UnreachablePose | Singu
             target,
             None,
             f"No arm configuration was found for the {target} pose: move the position closer to "
-            "the robot's "
-            "workspace, or change the orientation.",
+            "the robot's workspace, or change the orientation.",
         )
     if distance <= REACH.rounding:
         return SingularPose(target, 0.0)
@@ -103,6 +102,5 @@ def out_of_reach(distance: float | None, target: str) -> UnreachablePose | Singu
         target,
         distance,
         f"The {target} pose is {distance:.4g} m out of reach in this orientation: {hint}move the "
-        "position closer "
-        "to the robot's workspace, or change the orientation.",
+        "position closer to the robot's workspace, or change the orientation.",
     )

@@ -323,10 +323,8 @@ def _hull(
     second_least = np.where(possible, steps - 1, np.inf).min(axis=1) * eta
     second_most = np.where(possible, steps + 1, -np.inf).max(axis=1) * eta
     for joint, a, b in ((w, least, most), (w + 1, second_least, second_most)):
-        a, b = (
-            np.where(held, np.maximum(a, -half[:, joint]), 0.0),
-            np.where(held, np.minimum(b, half[:, joint]), 0.0),
-        )
+        a = np.where(held, np.maximum(a, -half[:, joint]), 0.0)
+        b = np.where(held, np.minimum(b, half[:, joint]), 0.0)
         centre[:, joint] += (a + b) / 2
         half[:, joint] = (b - a) / 2
     return centre, half, held

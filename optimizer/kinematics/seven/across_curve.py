@@ -112,10 +112,8 @@ def project_onto_curve(
         (again,) = ((left[rows] > ACROSS.tolerance) & (ratio < ACROSS.chord_ratio)).nonzero()
         if len(again):
             here, sides = rows[again], np.empty((len(again), q.shape[1]))
-            sides[:, :-1], sides[:, -1] = (
-                sine_error(chain.flange_components(q[here]), T),
-                ahead[here],
-            )
+            sides[:, :-1] = sine_error(chain.flange_components(q[here]), T)
+            sides[:, -1] = ahead[here]
             move = np.einsum("nij,nj->ni", inverse[again], sides)
             _advance(q, ahead, along, here, np.minimum(np.maximum(move, -longest), longest))
             left[here] = 2 * ratio[again] * np.maximum.reduce(np.abs(move), axis=1)
@@ -143,10 +141,8 @@ def _step(
         second-order term to the first-order step, and the inverse matrices (n, nq, nq).
     """
     reached, jacobian = chain.flange_and_columns(q)
-    inverse, sides = (
-        np.asarray(np.linalg.inv(_system(jacobian, along)), dtype=float),
-        np.zeros(q.shape),
-    )
+    inverse = np.asarray(np.linalg.inv(_system(jacobian, along)), dtype=float)
+    sides = np.zeros(q.shape)
     sides[:, :-1], sides[:, -1] = sine_error(reached, T), ahead
     move: Array = np.einsum("nij,nj->ni", inverse, sides)
     more: Array = np.einsum("nij,jn->ni", inverse[:, :, :-1], second_order(jacobian, move.T))

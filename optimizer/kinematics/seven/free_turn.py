@@ -104,12 +104,10 @@ class FreeTurn:
 
         If the fifth joint is free, the first three joints are bounded as in `redundant_boxes`.
         """
-        centre, sides = (
-            self.at(parameter),
-            np.full(
-                (len(parameter), 7),
-                SETTINGS.loop_half_width if self.joint == 4 else SETTINGS.rounding,
-            ),
+        centre = self.at(parameter)
+        sides = np.full(
+            (len(parameter), 7),
+            SETTINGS.loop_half_width if self.joint == 4 else SETTINGS.rounding,
         )
         sides[:, self.joint] += half
         if self.joint == 4:

@@ -66,11 +66,9 @@ def interval_edges(form: SphericalShoulder, coefficients: Array) -> Array:
 def _straight_elbow_angles(form: SphericalShoulder, square: list[float]) -> list[float]:
     """Angles of q7 [rad] with a stretched or folded elbow, |cos θ| = 1, or nearly so."""
     still, ahead, aside = square
-    reach, size, phase = (
-        2 * form.rho * form.nu,
-        hypot(ahead, aside),
-        atan2(aside, ahead),
-    )
+    reach = 2 * form.rho * form.nu
+    size = hypot(ahead, aside)
+    phase = atan2(aside, ahead)
     if size <= SETTINGS.negligible * reach:
         return []
     cosines = [(form.squares - still + each) / size for each in (reach, -reach)]

@@ -41,7 +41,7 @@ SETTINGS = RedundantArmSettings()
 
 @dataclass(frozen=True, eq=False)
 class RedundantArm:
-    """`ClosedForm` of a redundant arm.
+    """`PoseSolver` of a redundant arm.
 
     Configurations are never isolated, except on a self-motion that is a single point.
     """
@@ -107,11 +107,11 @@ class RedundantArm:
         best = int(tried.argmin())
         start: Array = np.array([angle[best] for angle in each], dtype=float)
 
-        def miss(x: Array) -> float:
+        def distance(x: Array) -> float:
             return float(self._misses(pose, x[:1], x[1:])[0])
 
         refined = minimize(
-            miss, start, method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-12}
+            distance, start, method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-12}
         )
         return float(min(refined.fun, tried[best]))
 
@@ -128,10 +128,8 @@ class RedundantArm:
         least, most = np.abs(inclined - cone), np.pi - np.abs(np.pi - inclined - cone)
         polar = np.arctan2(np.hypot(v[:, 0], v[:, 1]), v[:, 2])
         nearest = np.clip(polar, least, most)
-        across, up = (
-            np.hypot(v[:, 0], v[:, 1]) - length * np.sin(nearest),
-            v[:, 2] - length * np.cos(nearest),
-        )
+        across = np.hypot(v[:, 0], v[:, 1]) - length * np.sin(nearest)
+        up = v[:, 2] - length * np.cos(nearest)
         return np.asarray(np.hypot(across, up))
 
     def _angles(self, q: Array) -> tuple[float, float, float]:

@@ -131,10 +131,8 @@ def _boxes(pose: RedundantPose, cells: Cells, blur: float) -> tuple[Array, Array
     azimuth = np.arctan2(across[:, 1], across[:, 0])
     last = np.empty((4, n))
     last[0], last[3] = form.q4_at_zero - theta, middle
-    last[1], last[2] = (
-        azimuth[1] + wrist_angle[1] - form.sixth_azimuth,
-        wrist_angle[0] - azimuth[0] + form.fifth_azimuth,
-    )
+    last[1] = azimuth[1] + wrist_angle[1] - form.sixth_azimuth
+    last[2] = wrist_angle[0] - azimuth[0] + form.fifth_azimuth
     centre = pose.completed(last, _backwards(last, fourth, form.q4_at_zero, seventh), side)
     sides, moves = np.empty((7, n)), np.empty((2, n))
     moves[0], moves[1] = moved, form.rho * theta_half

@@ -299,10 +299,8 @@ class _LimitRanges:
     def of(cls, q_min: Array, q_max: Array) -> _LimitRanges:
         """Ranges of limits (7,) [rad]."""
         joints = [*range(7), 0, 1, 2]
-        middle, width = (
-            (q_min + q_max)[joints, None] / 2,
-            (q_max - q_min)[joints, None] / 2 + SETTINGS.rounding,
-        )
+        middle = (q_min + q_max)[joints, None] / 2
+        width = (q_max - q_min)[joints, None] / 2 + SETTINGS.rounding
         width[width >= np.pi] = np.inf
         return cls(middle, width)
 

@@ -148,11 +148,9 @@ class RedundantPose:
 
     def _last(self, q7: Array, theta: Array, psi: Array, seventh: Array, fourth: Array) -> Array:
         """The result of `wrist` from the harmonics (3, n) of q7 and of θ."""
-        form, v, S = (
-            self.form,
-            self._wrist_harmonics @ seventh,
-            self.form.shoulder_harmonics.T @ fourth,
-        )
+        form = self.form
+        v = self._wrist_harmonics @ seventh
+        S = self.form.shoulder_harmonics.T @ fourth
         last = np.empty((4, len(q7)))
         last[0], last[3] = form.q4_at_zero - theta, q7
         last[2] = psi - np.arctan2(v[1], v[0]) + form.fifth_azimuth

@@ -66,7 +66,7 @@ SETTINGS = TracedArmSettings()
 
 
 class TracedArm:
-    """`ClosedForm` interface of a seven-joint arm without a closed form; it has no isolated
+    """`PoseSolver` of a seven-joint arm without a closed form; it has no isolated
     configurations.
     """
 
@@ -83,11 +83,9 @@ class TracedArm:
         """
         if model.nq != 7:
             return None
-        chain, q_min, q_max = (
-            Chain.of(model),
-            model.lowerPositionLimit.copy(),
-            model.upperPositionLimit.copy(),
-        )
+        chain = Chain.of(model)
+        q_min = model.lowerPositionLimit.copy()
+        q_max = model.upperPositionLimit.copy()
         turns = q_max / 2 - q_min / 2 >= np.pi
         seeds = SeedTable(chain, np.where(turns, -np.pi, q_min), np.where(turns, np.pi, q_max))
         return cls(chain, seeds, NearbyArm.of(chain))
@@ -131,18 +129,22 @@ class TracedArm:
         """Always None: the distance is unknown."""
         return
 
-    def _with_near(self, q: Array, missed: Array, T: Array) -> tuple[Array, Array]:
+    def _with_near(self, q: Array, residual: Array, T: Array) -> tuple[Array, Array]:
         """The seeds, and further seeds around those that nearly reached the pose T (4, 4).
 
         Next to a singularity Newton's method is slow from most seeds, but not from all.
         """
-        near = q[np.argsort(np.where(missed < SETTINGS.solved, np.inf, missed))[: SETTINGS.nearest]]
-        near = near[: int(((missed >= SETTINGS.solved) & (missed < SETTINGS.nearly_solved)).sum())]
+        near = q[
+            np.argsort(np.where(residual < SETTINGS.solved, np.inf, residual))[: SETTINGS.nearest]
+        ]
+        near = near[
+            : int(((residual >= SETTINGS.solved) & (residual < SETTINGS.nearly_solved)).sum())
+        ]
         around = near[:, None] + SETTINGS.deviation * np.random.default_rng(0).normal(
             size=(len(near), SETTINGS.around, 7)
         )
         found = solved(self._chain, around.reshape(-1, 7), T, SETTINGS.steps)
-        return np.concatenate([q, found[0]]), np.concatenate([missed, found[1]])
+        return np.concatenate([q, found[0]]), np.concatenate([residual, found[1]])
 
     def _beside_nearby(self, T: Array) -> tuple[TracedCurveStack, Array]:
         """Curves along those of the nearby arm at the flange pose T (4, 4), and seeds (n, 7) for
@@ -183,17 +185,17 @@ class TracedArm:
         If there are no other curves, seeds of the table and of the nearby arm beside T are used,
         too.
         """
-        q, missed = solved(self._chain, starts, T, SETTINGS.steps)
-        if not others and not (missed < SETTINGS.solved).any():
+        q, residual = solved(self._chain, starts, T, SETTINGS.steps)
+        if not others and not (residual < SETTINGS.solved).any():
             starts = np.vstack([self._seeds.starts(T), *self._beside(T)])
-            q, missed = solved(self._chain, starts, T, SETTINGS.steps)
-        q, missed = self._with_near(q, missed, T)
-        if not others and not (missed < SETTINGS.solved).any():
-            q, missed = solved(self._chain, starts[: SETTINGS.few_seeds], T, SETTINGS.most_steps)
+            q, residual = solved(self._chain, starts, T, SETTINGS.steps)
+        q, residual = self._with_near(q, residual, T)
+        if not others and not (residual < SETTINGS.solved).any():
+            q, residual = solved(self._chain, starts[: SETTINGS.few_seeds], T, SETTINGS.most_steps)
         # A pose error that is small after many steps indicates a singularity.
         q = q[
-            missed
-            < (SETTINGS.solved if others or (missed < SETTINGS.solved).any() else SETTINGS.edge)
+            residual
+            < (SETTINGS.solved if others or (residual < SETTINGS.solved).any() else SETTINGS.edge)
         ]
         smallest = np.linalg.svd(self._chain.flange_and_jacobian(q)[1], compute_uv=False)[:, -1]
         regular = smallest > SETTINGS.singular

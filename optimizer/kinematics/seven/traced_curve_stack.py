@@ -62,10 +62,8 @@ class TracedCurveStack:
             np.pi if path.closed else SETTINGS.open_half if count > 1 else 0.0
             for path, count in zip(paths, counts, strict=True)
         ]
-        nodes, tangents = (
-            np.concatenate([path.q for path in paths]),
-            np.concatenate([path.tangents for path in paths]),
-        )
+        nodes = np.concatenate([path.q for path in paths])
+        tangents = np.concatenate([path.tangents for path in paths])
         return cls(nodes, tangents, np.cumsum([0, *counts[:-1]]), np.array(half))
 
     def joined(self, paths: Sequence[TracedPath]) -> TracedCurveStack:
@@ -217,10 +215,8 @@ class TracedCurveStack:
         # One phase per joint, so that mirrored curves differ.
         m, nq = self.nodes.shape
         phases, cosines_and_sines = self.nodes + np.arange(1.0, nq + 1), np.empty((m, 2 * nq))
-        c, s = (
-            np.cos(phases, out=cosines_and_sines[:, :nq]),
-            np.sin(phases, out=cosines_and_sines[:, nq:]),
-        )
+        c = np.cos(phases, out=cosines_and_sines[:, :nq])
+        s = np.sin(phases, out=cosines_and_sines[:, nq:])
         sine_sum, slope = s.sum(axis=1), np.einsum("ij,ij->i", c, self.tangents)
         # Trapezoidal rule with its end correction.
         parts, length = np.zeros(len(sine_sum)), self.segment_lengths[:-1]

@@ -50,10 +50,8 @@ class AlignedWrist:
         """Boxes that cover the curve, see `SelfMotion.boxes`; exact, since both joints move by the
         parameter.
         """
-        centre, half = (
-            self._unwrapped(np.asarray(parameter, dtype=float)),
-            np.asarray(half, dtype=float),
-        )
+        centre = self._unwrapped(np.asarray(parameter, dtype=float))
+        half = np.asarray(half, dtype=float)
         sides = np.zeros_like(centre)
         sides[:, 3] = sides[:, 5] = half
         return centre, sides

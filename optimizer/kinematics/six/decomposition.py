@@ -25,7 +25,7 @@ import pinocchio as pin
 from joulepath.models.robot import Array, Limits, Mask
 from joulepath.optimizer.exceptions import SingularPose
 from joulepath.optimizer.kinematics.angles import wrapped
-from joulepath.optimizer.kinematics.chain import Chain, miss, pose_error
+from joulepath.optimizer.kinematics.chain import Chain, pose_error, twist_size
 from joulepath.optimizer.kinematics.forward import link_frames
 from joulepath.optimizer.kinematics.isolated import ISOLATED, distinct, lies_on_a_curve
 from joulepath.optimizer.kinematics.jacobians import geometric_jacobian
@@ -95,7 +95,7 @@ class _Found:
 
 
 class DecomposedArm:
-    """`ClosedForm` of an arm with a decomposition known to EAIK."""
+    """`PoseSolver` of an arm with a decomposition known to EAIK."""
 
     confirmed = True
 
@@ -259,7 +259,7 @@ class DecomposedArm:
             if not isinstance(found, AlignedWrist):
                 wrists += [np.array(found)]
             elif (
-                miss(pose_error(self._chain.flange(found.q[None]), T))[0]
+                twist_size(pose_error(self._chain.flange(found.q[None]), T))[0]
                 < 2 * SPHERICAL_WRIST.aligned
             ):
                 motions.append(found)
@@ -277,23 +277,24 @@ class DecomposedArm:
         """Distinct solutions (n, 6) in [-pi, pi] from seeds q (m, 6), and their smallest singular
         values (n,).
         """
-        q, missed, smallest = self._refined(q, frames, T)
-        near = missed < self._seed_error
+        q, residual, smallest = self._refined(q, frames, T)
+        near = residual < self._seed_error
         # EAIK's rows of an aligned wrist are singular, but far from the pose.
         more = self._more_seeds(q, smallest, near, T)
-        q, missed, smallest = q[near], missed[near], smallest[near]
+        q, residual, smallest = q[near], residual[near], smallest[near]
         if len(more):
-            q_more, missed_more, smallest_more = self._refined(
+            q_more, residual_more, smallest_more = self._refined(
                 more, link_frames(self._chain.placements, more), T
             )
-            q, missed = np.vstack([q, q_more]), np.append(missed, missed_more)
+            q, residual = np.vstack([q, q_more]), np.append(residual, residual_more)
             smallest = np.append(smallest, smallest_more)
         # For an arm with deviations, a least pose error beside a singularity is not at the edge of
         # the workspace.
-        at_edge = (missed < REACH.beyond) & (smallest < REACH.singular) & self.complete
-        done = (missed < SETTINGS.solved) | at_edge
-        q, missed, smallest = np.clip(wrapped(q[done]), -np.pi, np.pi), missed[done], smallest[done]
-        chosen = distinct(q, missed, smallest)
+        at_edge = (residual < REACH.beyond) & (smallest < REACH.singular) & self.complete
+        done = (residual < SETTINGS.solved) | at_edge
+        q, residual, smallest = q[done], residual[done], smallest[done]
+        q = np.clip(wrapped(q), -np.pi, np.pi)
+        chosen = distinct(q, residual, smallest)
         return q[chosen], smallest[chosen]
 
     def _refined(self, q: Array, frames: Array, T: Array) -> tuple[Array, Array, Array]:
@@ -304,22 +305,22 @@ class DecomposedArm:
             values (n,), infinite for rows that cannot be singular.
         """
         T_reached = frames[:, -1] @ self._chain.T_last_flange
-        missed = miss(pose_error(T_reached, T))
+        residual = twist_size(pose_error(T_reached, T))
         singular = self._may_be_singular(q)
         moved = np.flatnonzero(
-            (missed > np.where(singular, NEWTON.exact, SETTINGS.refined))
-            & (missed < self._seed_error)
+            (residual > np.where(singular, NEWTON.exact, SETTINGS.refined))
+            & (residual < self._seed_error)
         )
         if len(moved):
             q = q.copy()
-            q[moved], missed[moved] = solved(self._chain, q[moved], T)
+            q[moved], residual[moved] = solved(self._chain, q[moved], T)
             frames = link_frames(self._chain.placements, q)
             T_reached = frames[:, -1] @ self._chain.T_last_flange
         smallest = np.full(len(q), np.inf)
         if singular.any():
             jacobian = geometric_jacobian(frames[singular], T_reached[singular, :3, 3])
             smallest[singular] = np.linalg.svd(jacobian, compute_uv=False)[:, -1]
-        return q, missed, smallest
+        return q, residual, smallest
 
     def _may_be_singular(self, q: Array) -> Mask:
         """Mask of the rows of q (n, 6) that the measures of a spherical wrist do not prove
@@ -345,5 +346,5 @@ class DecomposedArm:
         for each, T_exact in zip(q, T, strict=True):
             simple = np.array(self._decomposition.fwdkin(each))
             simple[:3, :3] = simple[:3, :3] @ self._R_zero
-            worst = max(worst, float(miss(pose_error(simple[None], T_exact))[0]))
+            worst = max(worst, float(twist_size(pose_error(simple[None], T_exact))[0]))
         return worst

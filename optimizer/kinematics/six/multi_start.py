@@ -59,7 +59,7 @@ MULTI_START = MultiStartSettings()
 
 
 class MultiStart:
-    """`ClosedForm` interface of a six-joint arm without a closed form."""
+    """`PoseSolver` of a six-joint arm without a closed form."""
 
     complete, confirmed = False, False
 
@@ -133,12 +133,12 @@ class MultiStart:
 
     def _joined(self, found: Array, starts: Array, T: Array) -> Array:
         """The known solutions (n, 6) [rad], and the distinct new ones found from starts (m, 6)."""
-        q, missed = solved(self._chain, starts, T, MULTI_START.steps, MULTI_START.hopeless)
+        q, residual = solved(self._chain, starts, T, MULTI_START.steps, MULTI_START.hopeless)
         singular = self._smallest(q) < REACH.singular
-        done = (missed < MULTI_START.solved) | ((missed < REACH.beyond) & singular)
+        done = (residual < MULTI_START.solved) | ((residual < REACH.beyond) & singular)
         q = np.vstack([found, np.clip(wrapped(q[done]), -np.pi, np.pi)])
         smallest = self._smallest(q)
-        return np.asarray(q[distinct(q, np.append(np.zeros(len(found)), missed[done]), smallest)])
+        return np.asarray(q[distinct(q, np.append(np.zeros(len(found)), residual[done]), smallest)])
 
     def _smallest(self, q: Array) -> Array:
         """Smallest singular values (n,) of the Jacobian at configurations (n, 6) [rad]."""

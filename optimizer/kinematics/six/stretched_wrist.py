@@ -56,10 +56,8 @@ class StretchedWrist:
         if least**2 > A + B or most**2 < A - B:
             return []
         # Range of the cosine, and the arcs over it.
-        lower, upper = (
-            max((least**2 - A) / B, -1.0) if B else -1.0,
-            min((most**2 - A) / B, 1.0) if B else 1.0,
-        )
+        lower = max((least**2 - A) / B, -1.0) if B else -1.0
+        upper = min((most**2 - A) / B, 1.0) if B else 1.0
         near, far = float(np.arccos(upper)), float(np.arccos(lower))
         if near == 0:
             return [(phase - far, phase + far)]
@@ -87,10 +85,8 @@ class StretchedWrist:
         elbow, shoulder = self._triangle(np.hypot(x, z))
         q = np.empty((len(h), 6))
         q[:, 0], q[:, 4] = self.q1, self.q5
-        q[:, 1], q[:, 2] = (
-            np.arctan2(z, x) - self._turned(shoulder, self.a2 < 0),
-            self._turned(elbow, self._opposed),
-        )
+        q[:, 1] = np.arctan2(z, x) - self._turned(shoulder, self.a2 < 0)
+        q[:, 2] = self._turned(elbow, self._opposed)
         q[:, 3], q[:, 5] = h - q[:, 1] - q[:, 2], self.turn * (h - self.h0)
         return np.clip(wrapped(q), -np.pi, np.pi)
 
@@ -122,10 +118,8 @@ class StretchedWrist:
         shoulder = (shoulders.max(axis=0) + shoulders.min(axis=0)) / 2
         centre[:, 1] = np.arctan2(z, x) - self._turned(shoulder, self.a2 < 0)
         sides[:, 1] = direction + (shoulders.max(axis=0) - shoulders.min(axis=0)) / 2
-        centre[:, 3], sides[:, 3] = (
-            h - centre[:, 1] - centre[:, 2],
-            half + sides[:, 1] + sides[:, 2],
-        )
+        centre[:, 3] = h - centre[:, 1] - centre[:, 2]
+        sides[:, 3] = half + sides[:, 1] + sides[:, 2]
         centre[:, 5], sides[:, 5] = self.turn * (h - self.h0), half
         return centre, sides
 

@@ -22,7 +22,7 @@ from joulepath.optimizer.problem.branches import Label
 
 
 class URClosedForm(URGeometry):
-    """`ClosedForm` of an arm of Universal Robots' form."""
+    """`PoseSolver` of an arm of Universal Robots' form."""
 
     complete, confirmed = True, False
 

@@ -175,9 +175,7 @@ def _match_next(course: _Course, found: _Places, k: int, asked: Array, moved: Ar
         )
     place = course.after(last, asked[k : k + 1], moved[k : k + 1])
     assert place is not None
-    found.piece[k], found.share[k], found.length[k] = (
-        place.piece[0],
-        place.share[0],
-        place.length[0],
-    )
+    found.piece[k] = place.piece[0]
+    found.share[k] = place.share[0]
+    found.length[k] = place.length[0]
     found.point[k], found.left_out[k] = place.point[0], place.left_out[0]

@@ -76,8 +76,7 @@ def _check(path: ToolPath, distance: Array) -> None:
             raise InvalidProblem(
                 "path" if last else f"path.via.{k}",
                 f"{which} {apart}: they must differ, and be at least as far apart as path.blend "
-                "takes of the way "
-                f"between them, {blended:.4g} m.",
+                f"takes of the way between them, {blended:.4g} m.",
             )
 
 
@@ -218,8 +217,7 @@ class Arc:
             raise InvalidProblem(
                 "path.via.0",
                 "The start, this pose and the goal are on a line, so that no arc goes through "
-                "them: move it aside, or "
-                'leave "shape" out for straight lines.',
+                'them: move it aside, or leave "shape" out for straight lines.',
             )
         first = -offset
         second = np.cross(normal / np.sqrt(area), first)

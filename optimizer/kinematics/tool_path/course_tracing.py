@@ -170,8 +170,8 @@ def turned_start(
     for pose in flange_pose(
         course.turned(np.tile(T, (len(angles), 1, 1)), angles), arm.T_flange_tcp
     ):
-        (found,), (missed,) = newton.solved(chain, q[None], pose)
-        if missed > TRACE.reached or np.abs(found - q).max() > TRACE.jump:
+        (found,), (residual,) = newton.solved(chain, q[None], pose)
+        if residual > TRACE.reached or np.abs(found - q).max() > TRACE.jump:
             return None
         q = found
     return q
@@ -237,12 +237,12 @@ def _traced(arm: Arm, courses: Sequence[ToolCourse], q_start: Array, at: Array) 
                 (at[k] - at[k - 1]) / (at[k - 1] - at[k - 2])
             )
         pose = poses[0, k] if len(courses) == 1 else poses[active, k]
-        found, missed = newton.solved(chain, guess, flange_pose(pose, arm.T_flange_tcp))
+        found, residual = newton.solved(chain, guess, flange_pose(pose, arm.T_flange_tcp))
         jumped = np.abs(found - before).max(axis=1) > TRACE.jump
-        for node, is_missed, is_jump in zip(active, missed > TRACE.reached, jumped, strict=True):
+        for node, is_missed, is_jump in zip(active, residual > TRACE.reached, jumped, strict=True):
             if is_missed or is_jump:
                 obstacle[node] = "unreachable" if is_missed else "singular"
-        kept = ~(jumped | (missed > TRACE.reached))
+        kept = ~(jumped | (residual > TRACE.reached))
         active = active[kept]
         if not len(active):
             break

@@ -71,10 +71,10 @@ def _denser(arm: Arm, course: ToolCourse, trace: Trace, breaks: Array) -> Trace 
     chain, found = chain_of(arm.robot), np.empty((len(at), trace.q.shape[1]))
     guesses = np.stack([np.interp(at, trace.at, q) for q in trace.q.T], axis=1)
     for k, pose in enumerate(course.poses(at)):
-        (found[k],), (missed,) = newton.solved(
+        (found[k],), (residual,) = newton.solved(
             chain, guesses[k][None], flange_pose(pose, arm.T_flange_tcp)
         )
-        if missed > TRACE.reached or np.abs(found[k] - guesses[k]).max() > TRACE.jump:
+        if residual > TRACE.reached or np.abs(found[k] - guesses[k]).max() > TRACE.jump:
             return None
     order = np.argsort(np.concatenate([trace.at, at]), kind="stable")
     return replace(

@@ -39,14 +39,14 @@ SETTINGS = LeastSpeedSettings()
 class LeastSpeed:
     """Speed of the TCP relative to the least one.
 
-    `speed` gives the ratio. `gone` (k,) [m] is the distance of the TCP at fractions `at` (k,) of
-    its course. Within `ramp` [m] of either end, the speed may be below `least` [m/s].
+    `speed` gives the ratio. `travelled` (k,) [m] is the distance of the TCP at fractions `at` (k,)
+    of its course. Within `ramp` [m] of either end, the speed may be below `least` [m/s].
     """
 
     arm: Arm
     speed: PathConstraints
     at: Array
-    gone: Array
+    travelled: Array
     least: float
     ramp: float
 
@@ -59,9 +59,9 @@ class LeastSpeed:
         point = PointSpeedConstraint(
             "path_speed", arm.robot.nq, T_last_tcp(arm)[None, :3, 3], path.least_speed
         )
-        at, gone = course.measured(SETTINGS.measured_points, SETTINGS.measured_step)
+        at, travelled = course.measured(SETTINGS.measured_points, SETTINGS.measured_step)
         speed = PathConstraints(joint_placements(arm.robot.model), [point])
-        return cls(arm, speed, at, gone, path.least_speed, path.ramp)
+        return cls(arm, speed, at, travelled, path.least_speed, path.ramp)
 
     def aimed_at(self, fraction: Array) -> tuple[Array, Array]:
         """Share (k,) of the least speed that a motion should have at fractions (k,) of the course,
@@ -70,16 +70,18 @@ class LeastSpeed:
         It rises smoothly from 0 to 1 within the ramps, and is 1 between them.
         """
         cell = np.clip(np.searchsorted(self.at, fraction, side="right") - 1, 0, len(self.at) - 2)
-        slope = np.diff(self.gone)[cell] / np.diff(self.at)[cell]
-        gone = self.gone[cell] + slope * (fraction - self.at[cell])
-        left = self.gone[-1] - gone
-        x = (np.minimum(gone, left) / self.ramp - SETTINGS.free_ramp) / (1 - SETTINGS.free_ramp)
+        slope = np.diff(self.travelled)[cell] / np.diff(self.at)[cell]
+        travelled = self.travelled[cell] + slope * (fraction - self.at[cell])
+        left = self.travelled[-1] - travelled
+        x = (np.minimum(travelled, left) / self.ramp - SETTINGS.free_ramp) / (
+            1 - SETTINGS.free_ramp
+        )
         inside = np.clip(x, 0.0, 1.0)
         by_distance = (
             6
             * (inside - inside**2)
             / (self.ramp * (1 - SETTINGS.free_ramp))
-            * np.where(gone < left, 1.0, -1.0)
+            * np.where(travelled < left, 1.0, -1.0)
         )
         return inside**2 * (3 - 2 * inside), by_distance * slope
 
@@ -111,7 +113,9 @@ class LeastSpeed:
         """Lowest speed between the ramps relative to the least one, from consecutive samples q
         [rad], v [rad/s] (n, nq).
         """
-        gone = np.cumsum(np.linalg.norm(np.diff(tcp_pose(self.arm, q)[:, :3, 3], axis=0), axis=1))
-        gone = np.append(0.0, gone)
-        between = (gone >= self.ramp) & (gone <= gone[-1] - self.ramp)
+        travelled = np.cumsum(
+            np.linalg.norm(np.diff(tcp_pose(self.arm, q)[:, :3, 3], axis=0), axis=1)
+        )
+        travelled = np.append(0.0, travelled)
+        between = (travelled >= self.ramp) & (travelled <= travelled[-1] - self.ramp)
         return float(self.speed.ratios(q, v)[between].min(initial=np.inf))

@@ -31,9 +31,9 @@ def least_tcp_distance(course: ToolCourse) -> float:
     best = float(ends)
     for count in DIVISIONS:
         points = course.poses(course.grid(count))[:, :3, 3]
-        missed = np.full(len(points), 2 * course.path.position_tolerance)
-        missed[[0, -1]] = 0.0
-        apart = np.linalg.norm(np.diff(points, axis=0), axis=1) - missed[1:] - missed[:-1]
+        slack = np.full(len(points), 2 * course.path.position_tolerance)
+        slack[[0, -1]] = 0.0
+        apart = np.linalg.norm(np.diff(points, axis=0), axis=1) - slack[1:] - slack[:-1]
         best = max(best, float(np.maximum(apart, 0.0).sum()))
     return best
 

@@ -179,10 +179,8 @@ class _Search:
             tried = self._error(wanted, q + step)
             if tried @ tried < error @ error:
                 q, error = q + step, tried
-                jacobian, damping = (
-                    self._jacobian(q)[: len(error)],
-                    max(damping / 10, SETTINGS.least_damping),
-                )
+                jacobian = self._jacobian(q)[: len(error)]
+                damping = max(damping / 10, SETTINGS.least_damping)
             else:
                 damping *= 10
         # Full turns of a joint do not change the pose: take the configuration nearest to the start.

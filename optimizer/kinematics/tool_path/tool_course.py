@@ -138,8 +138,7 @@ class ToolCourse:
             raise InvalidProblem(
                 "path.speed.ramp",
                 f"The TCP moves {length:.4g} m along this path: its ramps, {self.path.ramp:g} m at "
-                "either end, leave "
-                "nothing between them for path.speed.min.",
+                "either end, leave nothing between them for path.speed.min.",
             )
 
     def has_shape_of(self, other: ToolCourse) -> bool:

@@ -35,6 +35,8 @@ class TurningSettings:
     """Number of turning angles."""
     most_turn: int = 3
     """Largest number of angles that a turning passes from one point of the path to the next."""
+    newton_steps: int = 12
+    """Newton steps from a configuration to an adjacent point."""
     reached: float = 1e-9
     """Largest pose error of a configuration on the grid [m, rad]."""
     jump: float = 0.35
@@ -221,8 +223,8 @@ def _continued(chain: Chain, q: Array, T: Array) -> Array:
     """Configurations (n, nq) of flange poses T (n, 4, 4) near q; NaN where none is found or a joint
     would jump.
     """
-    found, missed = newton.solved(chain, q, T, steps=12)
-    found[(missed > TURNING_GRID.reached) | (np.abs(found - q).max(axis=1) > TURNING_GRID.jump)] = (
-        np.nan
-    )
+    found, residual = newton.solved(chain, q, T, steps=TURNING_GRID.newton_steps)
+    found[
+        (residual > TURNING_GRID.reached) | (np.abs(found - q).max(axis=1) > TURNING_GRID.jump)
+    ] = np.nan
     return found

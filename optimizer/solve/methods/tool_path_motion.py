@@ -256,7 +256,7 @@ class ToolPathMotion(Method):
         """
         least = self.prepared.least_speed
         assert least is not None
-        way = ON_RAMP * least.ramp / float(least.gone[-1])
+        way = ON_RAMP * least.ramp / float(least.travelled[-1])
         return 2 * way / (1 + 2 * way)
 
     def _intervals(self) -> list[DurationInterval]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.kinematics.chain import Chain, miss, pose_error
+from joulepath.optimizer.kinematics.chain import Chain, pose_error, twist_size
 from joulepath.optimizer.kinematics.seven.across_curve import (
     ACROSS,
     project_across,
@@ -54,7 +54,7 @@ def test_a_projected_point_is_on_the_curve_across_the_given_direction() -> None:
             along = np.linalg.svd(jacobian[0])[2][-1] + 0.1 * rng.normal(size=7)
             starts = q + away * rng.uniform(-1.0, 1.0, (20, 7))
             reached = project_across(chain, starts, np.tile(along, (20, 1)), T[0])
-            assert miss(pose_error(chain.flange(reached), T[0])).max() < EXACT
+            assert twist_size(pose_error(chain.flange(reached), T[0])).max() < EXACT
             assert np.abs((reached - starts) @ along).max() < EXACT
 
 
@@ -100,6 +100,6 @@ def test_a_displaced_point_is_on_the_curve_at_the_given_displacement() -> None:
         reached, left = project_onto_curve(chain, np.tile(q, (20, 1)), along, ahead, T[0], longest)
         assert (
             left.max() < ACROSS.tolerance
-            and miss(pose_error(chain.flange(reached), T[0])).max() < EXACT
+            and twist_size(pose_error(chain.flange(reached), T[0])).max() < EXACT
         )
         assert np.abs(((reached - q) * along).sum(axis=1) - ahead).max() < EXACT

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from joulepath.optimizer.kinematics.chain import Chain, miss, pose_error
+from joulepath.optimizer.kinematics.chain import Chain, pose_error, twist_size
 from joulepath.optimizer.kinematics.newton import solved
 from joulepath.optimizer.kinematics.seven.curve_tracing import trace
 from joulepath.optimizer.kinematics.seven.nearby_arm import NearbyArm
@@ -36,7 +36,7 @@ def test_curves_of_the_simple_arm_are_near_those_of_the_arm() -> None:
             T = chain.flange(q[None])[0]
             found, rest = nearby.loops(T)
             starts = np.vstack([found.points, *rest])
-            assert len(starts) and miss(pose_error(chain.flange(starts), T)).max() < 2e-3
+            assert len(starts) and twist_size(pose_error(chain.flange(starts), T)).max() < 2e-3
         found = TracedArm.of(model)
         assert found is not None and found.self_motions(T)
     assert NearbyArm.of(Chain.of(CHAIN.model)) is None

@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
-from joulepath.optimizer.kinematics.closed_form import ClosedFormInverseKinematics
+from joulepath.optimizer.kinematics.confirmed_inverse import ConfirmedInverseKinematics
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
 from joulepath.optimizer.problem.branches import Label
@@ -126,7 +126,7 @@ def test_an_arm_folded_onto_its_own_axis_is_no_isolated_solution() -> None:
 
 
 class NothingKnown:
-    """Closed form without a solution of a reachable pose, as if its self-motion were of unknown
+    """Pose solver without a solution of a reachable pose, as if its self-motion were of unknown
     form.
     """
 
@@ -150,5 +150,5 @@ class NothingKnown:
 
 def test_a_self_motion_of_unknown_form_is_a_singular_pose() -> None:
     with pytest.raises(SingularPose) as caught:
-        ClosedFormInverseKinematics(ROBOT, NothingKnown()).solve(forward(EVERYDAY), target="start")
+        ConfirmedInverseKinematics(ROBOT, NothingKnown()).solve(forward(EVERYDAY), target="start")
     assert (caught.value.target, caught.value.smallest_singular_value) == ("start", 0.0)

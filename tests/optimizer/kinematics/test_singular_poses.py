@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.kinematics.closed_form import INVERSE
+from joulepath.optimizer.kinematics.confirmed_inverse import INVERSE
 from joulepath.optimizer.kinematics.ik_solutions import LimitedSolution
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
 from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm

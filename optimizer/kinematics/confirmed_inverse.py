@@ -1,4 +1,4 @@
-"""Inverse kinematics by a closed form, with every solution confirmed by forward kinematics."""
+"""Inverse kinematics of a pose solver, with every solution confirmed by forward kinematics."""
 
 from __future__ import annotations
 
@@ -54,8 +54,10 @@ class InverseSettings:
 INVERSE = InverseSettings()
 
 
-class ClosedForm(Protocol):
-    """Branches of a flange pose, for one family of arms."""
+class PoseSolver(Protocol):
+    """Solver of the branches of a flange pose, for one family of arms: a closed form, or a
+    search.
+    """
 
     @property
     def complete(self) -> bool:
@@ -103,10 +105,10 @@ class _Reached:
     labels: list[BranchLabel]
     curves: list[SelfMotion | None]
 
-    def principal(self, form: ClosedForm, chain: Chain) -> list[PrincipalSolution]:
+    def principal(self, solver: PoseSolver, chain: Chain) -> list[PrincipalSolution]:
         """All configurations as solutions; q becomes read-only."""
         self.q.setflags(write=False)
-        singularities = Singularities(chain, self.q, form.singular_parts)
+        singularities = Singularities(chain, self.q, solver.singular_parts)
         return list(
             map(
                 PrincipalSolution,
@@ -119,28 +121,28 @@ class _Reached:
         )
 
 
-class ClosedFormInverseKinematics:
-    """`InverseKinematics` by a closed form, with every solution confirmed by forward kinematics."""
+class ConfirmedInverseKinematics:
+    """`InverseKinematics` by a pose solver, with every solution confirmed by forward kinematics."""
 
-    def __init__(self, robot: Robot, form: ClosedForm) -> None:
+    def __init__(self, robot: Robot, solver: PoseSolver) -> None:
         self._limits = robot.limits
-        self._form = form
+        self._solver = solver
         self._chain = Chain.of(robot.model)
 
     @property
     def complete(self) -> bool:
         """Whether every branch is guaranteed to be found."""
-        return self._form.complete
+        return self._solver.complete
 
     def label(self, q: Array) -> BranchLabel:
         """Branch of a configuration q (nq,) [rad]; full turns of a joint do not change it."""
-        return self._form.label(q)
+        return self._solver.label(q)
 
     def branches(
         self, T_base_flange: Array, members: int = INVERSE.members
     ) -> list[PrincipalSolution]:
         """Every branch of the flange pose (4, 4), see `InverseKinematics.branches`."""
-        return self._reached(T_base_flange, members, None).principal(self._form, self._chain)
+        return self._reached(T_base_flange, members, None).principal(self._solver, self._chain)
 
     def solve(
         self,
@@ -160,12 +162,12 @@ class ClosedFormInverseKinematics:
         except SingularPose as error:
             raise SingularPose(target, error.smallest_singular_value) from None
         if not reachable:
-            distance = self._form.distance_to_reach(_orthonormal(T))
+            distance = self._solver.distance_to_reach(_orthonormal(T))
             reached = self._reached_at_edge(T, members, limits, distance)
             if not len(reached.q):
                 raise out_of_reach(distance, target)
         nearest, inside = nearest_turns(reached.q, limits)
-        principal = reached.principal(self._form, self._chain)
+        principal = reached.principal(self._solver, self._chain)
         owners = list(compress(principal, inside))
         q = nearest if len(owners) == len(nearest) else nearest[np.flatnonzero(inside)]
         if windings:
@@ -184,10 +186,10 @@ class ClosedFormInverseKinematics:
     def _reached(self, T_base_flange: Array, members: int, limits: Limits | None) -> _Reached:
         """Confirmed configurations of a flange pose, without self-motions outside the limits."""
         T = _orthonormal(T_base_flange)
-        q, known = self._form.solve(T)
+        q, known = self._solver.solve(T)
         labels = list(known)
         curves: list[SelfMotion | None] = [None] * len(labels)
-        motions = self._form.self_motions(T, limits)
+        motions = self._solver.self_motions(T, limits)
         if motions:
             share = INVERSE.most_members * members // len(motions)
             count = max(INVERSE.least_members, min(members, share))
@@ -200,7 +202,7 @@ class ClosedFormInverseKinematics:
                 labels += [motion.label] * len(of_motion)
                 curves += [None if is_point(motion) else motion] * len(of_motion)
             q = np.vstack([q, *configurations])
-        elif self._form.confirmed:
+        elif self._solver.confirmed:
             return _Reached(q, labels, curves)
         reached = self._confirmed(_Reached(q, labels, curves), T, len(motions) > 1)
         missing = _unrepresented(motions, reached, limits) if motions and limits is not None else []
@@ -230,12 +232,14 @@ class ClosedFormInverseKinematics:
         # The squared Frobenius norm of a rotation's error is twice the squared angle.
         total = np.einsum("ijk,ijk->i", off, off)
         place = np.einsum("ij,ij->i", off[:, :3, 3], off[:, :3, 3])
-        q, missed = found.q, np.sqrt(np.maximum(place, (total - place) / 2))
+        q, residual = found.q, np.sqrt(np.maximum(place, (total - place) / 2))
         isolated = np.array([curve is None for curve in found.curves], dtype=bool)
-        q, missed = at_the_edge(self._chain, q, missed, isolated & (missed >= INVERSE.accuracy), T)
-        chosen = np.flatnonzero(missed < np.where(isolated, REACH.missed, INVERSE.accuracy))
+        q, residual = at_the_edge(
+            self._chain, q, residual, isolated & (residual >= INVERSE.accuracy), T
+        )
+        chosen = np.flatnonzero(residual < np.where(isolated, REACH.residual, INVERSE.accuracy))
         if several:
-            chosen = chosen[distinct(q[chosen], missed[chosen])]
+            chosen = chosen[distinct(q[chosen], residual[chosen])]
         kept = chosen.tolist()
         return _Reached(q[chosen], [found.labels[k] for k in kept], [found.curves[k] for k in kept])
 
