@@ -87,13 +87,10 @@ def solved(
         extra[active[~better]] = np.maximum(
             extra[active[~better]] * NEWTON.damping_growth, NEWTON.first_damping * squared[~better]
         )
-        stuck = (~better) & ((extra[active] > NEWTON.most_damping) | (residual[active] < NEWTON.last_digits))
-        late = (
-            (residual[active] > hopeless)
-            if step >= steps // 3
-            else np.zeros(len(active), dtype=bool)
-        )
-        active = active[(residual[active] > NEWTON.exact) & ~stuck & ~late]
+        left = residual[active]
+        stuck = ~better & ((extra[active] > NEWTON.most_damping) | (left < NEWTON.last_digits))
+        given_up = (left > hopeless) & (step >= steps // 3)
+        active = active[(left > NEWTON.exact) & ~stuck & ~given_up]
     return q, residual
 
 
