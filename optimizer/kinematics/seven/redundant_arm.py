@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.kinematics.seven.free_turn import FreeTurn, crossing, stretched
-from joulepath.optimizer.kinematics.seven.redundant_curve import RedundantCurve, within
+from joulepath.optimizer.kinematics.seven.redundant_curve import RedundantCurve, cut_to_limits
 from joulepath.optimizer.kinematics.seven.redundant_pose import RedundantPose
 from joulepath.optimizer.kinematics.seven.spherical_shoulder import SphericalShoulder
 from joulepath.optimizer.problem.branches import Label
@@ -90,7 +90,7 @@ class RedundantArm:
         ]
         aligned: Sequence[RedundantCurve] = curves
         if limits is not None:
-            curves, aligned = within(curves, limits.q_min, limits.q_max)
+            curves, aligned = cut_to_limits(curves, limits.q_min, limits.q_max)
         return [*curves, *crossing(aligned), *stretched(pose, label_of(np.ones(3)))]
 
     def distance_to_reach(self, T: Array) -> float:

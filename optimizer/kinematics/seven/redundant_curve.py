@@ -156,7 +156,7 @@ def members(curves: Sequence[RedundantCurve], parameters: Sequence[Array]) -> li
     return [q[end - count : end] for count, end in zip(counts, last, strict=True)]
 
 
-def within(
+def cut_to_limits(
     curves: Sequence[RedundantCurve], q_min: Array, q_max: Array
 ) -> tuple[list[RedundantCurve], list[RedundantCurve]]:
     """Curves of one pose, cut to the limits.
@@ -194,7 +194,7 @@ def within(
 
 
 def _kept(
-    curves: CurveStack, arcs: Array, room: _LimitRanges
+    curves: CurveStack, arcs: Array, limits: _LimitRanges
 ) -> tuple[tuple[Rows, list[tuple[float, float]]], Mask]:
     """Parts of curves on the right shoulder, and of their counterparts on the left one, that may be
     within limits.
@@ -202,7 +202,7 @@ def _kept(
     Args:
         curves: m curves on the right shoulder.
         arcs: arc of each, shape (m, 2).
-        room: limits.
+        limits: position limits.
 
     Returns:
         Rows (k,) of the 2 m curves and k arcs; and a mask (2, m) of the curves that may pass the
@@ -217,7 +217,7 @@ def _kept(
     q7 = curves.last_angle(ends.T, np.arange(m)).T
     signs = curves.signs[np.arange(m).repeat(coarse)]
     cells = Cells(q7[:, :-fine:fine].ravel(), q7[:, fine::fine].ravel(), signs)
-    held, inside, aligned = _judged(curves.pose, cells, room)
+    held, inside, aligned = _judged(curves.pose, cells, limits)
     decided = held & inside
     passing: Mask = np.logical_or.reduce((decided & aligned).reshape(2, m, coarse), axis=2)
     # Fine parts of each coarse part that may be within the limits.
@@ -228,7 +228,7 @@ def _kept(
     if len(left):
         low, high = q7[:, :-1].reshape(-1, fine)[left], q7[:, 1:].reshape(-1, fine)[left]
         held, _, aligned = _judged(
-            curves.pose, Cells(low.ravel(), high.ravel(), signs[left.repeat(fine)]), room
+            curves.pose, Cells(low.ravel(), high.ravel(), signs[left.repeat(fine)]), limits
         )
         held = held.reshape(2, -1, fine) & open_[:, left, None]
         parts[:, left] |= held
@@ -305,7 +305,7 @@ class _LimitRanges:
         return cls(middle, width)
 
 
-def _judged(pose: RedundantPose, cells: Cells, room: _LimitRanges) -> tuple[Mask, Mask, Mask]:
+def _judged(pose: RedundantPose, cells: Cells, limits: _LimitRanges) -> tuple[Mask, Mask, Mask]:
     """Decides which cells with the right shoulder, and their counterparts with the left one, are
     within limits.
 
@@ -323,7 +323,7 @@ def _judged(pose: RedundantPose, cells: Cells, room: _LimitRanges) -> tuple[Mask
     q[8] = -q[8] - 2 * pose.form.lean_at_zero
     sides[0, :7], sides[0, 7:] = half.T, half.T[:3]
     np.negative(sides[0], out=sides[1])
-    beyond = np.abs(wrapped(q - room.middle)) - room.width
+    beyond = np.abs(wrapped(q - limits.middle)) - limits.width
     within = beyond <= sides
     last = np.logical_and.reduce(within[:, 3:7], axis=1)
     first, mirrored = (last & np.logical_and.reduce(within[:, k : k + 3], axis=1) for k in (0, 7))

@@ -28,7 +28,7 @@ from joulepath.optimizer.kinematics.seven.nearby_loops import project_loops, see
 from joulepath.optimizer.kinematics.seven.seed_table import SeedTable
 from joulepath.optimizer.kinematics.seven.traced_curve import TracedCurve
 from joulepath.optimizer.kinematics.seven.traced_curve_stack import TracedCurveStack
-from joulepath.optimizer.kinematics.seven.traced_limits import within
+from joulepath.optimizer.kinematics.seven.traced_limits import cut_to_limits
 from joulepath.optimizer.problem.branches import BranchLabel, NumberedBranch
 
 
@@ -123,7 +123,7 @@ class TracedArm:
                 traced.
         """
         curves = self._found(np.ascontiguousarray(T, dtype=float).tobytes())
-        return curves if limits is None else within(curves, limits.q_min, limits.q_max)
+        return curves if limits is None else cut_to_limits(curves, limits.q_min, limits.q_max)
 
     def distance_to_reach(self, T: Array) -> None:
         """Always None: the distance is unknown."""

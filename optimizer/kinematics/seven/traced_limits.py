@@ -65,7 +65,7 @@ class _JointRanges:
         return np.asarray(np.maximum.reduce(away, axis=-1))
 
 
-def within(curves: Sequence[TracedCurve], q_min: Array, q_max: Array) -> list[TracedCurve]:
+def cut_to_limits(curves: Sequence[TracedCurve], q_min: Array, q_max: Array) -> list[TracedCurve]:
     """Curves of one pose, cut to the limits (nq,) [rad] up to full turns; curves wholly outside are
     left out.
     """
