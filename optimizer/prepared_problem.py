@@ -17,7 +17,8 @@ from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.dynamics.sensitivity import waiting_sensitivity
 from joulepath.optimizer.kinematics.path_constraints import PathConstraints, path_constraints_of
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace, joint_path, traces
+from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace, traces
+from joulepath.optimizer.kinematics.tool_path.joint_path import joint_path
 from joulepath.optimizer.kinematics.tool_path.least_speed import LeastSpeed
 from joulepath.optimizer.kinematics.tool_path.least_time import least_time
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
