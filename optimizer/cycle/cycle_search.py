@@ -24,7 +24,8 @@ from joulepath.optimizer.cycle.ways import layers_of
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError, NoTrajectory
 from joulepath.optimizer.motion.spline import Spline
-from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.prepared_problem import ArmModels, PreparedProblem
+from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stops import PlannedMove
@@ -69,8 +70,8 @@ class CycleSearch(LazySearch):
         self._runs: dict[tuple[int, int, int], Run] = {}
         # times [s] that first motions took
         self._spent = list[float]()
-        # one problem of each arm, whose models its other problems share
-        self._prepared: dict[int, PreparedProblem] = {}
+        # models that the problems of one arm share
+        self._models: list[ArmModels] = []
         self._known_motions = known_motions()
         try:
             with watch(self.end):
@@ -101,13 +102,19 @@ class CycleSearch(LazySearch):
     def _leg(self, move: PlannedMove, layers: Mapping[str, Layer]) -> Leg:
         start, *between, goal = (layers[place] for place in (move.start, *move.through, move.goal))
         problem = problem_of(self.asked, move, start.q[0], goal.q[0], self.asked.deadline)
-        known = self._prepared.get(id(move.arm))
-        prepared = PreparedProblem.of(problem) if known is None else known.sharing(problem)
-        self._prepared[id(move.arm)] = prepared
+        prepared = PreparedProblem.of(problem, self._models_of(move.arm))
         dwells = dwell_costs(self.asked, move, goal)
         if between:
             return PassingLeg.through(prepared, [start, *between, goal], dwells)
         return (Leg.of if move.tool_path is None else Leg.of_way)(prepared, start, goal, dwells)
+
+    def _models_of(self, arm: Arm) -> ArmModels:
+        """Models of an arm, shared by all moves with this arm."""
+        for models in self._models:
+            if models.arm is arm:
+                return models
+        self._models.append(ArmModels(arm))
+        return self._models[-1]
 
     def run(self) -> list[int]:
         """The nodes of the chain of least energy, whose motions are all in `solutions`.
@@ -395,8 +402,10 @@ class CycleSearch(LazySearch):
 
     def _run(self, k: int, problem: Problem, known: Sequence[Spline] = ()) -> Run:
         """The search of a motion of leg `k`."""
-        run = Run(problem, known, self.clock, like=self.legs[k].prepared)
-        run.incumbent.prepared.traces.update(self.legs[k].traces_of(problem))
+        run = Run(problem, known, self.clock, models=self.legs[k].prepared.models)
+        trace = self.legs[k].trace_of(problem)
+        if trace is not None:
+            run.incumbent.prepared.followed.keep(trace)
         return run
 
     def _problem_of(self, k: int, s: int, g: int, time: float) -> Problem:

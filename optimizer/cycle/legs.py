@@ -151,26 +151,20 @@ class Leg:
             self._by_target[target] = PreparedProblem.of(problem)
         return self._by_target[target]
 
-    def traces_of(self, problem: Problem) -> dict[bytes, Trace]:
-        """The line or path of a pair's problem as the arm follows it, by the bytes of its start;
-        none if not known.
-        """
+    def trace_of(self, problem: Problem) -> Trace | None:
+        """Trace of a pair's problem along its line or path; None if it is not known."""
         if self.prepared.problem.tool_path is None or not self.goal.traces:
-            return {}
+            return None
         q_start, q_goal = np.asarray(problem.start), np.asarray(problem.goal)
         nodes = np.flatnonzero(
             (self.start.q == q_start).all(axis=1) & (self.goal.q == q_goal).all(axis=1)
         )
         if not len(nodes):
-            return {}
+            return None
         trace = self.goal.traces[int(self.goal.end[nodes[0]])]
-        # but for full turns, the way is the same from every node of an end
+        # all nodes of an end have the same trace up to full turns
         turned = np.round((q_start - trace.q[0]) / (2 * np.pi)) * (2 * np.pi)
-        return {
-            q_start.tobytes(): replace(
-                trace, q=np.concatenate([q_start[None], trace.q[1:] + turned])
-            )
-        }
+        return replace(trace, q=np.concatenate([q_start[None], trace.q[1:] + turned]))
 
     @property
     def least_costs(self) -> Array:

@@ -19,7 +19,7 @@ from joulepath.optimizer.collision.planner.path_planner import (
 )
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.spline import Spline
-from joulepath.optimizer.prepared_problem import RATIO_ROUNDING, PreparedProblem
+from joulepath.optimizer.prepared_problem import PREPARED, PreparedProblem
 from joulepath.optimizer.solve.methods.method import Method, SolveResult, SolveStatus
 
 # a planning may take this fraction of the time left: the rest is for the solves. The first one to a
@@ -137,6 +137,6 @@ def _is_clear(prepared: PreparedProblem, path: Spline) -> bool:
     """Whether a path is proven to keep all margins, with its tool within the tool cone."""
     if prepared.path is not None:
         q = path.curve(np.linspace(0.0, path.duration, CONE_POINTS))
-        if (prepared.path.ratios(q, np.zeros_like(q)) > 1 + RATIO_ROUNDING).any():
+        if (prepared.path.ratios(q, np.zeros_like(q)) > 1 + PREPARED.ratio_rounding).any():
             return False
     return prepared.surroundings.worst_violation(path) is None

@@ -81,7 +81,7 @@ class ToolPathMotion(Method):
             return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED)
 
     def _solve(self) -> SolveResult:
-        path = self.prepared.joint_path(self.q_start)
+        path = self.prepared.followed.joint_path(self.q_start)
         if path is None:
             return SolveResult(SolveStatus.INFEASIBLE, TOO_SHARP)
         if self.prepared.least_speed is not None:
@@ -142,7 +142,10 @@ class ToolPathMotion(Method):
     def _may_turn(self) -> bool:
         """Whether the tool may turn about an axis, and its turning has not been looked for
         before."""
-        return self._tool_path.about is not None and not self.prepared.is_chosen(self.q_start)
+        followed = self.prepared.followed
+        return self._tool_path.about is not None and not followed.are_turnings_searched(
+            self.q_start
+        )
 
     def _turn(
         self, law: tuple[Array, Array], scaling: Basis, least: float, results: list[SolveResult]
@@ -155,7 +158,7 @@ class ToolPathMotion(Method):
         """
         prepared, best, q_start = self.prepared, least, self.q_start
         assert prepared.course is not None
-        prepared.choose(q_start)
+        prepared.followed.mark_turnings_searched(q_start)
 
         def is_best(trace: Trace, path: Spline, result: SolveResult) -> bool:
             nonlocal best
@@ -166,7 +169,7 @@ class ToolPathMotion(Method):
             best = cost
             # a motion of its control points begins there
             for first in (trace.q[0], result.spline.control_points[0]):
-                prepared.choose(first, trace, path)
+                prepared.followed.select_turning(first, trace, path)
             return True
 
         for side in prepared.course.free_sides:
@@ -217,7 +220,10 @@ class ToolPathMotion(Method):
     def solve_from(self, q: Array, t: Array, fine: bool) -> SolveResult:
         """The time scaling of least cost in a finer space, from samples q (k, nq) [rad] at t (k,)
         [s] of a motion along the path; and with other turnings of the tool, if it may turn."""
-        path, scaling = self.prepared.joint_path(self.q_start), self._scaling(FINER_SCALING)
+        path, scaling = (
+            self.prepared.followed.joint_path(self.q_start),
+            self._scaling(FINER_SCALING),
+        )
         if fine or path is None:
             return SolveResult(SolveStatus.FAILED, NOT_FINER)
         results, law = [SolveResult(SolveStatus.FAILED, NOT_FINER)], _on_path(path, q, t)
