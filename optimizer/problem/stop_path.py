@@ -9,7 +9,7 @@ import numpy as np
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.targets import PosesAround, Target, members
+from joulepath.optimizer.problem.targets import SampledPoses, Target, members
 from joulepath.optimizer.problem.tool_path import ToolPath
 
 STRAIGHT = ToolPath()
@@ -31,7 +31,7 @@ class StopPath:
     """
 
     goal: Pose | ConeOrientedPose
-    goals: PosesAround | None = None
+    goals: SampledPoses | None = None
     path: ToolPath = STRAIGHT
     speed: float | None = None
     split: bool = False

@@ -20,7 +20,7 @@ from joulepath.app.schemas.request import (
     which_candidates,
 )
 from joulepath.app.settings import LONGEST_DEADLINE
-from joulepath.optimizer.problem.cycle import LONGEST_ROUND, MOST_STOPS
+from joulepath.optimizer.problem.cycle import LONGEST_CYCLE, MOST_STOPS
 from joulepath.optimizer.problem.free_order import MOST_FREE_STOPS
 from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.result.energy import Objective
@@ -29,7 +29,7 @@ from joulepath.optimizer.result.energy import Objective
 # stay as large as before
 _MANY_STOPS, _LONG_DEADLINE, _LEAST_PERIOD = 100, 120.0, 1e-3
 
-LongTime = Annotated[float, Field(gt=0, le=LONGEST_ROUND)]
+LongTime = Annotated[float, Field(gt=0, le=LONGEST_CYCLE)]
 
 
 class TimeRange(DurationRange):
