@@ -209,7 +209,7 @@ def test_what_stops_is_the_answer_where_the_search_ends_too_early(
     """Its motions are certified as those of a cycle that passes, and it saves nothing."""
 
     def ended(search: CycleSearch) -> Any:
-        if search.asked.has_passes:
+        if search.cycle.has_passes:
             raise DeadlineExceeded([])
         return searched(search)
 
