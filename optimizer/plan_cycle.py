@@ -43,7 +43,7 @@ from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError, NoT
 from joulepath.optimizer.feasible_answer import least_certified
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.progress import Improved, Tell, forward, nobody, only_improved
+from joulepath.optimizer.progress import Improved, Tell, no_listener, only_improved, only_news
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ PLAN_CYCLE = PlanCycleSettings()
 
 
 def plan_cycle(
-    cycle: Cycle, clock: Clock = time.perf_counter, tell: Tell = nobody
+    cycle: Cycle, clock: Clock = time.perf_counter, tell: Tell = no_listener
 ) -> CycleSolution:
     """Find the cycle of least energy, every move of it certified against every limit.
 
@@ -84,7 +84,7 @@ def plan_cycle(
         JoulepathError: a stop or a move fails for another reason of `optimize`; it names the stop.
     """
     with one_thread():
-        began, tell = clock(), forward(tell)
+        began, tell = clock(), only_news(tell)
         cycle = _divided(cycle, clock)
         found = with_free_orientations(cycle, lambda other: _valued(other, clock, tell), clock)
         _tell_found(tell, found)
@@ -95,7 +95,7 @@ def _valued(cycle: Cycle, clock: Clock, tell: Tell) -> CycleSolution:
     """The cycle of least energy on its bus."""
     if cycle.arm.bus.mode == "storage":
         # energies on the buses of the search are not those of the cycle
-        return with_storage(cycle, lambda other: _optimized(other, clock, nobody), clock)
+        return with_storage(cycle, lambda other: _optimized(other, clock, no_listener), clock)
     return _optimized(cycle, clock, tell)
 
 
@@ -162,7 +162,7 @@ def _in_given_order(cycle: Cycle, clock: Clock, tell: Tell) -> CycleSolution:
         stopping = _searched(
             replace(cycle, rests_at_passes=True, deadline=STOPPING.deadline_share * cycle.deadline),
             clock,
-            nobody,
+            no_listener,
         )
     left = max(cycle.deadline - (clock() - began), MOVE.least_time)
     return _searched(replace(cycle, deadline=left), clock, tell, stopping)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from joulepath.app.cluster.machine import RESOURCES, compute, resource, version
 from joulepath.app.engine.work import Ended, Take, Work
 from joulepath.app.exceptions.queue import ClusterUnavailable, WorkerLost
-from joulepath.optimizer.progress import nobody
+from joulepath.optimizer.progress import no_listener
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -89,7 +89,7 @@ class Cluster:
         if client is None:
             raise ClusterUnavailable
         key = f"joulepath-{uuid.uuid4().hex}"
-        asked = [(work.task, work.deadline, work.tell is not nobody) for work in works]
+        asked = [(work.task, work.deadline, work.tell is not no_listener) for work in works]
         self._works[key] = works
         # short ones share a process with others, which are at the machine when it has ended these
         is_long = len(works) == 1 and expected >= TOGETHER

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.task import Task
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 
 SHORT = 0.05
 """Most that short work takes [s]."""
@@ -30,7 +30,7 @@ class Work:
     deadline: float
     ended: Callable[[Ended], object]
     stoppable: bool = True
-    tell: Tell = nobody
+    tell: Tell = no_listener
     expected: float = float("inf")
     is_small: bool = False
 
@@ -57,7 +57,7 @@ async def result_of(
     task: Task,
     deadline: float,
     stoppable: bool = True,
-    tell: Tell = nobody,
+    tell: Tell = no_listener,
 ) -> TaskResult:
     """The result of one task from what runs many. Raises what becomes of it otherwise, and what
     `run` raises.

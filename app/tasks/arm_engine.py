@@ -22,13 +22,13 @@ from joulepath.app.tasks.kept_answers import answers_given
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import UnknownRobot
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 
 
 class Runner(Protocol):
     """What runs a task: the engine, or a process that runs its tasks itself."""
 
-    async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
+    async def run(self, task: Task, deadline: float, tell: Tell = no_listener) -> TaskResult:
         """The result of a task, for which `deadline` [s] is left. `tell` gets what it finds."""
         ...
 
@@ -105,7 +105,7 @@ class ArmEngine:
     engine: Runner
     store: Store
 
-    async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
+    async def run(self, task: Task, deadline: float, tell: Tell = no_listener) -> TaskResult:
         """The task's result; `tell` gets what it finds.
 
         Raises UnknownRobot, UnknownFigures, UnknownLog, UnknownAnswer, and what the engine raises;

@@ -25,7 +25,13 @@ from joulepath.optimizer.prepared_problem import ArmModels, PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.stops import PlannedMove
-from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, nobody
+from joulepath.optimizer.progress import (
+    CandidatesFound,
+    CandidateTried,
+    Improved,
+    Tell,
+    no_listener,
+)
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.attempts import settled, solve
@@ -75,7 +81,7 @@ class CycleSearch(LazySearch):
         cycle: Cycle,
         clock: Clock,
         moves: Sequence[PlannedMove] | None = None,
-        tell: Tell = nobody,
+        tell: Tell = no_listener,
     ) -> None:
         self.cycle, self.clock = cycle, clock
         self.moves = cycle.moves if moves is None else moves
@@ -107,7 +113,7 @@ class CycleSearch(LazySearch):
         self._tell = tell
         self._first_kind = [0, *accumulate(len(leg.pair) for leg in legs)]
         tell(CandidatesFound(self._first_kind[-1]))
-        known = all(leg.closed for leg in legs) and tell is not nobody
+        known = all(leg.closed for leg in legs) and tell is not no_listener
         self._proven_bound = (
             LeastChain([leg.least_costs for leg in legs], cycle.closed).find()[0] if known else None
         )
@@ -197,7 +203,7 @@ class CycleSearch(LazySearch):
 
     def chain_tried(self, nodes: list[int]) -> None:
         """Tell the cycle of a chain if it is solved and its duration is allowed."""
-        if self._tell is nobody:
+        if self._tell is no_listener:
             return
         energy, motions = self.cost(nodes), [self.motion(*pair) for pair in self.pairs(nodes)]
         # a pair solved by another pair of its kind has no duration yet

@@ -27,7 +27,7 @@ from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from joulepath.optimizer.problem.cycle import START, Cycle
 from joulepath.optimizer.problem.free_order import earlier_groups, groups_of
 from joulepath.optimizer.problem.stops import PlannedMove, Stop, moves_over
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class OrderSearch:
         tell: receives the progress of single moves.
     """
 
-    def __init__(self, cycle: Cycle, clock: Clock, tell: Tell = nobody) -> None:
+    def __init__(self, cycle: Cycle, clock: Clock, tell: Tell = no_listener) -> None:
         assert cycle.order is not None
         self.cycle, self.order = cycle, cycle.order
         self.groups = groups_of(cycle.order, cycle.stops)

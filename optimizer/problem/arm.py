@@ -14,7 +14,7 @@ from joulepath.models.robot import Array, Drives, FrictionLaw, Limits, Robot
 from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
 from joulepath.optimizer.problem.arrays import frozen, per_joint, rigid_transform
 from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.names import first_among
+from joulepath.optimizer.problem.names import first_taken
 from joulepath.optimizer.problem.scene import Attachment, Scene
 from joulepath.optimizer.problem.tool_cone import ToolCone
 
@@ -249,7 +249,7 @@ class Arm:
 
     def _check_names(self) -> None:
         own = (*self.robot.link_names, TOOL, PAYLOAD)
-        taken = first_among(self.scene.names, own)
+        taken = first_taken(self.scene.names, own)
         if taken is not None:
             raise InvalidProblem(
                 f"scene.obstacles.{taken}.name",

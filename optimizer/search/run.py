@@ -15,7 +15,7 @@ from joulepath.optimizer.motion.spline import Spline, lasting, sampled
 from joulepath.optimizer.prepared_problem import ArmModels, PreparedProblem
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.progress import Improved, Tell, nobody
+from joulepath.optimizer.progress import Improved, Tell, no_listener
 from joulepath.optimizer.result.candidates import CandidateStatus, UnreachableTarget
 from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.result.solution import (
@@ -73,7 +73,7 @@ class Run:
         problem: Problem,
         known: Sequence[Spline] = (),
         clock: Clock = time.perf_counter,
-        tell: Tell = nobody,
+        tell: Tell = no_listener,
         models: ArmModels | None = None,
     ) -> None:
         self.clock, self.began = clock, clock()
