@@ -14,7 +14,13 @@ from joulepath.app.schemas import arm as asked
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import Array, Limits, Robot
 from joulepath.optimizer.exceptions import InvalidProblem, UnknownRobot
-from joulepath.optimizer.problem.arm import INVERTER_PARTS, LIMIT_NAMES, Arm, Inverter, Payload
+from joulepath.optimizer.problem.arm import (
+    INVERTER_COEFFICIENTS,
+    LIMIT_NAMES,
+    Arm,
+    Inverter,
+    Payload,
+)
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.tool_cone import ToolCone
 
@@ -45,7 +51,7 @@ def to_arm(request: asked.ArmRequest) -> Arm:
         limits=to_limits(request.limits, robot),
         friction=request.friction,
         inverter=Inverter(
-            **{name: getattr(request.drives.inverter, name) for name in INVERTER_PARTS}
+            **{name: getattr(request.drives.inverter, name) for name in INVERTER_COEFFICIENTS}
         ),
         bus=_to_bus(request.bus),
         link_mass_scale=np.array(request.link_mass_scale),

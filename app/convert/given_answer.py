@@ -20,11 +20,11 @@ from joulepath.optimizer.export.program import Move, Program, Rest
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.motion.through_samples import spline_through
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.cycle import LONGEST_ROUND, MOST_STOPS
+from joulepath.optimizer.problem.cycle import LONGEST_CYCLE, MOST_STOPS
 
 MOST_KNOTS = 4096
 HIGHEST_DEGREE = 31
-LONGEST_REST = LONGEST_ROUND
+LONGEST_REST = LONGEST_CYCLE
 # of a stop: a move, two lines, a path, a dwell and a wait
 MOST_LEGS = 6 * MOST_STOPS + 5
 MOVING = ("move", "line", "path")

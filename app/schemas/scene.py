@@ -20,7 +20,7 @@ from joulepath.app.schemas.common import (
 )
 from joulepath.app.schemas.examples.values import BOX, MESH_FILE, TOOL, at
 from joulepath.models.shape_sizes import SIZES
-from joulepath.optimizer.problem.arm import MOST_PARTS
+from joulepath.optimizer.problem.arm import MOST_TOOL_PARTS
 from joulepath.optimizer.problem.clouds import MOST_ALONG_EDGE, MOST_POINTS, MOST_VOXELS
 from joulepath.optimizer.problem.names import LONGEST_NAME
 from joulepath.optimizer.problem.scene import DEFAULT_MARGIN, MOST_OBSTACLES, MOST_VERTICES
@@ -353,7 +353,7 @@ class ToolCapsule(Request):
 class Tool(Request):
     """The shape of the tool, for collision checking."""
 
-    capsules: Annotated[list[ToolCapsule], Field(max_length=MOST_PARTS)] = described(
+    capsules: Annotated[list[ToolCapsule], Field(max_length=MOST_TOOL_PARTS)] = described(
         "Capsules that enclose the tool.",
         None,
         TOOL["capsules"],

@@ -218,7 +218,7 @@ def test_a_least_speed_that_no_motion_keeps_says_so() -> None:
 
 def test_the_gradient_of_the_least_speed_is_that_of_its_slack() -> None:
     prepared = PreparedProblem.of(cornered())
-    path = prepared.joint_path(HOME)
+    path = prepared.followed.joint_path(HOME)
     assert path is not None
     retiming = PathRetiming(
         prepared, path, duration_intervals(prepared, path.control_points[-1])[0]

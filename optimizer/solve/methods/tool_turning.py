@@ -141,9 +141,9 @@ def _known(prepared: PreparedProblem, q_start: Array) -> CubicSpline:
     """The present turning along the course from q_start (nq,) [rad]."""
     assert prepared.course is not None
     free = prepared.course.free_end, prepared.course.free_start
-    return prepared.traces[q_start.tobytes()].turning or turning_of(
-        np.zeros(TOOL_TURNING.knots - 2 + sum(free)), *free
-    )
+    known = prepared.followed.known_trace(q_start)
+    assert known is not None
+    return known.turning or turning_of(np.zeros(TOOL_TURNING.knots - 2 + sum(free)), *free)
 
 
 def _followed(
