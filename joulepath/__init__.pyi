@@ -82,7 +82,7 @@ from .optimizer.problem.scene import (
 )
 from .optimizer.problem.stop_path import StopPath
 from .optimizer.problem.stops import Stop
-from .optimizer.problem.targets import AnyOf, PosesAround
+from .optimizer.problem.targets import AnyOf, SampledPoses
 from .optimizer.problem.tool_cone import ToolCone
 from .optimizer.problem.tool_path import ToolPath
 from .optimizer.progress import CandidatesFound, CandidateTried, Improved
@@ -231,7 +231,6 @@ __all__ = [
     "PlannedTorques",
     "Points",
     "Pose",
-    "PosesAround",
     "Problem",
     "Program",
     "RapidOptions",
@@ -243,6 +242,7 @@ __all__ = [
     "Rest",
     "Robot",
     "Ros2Options",
+    "SampledPoses",
     "Samples",
     "SavingInterval",
     "SavingRange",

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from joulepath.optimizer.motion.spline import lasting, sampled
+from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.attempts import solve, solve_from
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.incumbent import Incumbent
@@ -31,7 +32,8 @@ def start_from_free_duration(incumbent: Incumbent, best: Candidate) -> None:
     if duration is None or not _applies(incumbent):
         return
     free = replace(incumbent.problem, duration_min=None, duration_max=None)
-    other = Incumbent(incumbent.prepared.sharing(free), incumbent.end, longest=incumbent.longest)
+    prepared = PreparedProblem.of(free, incumbent.prepared.models)
+    other = Incumbent(prepared, incumbent.end, longest=incumbent.longest)
     twin = Candidate(best.start, best.goal, best.q_start, best.q_goal)
     # beside others, a candidate is solved coarsely first: as it was when no duration was asked for
     beside = (each for each in incumbent.candidates if each is not best and each.holdable)

@@ -21,7 +21,7 @@ def path_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseline]:
     prepared, problem, path = (
         incumbent.prepared,
         incumbent.problem,
-        incumbent.prepared.joint_path(best.q_start),
+        incumbent.prepared.followed.joint_path(best.q_start),
     )
     assert path is not None and best.energy is not None
     motion = along(path, even_speed(best.duration))

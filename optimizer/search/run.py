@@ -12,10 +12,10 @@ from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkp
 from joulepath.optimizer.dynamics.interval import Known, with_interval
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from joulepath.optimizer.motion.spline import Spline, lasting, sampled
-from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.prepared_problem import ArmModels, PreparedProblem
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.progress import Improved, Tell, nobody
+from joulepath.optimizer.progress import Improved, Tell, no_listener
 from joulepath.optimizer.result.candidates import CandidateStatus, UnreachableTarget
 from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.result.solution import (
@@ -65,8 +65,7 @@ class Run:
     """One search. `known` are motions between the problem's ends, of any duration, that warm-start
     it.
 
-    `tell` gets what is found. `like` is another problem of the same arm, whose models are used
-    again.
+    `tell` gets what is found. `models` are those of the problem's arm, if they are built already.
     """
 
     def __init__(
@@ -74,12 +73,12 @@ class Run:
         problem: Problem,
         known: Sequence[Spline] = (),
         clock: Clock = time.perf_counter,
-        tell: Tell = nobody,
-        like: PreparedProblem | None = None,
+        tell: Tell = no_listener,
+        models: ArmModels | None = None,
     ) -> None:
         self.clock, self.began = clock, clock()
         self.problem, self.known = problem, known
-        prepared = PreparedProblem.of(problem) if like is None else like.sharing(problem)
+        prepared = PreparedProblem.of(problem, models)
         self.incumbent = Incumbent(prepared, Deadline.after(problem.deadline, clock), tell=tell)
         self.unreachable: list[UnreachableTarget] = []
         self.moved = self.lost = False

@@ -17,6 +17,7 @@ from scipy.interpolate import CubicSpline
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.kinematics.tool_path.followed_paths import EvenMotion
 from joulepath.optimizer.kinematics.tool_path.least_speed import LeastSpeed
 from joulepath.optimizer.motion.bspline import DEGREE, clamped, fit
 from joulepath.optimizer.motion.spline import Spline, sample
@@ -133,11 +134,12 @@ class EvenSpeed:
 
     def _attempt(self, first: float, last: float) -> _Attempt:
         checkpoint()
-        known, key = self.prepared.even_motions, (self.path.control_points.tobytes(), first, last)
-        if key not in known:
+
+        def compute() -> EvenMotion:
             motion = self._motion(first, last, EVEN_SPEED.spans)
-            known[key] = motion, motion is not None and self._is_within_limits(motion)
-        motion, within = known[key]
+            return motion, motion is not None and self._is_within_limits(motion)
+
+        motion, within = self.prepared.followed.even_motion(self.path, first, last, compute)
         cost = self._cost(motion) if motion is not None and within else np.inf
         return _Attempt(
             (first, last), motion if within else None, cost, motion is not None and not within

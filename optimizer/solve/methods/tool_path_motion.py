@@ -80,7 +80,7 @@ class ToolPathMotion(Method):
             return SolveResult(SolveStatus.OUT_OF_TIME, SolveReason.DEADLINE_PASSED)
 
     def _solve(self) -> SolveResult:
-        path = self.prepared.joint_path(self.q_start)
+        path = self.prepared.followed.joint_path(self.q_start)
         if path is None:
             return SolveResult(SolveStatus.INFEASIBLE, SolveReason.PATH_TOO_SHARP)
         if self.prepared.least_speed is not None:
@@ -155,8 +155,11 @@ class ToolPathMotion(Method):
         return self._tool_path.fixed_speed is not None
 
     def _may_turn(self) -> bool:
-        """Whether the tool may turn about an axis, and no turning was chosen before."""
-        return self._tool_path.about is not None and not self.prepared.is_chosen(self.q_start)
+        """Whether the tool may turn about an axis, and other turnings were not searched before."""
+        followed = self.prepared.followed
+        return self._tool_path.about is not None and not followed.are_turnings_searched(
+            self.q_start
+        )
 
     def _solve_turned(
         self, law: tuple[Array, Array], scaling: Basis, least: float, results: list[SolveResult]
@@ -173,7 +176,7 @@ class ToolPathMotion(Method):
         """
         prepared, best, q_start = self.prepared, least, self.q_start
         assert prepared.course is not None
-        prepared.choose(q_start)
+        prepared.followed.mark_turnings_searched(q_start)
 
         def is_best(trace: Trace, path: Spline, result: SolveResult) -> bool:
             nonlocal best
@@ -184,7 +187,7 @@ class ToolPathMotion(Method):
             best = cost
             # the path is found from its start, and from the start of its motion
             for first in (trace.q[0], result.spline.control_points[0]):
-                prepared.choose(first, trace, path)
+                prepared.followed.select_turning(first, trace, path)
             return True
 
         for side in prepared.course.free_sides:
@@ -241,7 +244,7 @@ class ToolPathMotion(Method):
             t: times of the samples, shape (k,) [s].
             fine: not available: the result has no motion.
         """
-        path = self.prepared.joint_path(self.q_start)
+        path = self.prepared.followed.joint_path(self.q_start)
         scaling = self._laws.scaling(TOOL_PATH_MOTION.finer_scaling)
         failed = SolveResult(SolveStatus.FAILED, SolveReason.NO_FINER_SCALING)
         if fine or path is None:

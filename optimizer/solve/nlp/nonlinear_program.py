@@ -21,8 +21,8 @@ import numpy as np
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.collision.clearance_constraint import CLEARANCE
 from joulepath.optimizer.dynamics.kernel import Kernel
+from joulepath.optimizer.kinematics.held_pose import HeldPose
 from joulepath.optimizer.kinematics.path_constraints import PathConstraints
-from joulepath.optimizer.kinematics.tool_path.held_pose import HeldPose
 from joulepath.optimizer.motion.bspline import Basis
 from joulepath.optimizer.solve.nlp.active_path_constraints import Index, PathConstraintRows
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates, GoalConstraints

@@ -13,7 +13,7 @@ from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.cycle.errors import NoSequence
-from joulepath.optimizer.cycle.ways import layers_of
+from joulepath.optimizer.cycle.stop_layers import layers_of
 from joulepath.optimizer.dynamics.dwell import holding_power
 from joulepath.optimizer.exceptions import (
     DeadlineExceeded,

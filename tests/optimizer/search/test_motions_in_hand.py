@@ -13,7 +13,7 @@ import pytest
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.deadline import DeadlinePassed
 from joulepath.optimizer.exceptions import DeadlineExceeded
-from joulepath.optimizer.in_hand import least_certified
+from joulepath.optimizer.feasible_answer import least_certified
 from joulepath.optimizer.motion.spline import Spline, lasting
 from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.optimize import optimize

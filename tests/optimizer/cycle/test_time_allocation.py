@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from joulepath.optimizer.cycle.time_sharing import SETTLED, SHARED, WORTH_SLOWING, TimeSharing
-from joulepath.optimizer.plan_cycle import WELL_SHARED
+from joulepath.optimizer.cycle.time_allocation import ALLOCATION, TimeAllocation
+from joulepath.optimizer.plan_cycle import PLAN_CYCLE
 
 # W: what a wait draws
 WAITING = 5.0
 # energies above the optimum, relative: what is promised, and a wait of which a little could have
 # been a slower move
-ENERGY = SHARED + WORTH_SLOWING**2
+ENERGY = ALLOCATION.duality_gap + ALLOCATION.worth_slowing**2
 
 
 @dataclass(frozen=True)
@@ -88,18 +88,18 @@ class TestFilling:
     def test_it_needs_the_least_energy_in_the_time(self, seed: int, factor: float) -> None:
         moves = moves_of(seed)
         time = factor * sum(move.shortest for move in moves)
-        found = TimeSharing(moves).fill(time, WAITING, fastest(moves))
-        assert sum(found.lengths) + found.waited == pytest.approx(time, rel=1e-12)
+        found = TimeAllocation(moves).allocate(time, WAITING, fastest(moves))
+        assert sum(found.durations) + found.waited == pytest.approx(time, rel=1e-12)
         shared = [
             replace(move, duration=length)
-            for move, length in zip(moves, found.lengths, strict=True)
+            for move, length in zip(moves, found.durations, strict=True)
         ]
         assert all(each.shortest <= each.duration <= each.longest for each in shared)
         needed = sum(each.energy for each in shared) + WAITING * found.waited
         if factor > 1.01:
             # a little below, by the price of a wait; of moves as fast as they can be, less is known
             assert found.least == pytest.approx(
-                needed - WORTH_SLOWING * WAITING * found.waited, rel=ENERGY
+                needed - ALLOCATION.worth_slowing * WAITING * found.waited, rel=ENERGY
             )
         # the tangents are below the energies by less than 1e-5 of them
         assert needed == pytest.approx(least(moves, time, WAITING), rel=ENERGY + 1e-5)
@@ -112,7 +112,7 @@ class TestFilling:
         saved = (least(moves, time - step, WAITING) - least(moves, time + step, WAITING)) / (
             2 * step
         )
-        found = TimeSharing(moves).fill(time, WAITING, fastest(moves))
+        found = TimeAllocation(moves).allocate(time, WAITING, fastest(moves))
         # the price changes over the step, and the tangents are not smooth
         assert found.price == pytest.approx(saved, rel=0.03, abs=0.2)
 
@@ -121,10 +121,10 @@ class TestFilling:
 def test_moves_that_gain_more_than_they_need(seed: int) -> None:
     moves = [replace(move, gained=100.0) for move in moves_of(seed)]
     time = 1.5 * sum(move.shortest for move in moves)
-    found = TimeSharing(moves).fill(time, WAITING, fastest(moves))
+    found = TimeAllocation(moves).allocate(time, WAITING, fastest(moves))
     assert found.energy < 0
     assert found.energy == pytest.approx(least(moves, time, WAITING), rel=10 * ENERGY)
-    assert found.energy - found.least <= SHARED * abs(found.energy)
+    assert found.energy - found.least <= ALLOCATION.duality_gap * abs(found.energy)
 
 
 def test_where_every_share_of_the_time_needs_the_same_any_is_the_best() -> None:
@@ -132,20 +132,20 @@ def test_where_every_share_of_the_time_needs_the_same_any_is_the_best() -> None:
     end to end.
     """
     moves = [Move(0.0, drawn, 1.0, 5.0) for drawn in (3.0, 3.0)]
-    found = TimeSharing(moves).fill(7.0, WAITING, fastest(moves))
-    assert found.moving == pytest.approx(7.0)
-    assert found.price == pytest.approx(-3.0, rel=SETTLED)
+    found = TimeAllocation(moves).allocate(7.0, WAITING, fastest(moves))
+    assert found.moving_time == pytest.approx(7.0)
+    assert found.price == pytest.approx(-3.0, rel=ALLOCATION.near_price)
     assert found.energy == pytest.approx(21.0, rel=1e-12)
-    assert found.energy - found.least <= WELL_SHARED * found.energy
+    assert found.energy - found.least <= PLAN_CYCLE.optimal_gap * found.energy
 
 
 def test_one_move_and_moves_of_one_duration() -> None:
     alone, rigid = Move(10.0, 4.0, 0.5, 9.0), Move(10.0, 4.0, 0.5, 0.5)
-    assert TimeSharing([alone]).fill(2.0, WAITING, fastest([alone])).lengths == pytest.approx(
-        [2.0], rel=SHARED
-    )
-    found = TimeSharing([rigid, rigid]).fill(2.0, WAITING, fastest([rigid, rigid]))
-    assert (found.lengths, found.waited) == ([0.5, 0.5], pytest.approx(1.0))
+    assert TimeAllocation([alone]).allocate(
+        2.0, WAITING, fastest([alone])
+    ).durations == pytest.approx([2.0], rel=ALLOCATION.duality_gap)
+    found = TimeAllocation([rigid, rigid]).allocate(2.0, WAITING, fastest([rigid, rigid]))
+    assert (found.durations, found.waited) == ([0.5, 0.5], pytest.approx(1.0))
 
 
 def test_where_the_durations_jump_the_best_is_not_known() -> None:
@@ -159,6 +159,6 @@ def test_where_the_durations_jump_the_best_is_not_known() -> None:
             return min(ends, key=lambda each: each.energy + price * each.duration)
 
     move = Jumping(swing=-100.0, drawn=1.0, shortest=1.0, longest=5.0)
-    found = TimeSharing([move]).fill(3.0, 50.0, fastest([move]))
-    assert found.moving == pytest.approx(3.0)
+    found = TimeAllocation([move]).allocate(3.0, 50.0, fastest([move]))
+    assert found.moving_time == pytest.approx(3.0)
     assert replace(move, duration=3.0).energy > found.least + 10

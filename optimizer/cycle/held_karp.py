@@ -1,9 +1,12 @@
-"""Tours over groups, each once, by dynamic programming over their subsets.
+"""Least tours over groups of stops by dynamic programming over subsets (Held and Karp, 1962).
 
-Nodes that differ in full turns alone are one configuration, an end. The least costs between ends
-make a problem with fewer nodes, whose least ways onward from every subset are found first: no way
-onward from a node of the end needs less. So a way that needs more than a limit with them is left
-out of the tours over all nodes.
+A tour visits every group once. It is extended by one group at a time, from every subset of groups
+and every configuration at the exit of the last group (M. Held and R. M. Karp, "A dynamic
+programming approach to sequencing problems", 1962).
+
+Nodes that differ by full turns alone form one end. The least costs between ends make a smaller
+problem. Its least costs onward from every subset are lower bounds for the nodes of an end, so
+partial tours above a limit are discarded from the problem over all nodes.
 """
 
 from __future__ import annotations
@@ -18,17 +21,31 @@ import numpy.typing as npt
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import checkpoint
 
-# how far above its lower bound a tour is looked for first, then next, as shares of the bound
-BEYOND = (0.01, 0.04, 0.16, np.inf)
-# relative: sums of the same costs in another order
-ROUNDING = 1e-12
+
+@dataclass(frozen=True)
+class HeldKarpSettings:
+    """Settings of the dynamic program over tours."""
+
+    excesses: tuple[float, ...] = (0.01, 0.04, 0.16, np.inf)
+    """Relative excesses over the lower bound within which a tour is sought, one after the other."""
+    rounding: float = 1e-12
+    """Relative rounding error of sums of the same costs in another order."""
+
+
+HELD_KARP = HeldKarpSettings()
 
 
 @dataclass(frozen=True)
-class _Costs:
-    """Costs [J] from the start's nodes to those of all groups `first` (s, n), `between` (n, n)
-    these, and `back` (n, s) to the start. Group k has the nodes `own[k]`; `group` (n,) is that of
-    each node."""
+class _CostMatrices:
+    """Costs [J] between nodes.
+
+    Attributes:
+        own: nodes of every group.
+        group: group of every node, shape (n,).
+        first: costs from the nodes of the start, shape (s, n).
+        between: costs between the nodes of groups, shape (n, n).
+        back: costs back to the start, shape (n, s).
+    """
 
     own: list[slice]
     group: npt.NDArray[np.intp]
@@ -37,17 +54,16 @@ class _Costs:
     back: Array
 
     @classmethod
-    def of(cls, starts: int, sizes: Sequence[int]) -> _Costs:
-        """No way from any node to another one; back to the start at no cost."""
+    def of(cls, starts: int, sizes: Sequence[int]) -> _CostMatrices:
+        """Infinite costs between all nodes, and zero costs back to the start."""
         last = np.concatenate([[0], np.cumsum(sizes)])
         nodes = int(last[-1])
         own = [slice(a, b) for a, b in pairwise(last.tolist())]
         group, first = np.repeat(np.arange(len(sizes)), sizes), np.full((starts, nodes), np.inf)
         return cls(own, group, first, np.full((nodes, nodes), np.inf), np.zeros((nodes, starts)))
 
-    def put(self, a: int | None, b: int | None, cost: Array) -> None:
-        """Take the costs from the nodes in which group a is left to those of b; None is the
-        start."""
+    def set_costs(self, a: int | None, b: int | None, cost: Array) -> None:
+        """Set the costs from the exit of group a to the exit of group b; None is the start."""
         if a is None:
             assert b is not None
             self.first[:, self.own[b]] = cost
@@ -58,22 +74,31 @@ class _Costs:
 
 
 @dataclass(frozen=True)
-class _Tour:
-    """What tours from one node of the start have in common: costs [J] to all nodes `first` (n,),
-    `back` (n,) from them, and `onward` (2^groups, ends), the least between ends from each subset
-    and the end in which it is left."""
+class _ToursFromStart:
+    """Common data of the tours from one node of the start.
+
+    Attributes:
+        first: costs to all nodes, shape (n,) [J].
+        back: costs back from all nodes, shape (n,) [J].
+        onward: least costs between ends onward from every subset and end, shape (2^groups, ends)
+            [J].
+    """
 
     first: Array
     back: Array
     onward: Array
 
 
-class Tours:
-    """Tours from a node of the start over all groups, back to this node if `closed`.
+class HeldKarp:
+    """Dynamic program over tours from a node of the start through all groups.
 
-    `ends` has the end (n,) of each node in which a group is left, ascending from 0; None is the
-    start. `earlier` are the groups that come before each group. Costs are `put` between all of them
-    before the first question.
+    All costs must be set by `set_costs` before the first call of `least`.
+
+    Args:
+        ends: end of every node at the exit of a group, shape (n,), ascending from 0; None is the
+            start.
+        earlier: groups that come before every group.
+        closed: whether a tour returns to its node of the start.
     """
 
     def __init__(
@@ -83,7 +108,7 @@ class Tours:
         closed: bool,
     ):
         self.count, self.closed = len(earlier), closed
-        # the groups that may come next after those of each subset
+        # groups that may follow the groups of a subset
         needed = [sum(1 << k for k in each) for each in earlier]
         self._may_follow = [
             [
@@ -94,42 +119,45 @@ class Tours:
             for subset in range(1 << self.count)
         ]
         groups, start = [ends[k] for k in range(self.count)], ends[None]
-        self._nodes = _Costs.of(len(start), [len(each) for each in groups])
-        self._ends = _Costs.of(int(start[-1]) + 1, [int(each[-1]) + 1 for each in groups])
-        # the end of each node, among those of all groups, and of each node of the start
+        self._nodes = _CostMatrices.of(len(start), [len(each) for each in groups])
+        self._ends = _CostMatrices.of(int(start[-1]) + 1, [int(each[-1]) + 1 for each in groups])
+        # end of every node of the groups, and of every node of the start
         self._end = np.concatenate(
             [own.start + each for own, each in zip(self._ends.own, groups, strict=True)]
         )
         self._end_of_start = start
         self._first_of_end = {k: np.unique(each, return_index=True)[1] for k, each in ends.items()}
 
-    def put(self, a: int | None, b: int | None, cost: Array) -> None:
-        """Take the costs (n_a, n_b) [J] from the nodes in which group a is left to those in which b
-        is left.
+    def set_costs(self, a: int | None, b: int | None, cost: Array) -> None:
+        """Set the costs (n_a, n_b) [J] from the exit of group a to the exit of group b; None is the
+        start.
         """
-        self._nodes.put(a, b, cost)
+        self._nodes.set_costs(a, b, cost)
         of_ends = np.minimum.reduceat(cost, self._first_of_end[a], axis=0)
-        self._ends.put(a, b, np.minimum.reduceat(of_ends, self._first_of_end[b], axis=1))
+        self._ends.set_costs(a, b, np.minimum.reduceat(of_ends, self._first_of_end[b], axis=1))
 
     def least(self) -> tuple[float, list[int], list[int]]:
-        """Cost [J] of the least tour, its groups in their order, and the nodes in which the start
-        and these are left; for a closed one the start's node again. Inf and nothing if there is
-        none."""
-        onward, group = self._onward(), self._nodes.group
+        """The least tour.
+
+        Returns:
+            Its cost [J], its groups in order, and its nodes at the start and at the exits of the
+            groups, followed by the start of a closed tour; inf and empty lists if there is no tour.
+        """
+        onward, group = self._least_onward(), self._nodes.group
         first, back = self._nodes.first, self._nodes.back
         after = onward[1 << group, :, self._end].T
         if not self.closed:
-            # any start will do: one stands for all
+            # the start is free: one stands for all
             first = first.min(axis=0, keepdims=True)
         bounds = (first + (after[self._end_of_start] if self.closed else after)).min(axis=1)
         best, nodes, start = np.inf, list[int](), -1
         for s in np.argsort(bounds, kind="stable").tolist():
             if bounds[s] >= best:
                 break
-            tour = _Tour(
+            tour = _ToursFromStart(
                 first[s], back[:, s], onward[:, self._end_of_start[s] if self.closed else 0]
             )
-            value, found = self._from(tour, float(bounds[s]), best)
+            value, found = self._least_from(tour, float(bounds[s]), best)
             if found:
                 best, nodes, start = value, found, s
         if not nodes:
@@ -140,15 +168,18 @@ class Tours:
         local = [node - self._nodes.own[k].start for node, k in zip(nodes, groups, strict=True)]
         return best, groups, [start, *local, *([start] if self.closed else [])]
 
-    def _onward(self) -> Array:
-        """Least costs (2^groups, starts, ends) [J] between ends, from each subset and the end in
-        which it is left, over all other groups and back to each end of the start; of one start if
-        the tour is not closed."""
+    def _least_onward(self) -> Array:
+        """Least costs (2^groups, starts, ends) [J] between ends onward from every subset and last
+        end.
+
+        The costs are over all other groups and back to every end of the start; a tour that is not
+        closed has one start.
+        """
         costs, whole = self._ends, (1 << self.count) - 1
         back = costs.back.T if self.closed else costs.back.T[:1]
         onward = np.full((1 << self.count, *back.shape), np.inf)
         onward[whole] = back
-        # the least along the first axis of three is found soonest
+        # minima along the first of three axes are fastest
         between = costs.between.T.copy()
         for subset in range(whole - 1, 0, -1):
             checkpoint()
@@ -163,23 +194,29 @@ class Tours:
                 ).min(axis=0)
         return onward
 
-    def _from(self, tour: _Tour, bound: float, most: float) -> tuple[float, list[int]]:
-        """Cost [J] and nodes of the least tour, if it costs less than `most`; no tour costs less
-        than `bound`. Inf and nothing if there is none."""
+    def _least_from(
+        self, tour: _ToursFromStart, bound: float, most: float
+    ) -> tuple[float, list[int]]:
+        """Cost [J] and nodes of the least tour with a cost below `most`; inf and no nodes without
+        one.
+
+        Args:
+            tour: data of the start.
+            bound: lower bound of all tours [J].
+            most: upper limit of the cost [J].
+        """
         best, nodes = most, list[int]()
-        for beyond in BEYOND:
-            limit = min(bound + beyond * abs(bound) if np.isfinite(beyond) else np.inf, best)
-            value, found = self._within(tour, limit + ROUNDING * abs(limit))
+        for excess in HELD_KARP.excesses:
+            limit = min(bound + excess * abs(bound) if np.isfinite(excess) else np.inf, best)
+            value, found = self._least_within(tour, limit + HELD_KARP.rounding * abs(limit))
             if value < best:
                 best, nodes = value, found
             if best <= limit:
                 break
         return (best, nodes) if nodes else (np.inf, [])
 
-    def _within(self, tour: _Tour, limit: float) -> tuple[float, list[int]]:
-        """Cost [J] and nodes of the least tour of those of which every part has a bound within a
-        limit [J].
-        """
+    def _least_within(self, tour: _ToursFromStart, limit: float) -> tuple[float, list[int]]:
+        """Cost [J] and nodes of the least tour with all partial bounds within a limit [J]."""
         costs, whole = self._nodes, (1 << self.count) - 1
         reached = {1 << k: self._row(k, tour.first[costs.own[k]]) for k in self._may_follow[0]}
         kept = dict[int, tuple[npt.NDArray[np.intp], Array]]()
@@ -211,7 +248,7 @@ class Tours:
         )
 
     def _row(self, group: int, cost: Array) -> Array:
-        """Costs (n,) [J] to all nodes: to those of one group, inf to the others."""
+        """Costs (n,) [J] to the nodes of one group; inf for all other nodes."""
         row = np.full(len(self._end), np.inf)
         row[self._nodes.own[group]] = cost
         return row
@@ -219,7 +256,7 @@ class Tours:
     def _traced(
         self, kept: Mapping[int, tuple[npt.NDArray[np.intp], Array]], last: int
     ) -> list[int]:
-        """The nodes of the least way over all groups that ends in node `last`."""
+        """Nodes of the least partial tour over all groups to node `last`."""
         found, subset = [last], (1 << self.count) - 1
         while subset := subset ^ 1 << int(self._nodes.group[found[-1]]):
             nodes, cost = kept[subset]
