@@ -34,7 +34,7 @@ from benchmarks.identification_standins import TORQUE_SENSOR, behind_the_gears, 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Robot
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
-from joulepath.optimizer.identify.fits.block import moving
+from joulepath.optimizer.identify.fits.block import moving_rows
 from joulepath.optimizer.identify.fits.fitting import fit_rows
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.options import IdentificationOptions
@@ -126,7 +126,7 @@ def tx40_torque(place: Path | None, _: int) -> list[Gate]:
         arm, rest = fit_rows(robot, rows.take(half), TX40_OPTIONS).arm, rows.take(~half)
         error = rest.effort - arm.torque(rest)
         for joint, most in enumerate((10.0, 8.0, 13.0, 12.0, 22.0, 20.0)):
-            of = moving(
+            of = moving_rows(
                 rest, rest.effort, joint, TX40_OPTIONS.velocity_threshold, TX40_OPTIONS.couplings
             )
             relative = 100 * float(

@@ -15,7 +15,7 @@ from joulepath.optimizer.dynamics.link_regressor import body_parameters
 from joulepath.optimizer.dynamics.torque_regressor import torque_regressor
 from joulepath.optimizer.excitation.excitation_problem import Part
 from joulepath.optimizer.identify.arm.base_parameters import base_parameters
-from joulepath.optimizer.identify.fits.torque_fit import LEAST_LOAD_SPREAD
+from joulepath.optimizer.identify.fits.torque_fit import TORQUE_FIT
 from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
 from joulepath.optimizer.problem.arm import Arm
 
@@ -87,7 +87,7 @@ def loaded_joints(arm: Arm) -> list[int]:
     poses = np.random.default_rng(0).uniform(low, high, (POSES, model.nq))
     weights = np.array([pin.computeGeneralizedGravity(model, data, q) for q in poses])
     return np.flatnonzero(
-        weights.std(axis=0) >= LEAST_LOAD_SPREAD * arm.robot.limits.tau_max
+        weights.std(axis=0) >= TORQUE_FIT.min_load_spread * arm.robot.limits.tau_max
     ).tolist()
 
 

@@ -1,4 +1,4 @@
-"""The errors of reading logs."""
+"""Errors of reading logs."""
 
 from __future__ import annotations
 

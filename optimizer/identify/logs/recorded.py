@@ -1,4 +1,4 @@
-"""The energy that was measured in each segment of a log."""
+"""Energy measured in each segment of a log."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from joulepath.optimizer.problem.arm import Arm
 
 @dataclass(frozen=True)
 class MeasuredEnergy:
-    """Electrical energy by what was measured during this part of a log."""
+    """Electrical energy by measurement during a part of a log."""
 
     electrical: Joules | None
     """Integral of the logged power of the arm's bus. Null if the log has none."""
@@ -35,7 +35,9 @@ class MeasuredEnergy:
 
 
 def measured(log: Log, arm: Arm) -> list[MeasuredEnergy]:
-    """What was measured in each segment of `log.recording()` of `arm`; empty if nothing was."""
+    """Measured energy of each segment of `log.recording()`; empty if neither power nor efforts were
+    logged.
+    """
     drives = arm.drives
     torque = None
     if log.effort is not None and log.effort_meaning != "external":
@@ -70,9 +72,7 @@ def _part(log: Log, plant: Plant, torque: Array | None, rows: slice) -> Measured
 
 
 def _pieces(first: int, last: int) -> Iterator[tuple[int, int]]:
-    """Rows from `first` to `last` in pieces of BLOCK rows at most, so that memory does not grow
-    with a log's length.
-    """
+    """Ranges of at most BLOCK rows, so that memory does not grow with the length of a log."""
     return pairwise([*range(first, last, BLOCK), last])
 
 

@@ -1,6 +1,4 @@
-"""Rows of a log's CSV file as arrays, some thousand lines at a time. Lines of a wrong length are
-dropped.
-"""
+"""Rows of a CSV file of a log as arrays, some thousand lines at a time."""
 
 from __future__ import annotations
 
@@ -20,31 +18,39 @@ from joulepath.optimizer.csv_table import line_of, names_of, numbers_of, with_po
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.evaluate.recording import BLOCK, MOST_ROWS
 from joulepath.optimizer.exceptions import InvalidTable
-from joulepath.optimizer.identify.logs.head import LONGEST_LINE, Head, is_comment
+from joulepath.optimizer.identify.logs.head import HEAD, Head, is_comment
 from joulepath.optimizer.identify.logs.log_errors import LogTooLarge
 
-MOST_BYTES = 1 << 30
-"""Most bytes of a log after unpacking, if the caller does not allow fewer."""
-MOST_DROPPED = 0.1
-"""Greatest fraction of lines with a wrong number of cells: beyond it, something is wrong with the
-file as a whole.
-"""
-_GZIP = b"\x1f\x8b"
+_GZIP_MAGIC = b"\x1f\x8b"
 
 
-class _Watched(RawIOBase):
-    """A file whose every reading looks at the watched deadline: gzip may have millions of members
-    with nothing in them."""
+@dataclass(frozen=True)
+class FileSettings:
+    """Limits of the file of a log."""
+
+    max_bytes: int = 1 << 30
+    """Largest size after unpacking [bytes]."""
+    max_dropped: float = 0.1
+    """Largest share of lines with a wrong number of cells; more show that the whole file is
+    wrong [1]."""
+
+
+FILE = FileSettings()
+
+
+class _DeadlineFile(RawIOBase):
+    """A file that checks the deadline at every read: gzip files may have millions of empty
+    members."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
 
     def readable(self) -> bool:
-        """It is."""
+        """Always true."""
         return True
 
     def readinto(self, buffer: Any, /) -> int:
-        """As of a file. Raises DeadlinePassed."""
+        """Read into a buffer; raises DeadlinePassed."""
         checkpoint()
         view = memoryview(buffer)
         data = self._file.read(len(view))
@@ -52,28 +58,30 @@ class _Watched(RawIOBase):
         return len(data)
 
     def close(self) -> None:
-        """Closes the file, too."""
+        """Close this and the underlying file."""
         self._file.close()
         super().close()
 
 
-class Source:
-    """The bytes of a log, unpacked if they are gzip, at most `most` of them. Raises LogTooLarge,
-    InvalidTable.
+class LogSource:
+    """Lines of a log, unpacked if the file is gzip.
+
+    Args:
+        source: path of the file, or its content.
+        max_bytes: largest size after unpacking [bytes].
     """
 
-    def __init__(self, source: Path | bytes, most: int = MOST_BYTES) -> None:
-        raw = BufferedReader(
-            _Watched(
+    def __init__(self, source: Path | bytes, max_bytes: int = FILE.max_bytes) -> None:
+        self._raw = BufferedReader(
+            _DeadlineFile(
                 BytesIO(source) if isinstance(source, bytes) else source.open("rb", buffering=0)
             )
         )
-        self._raw = raw
-        packed = raw.peek(2)[:2] == _GZIP
-        self._file: BufferedIOBase = gzip.GzipFile(fileobj=raw) if packed else raw
-        self._most, self._read = most, 0
+        packed = self._raw.peek(2)[:2] == _GZIP_MAGIC
+        self._file: BufferedIOBase = gzip.GzipFile(fileobj=self._raw) if packed else self._raw
+        self._max_bytes, self._read = max_bytes, 0
 
-    def __enter__(self) -> Source:
+    def __enter__(self) -> LogSource:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -81,7 +89,12 @@ class Source:
         self._raw.close()
 
     def readline(self, size: int | None = -1, /) -> bytes:
-        """As of a file."""
+        """Read a line, as of a file.
+
+        Raises:
+            InvalidTable: the file is broken gzip.
+            LogTooLarge: the file is too large.
+        """
         try:
             line = self._file.readline(size)
         except (OSError, EOFError, ZlibError):
@@ -89,63 +102,71 @@ class Source:
                 "The file is broken gzip: pack it anew, or send it unpacked."
             ) from None
         self._read += len(line)
-        if self._read > self._most:
-            raise LogTooLarge(self._most, "bytes after unpacking")
+        if self._read > self._max_bytes:
+            raise LogTooLarge(self._max_bytes, "bytes after unpacking")
         return line
 
 
-@dataclass
-class Rows:
-    """The rows of a file below its head: `blocks` yields (line numbers, values (k, used)).
+class FileRows:
+    """Rows of a file below its head.
 
-    `dropped` counts, while the blocks are read, lines with too few or too many cells. Comments and
-    repetitions of the header are no rows.
+    Lines with a wrong number of cells are dropped. Comments and repetitions of the header are not
+    rows.
+
+    Args:
+        file: lines of the log.
+        head: head that has been read from it.
     """
 
-    file: Source
-    head: Head
-    used: Sequence[int]
-    dropped: int = 0
-    _first_dropped: InvalidTable | None = None
-
-    def __post_init__(self) -> None:
-        self._row, self._pushed = self.head.row, self.head.first
+    def __init__(self, file: LogSource, head: Head) -> None:
+        self.head = head
+        self.dropped = 0
+        self._file = file
+        self._row, self._pushed = head.row, head.first
+        self._first_dropped: InvalidTable | None = None
 
     def first(self) -> tuple[list[str], int]:
-        """The cells of the next row, which is read again by whatever comes next, and its line."""
+        """Cells of the next row, which will be read again, and the number of its line."""
         row, line = next(self._lines(), (self._row, ""))
-        self._push(row, line)
+        self._row, self._pushed = row, line or None
         return self._stripped(line).split(self.head.separator), row
 
     def skip(self) -> None:
-        """Leaves out the row that `first` has shown."""
+        """Skip the row shown by `first`."""
         self._pushed = None
         self._row += 1
 
-    def blocks(self) -> Iterator[tuple[Array, Array]]:
-        """Blocks of rows. Raises InvalidTable or LogTooLarge."""
-        kept = 0
-        while found := [*islice(self._lines(), BLOCK)]:
-            good, numbers = self._of_right_length(found)
+    def blocks(self, used: Sequence[int]) -> Iterator[tuple[Array, Array]]:
+        """Blocks of rows.
+
+        Args:
+            used: indices of the columns to read.
+
+        Yields:
+            Numbers of the lines (k,), and values (k, used).
+
+        Raises:
+            InvalidTable: too many lines are dropped, or a cell is not a number.
+            LogTooLarge: there are too many rows.
+        """
+        kept, head = 0, self.head
+        while lines := [*islice(self._lines(), BLOCK)]:
+            good, numbers = self._of_right_length(lines)
             kept += len(good)
             if kept + self.dropped > MOST_ROWS:
                 raise LogTooLarge(MOST_ROWS, "rows")
             if good:
-                points = good if self.head.separator == "," else [*with_points(good, numbers[0])]
-                values = numbers_of(
-                    points, numbers, self.head.names, self.head.separator, self.used
-                )
+                points = good if head.separator == "," else [*with_points(good, numbers[0])]
+                values = numbers_of(points, numbers, head.names, head.separator, used)
                 yield np.array(numbers), values
-        if self.dropped > MOST_DROPPED * (kept + self.dropped) and self._first_dropped is not None:
+        too_many = self.dropped > FILE.max_dropped * (kept + self.dropped)
+        if too_many and self._first_dropped is not None:
             raise self._first_dropped
         if kept < 2:
             raise InvalidTable("The file has fewer than two rows of numbers: a log needs more.")
 
-    def _push(self, row: int, line: str) -> None:
-        self._row, self._pushed = row, line or None
-
     def _lines(self) -> Iterator[tuple[int, str]]:
-        """The lines that are rows, with their numbers."""
+        """Lines that are rows, with their numbers."""
         while line := self._next_line():
             self._row += 1
             if line.strip() and not is_comment(line):
@@ -153,16 +174,17 @@ class Rows:
 
     def _next_line(self) -> str:
         if self._pushed is None:
-            return line_of(self.file, self._row, LONGEST_LINE)
+            return line_of(self._file, self._row, HEAD.max_line_bytes)
         line, self._pushed = self._pushed, None
         return line
 
     def _stripped(self, line: str) -> str:
         return " ".join(line.split()) if self.head.separator == " " else line.rstrip("\r\n")
 
-    def _of_right_length(self, found: list[tuple[int, str]]) -> tuple[list[str], list[int]]:
+    def _of_right_length(self, lines: list[tuple[int, str]]) -> tuple[list[str], list[int]]:
+        """Lines with the right number of cells, and their numbers."""
         good, numbers, separator, width = [], [], self.head.separator, len(self.head.names)
-        for row, line in found:
+        for row, line in lines:
             stripped = self._stripped(line)
             cells = stripped.count(separator) + 1
             while cells > width and stripped.endswith(separator):
@@ -179,7 +201,7 @@ class Rows:
         return good, numbers
 
     def _is_header(self, line: str) -> bool:
-        """Whether a line is the header again, as where files were joined."""
+        """Whether a line repeats the header, as in concatenated files."""
         begin = line[:1].strip("\"'")
         return (
             bool(begin) and not begin.isdigit() and begin not in "+-. " and self._same_names(line)
