@@ -12,9 +12,10 @@ from joulepath.optimizer.exceptions import JoulepathError
 
 @dataclass(eq=False)
 class NotCertified(JoulepathError):
-    """The motion of an answer that is to be exported failed its certificate, which is computed
-    again: it exceeds a limit of the arm, touches something, does not stand still at its ends, or
-    its samples are not those of its spline on this arm."""
+    """The motion to be exported failed its certificate, which is computed again: it exceeds a limit
+    of the arm, touches something, does not stand still at its ends, or its samples do not belong to
+    its spline on this arm.
+    """
 
     title = "Motion not certified"
     remedy = (
@@ -27,7 +28,7 @@ class NotCertified(JoulepathError):
     move: int
     """Index of the move, from 0; 0 for an answer that is one move."""
     reason: Annotated[str, Internal]
-    """Which check failed."""
+    """The failed check."""
     worst_ratio: Annotated[dict[str, float], Unit("1")]
     """Largest value / limit, for each limit where it is finite; empty if the certificate was not
     reached.

@@ -16,7 +16,7 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.csv_table import line_of, names_of, numbers_of, with_points, wrong_length
 from joulepath.optimizer.deadline import checkpoint
-from joulepath.optimizer.evaluate.recording import BLOCK, MOST_ROWS
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.exceptions import InvalidTable
 from joulepath.optimizer.identify.logs.head import HEAD, Head, is_comment
 from joulepath.optimizer.identify.logs.log_errors import LogTooLarge
@@ -150,11 +150,11 @@ class FileRows:
             LogTooLarge: there are too many rows.
         """
         kept, head = 0, self.head
-        while lines := [*islice(self._lines(), BLOCK)]:
+        while lines := [*islice(self._lines(), MOTION_LIMITS.block_rows)]:
             good, numbers = self._of_right_length(lines)
             kept += len(good)
-            if kept + self.dropped > MOST_ROWS:
-                raise LogTooLarge(MOST_ROWS, "rows")
+            if kept + self.dropped > MOTION_LIMITS.max_rows:
+                raise LogTooLarge(MOTION_LIMITS.max_rows, "rows")
             if good:
                 points = good if head.separator == "," else [*with_points(good, numbers[0])]
                 values = numbers_of(points, numbers, head.names, head.separator, used)

@@ -9,7 +9,7 @@ from math import pi
 import numpy as np
 
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.evaluate.recording import FAR_OUT, MOST_ACCELERATION, MOST_SPEED
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.exceptions import InvalidTable
 from joulepath.optimizer.identify.logs.columns import Group
 from joulepath.optimizer.identify.logs.grid import GRID, Grid
@@ -23,9 +23,9 @@ class PlausibilitySettings:
 
     max_angle: float = 20 * pi
     """Largest position: ten turns [rad]."""
-    max_speed: float = MOST_SPEED
+    max_speed: float = MOTION_LIMITS.max_speed
     """Largest speed [rad/s]."""
-    max_acceleration: float = MOST_ACCELERATION
+    max_acceleration: float = MOTION_LIMITS.max_acceleration
     """Largest acceleration [rad/s²]."""
     max_number: float = 1e6
     """Largest number of any other channel [unit of the channel]."""
@@ -99,7 +99,9 @@ def check_radians(q: Array, rows: Array, robot: Robot, names: Sequence[str]) -> 
         InvalidTable: the positions look like degrees.
     """
     ratios = np.abs(q) / np.maximum(np.abs(robot.limits.q_min), np.abs(robot.limits.q_max))
-    wrong = ((ratios > FAR_OUT).sum(axis=1) > 1) | (np.abs(q) > PLAUSIBLE.max_angle).any(axis=1)
+    wrong = ((ratios > MOTION_LIMITS.max_position_ratio).sum(axis=1) > 1) | (
+        np.abs(q) > PLAUSIBLE.max_angle
+    ).any(axis=1)
     if wrong.any():
         at = int(np.argmax(wrong))
         row, name = int(rows[at]), names[int(ratios[at].argmax())]

@@ -12,7 +12,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.declared import Joules
 from joulepath.optimizer.dynamics.losses import breakdown
 from joulepath.optimizer.dynamics.plant import Plant
-from joulepath.optimizer.evaluate.recording import BLOCK
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.problem.arm import Arm
 
@@ -72,8 +72,8 @@ def _part(log: Log, plant: Plant, torque: Array | None, rows: slice) -> Measured
 
 
 def _pieces(first: int, last: int) -> Iterator[tuple[int, int]]:
-    """Ranges of at most BLOCK rows, so that memory does not grow with the length of a log."""
-    return pairwise([*range(first, last, BLOCK), last])
+    """Ranges of limited size, so that memory does not grow with the length of a log."""
+    return pairwise([*range(first, last, MOTION_LIMITS.block_rows), last])
 
 
 def _sum(one: float | None, other: float | None) -> float | None:
