@@ -32,7 +32,7 @@ FRICTION = ("coulomb", "viscous", "offset", "load")
 def found() -> Excitation:
     """A short search from one start."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "MOST_EVALUATIONS", 80)
+        patch.setattr(module, "EXCITATION", module.ExcitationSettings(max_evaluations=80))
         return excite(ExcitationProblem(arm=ARM, starts=1, deadline=np.inf))
 
 
@@ -161,10 +161,12 @@ def test_no_time_is_said() -> None:
 
 def test_an_obstacle_of_the_planes_name_stands_for_it() -> None:
     own = Scene([Obstacle(MOUNTING_PLANE, Sphere(0.05), np.diag([1.0, 1, 1, 1]))])
-    arm = module._standing(ExcitationProblem(arm=Arm(robot=ARM.robot, scene=own)))
+    arm = module._with_mounting_plane(ExcitationProblem(arm=Arm(robot=ARM.robot, scene=own)))
     assert len(arm.scene.obstacles) == 1
-    assert len(module._standing(ExcitationProblem(arm=ARM)).scene.obstacles) == 1
-    assert not module._standing(ExcitationProblem(arm=ARM, mounting_plane=False)).scene.obstacles
+    assert len(module._with_mounting_plane(ExcitationProblem(arm=ARM)).scene.obstacles) == 1
+    assert not module._with_mounting_plane(
+        ExcitationProblem(arm=ARM, mounting_plane=False)
+    ).scene.obstacles
 
 
 @pytest.mark.parametrize(
