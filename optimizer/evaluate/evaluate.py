@@ -100,7 +100,7 @@ def evaluate(
             (without the time that the arm waits after it).
         sample_period: period of the samples in the result [s]; None for no samples.
         deadline: wall time after which the computation is given up [s].
-        clock: function that returns the time [s].
+        clock: function for the current time [s].
 
     Returns:
         Energy of the whole motion and of each segment [J], the largest use of each limit, and the
@@ -236,7 +236,7 @@ class _Evaluator:
         Args:
             block: the block.
             nodes: its quadrature nodes.
-            steps: pieces that begin with a velocity step.
+            steps: pieces with a velocity step at their start.
             charge: charge of the energy storage at the nodes [J].
         """
         # the first node of every piece, and the end

@@ -41,7 +41,7 @@ REQUEST_LIMITS = ExcitationLimits()
 
 @dataclass(frozen=True, kw_only=True)
 class ExcitationProblem:
-    """Request for a periodic motion of an arm that determines its parameters.
+    """Request for a periodic motion to determine the parameters of an arm.
 
     The motion is a Fourier series. It keeps clear of the arm itself, of the scene, and optionally
     of the plane z = 0 of the base, on which the arm stands.

@@ -2,8 +2,8 @@
 
 The motion is a Fourier series at rest at both ends (Swevers, Ganseman, Tükel, De Schutter, Van
 Brussel 1997), D-optimal, found by L-BFGS on a cost with penalties from several random starts. A
-longer period removes the remaining excess of speed, acceleration, jerk and torque. A start whose
-motion is not proven free of collisions is dropped.
+longer period removes the remaining excess of speed, acceleration, jerk and torque. Starts without a
+proof of clearance are dropped.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ Coefficients = Annotated[Array, Axes(("joint", "harmonic")), Unit("rad/s")]
 @dataclass(frozen=True)
 class Series:
     """The Fourier series of every joint: q = centre + Σ_k a_k sin(kωt) / (kω) - b_k cos(kωt) /
-    (kω), ω = 2π / period. A row of `a` and `b` is that of a joint."""
+    (kω), ω = 2π / period. `a` and `b` have one row per joint."""
 
     period: Seconds
     """Period; longer than asked for if the limits need it."""
@@ -105,7 +105,7 @@ class PredictedDeviation:
 
 @dataclass(frozen=True, kw_only=True)
 class Excitation:
-    """A motion that determines parameters."""
+    """A motion to determine parameters."""
 
     coefficients: Series
     """The motion as a series."""
@@ -137,7 +137,7 @@ def excite(problem: ExcitationProblem) -> Excitation:
         problem: the request.
 
     Returns:
-        The best motion of all starts that end before the deadline.
+        The best motion of all starts completed before the deadline.
 
     Raises:
         ExcitationInfeasible: no start leads to a motion within all limits.
@@ -268,17 +268,16 @@ class _Design:
         return value + EXCITATION.penalty_weight * penalty, np.asarray(total)
 
     def within_limits(self, start: Array, found: Array) -> tuple[Excitation | None, str | None]:
-        """The motion nearest to the end of a search that is within all limits.
+        """The first motion within all limits on the way from the end of a search to its start.
 
-        A search that ran out of time may end beyond a limit, so motions between its end and its
-        start are tried.
+        A search without enough time may end beyond a limit.
 
         Args:
             start: coordinates of the start.
             found: coordinates of the end of the search.
 
         Returns:
-            The motion and None; or None and the limit that the last motion exceeds.
+            The motion and None; or None and the limit exceeded by the last motion.
         """
         limit = None
         for share in EXCITATION.fallback_shares:
@@ -345,7 +344,7 @@ class _Design:
         return float(max(1.0, *needed))
 
     def exceeded_limit(self, certificate: Certificate) -> str | None:
-        """The limit that a motion exceeds; None if it is within all limits."""
+        """Limit exceeded by a motion; None if it is within all limits."""
         clearance = certificate.clearance
         if clearance is not None and clearance.min_clearance < self.problem.clearance:
             return "clearance"

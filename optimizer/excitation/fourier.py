@@ -21,7 +21,7 @@ from joulepath.optimizer.motion.spline import Spline
 
 @dataclass(frozen=True)
 class SeriesSplineSettings:
-    """Settings of the spline that represents a series."""
+    """Settings of the spline of a series."""
 
     spans: int = 24
     """Knot spans per harmonic; the spline differs from the series by some 1e-9 rad."""

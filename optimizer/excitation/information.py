@@ -62,7 +62,7 @@ class Information:
         """Predicted standard deviations (p,) of the parameters.
 
         Args:
-            samples: number of independent measurements that all rows together stand for.
+            samples: number of independent measurements in all rows together.
         """
         gram = self.columns.T @ self.columns * (samples / len(self.columns))
         return np.asarray(np.sqrt(np.diag(np.linalg.inv(gram))))

@@ -152,7 +152,7 @@ def export(
         problem: problem of a `Solution`, which contains its arm; other motions contain theirs.
         speed_scale: fraction of the speed in (0, 1]. Moves are slowed down, rests are not.
         deadline: wall time after which the certificate is given up [s].
-        clock: function that returns the time [s].
+        clock: function for the current time [s].
 
     Returns:
         The file, with the largest value / limit of its motion.

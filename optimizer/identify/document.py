@@ -40,7 +40,7 @@ def document_of(figures: IdentifiedFigures, date: str) -> dict[str, Any]:
 
     Args:
         figures: the figures.
-        date: date that the sources of the figures name.
+        date: date of the sources of the figures.
     """
     source = f"identified from logs {', '.join(figures.logs)}, {date}"
 

@@ -105,7 +105,7 @@ class Identification:
         """The figures as a document, which `load_robot(robot, figures=document)` computes with.
 
         Args:
-            date: date that the sources of the figures name.
+            date: date of the sources of the figures.
 
         Returns:
             Value, unit, source, trust letter and standard deviation of each figure, and their
@@ -130,12 +130,12 @@ def identify(
         options: requested figures, method and held-out share.
 
     Returns:
-        The figures with their standard deviations, their validation, and advice on what to log.
+        The figures with their standard deviations, their validation, and advice for further logs.
 
     Raises:
         InvalidProblem: the logs or options do not fit the robot or each other.
         EffortNotUsable: the efforts of a log exclude gravity.
-        MethodNotApplicable: a log does not have what the method needs.
+        MethodNotApplicable: a log lacks a channel or property for the method.
         NoPowerChannel: power is requested, and no log has it.
         NotExcited: the logs identify none of the requested figures.
         PayloadUnknown: torque constants are requested, and the payload is not known.

@@ -66,7 +66,7 @@ class Prediction:
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """Measured and modelled torques and powers of n rows in motion, NaN where not logged."""
+    """Measured and modelled torques and powers of n rows in motion, NaN if not logged."""
 
     log: IntArray
     """Number of the log (n,), from 0."""

@@ -182,7 +182,7 @@ def replay(
         perturb: fraction by which a quantity of the arm is raised and lowered, one at a time, under
             the first controller, which does not know of it.
         deadline: wall time after which the replay is given up [s].
-        clock: function that returns the time [s].
+        clock: function for the current time [s].
         problem: problem of a `Solution`, which contains its arm; other motions contain theirs.
 
     Returns:

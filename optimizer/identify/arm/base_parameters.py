@@ -1,4 +1,4 @@
-"""Base parameters: the smallest set of combinations of standard parameters that determines torques.
+"""Base parameters: the fewest combinations of standard parameters that determine the torques.
 
 Most parameters of a body have no effect on any torque, or only together with others. At random
 states, the regressor has as many independent columns as there are base parameters. A QR

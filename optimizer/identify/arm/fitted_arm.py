@@ -147,7 +147,7 @@ def with_torques(
         arm: the arm.
         names: names of the figures.
         value: values (p,) of the figures.
-        couplings: motors that several joints share.
+        couplings: motors shared by several joints.
     """
     parts = {
         name: getattr(arm, name).copy()

@@ -103,7 +103,7 @@ def bus_power(
         figures: figures of the power model.
         parts: torque parts of the motion.
         torque_constant: torque constants (nq,) [N·m/A].
-        regeneration: share of negative power that is regained [1].
+        regeneration: regained share of negative power [1].
 
     Returns:
         Power (n,) [W], and its derivatives (n, 2 + 7 nq) by the packed figures.

@@ -113,7 +113,7 @@ def leave_one_out(
     Args:
         grouped: normal equations of the G groups.
         found: estimate (p,) from all groups.
-        free: parameters (p,) that are estimated; all others keep the value of `found`.
+        free: estimated parameters (p,); all others keep the value of `found`.
         prior: precision (p, p) of a Gaussian prior around the estimate's prior mean.
 
     Returns:
@@ -148,7 +148,7 @@ def residual_replicates(grouped: GroupedEquations, found: Array, free: Mask, pri
     Args:
         grouped: normal equations of the G groups.
         found: estimate (p,) from all groups and the prior.
-        free: parameters (p,) that are estimated.
+        free: estimated parameters (p,).
         prior: precision (p, p) of the prior.
     """
     at, groups = np.flatnonzero(free), len(grouped.gram)

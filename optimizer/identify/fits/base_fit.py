@@ -115,15 +115,15 @@ def fit_base(
 ) -> Estimate:
     """Fit base parameters and friction by ordinary, weighted or reweighted least squares.
 
-    With the method `essential_parameters`, unknowns that the rows do not determine are held at the
-    robot's own values, the least determined first, until all others are determined.
+    With the method `essential_parameters`, undetermined unknowns are held at the robot's own values,
+    the least determined first, until all others are determined.
 
     Args:
         robot: the robot with its own figures.
         rows: rows with regressors.
-        torque: motor torques (n, nq) [N·m], NaN where not logged.
+        torque: motor torques (n, nq) [N·m], NaN if not logged.
         clusters: partition of the rows for the jackknife.
-        options: what to identify, and by which estimator.
+        options: requested figures and estimator.
     """
     arm = base_regression(robot, rows, torque, clusters, options)
     terms = base_terms(robot, arm, options)

@@ -63,9 +63,9 @@ def joint_block(
     Args:
         robot: the robot with its own figures.
         rows: rows of the logs.
-        torque: motor torques (n, nq) [N·m], NaN where not logged.
+        torque: motor torques (n, nq) [N·m], NaN if not logged.
         clusters: partition of the rows.
-        options: what to identify.
+        options: requested figures.
         joints: numbers of the joints.
         speed: speed of the curved term [rad/s]; None for the robot's own, joint by joint.
     """
@@ -116,10 +116,10 @@ def moving_rows(
 
     Args:
         rows: rows of the logs.
-        torque: motor torques (n, nq) [N·m], NaN where not logged.
+        torque: motor torques (n, nq) [N·m], NaN if not logged.
         joint: number of the joint.
-        threshold: speed above which a joint or motor moves [rad/s].
-        couplings: motors that several joints share.
+        threshold: smallest speed of a moving joint or motor [rad/s].
+        couplings: motors shared by several joints.
     """
     use = np.isfinite(torque[:, joint]) & (np.abs(rows.v[:, joint]) > threshold)
     for coupling in couplings:

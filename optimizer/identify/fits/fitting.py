@@ -179,7 +179,7 @@ def _independent_errors(covariance: Array) -> Array:
 
 
 def motor_torque(arm: FittedArm, rows: Rows) -> Array:
-    """Logged motor torques (n, nq) [N·m], NaN where not logged."""
+    """Logged motor torques (n, nq) [N·m], NaN if not logged."""
     return rows.effort * arm.torque_constant if rows.current else rows.effort
 
 
@@ -193,7 +193,7 @@ def _with_power(
         rows: rows with power.
         fitted: the fit of torques.
         errors: errors (k, p) of the parameters of the `prior_error_arms`.
-        options: what to identify.
+        options: requested figures.
     """
     use, clusters, arm = np.isfinite(rows.power), fitted.clusters, fitted.arm
     use, clusters, arm = np.isfinite(rows.power), fitted.clusters, fitted.arm

@@ -125,9 +125,9 @@ def fit_payload(
     Args:
         robot: the robot with its own figures.
         rows: rows with regressors, whose rigid-body torques are without the payload.
-        torque: motor torques (n, nq) [N·m], NaN where not logged.
+        torque: motor torques (n, nq) [N·m], NaN if not logged.
         log: number of the log with the payload.
-        threshold: speed above which a joint moves [rad/s].
+        threshold: smallest speed of a moving joint [rad/s].
 
     Raises:
         InvalidProblem: the log carries less than the others.
@@ -172,10 +172,10 @@ def _equations(
     Args:
         robot: the robot with its own figures.
         rows: rows with regressors.
-        torque: motor torques (n, nq) [N·m], NaN where not logged.
+        torque: motor torques (n, nq) [N·m], NaN if not logged.
         clusters: partition of the rows.
         log: number of the log with the payload.
-        threshold: speed above which a joint moves [rad/s].
+        threshold: smallest speed of a moving joint [rad/s].
         body: parameters (10,) of the payload whose load friction is assumed.
         variance: variance (nq,) of the rows of each joint.
 

@@ -88,7 +88,7 @@ def fit_periodic(
         rows: rows of whole periods, with regressors.
         torque: motor torques (n, nq) [N·m].
         clusters: partition of the rows.
-        options: what to identify, and the period.
+        options: requested figures and period.
 
     Returns:
         The estimate, and the measured noise.

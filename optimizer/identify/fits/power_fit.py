@@ -100,7 +100,7 @@ def power_prior(robot: Robot, torque_known: bool) -> PowerPrior:
     copper, inverter, _, _, rotor, load, offset = (
         np.arange(1 + k * nq, 1 + (k + 1) * nq) for k in range(7)
     )
-    # all joints have motors of one maker: half of the variance is common to them
+    # the motors are of one maker: half of the variance is common to all joints
     variance[np.ix_(copper, copper)] = _half_common(copper_sd)
     variance[np.ix_(inverter, inverter)] = _half_common(np.full(nq, (high - low) / (2 * P95)))
     common, own, rotors, links, load_sd = known_sd, known_sd, known_sd, known_sd, np.zeros(nq)
@@ -184,7 +184,7 @@ def fit_power(
         parts: torque parts of the rows.
         measured: measured powers (n,) [W].
         torque_constant: torque constants (nq,) [N·m/A].
-        regeneration: share of negative power that is regained [1].
+        regeneration: regained share of negative power [1].
         prior: prior of the packed figures.
         clusters: partition of the rows for the jackknife.
         robust: whether outliers have less weight.
@@ -244,7 +244,7 @@ def _covariance_increase(
         grouped: normal equations of the G groups.
         precision: precision (p, p) of rows and prior.
         prior: precision (p, p) of the prior.
-        free: parameters (p,) that are estimated.
+        free: estimated parameters (p,).
         errors: errors (G, p) whose jackknife is the covariance due to the rows.
     """
     if len(errors) < POWER_FIT.min_clusters:

@@ -87,7 +87,7 @@ def not_excited(
 ) -> NotExcited:
     """The error, with a request for an excitation that identifies the parameters.
 
-    Friction is always excited, and links where their torques are needed.
+    Friction is always excited, and links if their torques are needed.
     """
     links = options.needs_regressor or {"torque_constant", "payload"} & set(options.fit)
     excite = [

@@ -49,10 +49,10 @@ def temperatures_of(
 
     Args:
         rows: rows of the logs.
-        torque: motor torques (n, nq) [N·m], NaN where not logged.
+        torque: motor torques (n, nq) [N·m], NaN if not logged.
         arm: arm with friction fitted at mixed temperatures.
         clusters: partition of the rows for the jackknife.
-        threshold: speed above which a joint moves [rad/s].
+        threshold: smallest speed of a moving joint [rad/s].
     """
     nq = rows.v.shape[1]
     reference, span, k, sd = (np.full(nq, np.nan) for _ in range(4))

@@ -1,8 +1,8 @@
 """Friction and rotor inertia of each joint from its torques, for links with known inertials.
 
 tau = tau_rigid + rotor_inertia·a + friction + offset, joint by joint, over the rows in which the
-joint moves. Coupled joints are fitted as one block. Terms that the rows do not determine are held
-at the robot's own figures, and the remaining terms are fitted again.
+joint moves. Coupled joints are fitted as one block. Undetermined terms are held at the robot's own
+figures, and the remaining terms are fitted again.
 """
 
 from __future__ import annotations
@@ -76,9 +76,9 @@ def fit_torques(
     Args:
         robot: the robot with its own figures.
         rows: rows of the logs.
-        torque: motor torques (n, nq) [N·m], NaN where not logged.
+        torque: motor torques (n, nq) [N·m], NaN if not logged.
         clusters: partition of the rows for the jackknife.
-        options: what to identify.
+        options: requested figures.
     """
     settings = TORQUE_FIT
     estimates, speeds = list[Estimate](), dict[int, float]()

@@ -50,9 +50,9 @@ def whole_arm_regression(
     Args:
         robot: the robot with its own figures.
         rows: rows of the logs.
-        torque: motor torques (n, nq) [N·m], NaN where not logged.
+        torque: motor torques (n, nq) [N·m], NaN if not logged.
         clusters: partition of the rows.
-        options: what to identify.
+        options: requested figures.
         bodies: regressor (n, nq, 10 bodies) of the links, and of further bodies to be found.
         change: change (10 nq,) of the links' parameters already contained in `rows.rigid`.
     """

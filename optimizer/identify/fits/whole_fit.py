@@ -66,9 +66,9 @@ def fit_whole(
     Args:
         robot: the robot with its own figures.
         rows: rows with regressors.
-        torque: motor torques (n, nq) [N·m], NaN where not logged.
+        torque: motor torques (n, nq) [N·m], NaN if not logged.
         clusters: partition of the rows for the jackknife.
-        options: what to identify, and the weight of the prior.
+        options: requested figures and weight of the prior.
     """
     own, bodies = body_parameters(robot.model), rows.regressor
     assert bodies is not None

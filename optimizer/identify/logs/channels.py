@@ -20,7 +20,7 @@ def channels_of(log: Log, columns: Columns, effort: Group | None) -> tuple[Chann
     Args:
         log: the log.
         columns: columns of the file.
-        effort: group of columns that the efforts come from.
+        effort: group of columns of the efforts.
     """
     return tuple(_channels(log, columns, effort))
 

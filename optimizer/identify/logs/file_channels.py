@@ -81,7 +81,7 @@ def read_channels(
         source: path of the file, or its content.
         robot: the robot of the log.
         options: options of the reading.
-        remarks: list that receives warnings.
+        remarks: list to receive warnings.
 
     Raises:
         InvalidTable: a row or the table as a whole is wrong.

@@ -39,7 +39,7 @@ def cutoff(rate: float) -> float:
 def low_passed(values: Array, rate: float) -> Array:
     """Channels (n, k) without frequencies above the cut-off and without delay."""
     smooth = np.empty_like(values)
-    # one channel at a time: the filter copies what it is given
+    # one channel at a time: the filter copies its input
     for k, channel in enumerate(values.T):
         smooth[:, k] = filtered(channel, rate, cutoff(rate))
     return smooth

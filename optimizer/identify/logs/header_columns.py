@@ -45,7 +45,7 @@ def columns_of_rows(
         robot: the robot of the log.
         options: options of the reading.
         scales: factor to SI units of each channel.
-        remarks: list that receives warnings.
+        remarks: list to receive warnings.
 
     Raises:
         InvalidTable: the header is not known, lacks a column, or names other units.

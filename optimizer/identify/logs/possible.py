@@ -1,4 +1,4 @@
-"""Physically impossible numbers in a log, which are refused, and whole turns, which are removed."""
+"""Refusal of physically impossible numbers in a log, and removal of whole turns."""
 
 from __future__ import annotations
 

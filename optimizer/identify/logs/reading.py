@@ -186,7 +186,7 @@ def _without_lag(what: str, values: Array, lag: float, time: Array, remarks: lis
         values: the channels.
         lag: time by which they are late [s].
         time: times of the grid (n,) [s].
-        remarks: list that receives the warning.
+        remarks: list to receive the warning.
     """
     if lag == 0:
         return values

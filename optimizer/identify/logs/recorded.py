@@ -66,7 +66,7 @@ def _part(log: Log, plant: Plant, torque: Array | None, rows: slice) -> Measured
         return MeasuredEnergy(drawn, None)
     q, v, a = (channel[rows].astype(float) for channel in (log.q, log.v, log.a))
     tau = plant.torques(q, v, a)
-    # what is left of the measured torque when the motion is made is lost
+    # the measured torque beyond that of the motion is lost
     energy = breakdown(weights, v, a, tau, 0.0, plant.arm, lost=torque[rows] - tau)
     return MeasuredEnergy(drawn, energy.electrical.total)
 

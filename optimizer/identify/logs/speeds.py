@@ -55,7 +55,7 @@ def speeds_of(
         a: logged accelerations (n, joints) [rad/s²], or None.
         columns: columns of the file.
         rate: rate of the rows [Hz].
-        remarks: list that receives a warning of inconsistent channels.
+        remarks: list to receive a warning of inconsistent channels.
 
     Raises:
         InvalidTable: all speeds are wrong by a common factor.

@@ -50,9 +50,9 @@ def choose_meaning(
 
     Args:
         found: report of the slopes.
-        group: group of columns that the efforts come from.
+        group: group of columns of the efforts.
         requested: meaning by option, or `auto`.
-        remarks: list that receives warnings of doubtful efforts.
+        remarks: list to receive warnings of doubtful efforts.
 
     Raises:
         EffortNotUsable: the efforts exclude gravity and are not declared as external, or their

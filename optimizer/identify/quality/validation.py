@@ -32,7 +32,7 @@ def validate(robot: Robot, folds: Sequence[Fold], threshold: float) -> Validatio
     Args:
         robot: the robot with its own figures.
         folds: held-out rows with their fits.
-        threshold: speed above which a joint moves [rad/s].
+        threshold: smallest speed of a moving joint [rad/s].
     """
     own, power = own_arm(robot), any(np.isfinite(fold.rows.power).any() for fold in folds)
     covered = [coverage(fold) for fold in folds]
@@ -68,7 +68,7 @@ def torque_errors(folds: Sequence[tuple[FittedArm, Rows]], threshold: float) -> 
 
     Args:
         folds: arms with the rows to predict.
-        threshold: speed above which a joint moves [rad/s].
+        threshold: smallest speed of a moving joint [rad/s].
     """
     parts = [
         (motor_torque(arm, rows), arm.torque(rows), rows.v, rows.weight) for arm, rows in folds
