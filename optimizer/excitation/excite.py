@@ -9,7 +9,6 @@ proof of clearance are dropped.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated
 
 import numpy as np
 from scipy.optimize import OptimizeResult, minimize
@@ -18,11 +17,15 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.collision.model import CollisionModel, collision_model
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.declared import Axes, Count, Internal, PerJoint, Ratio, Seconds, Unit
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.excitation.errors import ExcitationInfeasible
 from joulepath.optimizer.excitation.excitation_problem import ExcitationProblem
+from joulepath.optimizer.excitation.excitation_result import (
+    Excitation,
+    PredictedDeviation,
+    Series,
+)
 from joulepath.optimizer.excitation.fourier import FourierBasis
 from joulepath.optimizer.excitation.information import Information
 from joulepath.optimizer.excitation.limits import (
@@ -39,7 +42,6 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import HalfSpace, Obstacle, Scene
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.energy import Energy
-from joulepath.optimizer.result.solution import Trajectory
 
 MOUNTING_PLANE = "mounting plane"
 
@@ -73,60 +75,6 @@ class ExcitationSettings:
 
 
 EXCITATION = ExcitationSettings()
-Coefficients = Annotated[Array, Axes(("joint", "harmonic")), Unit("rad/s")]
-
-
-@dataclass(frozen=True)
-class Series:
-    """The Fourier series of every joint: q = centre + Σ_k a_k sin(kωt) / (kω) - b_k cos(kωt) /
-    (kω), ω = 2π / period. `a` and `b` have one row per joint."""
-
-    period: Seconds
-    """Period; longer than asked for if the limits need it."""
-    centre: Annotated[PerJoint, Unit("rad")]
-    """Centre of every joint."""
-    a: Coefficients
-    """Coefficients of the sines of a joint."""
-    b: Coefficients
-    """Coefficients of the cosines of a joint."""
-
-
-@dataclass(frozen=True)
-class PredictedDeviation:
-    """Predicted standard deviation of a parameter after one period."""
-
-    parameter: str
-    """A base parameter as a sum of parameters of bodies (`m`, `mx` …, `Ixx` …) and rotors (`Ia`),
-    each with the number of its joint; or `coulomb`, `viscous`, `offset` or `load` of a joint."""
-    sd: Annotated[float, Unit("SI")]
-    """Standard deviation after one period, with 10 independent samples of every joint per
-    second."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Excitation:
-    """A motion to determine parameters."""
-
-    coefficients: Series
-    """The motion as a series."""
-    trajectory: Trajectory
-    """The same motion as a spline, with samples."""
-    energy: Energy
-    """Energy of one period."""
-    condition: Ratio
-    """Condition of the columns, over the noise."""
-    scaled_condition: Ratio
-    """Condition of the columns, scaled to one length."""
-    predicted_sd: list[PredictedDeviation]
-    """Predicted standard deviations."""
-    cost: Annotated[float, Internal]
-    """Value of the criterion, which the search minimises."""
-    starts: Count
-    """Starts that were completed."""
-    feasible: Count
-    """Starts that gave a motion within all limits."""
-    certificate: Certificate
-    """Independent check of the motion."""
 
 
 @one_thread()

@@ -145,12 +145,7 @@ def identify(
     last = len(logs) - 1
     rows = _rows(robot, logs, options)
     check_logs(robot, rows, logs, options)
-    validation, held_out = None, np.zeros(len(rows.q), dtype=bool)
-    if options.held_out:
-        masks = held_out_masks(rows, options.held_out)
-        held_out = np.any(masks, axis=0)
-        folds = [_fold(robot, rows, mask, options, last) for mask in masks]
-        validation = validate(robot, folds, options.velocity_threshold)
+    validation, held_out = _validation(robot, rows, options, last)
     payload = _payload(robot, rows, options, last)
     rows = rows if payload is None else with_payload(rows, payload)
     fitted = fit_by_method(robot, rows, options)
@@ -177,6 +172,17 @@ def identify(
         curves=curves_of([(fitted.arm, rows, ~held_out)], threshold),
         logs=tuple(log.name or "" for log in logs),
     )
+
+
+def _validation(
+    robot: Robot, rows: Rows, options: IdentificationOptions, last: int
+) -> tuple[Validation | None, Mask]:
+    """Validation by held-out moves, if any are requested, and the held-out rows (n,)."""
+    if not options.held_out:
+        return None, np.zeros(len(rows.q), dtype=bool)
+    masks = held_out_masks(rows, options.held_out)
+    folds = [_fold(robot, rows, mask, options, last) for mask in masks]
+    return validate(robot, folds, options.velocity_threshold), np.any(masks, axis=0)
 
 
 def _rows(robot: Robot, logs: Sequence[Log], options: IdentificationOptions) -> Rows:

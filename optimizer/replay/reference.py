@@ -18,7 +18,7 @@ Course = Callable[[Array], tuple[Array, Array, Array]]
 
 
 @dataclass(frozen=True)
-class GridSettings:
+class TimeGridSettings:
     """Settings of the time grid of a simulation."""
 
     max_steps: int = 400_000
@@ -27,7 +27,7 @@ class GridSettings:
     """Last step over a step, up to which it is a rounding error [1]."""
 
 
-GRID = GridSettings()
+TIME_GRID = TimeGridSettings()
 
 
 @dataclass(frozen=True)
@@ -57,12 +57,12 @@ def reference(course: Course, duration: float, step: float) -> Reference:
     Raises:
         InvalidProblem: there are too many steps.
     """
-    count = math.ceil(duration / step * (1 - GRID.step_tolerance))
-    if count > GRID.max_steps:
+    count = math.ceil(duration / step * (1 - TIME_GRID.step_tolerance))
+    if count > TIME_GRID.max_steps:
         raise InvalidProblem(
             "step",
-            f"The motion takes {count} steps, of at most {GRID.max_steps}: give a step of at least "
-            f"{duration / GRID.max_steps:.3g} s.",
+            f"The motion takes {count} steps, of at most {TIME_GRID.max_steps}: give a step of at "
+            f"least {duration / TIME_GRID.max_steps:.3g} s.",
         )
     t = np.linspace(0.0, duration, count + 1)
     q, v, a = course(t)

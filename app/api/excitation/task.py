@@ -25,7 +25,8 @@ from joulepath.optimizer.excitation.excitation_problem import (
     ExcitationProblem,
     Part,
 )
-from joulepath.optimizer.excitation.excite import Excitation, excite
+from joulepath.optimizer.excitation.excitation_result import Excitation
+from joulepath.optimizer.excitation.excite import excite
 
 _ALL: list[Part] = ["inertials", "rotor", "friction"]
 _Angles = Annotated[

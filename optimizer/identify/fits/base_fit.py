@@ -115,8 +115,8 @@ def fit_base(
 ) -> Estimate:
     """Fit base parameters and friction by ordinary, weighted or reweighted least squares.
 
-    With the method `essential_parameters`, undetermined unknowns are held at the robot's own values,
-    the least determined first, until all others are determined.
+    With the method `essential_parameters`, undetermined unknowns are held at the robot's own
+    values, the least determined first, until all others are determined.
 
     Args:
         robot: the robot with its own figures.

@@ -71,6 +71,7 @@ def solve_consistent(gram: Array, moment: Array, bodies: int, lower: Array) -> A
         [clarabel.NonnegativeConeT(len(bounded)), *[clarabel.PSDTriangleConeT(4)] * bodies],
         settings,
     ).solve()
-    if str(solution.status) not in ("Solved", "AlmostSolved"):
+    solved = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
+    if solution.status not in solved:
         raise ArithmeticError(f"The semidefinite program ended with {solution.status}.")
     return np.asarray(solution.x) * scale

@@ -15,7 +15,12 @@ from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, join
 from joulepath.optimizer.identify.fits.base_fit import BaseTerms, fit_base
 from joulepath.optimizer.identify.fits.base_wrench import fit_wrench
 from joulepath.optimizer.identify.fits.periodic import fit_periodic
-from joulepath.optimizer.identify.fits.power_fit import PowerPrior, fit_power, power_prior
+from joulepath.optimizer.identify.fits.power_fit import (
+    PowerFit,
+    PowerPrior,
+    fit_power,
+    power_prior,
+)
 from joulepath.optimizer.identify.fits.torque_fit import fit_torques
 from joulepath.optimizer.identify.fits.whole_fit import LINK, fit_whole
 from joulepath.optimizer.identify.options import IdentificationOptions
@@ -196,7 +201,6 @@ def _with_power(
         options: requested figures.
     """
     use, clusters, arm = np.isfinite(rows.power), fitted.clusters, fitted.arm
-    use, clusters, arm = np.isfinite(rows.power), fitted.clusters, fitted.arm
     part, of_row = rows.take(use), Clusters(clusters.of_row[use], clusters.count)
     torque_known = len(fitted.estimate.names) > 0
     prior = power_prior(robot, torque_known)
@@ -209,16 +213,8 @@ def _with_power(
         of_row,
         options.estimator == "irls",
     )
-    # an error of the torques changes the power parameters by one step of the fit
     others = fitted.arms_without_cluster if torque_known else ()
-    parameters = PowerParameters.unpacked(fit.value)
-    here = replace(arm, power_parameters=parameters).power(part)[0]
-    moved = np.array(
-        [
-            fit.gain @ (here - replace(each, power_parameters=parameters).power(part)[0])
-            for each in (*others, *fitted.prior_error_arms)
-        ]
-    ).reshape(-1, len(fit.value))
+    moved = _parameter_changes(fit, arm, part, (*others, *fitted.prior_error_arms))
     shifts = moved[len(others) :]
     by_torques = moved[: len(others)] if torque_known else 0.0
     without, by_rows = fit.without_cluster + by_torques, fit.row_replicates + by_torques
@@ -252,6 +248,23 @@ def _with_power(
         prior_covariance=np.outer(relative, relative) * fit.prior_covariance,
         covariance_increase=np.outer(relative, relative) * fit.covariance_increase,
     )
+
+
+def _parameter_changes(
+    fit: PowerFit, arm: FittedArm, rows: Rows, others: Sequence[FittedArm]
+) -> Array:
+    """Changes (k, p) of the power parameters due to the torques of other arms.
+
+    An error of the torques changes the power parameters by one step of the fit.
+    """
+    parameters = PowerParameters.unpacked(fit.value)
+    power = replace(arm, power_parameters=parameters).power(rows)[0]
+    return np.array(
+        [
+            fit.gain @ (power - replace(other, power_parameters=parameters).power(rows)[0])
+            for other in others
+        ]
+    ).reshape(-1, len(fit.value))
 
 
 def _covariance_scale(nq: int, value: Array) -> Array:

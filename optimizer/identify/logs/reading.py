@@ -91,12 +91,14 @@ def read_log(
         InvalidProblem: an option does not fit the file or the robot.
         OSError: the file cannot be read.
     """
-    options = options or LogOptions()
+    path_or_content = source if isinstance(source, bytes) else Path(source)
+    return _read(path_or_content, robot, options or LogOptions())
+
+
+def _read(source: Path | bytes, robot: Robot, options: LogOptions) -> LogReading:
     gravity = frozen(options.gravity, (3,), "gravity")
     remarks: list[str] = []
-    channels = read_channels(
-        source if isinstance(source, bytes) else Path(source), robot, options, remarks
-    )
+    channels = read_channels(source, robot, options, remarks)
     grid, columns = channels.grid, channels.columns
     payload, payload_known = _payload(channels, options.payload)
     q = channels.take("q")

@@ -88,16 +88,21 @@ def choose_meaning(
             "name."
         )
         return EffortReport(_NAMED[group], 0.0, found.slope)
+    raise _unclear(found)
+
+
+def _unclear(found: EffortReport) -> EffortNotUsable:
+    """Error for efforts of unknown meaning."""
     slopes = [slope for slope in found.slope.values() if slope is not None]
     if slopes and max(slopes) < 0:
-        raise EffortNotUsable(
+        return EffortNotUsable(
             "The logged efforts have the other sign than the weight of the arm: turn the sign of "
             "their columns, or "
             "give `gravity` in the frame of the base if the arm hangs.",
             None,
             found.slope,
         )
-    raise EffortNotUsable(
+    return EffortNotUsable(
         "It is not clear what the logged efforts are: give effort=current for motor currents [A], "
         "effort=torque for "
         f"torques [N·m] or effort=external for torques without gravity. {OTHER_CAUSES}",

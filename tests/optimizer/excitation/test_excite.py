@@ -13,7 +13,8 @@ from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, Out
 from joulepath.optimizer.excitation import excite as module
 from joulepath.optimizer.excitation.errors import ExcitationInfeasible
 from joulepath.optimizer.excitation.excitation_problem import Criterion, ExcitationProblem
-from joulepath.optimizer.excitation.excite import MOUNTING_PLANE, Excitation, excite
+from joulepath.optimizer.excitation.excitation_result import Excitation
+from joulepath.optimizer.excitation.excite import MOUNTING_PLANE, excite
 from joulepath.optimizer.excitation.fourier import FourierBasis
 from joulepath.optimizer.excitation.information import Information
 from joulepath.optimizer.excitation.torque_columns import TorqueColumns
