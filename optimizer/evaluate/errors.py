@@ -20,9 +20,8 @@ class NotCertified(JoulepathError):
     title = "Motion not certified"
     remedy = (
         "Export the answer as the service gave it, with the arm that it was computed for. If the "
-        "robot's figures have "
-        "changed since, optimise again. A motion that `POST /evaluate` finds beyond a limit cannot "
-        "be exported."
+        "robot's figures have changed since, optimise again. A motion that `POST /evaluate` finds "
+        "beyond a limit cannot be exported."
     )
 
     move: int
@@ -41,7 +40,6 @@ class NotCertified(JoulepathError):
 
     def __str__(self) -> str:
         return (
-            f"The motion is not certified: {self.reason}. Export an answer as the service gave it, "
-            "for the robot as it "
-            "is."
+            f"The motion is not certified: {self.reason}. Export an answer as the service gave "
+            "it, for the robot as it is."
         )

@@ -231,8 +231,7 @@ def _check_finite(block: RecordedRows, first_row: int) -> None:
             column = name if name == "t" else f"{name}{joint + 1}"
             raise InvalidTable(
                 f"{column} at row {first_row + row} is not finite, or too large to be a robot's: "
-                "correct it or drop "
-                "the row.",
+                "correct it or drop the row.",
                 first_row + row,
                 column,
             )
@@ -262,9 +261,8 @@ def check_joints(arm: Arm, q: Array, first_row: int = 0) -> None:
     if len(wrong):
         row, joint = wrong[0].tolist()
         raise InvalidTable(
-            f"q{joint + 1} at row {first_row + row} is far beyond the joint's range and looks like "
-            "degrees: give "
-            "radians, or a CSV with units=deg.",
+            f"q{joint + 1} at row {first_row + row} is far beyond the joint's range and looks "
+            "like degrees: give radians, or a CSV with units=deg.",
             first_row + row,
             f"q{joint + 1}",
         )

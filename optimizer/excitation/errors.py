@@ -16,8 +16,7 @@ class ExcitationInfeasible(JoulepathError):
     title = "No excitation within the limits"
     remedy = (
         "For `clearance`, move obstacles, ask for less, or give a `centre` with more room; else "
-        "relax the limit or "
-        "give a longer `period`."
+        "relax the limit or give a longer `period`."
     )
 
     limit: str

@@ -46,8 +46,7 @@ def to_krl(program: Program, options: KrlOptions | None = None) -> WrittenFile:
         f"within {max(each.deviation for each in moves):.2e} rad of the spline, if the controller "
         "keeps every time",
         "model of the controller: it passes the points at their times, and between them anything "
-        "from straight lines "
-        "in joint space to the cubic spline",
+        "from straight lines in joint space to the cubic spline",
         "what it adds to a time that it cannot keep is not in this bound",
         *output_note(program, options.digital_output),
     )

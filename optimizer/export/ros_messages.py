@@ -145,8 +145,7 @@ def _file(
 ) -> WrittenFile:
     notes = (
         f"{len(points.nanoseconds)} points, and quintics between them are within "
-        f"{points.position:.1e} rad and "
-        f"{points.velocity:.1e} rad/s of the spline",
+        f"{points.position:.1e} rad and {points.velocity:.1e} rad/s of the spline",
         "payload and outputs are not in the message: set them on the robot",
         *(
             f"at {timed.t0:.4f} s the payload becomes {timed.payload.mass:.4g} kg"

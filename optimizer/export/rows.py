@@ -65,6 +65,5 @@ def _check_count(count: int, format: str, most: int) -> None:
         raise FormatUnsuitable(
             format,
             f"The file would have {count} rows, and {format} has at most {most}: export it with a "
-            "longer period, "
-            "with a larger speed_scale, or move by move.",
+            "longer period, with a larger speed_scale, or move by move.",
         )

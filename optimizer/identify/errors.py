@@ -91,9 +91,8 @@ class PayloadUnknown(JoulepathError):
     )
     detail = (
         "Gravity does not tell the torque constants of all joints, and nobody said what the arm "
-        "carried: give "
-        "`payload` with each log, of mass 0 if it was nothing, and find a payload and torque "
-        "constants one by one."
+        "carried: give `payload` with each log, of mass 0 if it was nothing, and find a payload "
+        "and torque constants one by one."
     )
 
     joints: Annotated[list[int], Unit("1")]

@@ -109,8 +109,7 @@ _STAMPS = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"), ("secs", "nan
 """Ends of the names of the two columns of a stamp of time."""
 _KNOWN_HEADERS = (
     "timestamp, actual_q_0, … (RTDE), t, q1, … (this service's own) or time, position1, … (ROS "
-    "JointState as CSV). "
-    "Otherwise say in `columns` which columns hold what"
+    "JointState as CSV). Otherwise say in `columns` which columns hold what"
 )
 
 
@@ -191,8 +190,7 @@ def recognised(names: Sequence[str], nq: int) -> Columns:
         if not time:
             raise InvalidTable(
                 f"The header has joint positions, as {names[found['q'][0]]}, but no column "
-                f"`{form.time.strip('%?')}`: "
-                "a log needs the time [s] of every row.",
+                f"`{form.time.strip('%?')}`: a log needs the time [s] of every row.",
                 1,
                 form.time.strip("%?"),
             )
@@ -342,8 +340,7 @@ def _check_counts(groups: Mapping[Group, tuple[int, ...]], names: Sequence[str],
             name = names[indices[0]] if indices else None
             raise InvalidTable(
                 f"The header has {len(indices)} columns like {name}, but the robot has {nq} "
-                "joints: a log is of one "
-                "robot, with one column for each of its joints.",
+                "joints: a log is of one robot, with one column for each of its joints.",
                 1,
                 name,
             )

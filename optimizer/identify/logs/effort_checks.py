@@ -131,10 +131,9 @@ def check_signs(found: Sequence[JointEffort], names: Sequence[str]) -> None:
         columns = ", ".join(names[joint] for joint in wrong)
         raise EffortNotUsable(
             f"The efforts in {columns} have the other sign than the motion: friction would drive "
-            "the joint. Turn their "
-            "sign, or that of the joint's positions and speeds; or the joints are in another order "
-            "than the robot's, "
-            "from base to flange (name the columns in `columns`).",
+            "the joint. Turn their sign, or that of the joint's positions and speeds; or the "
+            "joints are in another order than the robot's, from base to flange (name the columns "
+            "in `columns`).",
             None,
             {},
         )

@@ -54,8 +54,7 @@ def _of_word(names: Sequence[str], word: str, joints: Sequence[str]) -> tuple[in
             has = "no column" if not columns else "more than one column"
             raise InvalidTable(
                 f"The header has {has} `{word.partition('|')[0]}` of {joint}: a log has every "
-                "joint once. Correct the "
-                "header, or name the columns in `columns`.",
+                "joint once. Correct the header, or name the columns in `columns`.",
                 1,
                 None if not columns else names[columns[1]],
             )

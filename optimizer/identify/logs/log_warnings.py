@@ -50,8 +50,7 @@ def log_warnings(log: Log, grid: Grid, columns: Columns) -> list[str]:
     if columns.format == "ros" and any(name.rstrip("]")[-1:].isdigit() for name in columns.names):
         found.append(
             "The joints are taken in the order of their numbers, from base to flange: drivers of "
-            "ROS may publish them "
-            "in another one. Then name the columns in `columns`."
+            "ROS may publish them in another one. Then name the columns in `columns`."
         )
     return found
 

@@ -164,8 +164,8 @@ def check_leaps(q: Array, grid: Grid, lines: Array, robot: Robot, names: Sequenc
                     f"{name} changes by {change[at]:.3g} rad from line {lines[at]} to line {row}, "
                     f"within {steps[at]:.3g} s, and the joint does at most {v_max:.3g} rad/s. "
                     "Delete a wrong row; divide the log where rows were left out; give positions "
-                    "in rad (or units=deg), and times in seconds, "
-                    f"{GRID.min_rate:g} rows per second or more.",
+                    f"in rad (or units=deg), and times in seconds, {GRID.min_rate:g} rows per "
+                    "second or more.",
                     row,
                     name,
                 )

@@ -67,8 +67,7 @@ def speeds_of(
         v = _replaced(v, derivative(q[:, wrong], rate), wrong)
         remarks.append(
             f"The speeds of joints {numbers_of_joints(wrong)} do not fit their positions, and are "
-            "made from these: "
-            "check units, signs and the order of the columns."
+            "made from these: check units, signs and the order of the columns."
         )
     if a is None:
         return v, derivative(v, rate)
@@ -76,8 +75,8 @@ def speeds_of(
     if set(odd) - set(wrong):
         remarks.append(
             f"The accelerations of joints {numbers_of_joints(odd)} are not the change of their "
-            "speeds, and are made "
-            "from these: check units, signs and the order of the columns, or leave them out."
+            "speeds, and are made from these: check units, signs and the order of the columns, "
+            "or leave them out."
         )
     odd = sorted({*odd, *wrong})
     return v, _replaced(a, derivative(v[:, odd], rate), odd) if odd else a

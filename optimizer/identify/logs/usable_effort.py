@@ -15,10 +15,8 @@ from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
 
 OTHER_CAUSES = (
     "Otherwise the log is of another robot, a column never changes, the joints are in another "
-    "order than the robot's, "
-    "from base to flange (name the columns in `columns`), or `units`, `current_units`, `payload` "
-    "or `gravity` are not "
-    "as given."
+    "order than the robot's, from base to flange (name the columns in `columns`), or `units`, "
+    "`current_units`, `payload` or `gravity` are not as given."
 )
 """Other causes of efforts that do not fit the arm."""
 _NAMED: dict[Group, EffortMeaning] = {"current": "current", "torque": "torque"}
@@ -33,8 +31,7 @@ def check_measured(effort: Array) -> None:
     if (np.ptp(effort, axis=0) == 0).all():
         raise EffortNotUsable(
             "The logged efforts never change, so they were not measured: log motor currents, or "
-            "leave their columns "
-            "out to keep motion and power.",
+            "leave their columns out to keep motion and power.",
             None,
             {},
         )
@@ -60,11 +57,10 @@ def choose_meaning(
     """
     if found.meaning == "external" and requested != "external":
         raise EffortNotUsable(
-            "The logged efforts do not carry the arm's weight, and say nothing of it. If they are "
-            "without gravity, log "
-            "motor currents (with the driver of ROS 2: actual_current_as_torque off), or give "
-            "effort=external to keep "
-            f"motion and power. {OTHER_CAUSES}",
+            "The logged efforts do not carry the arm's weight, and say nothing of it. If they "
+            "are without gravity, log motor currents (with the driver of ROS 2: "
+            "actual_current_as_torque off), or give effort=external to keep motion and power. "
+            f"{OTHER_CAUSES}",
             "external",
             found.slope,
         )
@@ -97,15 +93,14 @@ def _unclear(found: EffortReport) -> EffortNotUsable:
     if slopes and max(slopes) < 0:
         return EffortNotUsable(
             "The logged efforts have the other sign than the weight of the arm: turn the sign of "
-            "their columns, or "
-            "give `gravity` in the frame of the base if the arm hangs.",
+            "their columns, or give `gravity` in the frame of the base if the arm hangs.",
             None,
             found.slope,
         )
     return EffortNotUsable(
-        "It is not clear what the logged efforts are: give effort=current for motor currents [A], "
-        "effort=torque for "
-        f"torques [N·m] or effort=external for torques without gravity. {OTHER_CAUSES}",
+        "It is not clear what the logged efforts are: give effort=current for motor currents "
+        "[A], effort=torque for torques [N·m] or effort=external for torques without gravity. "
+        f"{OTHER_CAUSES}",
         None,
         found.slope,
     )

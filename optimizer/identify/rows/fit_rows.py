@@ -177,10 +177,9 @@ def _check_power(robot: Robot, log: Log) -> None:
         raise InvalidProblem(
             "logs",
             f"The power of {'a log' if log.name is None else log.name} is {mean:.3g} W in the "
-            f"mean, and {robot.name} "
-            f"draws some {expected:.3g} W at rest: this is not the power of the arm's bus in W. "
-            "Log it in W, with the "
-            "sign that is positive where the arm draws power, or leave its column out.",
+            f"mean, and {robot.name} draws some {expected:.3g} W at rest: this is not the power "
+            "of the arm's bus in W. Log it in W, with the sign that is positive where the arm "
+            "draws power, or leave its column out.",
         )
 
 
