@@ -47,8 +47,9 @@ from .optimizer.identify.errors import (
 from .optimizer.identify.identify import Identification, identify
 from .optimizer.identify.logs.log import Log, LogMove
 from .optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
+from .optimizer.identify.logs.log_options import LogOptions
 from .optimizer.identify.logs.log_report import LogReport
-from .optimizer.identify.logs.reading import LogOptions, LogReading, read_log
+from .optimizer.identify.logs.reading import LogReading, read_log
 from .optimizer.identify.options import Coupling, IdentificationOptions
 from .optimizer.identify.results import Advice, Parameter, Validation
 from .optimizer.inverse_kinematics import IKSolution, IKSolutions, inverse_kinematics
