@@ -12,5 +12,7 @@ OWNER_LENGTH = 64
 """Of the name of an API key."""
 ROBOT_LENGTH = 64
 """Of a robot's name."""
+TOOL_LENGTH = 64
+"""Of a tool's name."""
 HOLDER_LENGTH = 128
 """Of the name of a process that works on jobs."""
