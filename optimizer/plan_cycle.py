@@ -32,6 +32,7 @@ from joulepath.optimizer.cycle.cycle_solution import (
 )
 from joulepath.optimizer.cycle.cycles_in_hand import CycleInHand, shared, simple_cycles
 from joulepath.optimizer.cycle.divided_paths import with_divided_paths
+from joulepath.optimizer.cycle.equal_times import in_equal_times
 from joulepath.optimizer.cycle.free_orientations import with_free_orientations
 from joulepath.optimizer.cycle.move_problem import LEAST_TIME
 from joulepath.optimizer.cycle.moves import moves_of
@@ -80,7 +81,7 @@ def plan_cycle(
         asked = _divided(cycle, clock)
         found = with_free_orientations(asked, lambda other: _valued(other, clock, tell), clock)
         _tell_found(tell, found)
-        return replace(found, wall_time=clock() - began)
+        return replace(in_equal_times(asked, found), wall_time=clock() - began)
 
 
 def _valued(asked: Cycle, clock: Clock, tell: Tell) -> CycleSolution:
@@ -119,7 +120,7 @@ def _optimized(asked: Cycle, clock: Clock, tell: Tell) -> CycleSolution:
 def _no_dearer_than(asked: Cycle, found: CycleSolution, baseline: CycleBaseline) -> CycleSolution:
     """The cycle with one more baseline, which becomes the answer itself if it needs less."""
     found = replace(found, baselines=[*found.baselines, baseline])
-    if baseline.saving >= 0:
+    if baseline.saving is None or baseline.saving >= 0:
         return found
     found = replace(found, status="feasible", moves=list(baseline.moves), price_of_time=0.0)
     return replace(

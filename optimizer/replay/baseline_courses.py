@@ -14,7 +14,7 @@ from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.motion.ruckig_motion import time_optimal_spline
+from joulepath.optimizer.motion.ruckig_motion import straight_spline, time_optimal_spline
 from joulepath.optimizer.motion.spline import lasting
 from joulepath.optimizer.motion.time_scalings import (
     blend_time,
@@ -57,6 +57,10 @@ def courses(
         "quintic": (course_of(quintic_spline(q_start, q_goal, duration)), duration),
         "ruckig": (course_of(fastest), fastest.duration),
         "ruckig_slowed": (course_of(lasting(fastest, duration)), duration),
+        "straight": (
+            course_of(lasting(straight_spline(limits, q_start, q_goal), duration)),
+            duration,
+        ),
     }
     if default is not None:
         own, blend = default_times(limits, default, way)
@@ -67,14 +71,14 @@ def courses(
 @dataclass(frozen=True)
 class ReportedBaseline:
     """A baseline as an answer reports it: duration [s], energies [J] with the wait after it, and
-    saving [1].
+    saving [1]; None where none is claimed.
     """
 
     name: BaselineName
     duration: float
     electrical: float
     mechanical: float
-    saving: float
+    saving: float | None
 
 
 def planned_baselines(
@@ -88,7 +92,8 @@ def planned_baselines(
 
     An answer does not tell to which goal configuration its baselines go: the one that gives the
     durations and energies it reports. `known` (nq,) [rad] are goals that it names, the first is its
-    own. What cannot be found is left out, as baselines along a tool path are.
+    own. What cannot be found is left out, as baselines along a tool path are, and so is what has no
+    saving, or takes another time than the answer and does not wait.
     """
     by_name = {each.name: each for each in reported}
     if not {"quintic", "ruckig"} <= by_name.keys():
@@ -99,10 +104,12 @@ def planned_baselines(
         return []
     found, plant = [], Plant(arm)
     for name, (course, own) in courses(arm, q_start, goal, duration).items():
-        if name in by_name:
-            each = by_name[name]
-            rest = each.electrical - _electrical(plant, course, own)
-            waiting = rest if rest > LEAST_WAITING * abs(each.electrical) else 0.0
+        each = by_name.get(name)
+        if each is None or each.saving is None:
+            continue
+        rest = each.electrical - _electrical(plant, course, own)
+        waiting = rest if rest > LEAST_WAITING * abs(each.electrical) else 0.0
+        if waiting > 0 or abs(own - duration) <= SAME_DURATION * duration:
             found.append(PlannedBaseline(name, course, own, each.saving, waiting))
     return found
 
