@@ -27,7 +27,7 @@ from joulepath.optimizer.result.solution import (
 )
 from joulepath.optimizer.search import free_goal, self_motions
 from joulepath.optimizer.search.attempts import solve, solve_from
-from joulepath.optimizer.search.baselines import with_saving_intervals
+from joulepath.optimizer.search.baselines import standing, with_savings
 from joulepath.optimizer.search.branch_and_bound import explore
 from joulepath.optimizer.search.candidates import Candidate, Reason, bound, pairs
 from joulepath.optimizer.search.claims import may_be_optimal
@@ -387,8 +387,11 @@ class Run:
             lower_bound=least,
             limits=LimitsInForce.of(arm.active_limits, arm.tcp_speed, arm.elbow_speed),
             complete=all_known(self.problem),
-            baselines=with_saving_intervals(
-                table, self.problem, Known(energy.electrical.total, sensitivity, spline.duration)
+            baselines=with_savings(
+                table,
+                self.problem,
+                Known(energy.electrical.total, sensitivity, spline.duration),
+                standing(arm, best.q_goal, prepared.torques),
             ),
             candidates=[each.report() for each in incumbent.candidates],
             unreachable=self.unreachable,

@@ -1,4 +1,4 @@
-"""The channels of a log, one by one, as its report lists them."""
+"""Channels of a log for its report."""
 
 from __future__ import annotations
 
@@ -15,7 +15,13 @@ _EFFORT_UNITS = {"current": "A", "torque": "N·m", "external": "N·m"}
 
 
 def channels_of(log: Log, columns: Columns, effort: Group | None) -> tuple[Channel, ...]:
-    """All channels of a log from these columns, whose efforts come from the group `effort`."""
+    """All channels of a log.
+
+    Args:
+        log: the log.
+        columns: columns of the file.
+        effort: group of columns of the efforts.
+    """
     return tuple(_channels(log, columns, effort))
 
 
@@ -53,6 +59,6 @@ def _channels(log: Log, columns: Columns, effort: Group | None) -> Iterator[Chan
 
 
 def _range(values: Array) -> tuple[float, float]:
-    """The least and the greatest of values (n,), with the digits that single precision has."""
+    """Least and greatest value, with the digits of single precision."""
     low, high = (float(f"{each:.7g}") for each in (values.min(), values.max()))
     return low, high

@@ -1,4 +1,4 @@
-"""Which columns of a log hold what, by the names in its header."""
+"""Columns of a log and their channels, by the names in the header."""
 
 from __future__ import annotations
 
@@ -22,17 +22,18 @@ Group = Literal[
     "payload",
     "wrench",
 ]
-"""What columns hold: joint positions, speeds, accelerations, currents, torques, efforts of unknown
+"""Channel of columns: joint positions, speeds, accelerations, currents, torques, efforts of unknown
 meaning, temperatures, commanded speeds; power of the arm, or voltage and current that multiply to
 it; mass and centre of the payload; force and torque on a sensor beneath the base."""
-WRENCH = 6
+WRENCH_COLUMNS = 6
 """Columns of a wrench: three of the force, then three of the torque."""
 
 
 @dataclass(frozen=True)
-class Form:
-    """Names of the columns of one kind of log: expressions whose first group, if any, is the number
-    of a joint.
+class LogFormat:
+    """Names of the columns of one kind of log, as regular expressions.
+
+    The first group of an expression, if any, is the number of a joint.
     """
 
     name: str
@@ -43,28 +44,28 @@ class Form:
     wrench: tuple[str, ...] = ()
 
 
-AT = r"[._\[ ]?([0-9]{1,3})\]?"
-"""Brackets, underscores, points or spaces before the number of a joint."""
-_BEFORE = r"(?:.*[./])?(?:joint_?|measured_?|msr_?|actual_?|motor_?)*"
-"""Of names of a topic or a structure, as `/joint_states/position[0]` or `state.q[0]`, and words for
-a measurement.
+JOINT_NUMBER = r"[._\[ ]?([0-9]{1,3})\]?"
+"""Number of a joint, behind a bracket, underscore, point or space."""
+_PREFIX = r"(?:.*[./])?(?:joint_?|measured_?|msr_?|actual_?|motor_?)*"
+"""Prefix of a topic or a structure, as in `/joint_states/position[0]` or `state.q[0]`, and words
+for a measurement.
 """
-FORMS = (
-    Form(
+FORMATS = (
+    LogFormat(
         "rtde",
         "timestamp",
         {
-            "q": f"actual_q{AT}",
-            "v": f"actual_qd{AT}",
-            "a": f"target_qdd{AT}",
-            "current": f"actual_current{AT}",
-            "temperature": f"joint_temperatures{AT}",
-            "commanded": f"target_qd{AT}",
+            "q": f"actual_q{JOINT_NUMBER}",
+            "v": f"actual_qd{JOINT_NUMBER}",
+            "a": f"target_qdd{JOINT_NUMBER}",
+            "current": f"actual_current{JOINT_NUMBER}",
+            "temperature": f"joint_temperatures{JOINT_NUMBER}",
+            "commanded": f"target_qd{JOINT_NUMBER}",
         },
         ("actual_robot_voltage", "actual_robot_current"),
         ("payload", "payload_cog_0", "payload_cog_1", "payload_cog_2"),
     ),
-    Form(
+    LogFormat(
         "own",
         "t",
         {
@@ -77,25 +78,25 @@ FORMS = (
         ("p",),
         wrench=("fx", "fy", "fz", "mx", "my", "mz"),
     ),
-    Form(
+    LogFormat(
         "ros",
         "%?time",
         {
-            "q": rf"(?:.*[./])?position{AT}",
-            "v": rf"(?:.*[./])?velocity{AT}",
-            "effort": rf"(?:.*[./])?effort{AT}",
+            "q": rf"(?:.*[./])?position{JOINT_NUMBER}",
+            "v": rf"(?:.*[./])?velocity{JOINT_NUMBER}",
+            "effort": rf"(?:.*[./])?effort{JOINT_NUMBER}",
         },
     ),
-    Form(
+    LogFormat(
         "numbered",
         "time",
         {
-            "q": rf"{_BEFORE}(?:q|pos|positions?|angles?|mp|axisqmsr_\w*?){AT}",
-            "v": rf"{_BEFORE}(?:dq|qd|v|vel|velocity|velocities|speeds?){AT}",
-            "current": rf"{_BEFORE}(?:i|currents?){AT}",
-            "torque": rf"{_BEFORE}(?:tau|tau_j|torques?|mt|axistaumsr_\w*?){AT}",
-            "effort": rf"{_BEFORE}(?:efforts?){AT}",
-            "temperature": rf"{_BEFORE}(?:temperatures?|temp){AT}",
+            "q": rf"{_PREFIX}(?:q|pos|positions?|angles?|mp|axisqmsr_\w*?){JOINT_NUMBER}",
+            "v": rf"{_PREFIX}(?:dq|qd|v|vel|velocity|velocities|speeds?){JOINT_NUMBER}",
+            "current": rf"{_PREFIX}(?:i|currents?){JOINT_NUMBER}",
+            "torque": rf"{_PREFIX}(?:tau|tau_j|torques?|mt|axistaumsr_\w*?){JOINT_NUMBER}",
+            "effort": rf"{_PREFIX}(?:efforts?){JOINT_NUMBER}",
+            "temperature": rf"{_PREFIX}(?:temperatures?|temp){JOINT_NUMBER}",
         },
         ("power",),
     ),
@@ -106,22 +107,24 @@ _TIME = (
 )
 _STAMPS = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"), ("secs", "nanosecs"))
 """Ends of the names of the two columns of a stamp of time."""
-_KNOWN = (
+_KNOWN_HEADERS = (
     "timestamp, actual_q_0, … (RTDE), t, q1, … (this service's own) or time, position1, … (ROS "
-    "JointState as CSV). "
-    "Otherwise say in `columns` which columns hold what"
+    "JointState as CSV). Otherwise say in `columns` which columns hold what"
 )
 
 
 @dataclass(frozen=True)
 class Columns:
-    """Indices of the columns of a log: its `form`, `time`, or seconds and nanoseconds of it, and
-    `groups`, those of joints with one index per joint."""
+    """Indices of the columns of a log."""
 
-    form: str
+    format: str
+    """Name of the format."""
     names: Sequence[str]
+    """Names of all columns."""
     time: tuple[int, ...]
+    """Column of the time, or columns of its seconds and nanoseconds."""
     groups: Mapping[Group, tuple[int, ...]]
+    """Columns of each channel; one per joint for channels of joints."""
 
     MAPPED: ClassVar[tuple[str, ...]] = (
         "time",
@@ -136,34 +139,46 @@ class Columns:
         "power",
         "wrench",
     )
-    """What a map of columns may name."""
+    """Keys of a map of columns."""
 
-    def without(self, first: Sequence[str]) -> tuple[Columns, list[Group]]:
-        """The columns without the groups of which the `first` row has no number, and these;
-        positions stay.
+    def without_empty(self, first: Sequence[str]) -> tuple[Columns, list[Group]]:
+        """Remove channels without a number in the first row, except positions.
+
+        Args:
+            first: cells of the first row.
+
+        Returns:
+            The remaining columns, and the removed channels.
         """
-        gone: list[Group] = [
+        removed: list[Group] = [
             group
             for group, indices in self.groups.items()
-            if group != "q" and all(_empty(first[k]) for k in indices)
+            if group != "q" and all(_is_empty(first[k]) for k in indices)
         ]
-        groups = {group: indices for group, indices in self.groups.items() if group not in gone}
-        return replace(self, groups=groups), gone
+        groups = {group: indices for group, indices in self.groups.items() if group not in removed}
+        return replace(self, groups=groups), removed
 
     @property
     def used(self) -> list[int]:
-        """All indices, each once, in the order of the file."""
+        """Sorted indices of all columns."""
         return sorted({*self.time, *(k for group in self.groups.values() for k in group)})
 
 
-def _empty(cell: str) -> bool:
+def _is_empty(cell: str) -> bool:
     return cell.strip().strip('"').lower() in ("", "nan", "none", "null")
 
 
 def recognised(names: Sequence[str], nq: int) -> Columns:
-    """The columns of a header for an arm with nq joints, of one of the FORMS. Raises
-    InvalidTable."""
-    for form in FORMS:
+    """Columns of a header in one of the known formats.
+
+    Args:
+        names: names of the columns.
+        nq: number of joints.
+
+    Raises:
+        InvalidTable: the header is in none of the formats, or lacks columns.
+    """
+    for form in FORMATS:
         found = {
             group: indices
             for group, pattern in form.joints.items()
@@ -175,23 +190,21 @@ def recognised(names: Sequence[str], nq: int) -> Columns:
         if not time:
             raise InvalidTable(
                 f"The header has joint positions, as {names[found['q'][0]]}, but no column "
-                f"`{form.time.strip('%?')}`: "
-                "a log needs the time [s] of every row.",
+                f"`{form.time.strip('%?')}`: a log needs the time [s] of every row.",
                 1,
                 form.time.strip("%?"),
             )
         _check_counts(found, names, nq)
-        return Columns(form.name, names, time, found | dict(_single(form, names)))
+        return Columns(form.name, names, time, found | dict(_columns_without_joint(form, names)))
     raise InvalidTable(
-        f"The header names no joint positions that are known: begin it with {_KNOWN}.", 1
+        f"The header names no joint positions that are known: begin it with {_KNOWN_HEADERS}.", 1
     )
 
 
 def other_positions(names: Sequence[str], columns: Columns) -> str | None:
-    """A column with positions that is not read, as those of another form are; None if there is
-    none.
-    """
-    for form in FORMS:
+    """Name of a column with positions in another format, which is not read; None if there is
+    none."""
+    for form in FORMATS:
         for name in names:
             if (
                 re.fullmatch(form.joints["q"], name)
@@ -202,8 +215,15 @@ def other_positions(names: Sequence[str], columns: Columns) -> str | None:
 
 
 def time_of(names: Sequence[str], first: str = "time") -> tuple[int, ...]:
-    """The index of the column of time, best one whose name is like `first`; or those of seconds and
-    nanoseconds, which are together more exact; empty if there is none."""
+    """Column of the time, or columns of its seconds and nanoseconds, which are more exact.
+
+    Args:
+        names: names of the columns.
+        first: preferred name of the column.
+
+    Returns:
+        Indices of the columns; empty if there is none.
+    """
     return _first(names, first) or _stamp(names) or _first(names, _TIME)
 
 
@@ -221,8 +241,11 @@ def _stamp(names: Sequence[str]) -> tuple[int, ...]:
 
 
 def _numbered(names: Sequence[str], pattern: str) -> tuple[int, ...]:
-    """Indices of the columns whose names match, by the number in them. Raises InvalidTable unless
-    these are consecutive from 0 or 1."""
+    """Columns with names that match a pattern, in the order of their numbers.
+
+    Raises:
+        InvalidTable: the numbers are not consecutive from 0 or 1.
+    """
     found: dict[int, int] = {}
     for k, name in enumerate(names):
         match = re.fullmatch(pattern, name)
@@ -245,8 +268,10 @@ def _numbered(names: Sequence[str], pattern: str) -> tuple[int, ...]:
     return tuple(found[number] for number in sorted(found))
 
 
-def _single(form: Form, names: Sequence[str]) -> Iterator[tuple[Group, tuple[int, ...]]]:
-    """The columns of a form that belong to no joint."""
+def _columns_without_joint(
+    form: LogFormat, names: Sequence[str]
+) -> Iterator[tuple[Group, tuple[int, ...]]]:
+    """Columns of channels that belong to no joint."""
     if form.power and all(name in names for name in form.power):
         yield "power", tuple(names.index(name) for name in form.power)
     if form.wrench and all(name in names for name in form.wrench):
@@ -258,10 +283,17 @@ def _single(form: Form, names: Sequence[str]) -> Iterator[tuple[Group, tuple[int
 
 
 def mapped(names: Sequence[str], columns: Mapping[str, str | Sequence[str]], nq: int) -> Columns:
-    """The columns that a caller's map names: `time`, `nanoseconds` and `power` by one name,
-    `wrench` by six, others by one per joint.
+    """Columns by a map of names.
 
-    Raises InvalidProblem for a wrong map, InvalidTable where the header does not have a column.
+    Args:
+        names: names of the columns.
+        columns: names of the columns of each channel: one for `time`, `nanoseconds` and `power`,
+            six for `wrench`, and one per joint for all others.
+        nq: number of joints.
+
+    Raises:
+        InvalidProblem: the map is wrong.
+        InvalidTable: the header lacks a column.
     """
     unknown = sorted(set(columns) - set(Columns.MAPPED))
     if unknown or not {"time", "q"} <= set(columns):
@@ -277,7 +309,7 @@ def mapped(names: Sequence[str], columns: Mapping[str, str | Sequence[str]], nq:
             raise InvalidProblem(
                 f"columns.{group}", f"columns.{group} must be the name of one column."
             )
-        if group == "wrench" and len(wanted) != WRENCH:
+        if group == "wrench" and len(wanted) != WRENCH_COLUMNS:
             raise InvalidProblem(
                 "columns.wrench",
                 "columns.wrench must name six columns: of the force, then the torque.",
@@ -308,8 +340,7 @@ def _check_counts(groups: Mapping[Group, tuple[int, ...]], names: Sequence[str],
             name = names[indices[0]] if indices else None
             raise InvalidTable(
                 f"The header has {len(indices)} columns like {name}, but the robot has {nq} "
-                "joints: a log is of one "
-                "robot, with one column for each of its joints.",
+                "joints: a log is of one robot, with one column for each of its joints.",
                 1,
                 name,
             )
