@@ -71,11 +71,9 @@ def plan(method: Method) -> PlannedPaths:
     states, and plans to the goals of other candidates too.
     """
     settings = PLANNED_PATHS
-    context, deadline, surroundings = (
-        method.context,
-        method.deadline,
-        method.prepared.surroundings,
-    )
+    context = method.context
+    deadline = method.deadline
+    surroundings = method.prepared.surroundings
     left = deadline.left
     others, unknown = context.other_goals(), np.isinf(method.incumbent_cost)
     tried = context.was_postponed or surroundings.seems_enclosed(method.q_start, method.q_goal)

@@ -302,11 +302,9 @@ class _TimeLaw:
 
         A state beyond a limit has a higher power if `soft`, else an infinite power.
         """
-        arm, limits, tau = (
-            self.prepared.arm,
-            self.prepared.arm.active_limits,
-            self.prepared.torques(q, v, a),
-        )
+        arm = self.prepared.arm
+        limits = self.prepared.arm.active_limits
+        tau = self.prepared.torques(q, v, a)
         if self.prepared.problem.objective == "mechanical":
             cost = np.abs(tau * v).sum(axis=1)
         else:

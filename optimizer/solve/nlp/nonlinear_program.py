@@ -128,7 +128,7 @@ class NonlinearProgram:
         return self.goal_constraints is not None or self.goal_curve is not None
 
     @property
-    def held(self) -> bool:
+    def has_equations(self) -> bool:
         """Whether every iterate meets equations of passes or of sliding ends."""
         return not (self.passes is None and self.start_curve is None and self.goal_curve is None)
 
