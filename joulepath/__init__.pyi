@@ -3,6 +3,7 @@ __version__: str
 from .models.own_arm.description import InvalidArm
 from .models.registry import load_robot, robot_names
 from .models.robot import Limits, Robot
+from .models.tools.registry import tool_names
 from .models.uncertainty.document import InvalidFigures
 from .optimizer.collision.model import ClosestPair
 from .optimizer.compare import Compared, Comparison, compare
@@ -24,6 +25,7 @@ from .optimizer.exceptions import (
     OutsideLimits,
     SingularPose,
     UnknownRobot,
+    UnknownTool,
     UnreachablePose,
     UnreachableTargets,
 )
@@ -83,7 +85,8 @@ from .optimizer.problem.scene import (
 )
 from .optimizer.problem.stop_path import StopPath
 from .optimizer.problem.stops import Stop
-from .optimizer.problem.targets import AnyOf, PosesAround
+from .optimizer.problem.targets import AnyOf, SampledPoses
+from .optimizer.problem.tool import Tool, load_tool
 from .optimizer.problem.tool_cone import ToolCone
 from .optimizer.problem.tool_path import ToolPath
 from .optimizer.progress import CandidatesFound, CandidateTried, Improved
@@ -232,7 +235,6 @@ __all__ = [
     "PlannedTorques",
     "Points",
     "Pose",
-    "PosesAround",
     "Problem",
     "Program",
     "RapidOptions",
@@ -244,6 +246,7 @@ __all__ = [
     "Rest",
     "Robot",
     "Ros2Options",
+    "SampledPoses",
     "Samples",
     "SavingInterval",
     "SavingRange",
@@ -260,12 +263,14 @@ __all__ = [
     "StopPath",
     "StorageUse",
     "TableOptions",
+    "Tool",
     "ToolCone",
     "ToolPath",
     "TorqueInfeasible",
     "Trajectory",
     "TriangleMesh",
     "UnknownRobot",
+    "UnknownTool",
     "UnreachablePose",
     "UnreachableTarget",
     "UnreachableTargets",
@@ -281,6 +286,7 @@ __all__ = [
     "identify",
     "inverse_kinematics",
     "load_robot",
+    "load_tool",
     "optimize",
     "optimize_many",
     "pareto",
@@ -288,5 +294,6 @@ __all__ = [
     "read_log",
     "replay",
     "robot_names",
+    "tool_names",
     "what_if",
 ]

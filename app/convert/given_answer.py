@@ -1,6 +1,4 @@
-"""From an answer that comes back in a request to the program of its motions: for exports and
-replays.
-"""
+"""The program of motions of an answer in a request, for exports and replays."""
 
 from __future__ import annotations
 
@@ -22,9 +20,11 @@ from joulepath.optimizer.export.program import Move, Program, Rest
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.motion.through_samples import spline_through
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.cycle import LONGEST_ROUND, MOST_STOPS
+from joulepath.optimizer.problem.cycle import LONGEST_CYCLE, MOST_STOPS
 
-MOST_KNOTS, HIGHEST_DEGREE, LONGEST_REST = 4096, 31, LONGEST_ROUND
+MOST_KNOTS = 4096
+HIGHEST_DEGREE = 31
+LONGEST_REST = LONGEST_CYCLE
 # of a stop: a move, two lines, a path, a dwell and a wait
 MOST_LEGS = 6 * MOST_STOPS + 5
 MOVING = ("move", "line", "path")
@@ -104,9 +104,9 @@ _MOTION = (
 def to_program(
     answer: dict[str, Any], arm: ArmRequest | None, kept: Callable[[list[str]], list[Any]]
 ) -> Program:
-    """The motion of an answer at full speed, its samples checked.
+    """The motion of an answer at full speed, with validated samples.
 
-    `kept` gives the kept answers of paths: those of the moves of a cycle. Raises ValidationError
+    `kept` returns the kept answers of paths, such as the moves of a cycle. Raises ValidationError
     (of pydantic), InvalidRequest, InvalidProblem, NotCertified or UnknownRobot.
     """
     if "legs" in answer:

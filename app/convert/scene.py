@@ -1,4 +1,4 @@
-"""From shapes and scenes in a request to those of the library."""
+"""Conversion of shapes and scenes of requests."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def to_scene(scene: asked.Scene, robot: Robot) -> Scene:
     )
 
 
-def to_tool(tool: asked.Tool) -> list[Attachment]:
+def to_capsules(tool: asked.Tool) -> list[Attachment]:
     """The capsules of a tool, in the flange frame."""
     return [
         capsule_between(np.array(c.start), np.array(c.end), c.radius, c.touches)

@@ -19,8 +19,9 @@ from joulepath.app.schemas.common import (
     frame_of,
 )
 from joulepath.app.schemas.examples.values import BOX, MESH_FILE, TOOL, at
+from joulepath.app.schemas.lengths import LENGTHS
 from joulepath.models.shape_sizes import SIZES
-from joulepath.optimizer.problem.arm import MOST_PARTS
+from joulepath.optimizer.problem.arm import MOST_TOOL_PARTS
 from joulepath.optimizer.problem.clouds import MOST_ALONG_EDGE, MOST_POINTS, MOST_VOXELS
 from joulepath.optimizer.problem.names import LONGEST_NAME
 from joulepath.optimizer.problem.scene import DEFAULT_MARGIN, MOST_OBSTACLES, MOST_VERTICES
@@ -31,9 +32,14 @@ _POSE_TEXT = (
 )
 # standard alphabet, filled to a multiple of four characters
 BASE64 = r"^[A-Za-z0-9+/]*={0,2}$"
-# most cells of a grid in bits, and most bytes of a mesh file, and the lengths of their base64
-MOST_CELLS, MOST_FILE_BYTES = 1 << 23, 1 << 22
-MOST_BITS_TEXT, MOST_FILE_TEXT = 4 * -(-MOST_CELLS // 8 // 3) + 4, 4 * -(-MOST_FILE_BYTES // 3)
+MOST_CELLS = 1 << 23
+"""Most cells of a grid given as bits."""
+MOST_FILE_BYTES = 1 << 22
+"""Largest mesh file [byte]."""
+MOST_BITS_TEXT = 4 * -(-MOST_CELLS // 8 // 3) + 4
+"""Longest base64 text of a grid."""
+MOST_FILE_TEXT = 4 * -(-MOST_FILE_BYTES // 3)
+"""Longest base64 text of a mesh file."""
 Size = Annotated[float, Field(ge=SIZES.smallest, le=SIZES.largest)]
 
 
@@ -106,8 +112,7 @@ class Points(_Shape):
     )
     radius: Size = described(
         "Radius of the ball about each point: at least half of the distance between neighbours, so "
-        "that nothing passes "
-        "between them.",
+        "that nothing passes between them.",
         "m",
         0.015,
     )
@@ -124,8 +129,8 @@ class VoxelBits(Request):
     data: Annotated[str, Field(min_length=4, max_length=MOST_BITS_TEXT, pattern=BASE64)] = (
         described(
             "Base64 of the bits, eight to a byte, the lowest bit first; 1: occupied. Cell (i, j, "
-            "k) is bit "
-            "i + dimensions[0] · (j + dimensions[1] · k). The last byte is filled with zeros.",
+            "k) is bit i + dimensions[0] · (j + dimensions[1] · k). The last byte is filled with "
+            "zeros.",
             None,
             "AwE=",
         )
@@ -152,8 +157,7 @@ class Voxels(_Shape):
         | None
     ) = described(
         "Occupied cells [i, j, k]: each is the cube from (i, j, k) · size to (i + 1, j + 1, k + 1) "
-        "· size. Give either "
-        "`cells` or `bits`.",
+        "· size. Give either `cells` or `bits`.",
         None,
         [[0, 0, 0], [1, 0, 0], [1, 0, 1]],
         default=None,
@@ -192,8 +196,8 @@ class _Obstacle(Request):
         str, Field(min_length=1, max_length=LONGEST_NAME, pattern=NO_CONTROLS), PLAIN
     ] = described(
         "Name of the obstacle in answers. Each name is used once, and none is a link's, `tool` or "
-        "`payload`; names "
-        "that differ only in case or spaces count as the same. Every character must show.",
+        "`payload`; names that differ only in case or spaces count as the same. Every character "
+        "must show.",
         None,
         "table",
     )
@@ -280,8 +284,7 @@ def touched_links(body: str) -> Any:
     """The field `touches` of a body that is fixed to the flange."""
     return described(
         f"Names of the links that the {body} touches by design: their distance from it is not "
-        "checked. Null: the link "
-        "that carries the flange (`wrist_3`). An empty list: none.",
+        "checked. Null: the link that carries the flange (`wrist_3`). An empty list: none.",
         None,
         ["wrist_3"],
         default=None,
@@ -351,7 +354,7 @@ class ToolCapsule(Request):
 class Tool(Request):
     """The shape of the tool, for collision checking."""
 
-    capsules: Annotated[list[ToolCapsule], Field(max_length=MOST_PARTS)] = described(
+    capsules: Annotated[list[ToolCapsule], Field(max_length=MOST_TOOL_PARTS)] = described(
         "Capsules that enclose the tool.",
         None,
         TOOL["capsules"],
@@ -359,13 +362,32 @@ class Tool(Request):
     )
 
 
+ToolName = Annotated[str, Field(min_length=1, max_length=LENGTHS.tool)]
+
+
+def _name_or_shape(value: Any) -> str | None:
+    """Discriminator of a union of a string, tagged `name`, and an object, tagged `shape`."""
+    if isinstance(value, str):
+        return "name"
+    return "shape" if isinstance(value, dict | Tool) else None
+
+
 class CellRequest(RobotWithTcp):
     """The robot, its tool and its surroundings."""
 
-    tool: Tool = described(
-        "Shape of the tool, for collision checking.",
+    tool: Annotated[
+        Annotated[ToolName, Tag("name")] | Annotated[Tool, Tag("shape")],
+        Discriminator(
+            _name_or_shape,
+            custom_error_type="name_or_shape",
+            custom_error_message="Give the name of a tool, or an object with its capsules",
+        ),
+    ] = described(
+        "Shape of the tool, for collision checking; or the name of a tool from `GET /tools`. A "
+        "name also gives the TCP, unless `tcp` is given, and adds the tool's mass to every "
+        "payload, which is then the part alone.",
         None,
-        TOOL,
+        "robotiq_2f_85",
         default=Tool(),
     )
     scene: Scene = described(

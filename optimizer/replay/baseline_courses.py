@@ -14,7 +14,7 @@ from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.motion.ruckig_motion import time_optimal_spline
+from joulepath.optimizer.motion.ruckig_motion import straight_spline, time_optimal_spline
 from joulepath.optimizer.motion.spline import lasting
 from joulepath.optimizer.motion.time_scalings import (
     blend_time,
@@ -39,6 +39,8 @@ class BaselineSettings:
     min_waiting: float = 1e-3
     """Share of a baseline's energy drawn while waiting, below which it is an error of the
     quadrature [1]."""
+    same_duration: float = 1e-6
+    """Relative difference of equal durations [1]."""
     sample_period: float = 1e-3
     """Period of the samples for the energy of a baseline [s]."""
 
@@ -76,6 +78,10 @@ def courses(
         "quintic": (course_of(quintic_spline(q_start, q_goal, duration)), duration),
         "ruckig": (course_of(fastest), fastest.duration),
         "ruckig_slowed": (course_of(lasting(fastest, duration)), duration),
+        "straight": (
+            course_of(lasting(straight_spline(limits, q_start, q_goal), duration)),
+            duration,
+        ),
     }
     if default is not None:
         own, blend = default_times(limits, default, displacement)
@@ -86,14 +92,14 @@ def courses(
 @dataclass(frozen=True)
 class ReportedBaseline:
     """A baseline as reported by an answer: duration [s], energies [J] with the subsequent wait,
-    saving [1].
+    saving [1]; None without a claimed saving.
     """
 
     name: BaselineName
     duration: float
     electrical: float
     mechanical: float
-    saving: float
+    saving: float | None
 
 
 def planned_baselines(
@@ -107,7 +113,8 @@ def planned_baselines(
 
     An answer does not contain the goal configuration of its baselines. It is found as the
     configuration that reproduces the reported durations and energies. Baselines that cannot be
-    found, such as those along a tool path, are left out.
+    found, such as those along a tool path, are left out, and so are baselines without a saving or
+    of another duration than the answer without a wait.
 
     Args:
         arm: the arm.
@@ -125,10 +132,12 @@ def planned_baselines(
         return []
     found, plant = [], Plant(arm)
     for name, (course, own) in courses(arm, q_start, goal, duration).items():
-        if name in by_name:
-            each = by_name[name]
-            rest = each.electrical - _electrical(plant, course, own)
-            waiting = rest if rest > BASELINES.min_waiting * abs(each.electrical) else 0.0
+        each = by_name.get(name)
+        if each is None or each.saving is None:
+            continue
+        rest = each.electrical - _electrical(plant, course, own)
+        waiting = rest if rest > BASELINES.min_waiting * abs(each.electrical) else 0.0
+        if waiting > 0 or abs(own - duration) <= BASELINES.same_duration * duration:
             found.append(PlannedBaseline(name, course, own, each.saving, waiting))
     return found
 

@@ -10,17 +10,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 from joulepath.optimizer.motion.spline import lasting, sampled
+from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.attempts import solve, solve_from
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.refinement import refine
-from joulepath.optimizer.solve.methods.free_spline import FreeSpline
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
 # greatest ratio of the two durations, and of the two energies, at which the free motion may lead to
 # a better one
 NEAR, PROMISING = 1.15, 1.01
-RETIMED = "the motion of least energy of any duration, retimed"
 
 
 def start_from_free_duration(incumbent: Incumbent, best: Candidate) -> None:
@@ -33,7 +32,8 @@ def start_from_free_duration(incumbent: Incumbent, best: Candidate) -> None:
     if duration is None or not _applies(incumbent):
         return
     free = replace(incumbent.problem, duration_min=None, duration_max=None)
-    other = Incumbent(incumbent.prepared.sharing(free), incumbent.end, longest=incumbent.longest)
+    prepared = PreparedProblem.of(free, incumbent.prepared.models)
+    other = Incumbent(prepared, incumbent.end, longest=incumbent.longest)
     twin = Candidate(best.start, best.goal, best.q_start, best.q_goal)
     # beside others, a candidate is solved coarsely first: as it was when no duration was asked for
     beside = (each for each in incumbent.candidates if each is not best and each.holdable)
@@ -57,7 +57,7 @@ def _applies(incumbent: Incumbent) -> bool:
     plain = (
         problem.objective == "electrical" and problem.dwell is None and not incumbent.uses_storage
     )
-    return fixed and plain and incumbent.method is FreeSpline
+    return fixed and plain and incumbent.method.free_control_points
 
 
 def _take(incumbent: Incumbent, best: Candidate, twin: Candidate, duration: float) -> None:
@@ -69,7 +69,10 @@ def _take(incumbent: Incumbent, best: Candidate, twin: Candidate, duration: floa
     before, confirmed = best.energy, incumbent.confirmed_energy(twin, motion)
     if confirmed is not None:
         found = SolveResult(
-            SolveStatus.SOLVED, RETIMED, spline=motion, stationarity=twin.attempt.stationarity
+            SolveStatus.SOLVED,
+            SolveReason.FREE_DURATION_RETIMED,
+            spline=motion,
+            stationarity=twin.attempt.stationarity,
         )
         incumbent.accept_if_better(best, found, confirmed, twin)
     if motion is not twin.spline and incumbent.prepared.cost_of(motion) < PROMISING * before:

@@ -14,14 +14,21 @@ from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
 from joulepath.optimizer.motion.spline import Spline, lasting
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LEAST_DURATION, Problem, narrowed
-from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, nobody
+from joulepath.optimizer.progress import (
+    CandidatesFound,
+    CandidateTried,
+    Improved,
+    Tell,
+    no_listener,
+)
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.reserve import reserve
 from joulepath.optimizer.solve.methods import method_of
-from joulepath.optimizer.solve.methods.method import Method, SolveResult
+from joulepath.optimizer.solve.methods.method import Method
+from joulepath.optimizer.solve.methods.solve_result import SolveResult
 
 # a baseline counts as better only beyond this share, the error of the quadratures that are compared
 SLACK = 1e-6
@@ -46,7 +53,7 @@ class Incumbent:
     solves: int = 0
     cut_short: bool = False
     longest: float = 0.0
-    tell: Tell = nobody
+    tell: Tell = no_listener
     proven: float | None = None
 
     @property
@@ -139,7 +146,7 @@ class Incumbent:
 
     def tell_tried(self, candidate: Candidate) -> None:
         """Tell what became of a candidate, and what is the best now."""
-        if self.tell is nobody:
+        if self.tell is no_listener:
             return
         index = next(k for k, each in enumerate(self.candidates) if each is candidate)
         status: Literal["solved", "pruned", "failed"] = "failed"
@@ -152,7 +159,7 @@ class Incumbent:
 
     def tell_best(self) -> None:
         """Tell the best motion so far, if there is one."""
-        best = None if self.tell is nobody else self.best()
+        best = None if self.tell is no_listener else self.best()
         if best is not None and best.energy is not None:
             self.tell(Improved(best.energy, best.duration, self.proven, best.q_goal))
 

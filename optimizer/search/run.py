@@ -12,10 +12,10 @@ from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkp
 from joulepath.optimizer.dynamics.interval import Known, with_interval
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from joulepath.optimizer.motion.spline import Spline, lasting, sampled
-from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.prepared_problem import ArmModels, PreparedProblem
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.progress import Improved, Tell, nobody
+from joulepath.optimizer.progress import Improved, Tell, no_listener
 from joulepath.optimizer.result.candidates import CandidateStatus, UnreachableTarget
 from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.result.solution import (
@@ -27,7 +27,7 @@ from joulepath.optimizer.result.solution import (
 )
 from joulepath.optimizer.search import free_goal, self_motions
 from joulepath.optimizer.search.attempts import solve, solve_from
-from joulepath.optimizer.search.baselines import with_saving_intervals
+from joulepath.optimizer.search.baselines import standing, with_savings
 from joulepath.optimizer.search.branch_and_bound import explore
 from joulepath.optimizer.search.candidates import Candidate, Reason, bound, pairs
 from joulepath.optimizer.search.claims import may_be_optimal
@@ -54,7 +54,7 @@ from joulepath.optimizer.search.sampled_ends import activate_deferred, between
 from joulepath.optimizer.search.second_attempt import reject
 from joulepath.optimizer.search.seeds import activate_seeds
 from joulepath.optimizer.search.sliding import slides
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
 # time after the deadline [s] at which a certificate is given up: better a little late than no
 # answer
@@ -65,8 +65,7 @@ class Run:
     """One search. `known` are motions between the problem's ends, of any duration, that warm-start
     it.
 
-    `tell` gets what is found. `like` is another problem of the same arm, whose models are used
-    again.
+    `tell` gets what is found. `models` are those of the problem's arm, if they are built already.
     """
 
     def __init__(
@@ -74,12 +73,12 @@ class Run:
         problem: Problem,
         known: Sequence[Spline] = (),
         clock: Clock = time.perf_counter,
-        tell: Tell = nobody,
-        like: PreparedProblem | None = None,
+        tell: Tell = no_listener,
+        models: ArmModels | None = None,
     ) -> None:
         self.clock, self.began = clock, clock()
         self.problem, self.known = problem, known
-        prepared = PreparedProblem.of(problem) if like is None else like.sharing(problem)
+        prepared = PreparedProblem.of(problem, models)
         self.incumbent = Incumbent(prepared, Deadline.after(problem.deadline, clock), tell=tell)
         self.unreachable: list[UnreachableTarget] = []
         self.moved = self.lost = False
@@ -148,7 +147,10 @@ class Run:
             incumbent.prepared, incumbent.candidates, *spline.control_points[[0, -1]]
         )
         result = SolveResult(
-            SolveStatus.SOLVED, "a known motion", spline=spline, stationarity=stationarity
+            SolveStatus.SOLVED,
+            SolveReason.KNOWN_MOTION,
+            spline=spline,
+            stationarity=stationarity,
         )
         incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(spline))
         incumbent.cut_short = not is_optimal
@@ -307,7 +309,10 @@ class Run:
         )
         spline = found.trajectory.spline
         result = SolveResult(
-            SolveStatus.SOLVED, "converged", spline=spline, stationarity=found.solver.stationarity
+            SolveStatus.SOLVED,
+            SolveReason.CONVERGED,
+            spline=spline,
+            stationarity=found.solver.stationarity,
         )
         return candidate, result, incumbent.prepared.energy(spline)
 
@@ -329,7 +334,7 @@ class Run:
         if energy is not None:
             incumbent.accept_if_better(
                 candidate,
-                SolveResult(SolveStatus.SOLVED, "a known motion, retimed", spline=known),
+                SolveResult(SolveStatus.SOLVED, SolveReason.KNOWN_MOTION_RETIMED, spline=known),
                 energy,
             )
         solve_from(incumbent, candidate, sampled(known), fine=self.problem.method == "time_scaling")
@@ -382,8 +387,11 @@ class Run:
             lower_bound=least,
             limits=LimitsInForce.of(arm.active_limits, arm.tcp_speed, arm.elbow_speed),
             complete=all_known(self.problem),
-            baselines=with_saving_intervals(
-                table, self.problem, Known(energy.electrical.total, sensitivity, spline.duration)
+            baselines=with_savings(
+                table,
+                self.problem,
+                Known(energy.electrical.total, sensitivity, spline.duration),
+                standing(arm, best.q_goal, prepared.torques),
             ),
             candidates=[each.report() for each in incumbent.candidates],
             unreachable=self.unreachable,

@@ -174,7 +174,12 @@ def test_the_savings_persist_as_planned() -> None:
     move it.
     """
     plan = answer()
-    assert {each.name for each in plan.baselines} == {each.name for each in solution().baselines}
+    claimed = {
+        each.name
+        for each in solution().baselines
+        if each.saving is not None and each.duration == pytest.approx(plan.duration)
+    }
+    assert {each.name for each in plan.baselines} == claimed and len(claimed) > 1
     found = replay(plan, ("feed_forward",), FAST, {"payload": 0.1, "friction": 0.3})
     assert [(each.quantity, each.factor) for each in found.changes] == [
         ("payload", 0.9),
