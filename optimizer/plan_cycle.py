@@ -23,6 +23,7 @@ from joulepath.optimizer.cycle.cycle_solution import (
     energies_of,
 )
 from joulepath.optimizer.cycle.divided_paths import with_divided_paths
+from joulepath.optimizer.cycle.equal_times import in_equal_times
 from joulepath.optimizer.cycle.feasible_cycles import FeasibleCycle, allocated_cycle, simple_cycles
 from joulepath.optimizer.cycle.free_orientations import with_free_orientations
 from joulepath.optimizer.cycle.move_problem import MOVE
@@ -68,7 +69,7 @@ def plan_cycle(
     of least energy shares its time among the moves, and waits where that costs least.
 
     Args:
-        cycle: stops and what is cycle of the cycle. Its `deadline` bounds the wall time.
+        cycle: stops and settings of the cycle. Its `deadline` bounds the wall time.
         clock: function that returns the time [s].
         tell: gets the progress: moves as candidates, and the best cycle so far.
 
@@ -77,7 +78,7 @@ def plan_cycle(
 
     Raises:
         NoSequence: no chain of configurations leads over all stops.
-        CycleTooShort: no cycle is as fast as cycle for.
+        CycleTooShort: no cycle is as fast as requested.
         PathInfeasible: no configuration follows the path or a line of a stop.
         InCollision: every configuration at the start or at a stop collides.
         DeadlineExceeded: the deadline passed before any cycle was certified.
@@ -88,7 +89,7 @@ def plan_cycle(
         cycle = _divided(cycle, clock)
         found = with_free_orientations(cycle, lambda other: _valued(other, clock, tell), clock)
         _tell_found(tell, found)
-        return replace(found, wall_time=clock() - began)
+        return replace(in_equal_times(cycle, found), wall_time=clock() - began)
 
 
 def _valued(cycle: Cycle, clock: Clock, tell: Tell) -> CycleSolution:
@@ -127,7 +128,7 @@ def _optimized(cycle: Cycle, clock: Clock, tell: Tell) -> CycleSolution:
 def _no_dearer_than(cycle: Cycle, found: CycleSolution, baseline: CycleBaseline) -> CycleSolution:
     """The cycle with one more baseline, which becomes the answer if it needs less energy."""
     found = replace(found, baselines=[*found.baselines, baseline])
-    if baseline.saving >= 0:
+    if baseline.saving is None or baseline.saving >= 0:
         return found
     found = replace(found, status="feasible", moves=list(baseline.moves), price_of_time=0.0)
     return replace(

@@ -144,6 +144,8 @@ CycleBaselineName = Literal[
     "fastest_then_wait",
     "given_order",
     "without_storage",
+    "ruckig_slowed",
+    "straight",
 ]
 
 
@@ -162,7 +164,8 @@ class CycleBaseline:
     `fastest_then_wait`, the fastest cycle, in configurations of its own, and a wait. With a free
     order, where it is allowed: `given_order`, the best cycle in the order of `stops`. With an
     energy storage on the bus: `without_storage`, the best cycle on the same bus without it, beside
-    `move_by_move` alone."""
+    `move_by_move` alone. In the configurations and times of the answer: `ruckig_slowed` and
+    `straight`, every move but lines and paths by the motion of this name of `POST /optimize`."""
     duration: Seconds
     """Duration of this cycle."""
     electrical: Joules = field(init=False)
@@ -171,10 +174,12 @@ class CycleBaseline:
     """Mechanical work of its moves."""
     within_limits: bool
     """Whether every move is within the limits; collisions are checked at sample points."""
-    saving: Ratio
-    """1 - energy of the answer / energy of this cycle, of the objective."""
+    saving: Ratio | None
+    """1 - energy of the answer / energy of this cycle, of the objective, in the same cycle time:
+    the shorter one also waits, where the answer waits for least, until the longer one ends. Null
+    where this cycle is not within the limits: it is no way to compare with."""
     saving_interval: SavingInterval | None
-    """How well the saving is known. Null for the objective `mechanical`."""
+    """How well the saving is known. Null without a saving, and for the objective `mechanical`."""
     energies: Annotated[CycleEnergies, Internal] = field(repr=False)
     """What this cycle needs."""
     moves: Annotated[Sequence[CycleMove], Internal] = field(default=(), repr=False)

@@ -20,7 +20,7 @@ import pinocchio as pin
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
 # question that a motion answers: first motion, converged motion, at a price of time, or fastest
 Stage = Literal["tried", "finished", "priced", "fastest"]
@@ -39,7 +39,10 @@ class KnownMotion:
     def result(self) -> SolveResult:
         """The result of a solve that ended in this motion."""
         return SolveResult(
-            SolveStatus.SOLVED, "converged", spline=self.spline, stationarity=self.stationarity
+            SolveStatus.SOLVED,
+            SolveReason.CONVERGED,
+            spline=self.spline,
+            stationarity=self.stationarity,
         )
 
 

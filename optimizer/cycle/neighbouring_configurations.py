@@ -17,9 +17,9 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.kinematics.angles import nearest_turn
 from joulepath.optimizer.kinematics.goal_manifold import GoalManifold
+from joulepath.optimizer.kinematics.held_pose import HeldPose
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.tcp import tcp_jacobian, tcp_pose
-from joulepath.optimizer.kinematics.tool_path.held_pose import HeldPose
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.cycle import START, Cycle

@@ -15,8 +15,8 @@ from joulepath.models.robot import Array, Limits, Mask
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
 from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
-from joulepath.optimizer.kinematics.six.full_turns import full_turn_alternatives
 from joulepath.optimizer.kinematics.tool_path.course_tracing import traces
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.problem.arm import Arm

@@ -24,7 +24,7 @@ from joulepath.optimizer.result.candidates import CandidateReport, CandidateStat
 from joulepath.optimizer.search.end_feasibility import check_configurations, raise_if_none_is_left
 from joulepath.optimizer.search.ends import SIDES, EndConfiguration
 from joulepath.optimizer.search.passing import bound_through
-from joulepath.optimizer.solve.methods.method import SolveResult
+from joulepath.optimizer.solve.methods.solve_result import SolveResult
 
 FULL_TURN = 2 * np.pi
 # 64 poses from a given start make 16384, two poses 2048; each is named in the answer with some 400
@@ -116,7 +116,7 @@ class Candidate:
         hand."""
         self.earlier = None if self.energy is None else copy(self)
         self.attempt, self.energy = result, energy
-        self.settle(CandidateStatus.SOLVED, Reason.METHOD, result.reason)
+        self.settle(CandidateStatus.SOLVED, Reason.METHOD, result.message)
 
     def refuse(self) -> None:
         """Go back to the motion before the last one, which the certificate did not confirm; without

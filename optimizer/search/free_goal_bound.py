@@ -30,7 +30,7 @@ from joulepath.optimizer.deadline import NEVER, Deadline
 from joulepath.optimizer.kinematics.covers.pose_boxes import PoseBoxes
 from joulepath.optimizer.kinematics.covers.wrist_boxes import WristBoxes
 from joulepath.optimizer.kinematics.covers.wrist_geometry import (
-    OUTER,
+    WRIST_JOINTS,
     Shell,
     WristBody,
     WristGeometry,
@@ -123,12 +123,14 @@ def _greatest_potentials(prepared: PreparedProblem, centre: Array, half: Array |
 def whole_turns(nq: int, along: int) -> tuple[Array, Array]:
     """Middles and half sides (b, nq) [rad] of boxes that cover one turn of every joint, so many
     along each inner one."""
-    inner, side = max(nq - OUTER, 0), np.pi / along
+    inner, side = max(nq - WRIST_JOINTS, 0), np.pi / along
     one_side = -np.pi + side * (2 * np.arange(along) + 1)
     # both ways of bending the wrist
-    parts = np.array(list(product(*[one_side] * inner, *[(-np.pi / 2, np.pi / 2)] * (nq > OUTER))))
+    parts = np.array(
+        list(product(*[one_side] * inner, *[(-np.pi / 2, np.pi / 2)] * (nq > WRIST_JOINTS)))
+    )
     centre, half = np.zeros((len(parts), nq)), np.full((len(parts), nq), np.pi)
-    if nq > OUTER:
+    if nq > WRIST_JOINTS:
         centre[:, :inner], half[:, :inner] = parts[:, :inner], side
         centre[:, inner + 1], half[:, inner + 1] = parts[:, inner], np.pi / 2
     return centre, half
@@ -158,7 +160,7 @@ class _BoxSearch(BoxSearch[_Boxes]):
         in parts.
         """
         nq, count = self.starts.shape[1], len(self.starts)
-        inner = max(nq - OUTER, 0)
+        inner = max(nq - WRIST_JOINTS, 0)
         along = next(
             (n for n in FIRST_BOXES if 2 * n**inner * count <= MOST_FIRST), FIRST_BOXES[-1]
         )

@@ -10,7 +10,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.box_search import FEW, TIGHT_ROUNDS
 from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.deadline import NEVER, Deadline
-from joulepath.optimizer.kinematics.covers.covering_sheets import CoveringSheet, covering_sheets
+from joulepath.optimizer.kinematics.covers.branch_covers import BranchCover, branch_covers
 from joulepath.optimizer.kinematics.covers.wrist_geometry import potential_rates
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.tcp import flange_pose
@@ -42,7 +42,7 @@ def bound_of_others(
     candidates; inf if there are none.
 
     If all branches are known, the others are on self-motions. Else they may be anywhere. Of an arm
-    that is nearly of a form whose curves are known, they are on `covering_sheets`. From given joint
+    that is nearly of a form whose curves are known, they are on `branch_covers`. From given joint
     positions of any other arm the bound is that of the motions to the goal poses with any rotation
     about their z axes, by boxes of joint positions that need no inverse kinematics. From poses it
     is that of the motions between any two configurations. `enough` [J]: see `self_motion_bound`.
@@ -79,16 +79,16 @@ def _covered(
 ) -> EndCurves | None:
     """Joint positions that are given at one end, and all that reaches its poses; None of an arm
     whose poses are not covered. Poses of free orientation are left to `free_goal_bound`."""
-    arm, curves = prepared.arm, dict[int, Array | CoveringSheet]()
+    arm, curves = prepared.arm, dict[int, Array | BranchCover]()
     for end in (getattr(candidate, name) for candidate in candidates):
         if end.fixed and not end.sampled:
             curves[id(end.q)] = end.q
     given = True
     for pose in _poses(getattr(prepared.problem, name)):
-        sheets = covering_sheets(arm.robot, flange_pose(pose.T, arm.T_flange_tcp))
-        if sheets is None:
+        covers = branch_covers(arm.robot, flange_pose(pose.T, arm.T_flange_tcp))
+        if covers is None:
             return None
-        curves |= {id(each): each for each in sheets}
+        curves |= {id(each): each for each in covers}
         given = False
     return EndCurves(arm.robot.nq, list(curves.values()), given)
 

@@ -22,7 +22,7 @@ from joulepath.optimizer.search.end_feasibility import check_configurations
 from joulepath.optimizer.search.other_turns import other_turns
 from joulepath.optimizer.search.sampled_ends import activate_deferred, moved_end, on_branch
 from joulepath.optimizer.search.seeds import NEAR_IN_WORK, estimates, expected
-from joulepath.optimizer.solve.methods.sqp_method import above
+from joulepath.optimizer.solve.methods.method import above
 
 # samples that move: those of least lower bound
 MOST_MOVED = 384

@@ -16,7 +16,7 @@ from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.candidates import FULL_TURN, Candidate, bound
 from joulepath.optimizer.search.seeds import estimates_between
-from joulepath.optimizer.solve.methods.sqp_method import above
+from joulepath.optimizer.solve.methods.method import above
 
 # motions that are returned: those that are expected to need least, at most this ratio of the least
 # of all

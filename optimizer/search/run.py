@@ -27,7 +27,7 @@ from joulepath.optimizer.result.solution import (
 )
 from joulepath.optimizer.search import free_goal, self_motions
 from joulepath.optimizer.search.attempts import solve, solve_from
-from joulepath.optimizer.search.baselines import with_saving_intervals
+from joulepath.optimizer.search.baselines import standing, with_savings
 from joulepath.optimizer.search.branch_and_bound import explore
 from joulepath.optimizer.search.candidates import Candidate, Reason, bound, pairs
 from joulepath.optimizer.search.claims import may_be_optimal
@@ -54,7 +54,7 @@ from joulepath.optimizer.search.sampled_ends import activate_deferred, between
 from joulepath.optimizer.search.second_attempt import reject
 from joulepath.optimizer.search.seeds import activate_seeds
 from joulepath.optimizer.search.sliding import slides
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
 # time after the deadline [s] at which a certificate is given up: better a little late than no
 # answer
@@ -147,7 +147,10 @@ class Run:
             incumbent.prepared, incumbent.candidates, *spline.control_points[[0, -1]]
         )
         result = SolveResult(
-            SolveStatus.SOLVED, "a known motion", spline=spline, stationarity=stationarity
+            SolveStatus.SOLVED,
+            SolveReason.KNOWN_MOTION,
+            spline=spline,
+            stationarity=stationarity,
         )
         incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(spline))
         incumbent.cut_short = not is_optimal
@@ -306,7 +309,10 @@ class Run:
         )
         spline = found.trajectory.spline
         result = SolveResult(
-            SolveStatus.SOLVED, "converged", spline=spline, stationarity=found.solver.stationarity
+            SolveStatus.SOLVED,
+            SolveReason.CONVERGED,
+            spline=spline,
+            stationarity=found.solver.stationarity,
         )
         return candidate, result, incumbent.prepared.energy(spline)
 
@@ -328,7 +334,7 @@ class Run:
         if energy is not None:
             incumbent.accept_if_better(
                 candidate,
-                SolveResult(SolveStatus.SOLVED, "a known motion, retimed", spline=known),
+                SolveResult(SolveStatus.SOLVED, SolveReason.KNOWN_MOTION_RETIMED, spline=known),
                 energy,
             )
         solve_from(incumbent, candidate, sampled(known), fine=self.problem.method == "time_scaling")
@@ -381,8 +387,11 @@ class Run:
             lower_bound=least,
             limits=LimitsInForce.of(arm.active_limits, arm.tcp_speed, arm.elbow_speed),
             complete=all_known(self.problem),
-            baselines=with_saving_intervals(
-                table, self.problem, Known(energy.electrical.total, sensitivity, spline.duration)
+            baselines=with_savings(
+                table,
+                self.problem,
+                Known(energy.electrical.total, sensitivity, spline.duration),
+                standing(arm, best.q_goal, prepared.torques),
             ),
             candidates=[each.report() for each in incumbent.candidates],
             unreachable=self.unreachable,

@@ -22,7 +22,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason, bound
 from joulepath.optimizer.search.ends import SIDES, EndConfiguration, label_of
-from joulepath.optimizer.solve.methods.sqp_method import above
+from joulepath.optimizer.solve.methods.method import above
 
 # samples solved before any is refined: in all, and of one pair of branches
 BATCH, ALIKE = 12, 2

@@ -23,7 +23,7 @@ from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.ends import EndConfiguration
-from joulepath.optimizer.solve.methods.sqp_method import above
+from joulepath.optimizer.solve.methods.method import above
 
 # durations of the quintic, in multiples of the shortest one, and the panels and points of its
 # quadrature

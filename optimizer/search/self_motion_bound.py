@@ -27,7 +27,7 @@ from joulepath.optimizer.bounds.holding_cells import HoldingCells
 from joulepath.optimizer.bounds.least_displacement import least_displacement
 from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.deadline import NEVER, Deadline
-from joulepath.optimizer.kinematics.covers.covering_sheets import CoveringSheet, boxes_on
+from joulepath.optimizer.kinematics.covers.branch_covers import BranchCover, boxes_on
 from joulepath.optimizer.kinematics.covers.wrist_geometry import potential_rates
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
 from joulepath.optimizer.kinematics.seven.redundant_curve import CurveStack, RedundantCurve
@@ -137,7 +137,7 @@ class EndCurves:
     """
 
     joints: int
-    curves: Sequence[Array | SelfMotion | CoveringSheet]
+    curves: Sequence[Array | SelfMotion | BranchCover]
     given: bool
 
     @staticmethod
@@ -180,7 +180,7 @@ class EndCurves:
         are."""
         found: dict[tuple[type, int], list[int]] = {}
         for k, each in enumerate(self.curves):
-            if isinstance(each, RedundantCurve | CoveringSheet):
+            if isinstance(each, RedundantCurve | BranchCover):
                 key = id(each.pose)
             else:
                 key = 0 if isinstance(each, np.ndarray) else id(each)
@@ -188,13 +188,13 @@ class EndCurves:
         return [(owners, _boxes_of([self.curves[k] for k in owners])) for owners in found.values()]
 
 
-def _boxes_of(curves: Sequence[Array | SelfMotion | CoveringSheet]) -> _Boxes:
+def _boxes_of(curves: Sequence[Array | SelfMotion | BranchCover]) -> _Boxes:
     """How the boxes of a group of `EndCurves` are found."""
     one = curves[0]
     if isinstance(one, RedundantCurve):
         return CurveStack.of([each for each in curves if isinstance(each, RedundantCurve)]).boxes
-    if isinstance(one, CoveringSheet):
-        return partial(boxes_on, [each for each in curves if isinstance(each, CoveringSheet)])
+    if isinstance(one, BranchCover):
+        return partial(boxes_on, [each for each in curves if isinstance(each, BranchCover)])
     if isinstance(one, np.ndarray):
         q = np.array(curves)
         return lambda rows, _, half: (q[rows], np.zeros((len(half), q.shape[1])))

@@ -22,7 +22,6 @@ from joulepath.optimizer.search.free_goal import REFINED, refine_goal
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
 from joulepath.optimizer.search.sliding import slides
-from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 
 # first step of a parameter, half the way between two samples on a whole circle, and the least one
 # [rad]
@@ -56,7 +55,7 @@ def refine(incumbent: Incumbent) -> list[Candidate]:
 def _moved_along(incumbent: Incumbent, candidate: Candidate) -> Candidate:
     """The candidate with its ends moved along their self-motions; itself if that never helps."""
     sides = _sides(candidate)
-    if incumbent.method is FreeSpline and "goal" in sides:
+    if incumbent.method.free_control_points and "goal" in sides:
         candidate = refine_goal(incumbent, candidate)
         sides.remove("goal")
     return _descend(incumbent, candidate, sides)

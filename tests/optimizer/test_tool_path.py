@@ -25,7 +25,8 @@ from joulepath.optimizer.problem.tool_path import ToolPath
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory, PathInfeasible
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
-from joulepath.optimizer.solve.methods.path_retiming import PathRetiming, RetimingProgram
+from joulepath.optimizer.solve.methods.path_retiming import PathRetiming
+from joulepath.optimizer.solve.methods.retiming_program import RetimingProgram
 from tests.optimizer.moves import AMPLE, ROBOT, limits, tcp_pose
 from tests.optimizer.tool_paths import ARM, HOME, along, moved, poses_of
 from tests.selection import long_but

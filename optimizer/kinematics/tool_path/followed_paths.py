@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace, joint_path, traces
+from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace, traces
+from joulepath.optimizer.kinematics.tool_path.joint_path import joint_path
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm

@@ -23,7 +23,7 @@ from joulepath.optimizer.deadline import NEVER
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
 from joulepath.optimizer.kinematics.tcp import flange_pose
-from joulepath.optimizer.kinematics.tool_path.least_time import least_time, least_way
+from joulepath.optimizer.kinematics.tool_path.least_time import least_tcp_distance, least_time
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm, Payload
@@ -190,7 +190,7 @@ def test_no_way_within_the_tolerance_is_shorter_than_the_least(shape: str) -> No
     for tolerance in (1e-4, 5e-3):
         path = ToolPath(**kinds[shape], position_tolerance=tolerance)
         course = ToolCourse.of(path, poses[0].T, poses[2].T)
-        least = least_way(course)
+        least = least_tcp_distance(course)
         for _ in range(2):
             at = np.unique(np.concatenate([[0.0, 1.0], rng.random(rng.integers(1, 40))]))
             points = course.poses(at)[:, :3, 3]
@@ -211,7 +211,7 @@ def test_no_way_within_the_tolerance_is_shorter_than_the_least(shape: str) -> No
     arm = Arm(robot=load_robot("ur5e"))
     assert least_time(arm, course) == 0.0
     assert least_time(replace(arm, tcp_speed=0.1), course) == pytest.approx(
-        least_way(course) / 0.1, rel=1e-5
+        least_tcp_distance(course) / 0.1, rel=1e-5
     )
 
 

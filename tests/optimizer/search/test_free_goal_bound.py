@@ -12,9 +12,9 @@ import pytest
 
 from joulepath.optimizer.bounds.box_search import FEW, NEARLY, ROUNDS
 from joulepath.optimizer.bounds.lower_bound import lower_bounds
+from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations
-from joulepath.optimizer.kinematics.six.full_turns import full_turn_alternatives
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
