@@ -121,11 +121,8 @@ class FreeEndsChain:
         self.quick = dict[int, SingleJointBound]()
         self.costs = [self._costs(k) for k in range(len(legs))]
         # pairs of cells of two layers with the bound of their displacement
-        self.tightened = {
-            k: np.zeros(cost.shape, dtype=bool)
-            for k, cost in enumerate(self.costs)
-            if self._is_inner(k)
-        }
+        inner = (k for k in range(len(legs)) if self._is_inner(k))
+        self.tightened = {k: np.zeros(self.costs[k].shape, dtype=bool) for k in inner}
 
     @classmethod
     def of(cls, cycle: Cycle, legs: Sequence[Leg]) -> FreeEndsChain | None:
