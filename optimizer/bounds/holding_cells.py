@@ -17,8 +17,9 @@ from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
 from joulepath.optimizer.bounds.cruise import TINY, copper_loss
 from joulepath.optimizer.bounds.holding import HoldingBound, Planes
-from joulepath.optimizer.bounds.least_displacement import turned
-from joulepath.optimizer.bounds.lower_bound import LeastBound, NetEnergy
+from joulepath.optimizer.bounds.least_displacement import full_turns
+from joulepath.optimizer.bounds.lower_bound import LeastBound
+from joulepath.optimizer.bounds.net_energy import NetEnergy
 from joulepath.optimizer.bounds.straight_line import Line
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.motion.seven_segment import shortest_duration
@@ -111,7 +112,7 @@ class HoldingCells:
         the least of other turns to the boxes; inf for none."""
         limits = self.prepared.arm.active_limits
         nearest, next_ = np.full(goal.shape, np.inf), np.full(goal.shape, np.inf)
-        for to, reached in turned(goal, half, limits):
+        for to, reached in full_turns(goal, half, limits):
             away = np.where(reached, to - start, np.inf)
             nearer = np.abs(away) < np.abs(nearest)
             next_ = np.minimum(next_, np.abs(np.where(nearer, nearest, away)))

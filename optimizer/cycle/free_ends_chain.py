@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.bounds.least_displacement import ROUNDING
+from joulepath.optimizer.bounds.least_displacement import LIMIT_TOLERANCE
 from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.cycle.chains import LeastChain
@@ -298,7 +298,9 @@ def _is_nearest(asked: Cycle, layer: Layer) -> bool:
     """Whether every joint of the known nodes is in the position that is nearest to the middle of
     its range: not where the path cannot be followed from there."""
     limits = asked.arm.active_limits
-    return bool((np.abs(layer.q - (limits.q_min + limits.q_max) / 2) <= np.pi + ROUNDING).all())
+    return bool(
+        (np.abs(layer.q - (limits.q_min + limits.q_max) / 2) <= np.pi + LIMIT_TOLERANCE).all()
+    )
 
 
 def _least(values: Array, count: int) -> Indices:

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.bounds.lower_bound import priced_bounds
+from joulepath.optimizer.bounds.priced_work import priced_work_bounds
 from joulepath.optimizer.cycle.layers import Layer
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.exceptions import InvalidProblem
@@ -26,7 +27,6 @@ from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LONGEST_DURATION, Problem
 from joulepath.optimizer.problem.stops import PlannedMove
-from joulepath.optimizer.search.priced_work import priced_work_bounds
 
 # pairs of configurations of one leg: a matrix of this size takes some 30 MB
 MOST_PAIRS = 4_000_000

@@ -7,33 +7,29 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from enum import Enum
-from itertools import product
 
 import numpy as np
 import numpy.typing as npt
 
 from joulepath.models.robot import Array, Mask
-from joulepath.optimizer.bounds.lower_bound import lower_bounds
+from joulepath.optimizer.bounds.lower_bound import bound_through_passes, lower_bounds
 from joulepath.optimizer.bounds.mechanical_bound import mechanical_bounds
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration, joint_options
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.targets import AnyOf, Side
 from joulepath.optimizer.result.candidates import CandidateReport, CandidateStatus
 from joulepath.optimizer.search.end_feasibility import check_configurations, raise_if_none_is_left
-from joulepath.optimizer.search.ends import SIDES, EndConfiguration
-from joulepath.optimizer.search.passing import bound_through
+from joulepath.optimizer.search.ends import SIDES
 from joulepath.optimizer.solve.methods.method import SolveResult
 
-FULL_TURN = 2 * np.pi
 # 64 poses from a given start make 16384, two poses 2048; each is named in the answer with some 400
 # bytes
 MOST_PAIRS = 32768
 # pairs between two looks at the deadline: some ten milliseconds
 PAIRS_PER_CHECK = 1024
-# joint displacements that differ by less are the same [rad]
-SAME_TRAVEL = 1e-9
 
 
 class Reason(Enum):
@@ -53,7 +49,7 @@ class Reason(Enum):
     NOT_CONFIRMED = "the certificate did not confirm it"
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Candidate:
     """A start and goal configuration with the state of their search; `energy` [J] is the exact
     value of the objective.
@@ -94,6 +90,11 @@ class Candidate:
             reason,
             reason.value if message is None else message,
         )
+
+    @property
+    def motion(self) -> Spline | None:
+        """Motion of the last attempt; None if it found none."""
+        return None if self.attempt is None else self.attempt.spline
 
     @property
     def spline(self) -> Spline:
@@ -219,26 +220,6 @@ def _combined(
     return q_start, q_goal
 
 
-def joint_options(
-    starts: list[float], goals: list[float], fixed: bool, windings: bool
-) -> list[tuple[float, float]]:
-    """(start, goal) [rad] of one joint for each displacement, least first."""
-    both = sorted(
-        product(starts, goals),
-        key=lambda pair: (abs(pair[1] - pair[0]), abs(pair[0]) + abs(pair[1])),
-    )
-    if not windings:
-        return both[:1]
-    if fixed:
-        return both
-    kept: list[tuple[float, float]] = []
-    for s, g in both:
-        fresh = all(abs((g - s) - (other[1] - other[0])) > SAME_TRAVEL for other in kept)
-        if fresh and (not kept or abs(g - s) < FULL_TURN + SAME_TRAVEL):
-            kept.append((s, g))
-    return kept
-
-
 def bound(
     prepared: PreparedProblem, candidates: Sequence[Candidate], checked: Sequence[Side] = SIDES
 ) -> None:
@@ -266,7 +247,7 @@ def bound(
     if prepared.problem.objective == "mechanical":
         bounds = np.maximum(bounds, mechanical_bounds(prepared, q_start, q_goal, levels))
     if prepared.problem.passes:
-        bounds = np.maximum(bounds, bound_through(prepared, q_start[0], q_goal[0]))
+        bounds = np.maximum(bounds, bound_through_passes(prepared, q_start[0], q_goal[0]))
     for candidate, value, least in zip(candidates, bounds.tolist(), shortest.tolist(), strict=True):
         candidate.lower_bound, candidate.shortest = value, least
         if not math.isfinite(value):

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import replace
 
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.deadline import checkpoint
@@ -14,12 +12,12 @@ from joulepath.optimizer.exceptions import (
     UnreachablePose,
     UnreachableTargets,
 )
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.inverse import (
     inverse_kinematics_for,
     required_inverse_kinematics,
 )
-from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations
-from joulepath.optimizer.kinematics.self_motion import SelfMotion
+from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations, within_cone
 from joulepath.optimizer.kinematics.six.full_turns import full_turn_alternatives
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -39,30 +37,6 @@ SAMPLES_PER_CHECK = 24
 INSIDE = 0.999
 # label of joint positions of an arm without named branches
 GIVEN = "given"
-
-
-@dataclass(frozen=True)
-class EndConfiguration:
-    """One branch at the start or goal: its label, and per joint its full-turn alternatives within
-    the limits [rad].
-
-    `fixed`: the joint positions are given. `target` is the index of the target that it reaches.
-    `tolerance` is this target if its orientation is free in part: then the configuration is a
-    sample of it. Of a pose that is held on a `self_motion`, too, the configuration is a sample.
-    """
-
-    label: str
-    q: Array
-    choices: list[list[float]]
-    fixed: bool
-    target: int = 0
-    tolerance: ConeOrientedPose | None = None
-    self_motion: SelfMotion | None = None
-
-    @property
-    def sampled(self) -> bool:
-        """Whether it is one of infinitely many configurations that reach the target."""
-        return self.tolerance is not None or self.self_motion is not None
 
 
 def ends(
@@ -164,7 +138,7 @@ def _ends_of_samples(
     """The branches of orientations sampled evenly from those that the pose and the tool's cone
     allow.
     """
-    pose = within_cone(prepared, pose, INSIDE)
+    pose = within_cone(prepared.arm, pose, INSIDE)
     found: list[EndConfiguration] = []
     errors: list[UnreachablePose | SingularPose] = []
     tried = samples if pose.freedom > 1 else max(samples // 4, LEAST_SAMPLES)
@@ -192,26 +166,4 @@ def _ends_of_samples(
         f"The {name} is out of reach in each of the {tried} orientations tried: move it closer to "
         "the robot's "
         "workspace, widen limits.position or leave `branch` out.",
-    )
-
-
-def within_cone(
-    prepared: PreparedProblem, pose: ConeOrientedPose, share: float = 1.0
-) -> ConeOrientedPose:
-    """The pose with no more freedom than a share of the tool's cone leaves it, if both have the
-    same axes.
-
-    Else few samples of a free orientation would lie in a narrow cone, and a bound would count what
-    the cone excludes.
-    """
-    cone = prepared.problem.arm.tool_cone
-    if cone is None:
-        return pose
-    free = pose.half_angle == np.pi
-    if not free and not (
-        np.allclose(pose.axis, cone.axis) and np.allclose(pose.direction, cone.direction)
-    ):
-        return pose
-    return ConeOrientedPose(
-        pose.position, cone.axis, cone.direction, min(pose.half_angle, share * cone.half_angle)
     )

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from joulepath.optimizer.bounds.missed_branches import all_branches_known
 from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
 from joulepath.optimizer.motion.spline import Spline, lasting, sampled
 from joulepath.optimizer.result.candidates import CandidateStatus
@@ -18,7 +19,6 @@ from joulepath.optimizer.search.attempts import solve_from, solver_of
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.incumbent import Incumbent
-from joulepath.optimizer.search.missed_branches import all_known
 from joulepath.optimizer.search.outer_turns import families_of
 from joulepath.optimizer.search.quicker_ends import with_quicker_ends
 from joulepath.optimizer.search.sampled_ends import fastest_samples
@@ -171,7 +171,7 @@ def least_duration(incumbent: Incumbent) -> float:
     not known.
     """
     candidates = incumbent.candidates
-    if any(each.sampled for each in candidates) or not all_known(incumbent.problem):
+    if any(each.sampled for each in candidates) or not all_branches_known(incumbent.problem):
         return 0.0
     return max(min(each.shortest for each in candidates), incumbent.prepared.least_time)
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import DeadlinePassed, watch
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.orientation_tolerance import tilt
 from joulepath.optimizer.kinematics.tcp import tcp_jacobian, tcp_pose
 from joulepath.optimizer.motion import bspline
@@ -22,7 +23,6 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.search.attempts import settled, solver_of
 from joulepath.optimizer.search.candidates import Candidate
-from joulepath.optimizer.search.ends import EndConfiguration
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
 from joulepath.optimizer.solve.methods.duration_intervals import (

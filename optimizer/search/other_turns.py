@@ -12,9 +12,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from joulepath.optimizer.kinematics.end_configuration import FULL_TURN
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.search.candidates import FULL_TURN, Candidate, bound
+from joulepath.optimizer.search.candidates import Candidate, bound
 from joulepath.optimizer.search.seeds import estimates_between
 from joulepath.optimizer.solve.methods.sqp_method import above
 

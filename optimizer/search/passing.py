@@ -1,4 +1,4 @@
-"""A motion through passes: what it needs at least, and the baselines that rest at each of them."""
+"""Baselines of a motion through passes, which rest at each pass."""
 
 from __future__ import annotations
 
@@ -9,27 +9,12 @@ from operator import add
 
 import numpy as np
 
-from joulepath.models.robot import Array
-from joulepath.optimizer.bounds.lower_bound import travel_bounds
 from joulepath.optimizer.motion.passing import pass_times
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
+from joulepath.optimizer.problem.problem import LEAST_DURATION, Problem
 from joulepath.optimizer.result.solution import Baseline
 from joulepath.optimizer.search.baselines import baselines, saving
-
-
-def bound_through(prepared: PreparedProblem, q_start: Array, q_goal: Array) -> float:
-    """Lower bound [J] on the objective of all motions from q_start through the passes to q_goal
-    (nq,) [rad].
-    """
-    problem = prepared.problem
-    if problem.objective == "mechanical" or problem.dwell is not None:
-        return -np.inf
-    q = np.array([q_start, *problem.passes, q_goal])
-    gains = np.diff([prepared.potential(each) for each in q])
-    longest = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
-    return float(travel_bounds(prepared, np.diff(q, axis=0), gains, longest=longest).sum())
 
 
 def stopping_baselines(prepared: PreparedProblem, spline: Spline, ours: float) -> list[Baseline]:

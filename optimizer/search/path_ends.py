@@ -9,8 +9,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.bounds.free_ends_bound import bound_between_free_ends, reversed_problem
+from joulepath.optimizer.bounds.free_goal_bound import bound_of_free_goals
+from joulepath.optimizer.bounds.missed_branches import bound_of_missed_branches
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.tool_path.course_tracing import (
     Trace,
     traces,
@@ -24,11 +28,8 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import Target
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason, bound, pairs
-from joulepath.optimizer.search.ends import EndConfiguration, ends, ends_of, label_of
+from joulepath.optimizer.search.ends import ends, ends_of, label_of
 from joulepath.optimizer.search.errors import PathAttempt, PathInfeasible
-from joulepath.optimizer.search.free_ends_bound import backwards, bound_between
-from joulepath.optimizer.search.free_goal_bound import family_bound_of
-from joulepath.optimizer.search.missed_branches import bound_of_others
 
 # rad: where a path leads, and joint positions that are given for its end
 SAME = 1e-6
@@ -104,10 +105,13 @@ def bound_beside(
     start, goal = prepared.problem.start, prepared.problem.goal
     if isinstance(start, ConeOrientedPose) and isinstance(goal, ConeOrientedPose):
         known = prepared.freed(start=followed[0].q_start)
-        return bound_between(PreparedProblem.of(known), start, goal, deadline, enough)
+        return bound_between_free_ends(PreparedProblem.of(known), start, goal, deadline, enough)
     if isinstance(start, ConeOrientedPose):
         return _bound_to_free(
-            backwards(prepared.freed(goal, start), goal, start), followed[0].start, deadline, enough
+            reversed_problem(prepared.freed(goal, start), goal, start),
+            followed[0].start,
+            deadline,
+            enough,
         )
     problem = prepared.freed()
     if isinstance(goal, ConeOrientedPose):
@@ -121,7 +125,7 @@ def bound_beside(
         for each in candidates
         if not each.sampled and not _is_among(each, followed)
     )
-    return min([bound_of_others(free, candidates, deadline), *others])
+    return min([bound_of_missed_branches(free, candidates, deadline), *others])
 
 
 def _bound_to_free(
@@ -133,8 +137,8 @@ def _bound_to_free(
     prepared = PreparedProblem.of(problem)
     anywhere = [Candidate(start, goal, start.q, goal.q) for start in ends(prepared, "start")[0]]
     return min(
-        family_bound_of(prepared, anywhere, deadline, enough),
-        bound_of_others(prepared, anywhere, deadline),
+        bound_of_free_goals(prepared, anywhere, deadline, enough),
+        bound_of_missed_branches(prepared, anywhere, deadline),
     )
 
 

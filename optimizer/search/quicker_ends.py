@@ -11,10 +11,10 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.kinematics.angles import nearest_turn
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.candidates import Candidate
-from joulepath.optimizer.search.ends import EndConfiguration
 from joulepath.optimizer.search.sampled_ends import nearest_configuration, with_ends
 
 

@@ -6,13 +6,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from joulepath.optimizer.bounds.free_goal_bound import bound_of_free_goals
+from joulepath.optimizer.bounds.missed_branches import all_branches_known, bound_of_missed_branches
+from joulepath.optimizer.bounds.raised_bounds import raised_bounds
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Reason
-from joulepath.optimizer.search.free_goal_bound import family_bound_of
 from joulepath.optimizer.search.incumbent import Incumbent
-from joulepath.optimizer.search.missed_branches import all_known, bound_of_others
 from joulepath.optimizer.search.path_ends import bound_beside
-from joulepath.optimizer.search.raised_bounds import raise_bounds
 
 
 def ruled_out(incumbent: Incumbent, objective: float) -> tuple[float, bool]:
@@ -20,7 +20,9 @@ def ruled_out(incumbent: Incumbent, objective: float) -> tuple[float, bool]:
     `objective`.
     """
     prepared, candidates = incumbent.prepared, incumbent.candidates
-    raise_bounds(prepared, candidates, objective, incumbent.deadline)
+    raised = raised_bounds(prepared, candidates, objective, incumbent.deadline)
+    for candidate, value in zip(candidates, raised, strict=True):
+        candidate.lower_bound = value
     open_ = [
         each
         for each in candidates
@@ -31,9 +33,14 @@ def ruled_out(incumbent: Incumbent, objective: float) -> tuple[float, bool]:
             candidate.settle(CandidateStatus.PRUNED, Reason.BOUND)
     # of a target that infinitely many configurations reach, only samples are solved: it is done
     # only if a bound rules all of it out
-    family, beside = bound_of_others(prepared, candidates, incumbent.deadline, objective), np.inf
+    family, beside = (
+        bound_of_missed_branches(prepared, candidates, incumbent.deadline, objective),
+        np.inf,
+    )
     if incumbent.problem.tool_path is None:
-        family = min(family, family_bound_of(prepared, candidates, incumbent.deadline, objective))
+        family = min(
+            family, bound_of_free_goals(prepared, candidates, incumbent.deadline, objective)
+        )
     else:
         beside = bound_beside(prepared, candidates, incumbent.deadline, objective)
         family = min(family, beside) if any(each.sampled for each in candidates) else family
@@ -44,4 +51,4 @@ def ruled_out(incumbent: Incumbent, objective: float) -> tuple[float, bool]:
         and min(family, unsought) >= objective
     )
     least = min([family, beside, *(each.lower_bound for each in candidates if not each.sampled)])
-    return least, done and all_known(incumbent.problem)
+    return least, done and all_branches_known(incumbent.problem)

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from joulepath.optimizer.bounds.missed_branches import all_branches_known
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
 from joulepath.optimizer.dynamics.interval import Known, with_interval
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
@@ -37,7 +38,6 @@ from joulepath.optimizer.search.fastest import explore_or_find_fastest, find_fas
 from joulepath.optimizer.search.freed_duration import start_from_free_duration
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.least_work import explore_least_work
-from joulepath.optimizer.search.missed_branches import all_known
 from joulepath.optimizer.search.near_goals import activate_near_goals
 from joulepath.optimizer.search.other_starts import start_beside
 from joulepath.optimizer.search.outer_turns import explore_families
@@ -120,7 +120,7 @@ class Run:
         if (
             self.problem.tool_path
             or any(each.sampled for each in candidates)
-            or not all_known(self.problem)
+            or not all_branches_known(self.problem)
         ):
             return None
         return min(each.lower_bound for each in candidates)
@@ -381,7 +381,7 @@ class Run:
             sensitivity=sensitivity,
             lower_bound=least,
             limits=LimitsInForce.of(arm.active_limits, arm.tcp_speed, arm.elbow_speed),
-            complete=all_known(self.problem),
+            complete=all_branches_known(self.problem),
             baselines=with_saving_intervals(
                 table, self.problem, Known(energy.electrical.total, sensitivity, spline.duration)
             ),

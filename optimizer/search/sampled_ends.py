@@ -16,12 +16,13 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.kinematics.angles import nearest_turn
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.goal_manifold import GoalManifold
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason, bound
-from joulepath.optimizer.search.ends import SIDES, EndConfiguration, label_of
+from joulepath.optimizer.search.ends import SIDES, label_of
 from joulepath.optimizer.solve.methods.sqp_method import above
 
 # samples solved before any is refined: in all, and of one pair of branches

@@ -16,13 +16,13 @@ import numpy as np
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.dynamics.dwell import brake_power, waits
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.motion import quintic
 from joulepath.optimizer.motion.quadrature import quadrature
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason
-from joulepath.optimizer.search.ends import EndConfiguration
 from joulepath.optimizer.solve.methods.sqp_method import above
 
 # durations of the quintic, in multiples of the shortest one, and the panels and points of its

@@ -12,12 +12,12 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.tool_path.held_pose import HeldPose
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.targets import Side
 from joulepath.optimizer.search.candidates import Candidate
-from joulepath.optimizer.search.ends import EndConfiguration
 from joulepath.optimizer.search.sampled_ends import with_ends
 from joulepath.optimizer.solve.methods import method_of
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline

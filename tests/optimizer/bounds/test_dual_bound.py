@@ -16,7 +16,7 @@ from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
 from joulepath.optimizer.bounds.dual_bound import DualBound, multiplier_rates
 from joulepath.optimizer.bounds.friction_conjugate import FrictionConjugate
 from joulepath.optimizer.bounds.grid_cells import Spacing
-from joulepath.optimizer.bounds.lower_bound import copper_multiplier
+from joulepath.optimizer.bounds.net_energy import copper_multiplier
 from joulepath.optimizer.bounds.path_terms import path_terms
 from joulepath.optimizer.bounds.reference import Reference, half_sides
 from joulepath.optimizer.bounds.weights import Weights
@@ -28,8 +28,8 @@ from joulepath.optimizer.problem.problem import LEAST_DURATION
 from joulepath.optimizer.search.baselines import guesses
 from tests.optimizer.bounds.numpy_terms import greatest
 from tests.optimizer.bounds.test_holding import NAMES, NEAR, SAMPLED, SHIFT, asked, many_motions
+from tests.optimizer.bounds.test_lower_bound import CONDITIONS, QUADRATURE, Torques, ends, motions
 from tests.optimizer.moves import GOAL, ROBOT, START, problem
-from tests.optimizer.search.test_lower_bound import CONDITIONS, QUADRATURE, Torques, ends, motions
 from tests.selection import long_but
 
 # times, positions, speeds and accelerations of a motion, and weights of the times [s]

@@ -13,15 +13,14 @@ from scipy.integrate import simpson
 from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.holding import Cells
 from joulepath.optimizer.bounds.holding_cells import HoldingCells
-from joulepath.optimizer.bounds.lower_bound import NetEnergy
+from joulepath.optimizer.bounds.net_energy import NetEnergy
 from joulepath.optimizer.bounds.straight_line import Line
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.spline import peak_rates, sample, spline_of
 from joulepath.optimizer.problem.problem import LEAST_DURATION, Problem
 from joulepath.optimizer.search.baselines import guesses
-from tests.optimizer.moves import limits, problem
-from tests.optimizer.search.test_lower_bound import (
+from tests.optimizer.bounds.test_lower_bound import (
     CONDITIONS,
     QUADRATURE,
     Torques,
@@ -29,6 +28,7 @@ from tests.optimizer.search.test_lower_bound import (
     ends,
     motions,
 )
+from tests.optimizer.moves import limits, problem
 from tests.selection import long_but
 
 MOVES = 6

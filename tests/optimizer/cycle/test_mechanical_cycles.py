@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from joulepath.optimizer.bounds.mechanical_bound import mechanical_bounds
+from joulepath.optimizer.bounds.priced_work import CELLS, WORKS, priced_work_bounds
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.cycle.errors import CycleTooShort
 from joulepath.optimizer.cycle.ways import layers_of
@@ -22,7 +23,6 @@ from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.free_order import FreeOrder
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.search.priced_work import CELLS, WORKS, priced_work_bounds
 from tests.optimizer.cycle.cycles import HOME, pick_and_place
 from tests.optimizer.moves import ROBOT
 from tests.selection import long_but

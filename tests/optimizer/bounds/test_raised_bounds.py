@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from joulepath.models.registry import load_robot
+from joulepath.optimizer.bounds.raised_bounds import RAISING, raised_bounds
 from joulepath.optimizer.deadline import NEVER, Deadline
 from joulepath.optimizer.kinematics.tcp import tcp_pose as tcp_pose_of
 from joulepath.optimizer.optimize import optimize
@@ -19,7 +20,6 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search import candidates as search
 from joulepath.optimizer.search.ends import ends
-from joulepath.optimizer.search.raised_bounds import LEAST_GAP, QUICK, raise_bounds
 from tests.optimizer.moves import GOAL, START, problem, tcp_pose
 from tests.selection import long_but
 
@@ -45,6 +45,14 @@ def bounded(asked: Problem) -> tuple[PreparedProblem, list[search.Candidate]]:
     return made, found
 
 
+def raise_all(
+    made: PreparedProblem, found: list[search.Candidate], energy: float, deadline: Deadline
+) -> None:
+    """Raise the bounds of candidates as a search does."""
+    for candidate, value in zip(found, raised_bounds(made, found, energy, deadline), strict=True):
+        candidate.lower_bound = value
+
+
 def test_a_heavy_arm_that_holds_its_weight_gains_much() -> None:
     asked = problem(OUT, TURNED, robot=load_robot("ur20"))
     _, (plain,) = bounded(asked)
@@ -65,15 +73,17 @@ def test_the_lowest_are_raised_until_the_least_is() -> None:
     """
     made, found = bounded(problem(OUT, tcp_pose(TURNED)))
     energy = optimize(made.problem).energy.electrical.total
-    before = {id(each): each.lower_bound for each in found}
-    raise_bounds(made, found, energy, NEVER)
-    raised = [each for each in found if each.lower_bound != before[id(each)]]
-    assert all(before[id(each)] < each.lower_bound <= (1 - LEAST_GAP) * energy for each in raised)
+    before = {each: each.lower_bound for each in found}
+    raise_all(made, found, energy, NEVER)
+    raised = [each for each in found if each.lower_bound != before[each]]
+    assert all(
+        before[each] < each.lower_bound <= (1 - RAISING.least_gap) * energy for each in raised
+    )
     assert min(found, key=lambda each: each.lower_bound) in raised
     assert len(raised) < len(found)
     # a second time, nothing is left to be raised
     least = min(each.lower_bound for each in found)
-    raise_bounds(made, found, energy, NEVER)
+    raise_all(made, found, energy, NEVER)
     assert min(each.lower_bound for each in found) == pytest.approx(least, rel=AGAIN)
 
 
@@ -99,28 +109,28 @@ def test_turns_that_are_no_candidates_are_bounded_too(bound: str) -> None:
 def test_nothing_changes_where_it_does_not_apply() -> None:
     for given, deadline, energy in (
         ({"objective": "mechanical", "duration_max": 3.0}, NEVER, ENOUGH),
-        ({}, Deadline.after(QUICK.effort.time / 2), ENOUGH),
-        ({"bound": "tight"}, Deadline.after(QUICK.effort.time / 2), ENOUGH),
+        ({}, Deadline.after(RAISING.quick.effort.time / 2), ENOUGH),
+        ({"bound": "tight"}, Deadline.after(RAISING.quick.effort.time / 2), ENOUGH),
         ({}, NEVER, -1.0),
     ):
         made, found = bounded(problem(START, tcp_pose(GOAL), **given))
         before = [each.lower_bound for each in found]
-        raise_bounds(made, found, energy, deadline)
+        raise_all(made, found, energy, deadline)
         assert [each.lower_bound for each in found] == before
 
 
 def test_no_bound_is_begun_that_would_end_late() -> None:
     """With many joints it takes several times as long."""
     made, found = bounded(problem(OUT, TURNED, robot=load_robot("ur20")))
-    plain, left = found[0].lower_bound, 2 * QUICK.effort.time
-    raise_bounds(made, found, ENOUGH, Deadline.after(QUICK.effort.time / 2))
+    plain, left = found[0].lower_bound, 2 * RAISING.quick.effort.time
+    raise_all(made, found, ENOUGH, Deadline.after(RAISING.quick.effort.time / 2))
     assert found[0].lower_bound == plain
-    raise_bounds(made, found, ENOUGH, Deadline.after(left, lambda: 0.0))
+    raise_all(made, found, ENOUGH, Deadline.after(left, lambda: 0.0))
     assert found[0].lower_bound > plain
     assert (
-        QUICK.effort.takes(6)
-        == QUICK.effort.time
+        RAISING.quick.effort.time_for(6)
+        == RAISING.quick.effort.time
         < left
-        < QUICK.effort.takes(7)
-        < QUICK.effort.takes(8)
+        < RAISING.quick.effort.time_for(7)
+        < RAISING.quick.effort.time_for(8)
     )

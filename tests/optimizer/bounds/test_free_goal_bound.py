@@ -4,25 +4,25 @@ that reach it.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath.optimizer.bounds.box_search import FEW, NEARLY, ROUNDS
+from joulepath.optimizer.bounds import free_goal_bound
+from joulepath.optimizer.bounds.free_goal_bound import FAMILY, family_bound
 from joulepath.optimizer.bounds.lower_bound import lower_bounds
+from joulepath.optimizer.bounds.subdivide import SUBDIVISION, SearchLimits
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
-from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations
+from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations, within_cone
 from joulepath.optimizer.kinematics.six.full_turns import full_turn_alternatives
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.tool_cone import ToolCone
-from joulepath.optimizer.search import free_goal_bound
-from joulepath.optimizer.search.ends import within_cone
-from joulepath.optimizer.search.free_goal_bound import MOST_FIRST, family_bound
 from tests.optimizer.chains import serial_chain
 from tests.optimizer.moves import GOAL, HOME, PAYLOAD, ROBOT, TILTED, problem, tcp_pose
 from tests.selection import long_but
@@ -82,7 +82,7 @@ def test_the_bound_holds_for_the_whole_family(half_angle: float, condition: str)
         T = tcp_pose(goal, given.get("T_flange_tcp")).T
         pose = ConeOrientedPose(T[:3, 3], [0, 0, 1], T[:3, 2], half_angle)
         values = [
-            family_bound(PreparedProblem.of(task), pose, start[None], rounds)
+            family_bound(PreparedProblem.of(task), pose, start[None], SearchLimits(rounds))
             for rounds in (0, 5, 20)
         ]
         assert values == sorted(values)
@@ -108,7 +108,7 @@ def test_the_bound_holds_for_any_chain(nq: int, given: dict[str, Any]) -> None:
         # the chain's ranges are less than a turn
         displacement = goal - start
         gain = np.array([made.potential(goal) - made.potential(start)])
-        value = family_bound(made, pose, start[None], 5)
+        value = family_bound(made, pose, start[None], SearchLimits(5))
         assert np.isfinite(value) and value <= lower_bounds(made, displacement[None], gain)[0][0]
 
 
@@ -126,8 +126,12 @@ def test_the_bound_tells_far_from_near() -> None:
 @pytest.mark.parametrize(
     ("most", "alone", "rounds", "rounds_at_goal"),
     long_but(
-        [(MOST_FIRST, 2, 20, 10)],
-        [(most, *given) for most in (MOST_FIRST, 8, 1) for given in ((2, 20, 10), (4, 30, 30))],
+        [(FAMILY.most_first_boxes, 2, 20, 10)],
+        [
+            (most, *given)
+            for most in (FAMILY.most_first_boxes, 8, 1)
+            for given in ((2, 20, 10), (4, 30, 30))
+        ],
     ),
 )
 def test_many_starts_are_bounded_together(
@@ -136,24 +140,31 @@ def test_many_starts_are_bounded_together(
     """Also more starts than can have fine boxes at first: the bound of all is no higher than that
     of any.
     """
-    monkeypatch.setattr(free_goal_bound, "MOST_FIRST", most)
+    monkeypatch.setattr(free_goal_bound, "FAMILY", replace(FAMILY, most_first_boxes=most))
     rng = np.random.default_rng(6)
     made, pose = PreparedProblem.of(problem(HOME, GOAL)), ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])
     starts = HOME + rng.normal(scale=0.05, size=(4, 6))
-    together = family_bound(made, pose, starts, rounds)
+    together = family_bound(made, pose, starts, SearchLimits(rounds))
     assert (
         0
         < together
-        <= min(family_bound(made, pose, start[None], 2 * rounds) for start in starts[:alone])
+        <= min(
+            family_bound(made, pose, start[None], SearchLimits(2 * rounds))
+            for start in starts[:alone]
+        )
     )
-    assert family_bound(made, pose, np.concatenate([starts, GOAL[None]]), rounds_at_goal) == 0
+    assert (
+        family_bound(made, pose, np.concatenate([starts, GOAL[None]]), SearchLimits(rounds_at_goal))
+        == 0
+    )
 
 
 def test_the_rim_of_the_tools_cone_is_covered() -> None:
     cone = ToolCone([0, 0, 1], [0, 0, -1], 0.4)
     made = PreparedProblem.of(problem(HOME, GOAL, tool_cone=cone))
     assert (
-        within_cone(made, ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])).half_angle == cone.half_angle
+        within_cone(made.arm, ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])).half_angle
+        == cone.half_angle
     )
 
 
@@ -164,11 +175,14 @@ def test_more_boxes_are_halved_where_the_bound_is_far_from_the_energy() -> None:
     """
     made = PreparedProblem.of(problem(HOME, GOAL))
     pose = ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])
-    few, many = (family_bound(made, pose, HOME[None], rounds) for rounds in (FEW, ROUNDS))
-    assert few < many
-    enough = few / (1 - NEARLY)
-    assert family_bound(made, pose, HOME[None], ROUNDS, enough=enough, nearly=NEARLY) == few
-    between = family_bound(
-        made, pose, HOME[None], ROUNDS, enough=many / (1 - NEARLY), nearly=NEARLY
+    few, many = (
+        family_bound(made, pose, HOME[None], SearchLimits(rounds))
+        for rounds in (SUBDIVISION.early_rounds, SUBDIVISION.rounds)
     )
+    assert few < many
+    tolerance = SUBDIVISION.tolerance
+    limits = SearchLimits(enough=few / (1 - tolerance), tolerance=tolerance)
+    assert family_bound(made, pose, HOME[None], limits) == few
+    limits = SearchLimits(enough=many / (1 - tolerance), tolerance=tolerance)
+    between = family_bound(made, pose, HOME[None], limits)
     assert between >= many * (1 - 1e-9)

@@ -12,6 +12,7 @@ import pytest
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.lower_bound import lower_bounds
+from joulepath.optimizer.bounds.missed_branches import all_branches_known, bound_of_missed_branches
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
 from joulepath.optimizer.kinematics.chain import Chain
@@ -22,7 +23,6 @@ from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.candidates import Candidate, pairs
 from joulepath.optimizer.search.ends import ends
-from joulepath.optimizer.search.missed_branches import all_known, bound_of_others
 from tests.optimizer.search.test_redundant_goals import asked, members, pose_of, tasks
 from tests.selection import long_but
 
@@ -46,8 +46,8 @@ def candidates(prepared: PreparedProblem) -> list[Candidate]:
 def whole(start: Any, goal: Any, **given: Any) -> float:
     """The bound of what may be missed."""
     prepared = PreparedProblem.of(asked(GEN3, start, goal, **given))
-    assert not all_known(prepared.problem)
-    return bound_of_others(prepared, candidates(prepared))
+    assert not all_branches_known(prepared.problem)
+    return bound_of_missed_branches(prepared, candidates(prepared))
 
 
 def least(starts: Array, goals: Array, **given: Any) -> float:
@@ -140,7 +140,9 @@ def test_no_configuration_on_a_singularity_is_below() -> None:
             others = candidates(prepared)
         except JoulepathError:
             continue
-        assert bound_of_others(prepared, others) <= least(start[None], goal[None]) * (1 + ROUNDING)
+        assert bound_of_missed_branches(prepared, others) <= least(start[None], goal[None]) * (
+            1 + ROUNDING
+        )
         compared += 1
     assert compared > 3
 

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from joulepath.models.robot import Array, Limits
-from joulepath.optimizer.bounds.least_displacement import ROUNDING, least_displacement
+from joulepath.optimizer.bounds.least_displacement import LIMIT_TOLERANCE, least_displacement
 
 NQ, COUNT = 2, 200
 ONES = np.ones(NQ)
@@ -37,7 +37,7 @@ def test_no_member_is_nearer() -> None:
             )
             for a, b in product(turned_inside(s), turned_inside(g)):
                 pairs += 1
-                assert possible[k] and (np.abs(b - a) >= least[k] - 2 * ROUNDING).all()
+                assert possible[k] and (np.abs(b - a) >= least[k] - 2 * LIMIT_TOLERANCE).all()
     assert pairs > COUNT
 
 
@@ -54,7 +54,7 @@ def test_a_given_start_stands_as_it_is() -> None:
     assert np.allclose(given, [[0.0, 13.0 - 0.5 - 4 * np.pi]]) or np.allclose(
         given, [[0.0, 0.5 + 4 * np.pi - 13.0]]
     )
-    assert (free <= given + ROUNDING).all()
+    assert (free <= given + LIMIT_TOLERANCE).all()
 
 
 def test_boxes_beyond_the_limits_hold_nothing() -> None:
