@@ -20,13 +20,12 @@ from itertools import product
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
-from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
-from joulepath.optimizer.bounds.cruise import TINY, copper_loss
+from joulepath.optimizer.bounds.cruise import TINY
 from joulepath.optimizer.bounds.dual_bound import CellBounds, DualBound, multiplier_rates
-from joulepath.optimizer.bounds.friction_conjugate import FrictionConjugate
 from joulepath.optimizer.bounds.grid_cells import Spacing
 from joulepath.optimizer.bounds.net_energy import copper_multiplier, electrical
 from joulepath.optimizer.bounds.pair import Pair
+from joulepath.optimizer.bounds.pair_bounds import GRID_JOINTS, Effort, PairBounds
 from joulepath.optimizer.bounds.path_terms import path_terms
 from joulepath.optimizer.bounds.reference import Reference, half_sides
 from joulepath.optimizer.bounds.weights import Weights
@@ -34,13 +33,9 @@ from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.dynamics.dwell import LinearDwell
 from joulepath.optimizer.motion.spline import Spline, sample
 from joulepath.optimizer.motion.time_scalings import quintic_spline
-from joulepath.optimizer.prepared_problem import PreparedProblem
 
 Factors = tuple[float, float]
 """Factor of the multipliers, and of κ + μ."""
-
-GRID_JOINTS = 2
-"""Joints with a grid: those with the greatest copper loss of holding against gravity."""
 
 
 @dataclass(frozen=True)
@@ -74,66 +69,6 @@ class DualSettings:
 
 
 DUAL = DualSettings()
-
-
-@dataclass(frozen=True)
-class Effort:
-    """How finely a pair is bounded."""
-
-    steps: int
-    """Number of steps of the path."""
-    cell_ratio: float
-    """Ratio of the longest to the shortest duration of a cell."""
-    cells_per_group: int
-    """Number of cells of durations that share their boxes."""
-    spacing: Spacing
-    """Spacing of the grid around the path."""
-    loaded_joints: tuple[int, ...]
-    """Numbers of joints with multipliers among those that carry gravity, tried one by one."""
-    weight_rounds: int
-    """Number of rounds of the search for weights."""
-    time: float
-    """Longest time [s] for a group of an arm with six joints on an idle machine."""
-
-    def time_for(self, joints: int) -> float:
-        """Time [s] without which a group of an arm is not begun.
-
-        It grows with joints⁵, the number of bounds on third derivatives of the inertia.
-        """
-        return self.time * max(joints / 6, 1) ** 5
-
-
-@dataclass(frozen=True)
-class PairBounds:
-    """Data that the dual bounds of all pairs of a problem share."""
-
-    prepared: PreparedProblem
-    chain: ChainDerivatives
-    friction: FrictionConjugate
-    loss: Array
-    """Copper loss c, shape (nq,) [W/(N·m)²]."""
-    stiffness: Array
-    """Unit of κ + μ, shape (nq,) [N·m·s/rad]."""
-
-    @classmethod
-    def of(cls, prepared: PreparedProblem) -> PairBounds | None:
-        """The data; None where the dual bound does not hold or cannot be higher than the plain one.
-
-        It needs the electrical objective, a concave friction law, and at least two joints. Friction
-        of the same torque at every speed has no convexity to spare for the confinement.
-        """
-        arm = prepared.arm
-        friction = FrictionConjugate.of(arm.friction_law, arm.active_limits.v_max)
-        if (
-            prepared.problem.objective != "electrical"
-            or friction is None
-            or arm.robot.nq < GRID_JOINTS
-        ):
-            return None
-        stiffness = friction.stiffness(arm.friction_law)
-        if stiffness.min() <= 0:
-            return None
-        return cls(prepared, ChainDerivatives.of(arm), friction, copper_loss(arm), stiffness)
 
 
 class DurationCells:

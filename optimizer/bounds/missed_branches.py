@@ -46,14 +46,14 @@ def bound_of_missed_branches(
     """Lower bound on motions between poses in configurations of no candidate [J]; inf for none.
 
     - If all branches are known, the other configurations are members of self-motions.
-    - Else, if the arm is nearly of a form whose curves are known, `covering_sheets` hold them.
-    - Else, from given joint positions, the bound is over the motions to the goal poses with any
+    - Else, if the arm is nearly of a form with known curves, `covering_sheets` hold them.
+    - Else, from given joint positions, the bound covers the motions to the goal poses with any
       rotation about their z axes, by boxes of joint positions, without inverse kinematics.
-    - Else, between poses, the bound is over the motions between any two configurations.
+    - Else, between poses, the bound covers the motions between any two configurations.
 
     Args:
         prepared: problem of the motions.
-        candidates: pairs of end configurations that are known.
+        candidates: pairs of known end configurations.
         deadline: instant at which the search ends with the bound it has.
         enough: sufficient bound [J], as in `self_motion_bound`.
     """
@@ -83,10 +83,10 @@ def bound_of_missed_branches(
 def _covered(
     prepared: PreparedProblem, ends: Sequence[EndConfiguration], target: Target
 ) -> EndCurves | None:
-    """Joint positions that one end gives, and sheets with all configurations of its poses.
+    """Joint positions given at one end, and sheets with all configurations of its poses.
 
-    It is None for an arm whose poses have no covering sheets. Poses of partly free orientation are
-    left to `free_goal_bound`.
+    It is None for an arm without covering sheets. Poses of partly free orientation are left to
+    `free_goal_bound`.
     """
     arm = prepared.arm
     isolated = {end.q.tobytes(): end.q for end in ends if end.fixed and not end.sampled}

@@ -1,9 +1,9 @@
 """Bound on the motions between two branches with full turns that no candidate has.
 
-Without `windings`, and between two poses beyond one turn, full turns that make a motion longer are
-no candidates (`search.candidates.pairs`). The plain lower bound rises with the displacement of each
-joint, so the bound of the candidates holds for motions with such turns. A bound that is raised by
-other means than the displacement need not hold for them.
+Without `windings`, full turns that make a motion longer are no candidates, nor between two poses
+displacements beyond one turn (`search.candidates.pairs`). The plain lower bound rises with the
+displacement of each joint, so the bound of the candidates holds for motions with such turns. A
+bound raised by other means than the displacement need not hold for them.
 """
 
 from __future__ import annotations

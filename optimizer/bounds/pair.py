@@ -9,9 +9,8 @@ from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 
 
 class Pair(Protocol):
-    """A start and a goal configuration, each with one choice of full turns.
-
-    The candidates of a search are such pairs.
+    """A start and a goal configuration with a choice of full turns; candidates of a search are
+    pairs.
     """
 
     @property

@@ -1,12 +1,12 @@
 """Lower bounds of pairs, raised by the copper loss of holding against gravity and of acceleration.
 
 The plain bound leaves most of this loss out, and the loss is most of the gap to the energy found.
-`duration_cells` computes a bound with it in some milliseconds. So only pairs that would determine
-the answer's bound are raised: the lowest pair first, and again with more effort while its gap is
-wide. With `"bound": "tight"`, every pair below the best energy is raised as far as possible. No
-bound falls. Where the dual bound does not apply the plain bound stays.
+`duration_cells` computes a bound with the loss in some milliseconds. So only pairs that would
+determine the answer's bound are raised: the lowest pair first, and again with more effort while its
+gap is wide. With `"bound": "tight"`, every pair below the best energy is raised as far as possible.
+No bound falls. Pairs without a dual bound keep the plain bound.
 
-A raised bound is at most the plain bound of full turns that no candidate has (`omitted_turns`).
+A raised bound is at most the plain bound of full turns without a candidate (`omitted_turns`).
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
-from joulepath.optimizer.bounds.duration_cells import DurationCells, Effort, PairBounds
+from joulepath.optimizer.bounds.duration_cells import DurationCells
 from joulepath.optimizer.bounds.grid_cells import Spacing
 from joulepath.optimizer.bounds.omitted_turns import bound_of_omitted_turns
 from joulepath.optimizer.bounds.pair import Pair
+from joulepath.optimizer.bounds.pair_bounds import Effort, PairBounds
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.dynamics.dwell import LinearDwell, linear_dwells
 from joulepath.optimizer.motion.spline import Spline
@@ -110,12 +111,12 @@ class BoundedPair(Pair, Protocol):
 def raised_bounds(
     prepared: PreparedProblem, candidates: Sequence[BoundedPair], energy: float, deadline: Deadline
 ) -> list[float]:
-    """Bounds of pairs after those below an energy were raised [J].
+    """Bounds of pairs after raising all bounds below an energy [J].
 
     Args:
         prepared: problem of the motions.
         candidates: pairs with their bounds so far.
-        energy: objective of a motion found [J].
+        energy: objective of a known motion [J].
         deadline: instant at which the raising ends.
 
     Returns:
@@ -152,7 +153,7 @@ def raised_bounds(
 
 
 def _lowest_pairs(pairs: Sequence[_RaisedPair]) -> Iterator[_RaisedPair]:
-    """The pair of least bound again and again, until a pair that was yielded stays the lowest."""
+    """The pair of least bound, again and again, until the same pair stays the lowest."""
     yielded = set[int]()
     while pairs and len(yielded) < RAISING.most_pairs:
         lowest = min(range(len(pairs)), key=lambda k: pairs[k].bound)

@@ -1,14 +1,14 @@
 """Lower bound on the motions from or to a pose that the arm holds on a self-motion.
 
 The bound covers all members of the self-motion. Its arcs are cut into cells, and `SelfMotion.boxes`
-gives a box of joint positions that holds every member of a cell. Between two boxes,
+gives a box of joint positions around all members of a cell. Between two boxes,
 
 - the displacement of each joint is at least their distance,
 - the gain of potential energy is at least the gain between their middles less the greatest change
   within them (`potential_rates`).
 
-`lower_bounds` falls with neither, so that its value at both bounds every motion between the boxes.
-Pairs of cells of least bound are halved until their boxes are small. The least value over all pairs
+`lower_bounds` falls with neither, so its value at both bounds every motion between the boxes. Pairs
+of cells of least bound are halved until their boxes are small. The least value over all pairs
 bounds the self-motion.
 
 From given joint positions, the pairs of least bound then get the copper loss of holding
@@ -93,9 +93,9 @@ def self_motion_bound(
 
     Args:
         prepared: problem of the motions.
-        candidates: pairs of end configurations, of which those with a sampled end count.
+        candidates: pairs of end configurations; only pairs with a sampled end count.
         deadline: instant at which the search ends with the bound it has.
-        enough: sufficient bound [J]; the copper loss of holding is added only to bounds far below
+        enough: sufficient bound [J]. The copper loss of holding is added only to bounds far below
             it, unless the problem asks for a tight bound.
     """
     pairs = [
@@ -121,7 +121,7 @@ def bound_between_curves(
     deadline: Deadline = NEVER,
     enough: float = np.inf,
 ) -> float:
-    """Lower bound on motions between curves of which at least one is no isolated configuration [J].
+    """Lower bound on motions between curves, one of them more than an isolated configuration [J].
 
     The arguments are those of `self_motion_bound`.
     """
@@ -142,7 +142,7 @@ class _Pairs(Bounded):
 
 
 class _CellPairs(Subdivision[_Pairs]):
-    """Pairs of cells of which at least one belongs to a self-motion."""
+    """Pairs of cells with at least one cell of a self-motion."""
 
     def __init__(self, prepared: PreparedProblem, start: EndCurves, goal: EndCurves) -> None:
         self.prepared, self.start, self.goal = prepared, start, goal
@@ -161,7 +161,7 @@ class _CellPairs(Subdivision[_Pairs]):
         return self.bounded(starts[s[extended]], goals[g[extended]])
 
     def chosen(self, parts: _Pairs, number: int) -> Indices:
-        """Pairs of least bound that are wide enough; none if the first is not, or is tight."""
+        """Pairs of least bound with a wide cell; none if the first pair is narrow or tight."""
         wide = np.maximum(parts.start.half, parts.goal.half) >= CELLS.smallest_half_width
         due = np.ones(len(wide), dtype=bool)
         if np.isfinite(self.least_member):
@@ -214,9 +214,10 @@ class _CellPairs(Subdivision[_Pairs]):
 def _with_holding(search: _CellPairs, pairs: _Pairs, deadline: Deadline, enough: float) -> float:
     """Least bound [J] of pairs of cells after pairs of least bound got the copper loss of holding.
 
-    In each round, pairs near the least bound get the loss, and pairs that have it are halved. If
-    the lowest pair has it and cannot be halved, its multipliers were chosen for the pair that was
-    lowest before: pairs near it then get the loss with multipliers of the lowest pair.
+    In each round, pairs near the least bound get the loss, and pairs with the loss are halved. If
+    the lowest pair has the loss and cannot be halved, its multipliers were chosen for the pair that
+    was lowest before. Then pairs near it get the loss again, with multipliers chosen for the lowest
+    pair.
     """
     cells = HoldingCells.of(search.prepared) if search.start.given else None
     if cells is None:
@@ -256,7 +257,7 @@ def _with_holding(search: _CellPairs, pairs: _Pairs, deadline: Deadline, enough:
 
 
 def _raised(search: _CellPairs, cells: HoldingCells, pairs: _Pairs) -> _Pairs:
-    """The pairs, those from cells without extent raised by the copper loss of holding."""
+    """The pairs, raised by the copper loss of holding if the start has no extent."""
     possible = np.flatnonzero(
         np.isfinite(pairs.value)
         & (pairs.start.half == 0)

@@ -1,8 +1,8 @@
 """Best-first subdivision of boxes, the driver of the branch-and-bound searches for lower bounds.
 
-Boxes cover a set, for instance all joint positions that reach a pose, and each has a lower bound on
-the motions that it stands for. The boxes of least bound are split again and again. The least bound
-of all boxes bounds the whole set at any time, and it never falls.
+Boxes cover a set, for instance all joint positions that reach a pose. Each box has a lower bound on
+its motions. The boxes of least bound are split again and again. The least bound of all boxes bounds
+the whole set at any time, and it never falls.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ DEFAULT_LIMITS = SearchLimits()
 
 @dataclass(frozen=True)
 class Rows:
-    """Base of dataclasses whose fields are arrays (n, …), or tables, with rows in common."""
+    """Base of dataclasses of arrays (n, …), or of tables, with rows in common."""
 
     def __getitem__(self, chosen: Indices | slice) -> Self:
         return type(self)(*(getattr(self, field.name)[chosen] for field in fields(self)))
@@ -104,7 +104,7 @@ class Bounded(Rows):
 
 @dataclass(frozen=True)
 class Boxes(Bounded):
-    """Boxes of joint positions, or tuples of such boxes."""
+    """Boxes of joint positions, or tuples of boxes."""
 
     centre: Array
     """Middles, shape (n, …, nq) [rad]."""
@@ -133,7 +133,7 @@ class Subdivision(ABC, Generic[B]):
 
     @abstractmethod
     def divided(self, parts: B, rows: Indices) -> B:
-        """Smaller parts that cover the parts of these rows, with bounds no lower than theirs."""
+        """Parts of the given rows, with bounds no lower than those of the rows."""
 
     def run(self, limits: SearchLimits) -> B:
         """Parts that cover the set after best-first subdivision within limits."""

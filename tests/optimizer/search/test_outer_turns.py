@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath.optimizer.kinematics.end_configuration import FULL_TURN
 from joulepath.optimizer.result.candidates import CandidateStatus
-from joulepath.optimizer.search.candidates import FULL_TURN, Candidate, Reason
+from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.outer_turns import (
     FAMILIES,
