@@ -149,8 +149,7 @@ def print_summary(results: dict[str, Any]) -> None:
     """Prints the statistics of a run."""
     print(
         f"tasks                       {results['count']} of {results['draws']} draws; straight "
-        "line in collision in "
-        f"{results['blocked']}"
+        f"line in collision in {results['blocked']}"
     )
     print(f"obstacles                   {results['obstacles'].formatted('', 0)}")
     for kind in KINDS:

@@ -135,8 +135,7 @@ def compare(seed: int, count: int, json: Path | None) -> int:
         rows.append(row)
         print(
             f"{index:4d} {kind:10s} {energy:9.2f} J, {answer.duration:7.3f} s, excess "
-            f"{row['excess']:7.3%} ({best}), "
-            f"{spent:.2f} s",
+            f"{row['excess']:7.3%} ({best}), {spent:.2f} s",
             flush=True,
         )
     for kind in SLOW_KINDS:

@@ -21,27 +21,25 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from joulepath.app.exceptions.access import Role
 
 _NAME_LENGTH = 64
-"""Of a name, at most: the database keeps it as the owner of what the client created."""
+"""Longest name of a key; the database stores it as owner."""
 _HEAD = (
     "# API keys of joulepath, written by `joulepath keys`. Only hashes: no key can be read "
     "from this file.\n"
 )
 _PREFIX = "joulepath_"
-"""Of every key, so that scanners of source code find one that was committed."""
+"""Prefix of every key, so that scanners of source code find committed keys."""
 _SECRET_BYTES = 32
-"""Random bytes of a key: too many to try, so that a fast hash without salt protects it."""
+"""Random bytes of a key: too many for a search, so that a fast hash without salt suffices."""
 _ID_LENGTH = 8
 _PRIVATE = 0o600
 
 
 class WrongKeyFile(Exception):
-    """The file of API keys cannot be read; the message says why, and what to do."""
+    """The file of API keys is invalid; the message says why, and what to do."""
 
 
 class ApiKey(BaseModel):
-    """One key. Several keys may have one name: they are the same client, so that a key can be
-    replaced at leisure.
-    """
+    """One key. Keys with the same name belong to the same client, so that keys can be rotated."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -65,7 +63,7 @@ def hash_of(secret: str) -> str:
 
 
 def new_key(name: str, role: Role) -> tuple[str, ApiKey]:
-    """A new random key, and its entry. Raises ValidationError for a name that is none."""
+    """A new random key and its entry. Raises ValidationError for an invalid name."""
     secret = _PREFIX + secrets.token_urlsafe(_SECRET_BYTES)
     entry = ApiKey(
         name=name,
@@ -116,7 +114,7 @@ def changing(file: Path) -> Iterator[list[ApiKey]]:
 
 
 def _replace(file: Path, entries: Sequence[ApiKey]) -> None:
-    """A service that reads meanwhile sees the old file or the new one, never a part."""
+    """Replaces the file atomically for services reading it."""
     text = _HEAD + yaml.safe_dump(_ENTRIES.dump_python(list(entries)), sort_keys=False)
     with NamedTemporaryFile(
         "w", encoding="utf-8", dir=file.parent, prefix=f".{file.name}.", delete=False

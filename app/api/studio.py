@@ -81,8 +81,7 @@ def _policy() -> str:
     )
     return (
         f"default-src 'none'; script-src 'self' {digests}; style-src 'self'; img-src 'self' data: "
-        "blob:; "
-        "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+        "blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     )
 
 

@@ -1,4 +1,4 @@
-"""Exit codes of `joulepath`. Its `--help` explains them."""
+"""Exit codes of `joulepath`, see `joulepath --help`."""
 
 from __future__ import annotations
 

@@ -22,19 +22,19 @@ logger = logging.getLogger(__name__)
 LOOK = 0.5
 """Time [s] between two looks at the machines, and between two attempts to reach the scheduler."""
 TOGETHER = 0.25
-"""Work [s] that becomes one task of Dask."""
+"""Work [s] combined into one task of Dask."""
 PER_PROCESS = 2
-"""Tasks of Dask for each process of a machine: while one is computed, the next one is there."""
+"""Tasks of Dask per process of a machine: the next one is ready when one ends."""
 _PATIENCE = 5.0
-"""Time [s] in which the scheduler must answer."""
+"""Longest time [s] until the scheduler's answer."""
 
 
 class _Unsuitable(Exception):
-    """The scheduler cannot pass on what is sent to the machines; the message says why."""
+    """The scheduler cannot pass on tasks; the message says why."""
 
 
 class Cluster:
-    """A Dask cluster whose scheduler listens at `address`."""
+    """A Dask cluster with a scheduler at `address`."""
 
     def __init__(self, address: str) -> None:
         self.address = address
@@ -48,14 +48,14 @@ class Cluster:
 
     @property
     def workers(self) -> dict[str, int]:
-        """Worker processes of each machine, by its address. Raises ClusterUnavailable."""
+        """Worker processes of the machines by address. Raises ClusterUnavailable."""
         if self._client is None:
             raise ClusterUnavailable
         return self._workers
 
     @property
     def slots(self) -> int:
-        """Runs that keep all machines at work; 0 if the scheduler cannot be reached."""
+        """Number of runs for full use of all machines; 0 without a scheduler."""
         return 0 if self._client is None else PER_PROCESS * sum(self._workers.values())
 
     def start(self) -> None:
@@ -69,11 +69,10 @@ class Cluster:
             await asyncio.gather(self._keeper, *self._releasing, return_exceptions=True)
 
     async def run(self, take: Take) -> None:
-        """Runs works on some machine, one after another: several short ones as one task of Dask,
-        which costs more than each of them.
+        """Runs works on a machine one after another, several short ones as one task of Dask.
 
-        Each ends with what it raises if it fails, DeadlineExceeded, or WorkerLost. If cancelled,
-        the work is stopped. Raises ClusterUnavailable.
+        A work ends with its result, its error, DeadlineExceeded, or WorkerLost. If cancelled, the
+        work is stopped. Raises ClusterUnavailable.
         """
         works, expected = list[Work](), 0.0
         while expected < TOGETHER and (work := take()) is not None:
@@ -91,7 +90,7 @@ class Cluster:
         key = f"joulepath-{uuid.uuid4().hex}"
         asked = [(work.task, work.deadline, work.tell is not nobody) for work in works]
         self._works[key] = works
-        # short ones share a process with others, which are at the machine when it has ended these
+        # Short works share a process, so that the next ones are ready at the machine.
         is_long = len(works) == 1 and expected >= TOGETHER
         use = {resource(): 1.0 if is_long else 1.0 / PER_PROCESS}
         future = client.submit(
@@ -118,7 +117,7 @@ class Cluster:
             work.ended(each)
 
     def _release(self, future: Future[Any]) -> None:
-        """Has the cluster forget a task: nobody waits for it any more."""
+        """Releases an unwanted task of the cluster."""
         if future.done():
             future.release()
             return
@@ -160,10 +159,7 @@ class Cluster:
             await asyncio.sleep(LOOK)
 
     async def _check(self, client: Client) -> None:
-        """Raises _Unsuitable unless the scheduler has this version of this package.
-
-        It reads tasks before it passes them on.
-        """
+        """Raises _Unsuitable unless the scheduler, which unpickles tasks, has this version."""
         try:
             async with asyncio.timeout(_PATIENCE):
                 found = await client.run_on_scheduler(version)
@@ -177,8 +173,7 @@ class Cluster:
         if found != version():
             raise _Unsuitable(
                 "the scheduler has another version of this package: install the same one on all "
-                "machines "
-                f"(there {found}, here {version()})"
+                f"machines (there {found}, here {version()})"
             )
 
     async def _watch(self, client: Client) -> None:
@@ -208,7 +203,7 @@ class Cluster:
         raise OSError("the connection was lost")
 
     def _tell_others(self, others: set[str]) -> None:
-        """Says once of each machine of another version why it gets nothing to do."""
+        """Logs once why a machine with another version gets no work."""
         if new := others - self._others:
             logger.warning(
                 "machines of another version get no work: install the same one there",
@@ -217,7 +212,7 @@ class Cluster:
         self._others = others
 
     def _heard(self, event: tuple[float, dict[str, Any]]) -> None:
-        """Something that a task has found."""
+        """Handles an event of a task."""
         _, message = event
         works = self._works.get(message["key"])
         if works is not None:

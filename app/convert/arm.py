@@ -20,7 +20,7 @@ from joulepath.optimizer.problem.tool_cone import ToolCone
 
 
 def robot_named(name: str) -> Robot:
-    """The robot with this name: one that comes with the library, or the own robot of this request.
+    """The bundled robot of this name, or the own robot of this request.
 
     Raises UnknownRobot or InvalidProblem.
     """
@@ -85,9 +85,7 @@ def to_payload(payload: asked.Payload | None) -> Payload:
 
 
 def to_limits(limits: asked.MoveLimits, robot: Robot) -> Limits:
-    """The limits of the library: those of the robot, with the given ones in their place. Raises
-    InvalidProblem.
-    """
+    """The robot's limits, updated by the request. Raises InvalidProblem."""
     tighter = {
         name: _per_joint(f"limits.{public}", getattr(limits, public), robot.nq)
         for public, name in LIMIT_NAMES.items()

@@ -1,6 +1,4 @@
-"""From an answer that comes back in a request to the program of its motions: for exports and
-replays.
-"""
+"""The program of motions of an answer in a request, for exports and replays."""
 
 from __future__ import annotations
 
@@ -104,9 +102,9 @@ _MOTION = (
 def to_program(
     answer: dict[str, Any], arm: ArmRequest | None, kept: Callable[[list[str]], list[Any]]
 ) -> Program:
-    """The motion of an answer at full speed, its samples checked.
+    """The motion of an answer at full speed, with validated samples.
 
-    `kept` gives the kept answers of paths: those of the moves of a cycle. Raises ValidationError
+    `kept` returns the kept answers of paths, such as the moves of a cycle. Raises ValidationError
     (of pydantic), InvalidRequest, InvalidProblem, NotCertified or UnknownRobot.
     """
     if "legs" in answer:

@@ -24,7 +24,7 @@ from joulepath.optimizer.problem.tool_path import ToolPath
 
 
 def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
-    """The problem of a request, of whose time `deadline` [s] is left.
+    """The problem of a request with a remaining time of `deadline` [s].
 
     Raises UnknownRobot, InvalidProblem, OutsideLimits or DeadlineExceeded.
     """

@@ -1,4 +1,4 @@
-"""From shapes and scenes in a request to those of the library."""
+"""Conversion of shapes and scenes of requests."""
 
 from __future__ import annotations
 

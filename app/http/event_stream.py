@@ -1,6 +1,4 @@
-"""Answers one request by server-sent events: what its work tells while it runs, and at the end what
-it answers.
-"""
+"""Answers by server-sent events: events of the work, and finally its answer."""
 
 from __future__ import annotations
 
@@ -32,19 +30,18 @@ EVENT_SCHEMA = {
 """One event, in the OpenAPI document."""
 Work = Callable[[Tell], Coroutine[Any, Any, TaskResult]]
 _PAUSE = 15.0
-"""Time [s] without an event after which a comment tells proxies that the stream lives."""
+"""Time [s] without an event after which a comment keeps the stream alive in proxies."""
 _MOST_WAITING = 1000
-"""Events that wait for a client who does not read them; then the oldest are left out."""
+"""Most unread events of a client; the oldest ones are dropped beyond it."""
 EVENT_STREAM_HEADERS = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
 _COMMENT = b": working\n\n"
 
 
 class EventStream(StreamingResponse):
-    """The events of `work`, which gets whom to tell, then `answer` with its result or `problem`
-    with its error.
+    """The events of `work`, then `answer` with its result or `problem` with its error.
 
-    The stream begins with the first event. Work that fails before raises here, so that its problem
-    is answered as to any request. If the client closes the connection, the work is cancelled.
+    The stream begins with the first event. An earlier error is raised here and answered as an
+    ordinary problem. If the client closes the connection, the work is cancelled.
     """
 
     def __init__(self, request: Request, work: Work) -> None:
@@ -53,7 +50,7 @@ class EventStream(StreamingResponse):
         self._begun = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Sends the events. Raises ClientDisconnected, and what the work raises before the first
+        """Sends the events. Raises ClientDisconnected, and errors of the work before the first
         event.
         """
         await unless_disconnected(self._request, self._answer(send))
@@ -66,7 +63,7 @@ class EventStream(StreamingResponse):
             waiting.append(event)
             bell.set()
 
-        # a request that gave its worker back begins again: its client need not know
+        # A preempted request starts again: its client need not know.
         working = asyncio.create_task(self._work(forward(told)))
         working.add_done_callback(lambda _: bell.set())
         try:

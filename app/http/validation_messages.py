@@ -1,7 +1,7 @@
-"""What a client is told of an error of pydantic: where it is, and what to do.
+"""Messages of validation errors: location and remedy.
 
-A location keeps only names that the contract knows, or that are plain; pydantic's `input` is left
-out. Both may repeat what the client sent.
+Locations contain only known or plain names, and pydantic's `input` is left out: both could repeat
+arbitrary data of the client.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _MESSAGES = {
     "int_parsing": "Give a whole number",
     "float_parsing": "Give a number",
 }
-"""In place of pydantic's messages, which name Python's types."""
+"""Messages replacing those of pydantic, which name Python types."""
 _PATTERNS = {
     BASE64: "Give base64 in the standard alphabet, without line breaks and blanks",
     NO_CONTROLS: "Leave out line breaks, tabs and other control characters",
@@ -45,7 +45,7 @@ _PATTERNS = {
 
 
 def told(error: Mapping[str, Any], where: tuple[str, ...]) -> Iterator[FieldError]:
-    """What is told of one error of pydantic: one entry, or one for each unknown field."""
+    """Entries for one error of pydantic: one, or one per unknown field."""
     loc: list[str | int] = [*where]
     for part in error["loc"]:
         keyed = (
@@ -84,7 +84,7 @@ def _message(error: Mapping[str, Any]) -> str:
 
 @cache
 def _keyed_fields() -> set[str]:
-    """Fields whose value is an object with names of the caller's."""
+    """Fields with an object whose keys are names chosen by the caller."""
     return {
         name
         for model in _models(RequestModel)

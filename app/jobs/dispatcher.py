@@ -1,6 +1,4 @@
-"""The dispatcher: leases requests of jobs from the database, has them run, and stores their
-outcomes.
-"""
+"""The dispatcher: it leases requests of jobs, has them run, and stores their outcomes."""
 
 from __future__ import annotations
 
@@ -30,29 +28,23 @@ from joulepath.app.store.tables import now as present_time
 logger = logging.getLogger(__name__)
 
 LEASE = timedelta(seconds=30)
-"""Time for which a request is leased; leases are renewed after a third of it."""
+"""Length of a lease; leases are renewed after a third of it."""
 LOOK = 0.5
-"""Time [s] between two looks into the database: for new requests, and for those that were cancelled
-elsewhere.
-"""
+"""Time [s] between two queries of the database for new requests and cancelled ones."""
 AHEAD = 0.25
-"""Work [s] for each worker that is leased ahead of time, so that small requests share the cost of a
-transaction.
-"""
+"""Work [s] leased ahead per worker, so that small requests share the cost of a transaction."""
 MOST_AHEAD = 32
-"""Requests for each worker that are leased ahead of time at most."""
+"""Most requests leased ahead per worker."""
 GATHER = 0.05
-"""Time [s] in which outcomes are gathered, to be stored together, while the workers have more to
-do.
-"""
+"""Time [s] in which outcomes are collected for one transaction while workers have more to do."""
 MOST_EQUAL = 500
-"""Requests that are leased beyond that, because they wait for equal ones."""
+"""Most requests leased beyond MOST_AHEAD while they wait for equal requests."""
 MOST_KNOWN = 64
-"""The same, because those before them were all known."""
+"""Most requests leased beyond MOST_AHEAD if all earlier ones had known answers."""
 PRUNING = timedelta(hours=1)
 """Time between two deletions of old jobs."""
 _STOP = 3.0
-"""Longest time [s] that the last exchange with the database may take when the service stops."""
+"""Longest time [s] of the last exchange with the database when the service stops."""
 _LONGEST_PAUSE = 30.0
 """Longest time [s] until an unreachable database is tried again."""
 
@@ -68,10 +60,10 @@ class _Times:
 
 
 class Dispatcher:
-    """Works on jobs with as many requests at a time as its executor has slots.
+    """Works on as many requests of jobs at a time as its executor has slots.
 
-    It leases some requests ahead of time, so that no worker waits for the database. Its loop alone
-    reads and writes the queue. `now` is the clock of the leases.
+    Some requests are leased ahead, so that no worker waits for the database. Only its loop reads
+    and writes the queue. `now` is the clock of the leases.
     """
 
     def __init__(
@@ -107,7 +99,7 @@ class Dispatcher:
         self._tasks = [asyncio.create_task(self._dispatch())]
 
     def drain(self) -> None:
-        """Stops all work. What was begun waits again."""
+        """Stops all work; running requests wait again."""
         self._draining = True
         for held in self._held.values():
             held.drop()
@@ -118,7 +110,7 @@ class Dispatcher:
         """Gives all leases back and ends."""
         self.drain()
         if self._tasks:
-            # what it has just leased is given back, too
+            # Requests leased just now are returned as well.
             await asyncio.wait(self._tasks[:1], timeout=_STOP)
         for task in self._tasks:
             task.cancel()
@@ -173,9 +165,7 @@ class Dispatcher:
         self._has_outcome(held, outcome)
 
     def _give_back(self, held: Held) -> None:
-        """A request that nobody wants here waits again, unless its job was cancelled: `settle`
-        knows.
-        """
+        """Returns an unwanted request to the queue, unless `settle` knows its job as cancelled."""
         self._has_outcome(held, Outcome(held.lease, "waiting"))
 
     def _has_outcome(self, held: Held, outcome: Outcome) -> None:
@@ -217,7 +207,7 @@ class Dispatcher:
         await self._store_outcomes()
         await self._watch()
         await self._report()
-        # one of them dispatches; those beyond the slots find nothing to do
+        # One task dispatches; tasks beyond the slots find nothing to do.
         more = self._executor.slots + 1 - len(self._tasks)
         self._tasks += [asyncio.create_task(self._run()) for _ in range(more)]
         await self._begin(self._equals.released())
@@ -245,7 +235,7 @@ class Dispatcher:
                 self._more_known = min(max(1, 2 * self._more_known), MOST_KNOWN)
 
     async def _begin(self, held: list[Held]) -> int:
-        """Has requests computed that are equal to no others; returns their number."""
+        """Starts requests without equal ones, and returns their number."""
         wanted = [each for each in held if not each.dropped]
         for each in held:
             if each.dropped:
@@ -263,7 +253,7 @@ class Dispatcher:
 
     @property
     def _most_held(self) -> int:
-        """Requests that it may have leased: one for each worker, and some ahead."""
+        """Most leased requests: one per worker, and some ahead."""
         ahead = max(1, round(AHEAD / max(self._mean_work, AHEAD / MOST_AHEAD)))
         return self._executor.slots * (1 + ahead)
 
@@ -281,13 +271,13 @@ class Dispatcher:
             self._outcomes = outcomes + self._outcomes
             raise
         except Exception:
-            # nobody waits for these answers for ever
+            # Clients must not wait forever for these answers.
             self._outcomes = [defect(each.lease) for each in outcomes] + self._outcomes
             raise
         self.changes.ring(changed)
 
     async def _watch(self) -> None:
-        """Renews leases, stops what was cancelled elsewhere, and deletes old jobs."""
+        """Renews leases, stops cancelled requests, and deletes old jobs."""
         now, clock = self._now(), self._clock()
         if self._held and now - self._times.renewed >= LEASE / 3:
             await self._store.write(partial(leases.renew, holder=self.holder, until=now + LEASE))
@@ -305,7 +295,7 @@ class Dispatcher:
             self._times.pruned = now
 
     async def _report(self) -> None:
-        """Records progress within requests, where there is some."""
+        """Records progress within requests."""
         fresh = {held.lease.key: held.found for held in self._held.values() if held.found.is_news}
         if fresh and self._clock() - self._times.reported >= LOOK:
             self._times.reported = self._clock()

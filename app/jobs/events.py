@@ -17,11 +17,11 @@ from joulepath.app.store.store import Store
 
 _BATCH = 500
 LOOK = 1.0
-"""Time [s] after which events of other services are looked for."""
+"""Time [s] between two queries for events of other services."""
 GATHER = 0.2
-"""Least time [s] between two reads for one reader: what happens within it is sent together."""
+"""Least time [s] between two reads for one reader; events in between are sent together."""
 QUIET = 15.0
-"""Time [s] without an event after which a comment tells proxies that the stream lives."""
+"""Time [s] without an event after which a comment keeps the stream alive in proxies."""
 _COMMENT = b": working\n\n"
 
 
@@ -38,17 +38,16 @@ class _Batch:
 async def events_after(
     store: Store, dispatcher: Dispatcher, job_id: str, number: int
 ) -> AsyncIterator[bytes]:
-    """The events after that of `number`, until the end of the job or of the service, in the form of
-    server-sent events.
+    """Server-sent events after `number`, until the end of the job or of the service.
 
-    Readers of one job that are equally far share what is read and written for them.
+    Readers at the same position of one job share the reads and the encoded events.
     """
     changes = dispatcher.changes
     bell = changes.listen(job_id)
     quiet = 0.0
     try:
         while True:
-            # what happened before the service stops is still told
+            # Events before the stop of the service are still sent.
             is_last = dispatcher.draining
             read = partial(_batch, job_id=job_id, number=number)
             batch = await changes.shared((job_id, number), partial(store.read, read))
@@ -61,7 +60,7 @@ async def events_after(
                 yield _COMMENT
             if batch.over or is_last:
                 return
-            # a batch that is not full has all that there is
+            # An incomplete batch is the last one.
             if batch.count < _BATCH:
                 await asyncio.sleep(GATHER)
                 quiet += GATHER

@@ -28,18 +28,18 @@ from joulepath.optimizer.exceptions import DeclaredError
 logger = logging.getLogger(__name__)
 
 MOST_DEATHS = 3
-"""Workers that may die of a request."""
+"""Dead workers after which a request fails."""
 MOST_PREEMPTIONS = 2
-"""Times that a caller may take the worker of a request; then it is left to end."""
+"""Preemptions of a request, after which it may run to its end."""
 
 
 def task_of(lease: Lease, motions: Mapping[str, bytes]) -> JobRequestTask:
-    """The task of a lease; `motions` are known ones of the cell of a cycle."""
+    """The task of a lease; `motions` are known motions of the cell of a cycle."""
     return JobRequestTask(lease.kind, lease.body, request_id_of(lease), motions=motions)
 
 
 def outcome_of(lease: Lease, ended: Ended, began: float) -> Outcome:
-    """The outcome of work that began at a time [s] by `perf_counter` and ended like this."""
+    """The outcome of work started at `began` [s] by `perf_counter`."""
     if not isinstance(ended, Exception):
         return _done(lease, ended)
     if isinstance(ended, Preempted):
@@ -73,7 +73,7 @@ def _done(lease: Lease, result: TaskResult) -> Outcome:
 
 
 def defect(lease: Lease) -> Outcome:
-    """The outcome of a request that a defect of the service ends; the log has it."""
+    """The outcome of a request ended by a logged defect of the service."""
     return Outcome(lease, "failed", problem=_content(InternalError(), request_id_of(lease)))
 
 
@@ -89,6 +89,6 @@ def _failed(lease: Lease, error: Exception, began: float) -> Outcome:
 
 
 def _content(error: Exception, request_id: str) -> dict[str, Any]:
-    # as it is sent: without arrays, and null for what is not finite
+    # as sent: without arrays, and null for non-finite numbers
     content: dict[str, Any] = orjson.loads(json_document(problem_of(error, request_id)))
     return content

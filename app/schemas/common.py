@@ -117,8 +117,7 @@ class Answer(Response):
     )
     id: str | None = described(
         "Id of this answer: `GET /answers/{id}` returns it again, and exports and replays take it. "
-        "Null if it is not "
-        "kept.",
+        "Null if it is not kept.",
         None,
         ANSWER_ID,
     )
@@ -130,8 +129,7 @@ class MotionAnswer(Answer):
 
     arm: dict[str, Any] | None = described(
         "What the request says of the arm beside its robot: payload, limits, scene, ... as it was "
-        "sent. Null if that "
-        "is larger than 64 KiB of JSON.",
+        "sent. Null if that is larger than 64 KiB of JSON.",
         None,
         {"payload": {"mass": 2.0, "com": [0.0, 0.0, 0.05]}},
     )
@@ -284,11 +282,9 @@ def frame_of(what: str) -> Any:
     """The field `frame` of what is given in one of the two frames at the robot's base."""
     return described(
         f"Frame of {what}. `base`: the robot's base frame, as on the teach pendant and in every "
-        "answer. `base_link`: "
-        "the frame of this name in ROS. For Universal Robots it is `base` after half a turn about "
-        "z, so x and y have "
-        "the opposite sign. For a robot whose figures have no `base_link_origin`, the two are the "
-        "same.",
+        "answer. `base_link`: the frame of this name in ROS. For Universal Robots it is `base` "
+        "after half a turn about z, so x and y have the opposite sign. For a robot whose figures "
+        "have no `base_link_origin`, the two are the same.",
         None,
         "base",
         default="base",

@@ -65,8 +65,7 @@ class LogFile(Request):
     current_units: Literal["A", "mA"] = described("Unit of currents.", None, "A", default="A")
     effort: Literal["auto", "current", "torque", "external"] = described(
         "What the efforts are: motor currents, motor torques at the joints, or torques from "
-        "outside, without gravity. "
-        "`auto` finds it out.",
+        "outside, without gravity. `auto` finds it out.",
         None,
         "auto",
         default="auto",

@@ -106,8 +106,7 @@ class Points(_Shape):
     )
     radius: Size = described(
         "Radius of the ball about each point: at least half of the distance between neighbours, so "
-        "that nothing passes "
-        "between them.",
+        "that nothing passes between them.",
         "m",
         0.015,
     )
@@ -124,8 +123,8 @@ class VoxelBits(Request):
     data: Annotated[str, Field(min_length=4, max_length=MOST_BITS_TEXT, pattern=BASE64)] = (
         described(
             "Base64 of the bits, eight to a byte, the lowest bit first; 1: occupied. Cell (i, j, "
-            "k) is bit "
-            "i + dimensions[0] · (j + dimensions[1] · k). The last byte is filled with zeros.",
+            "k) is bit i + dimensions[0] · (j + dimensions[1] · k). The last byte is filled with "
+            "zeros.",
             None,
             "AwE=",
         )
@@ -152,8 +151,7 @@ class Voxels(_Shape):
         | None
     ) = described(
         "Occupied cells [i, j, k]: each is the cube from (i, j, k) · size to (i + 1, j + 1, k + 1) "
-        "· size. Give either "
-        "`cells` or `bits`.",
+        "· size. Give either `cells` or `bits`.",
         None,
         [[0, 0, 0], [1, 0, 0], [1, 0, 1]],
         default=None,
@@ -192,8 +190,8 @@ class _Obstacle(Request):
         str, Field(min_length=1, max_length=LONGEST_NAME, pattern=NO_CONTROLS), PLAIN
     ] = described(
         "Name of the obstacle in answers. Each name is used once, and none is a link's, `tool` or "
-        "`payload`; names "
-        "that differ only in case or spaces count as the same. Every character must show.",
+        "`payload`; names that differ only in case or spaces count as the same. Every character "
+        "must show.",
         None,
         "table",
     )
@@ -280,8 +278,7 @@ def touched_links(body: str) -> Any:
     """The field `touches` of a body that is fixed to the flange."""
     return described(
         f"Names of the links that the {body} touches by design: their distance from it is not "
-        "checked. Null: the link "
-        "that carries the flange (`wrist_3`). An empty list: none.",
+        "checked. Null: the link that carries the flange (`wrist_3`). An empty list: none.",
         None,
         ["wrist_3"],
         default=None,

@@ -110,15 +110,13 @@ class Iteration(Response):
     duration: float = described("Duration of the motion.", "s", 1.33)
     change_from_last: float | None = described(
         "Energy minus the energy of the previous iteration; a negative value is a saving. Null for "
-        "the first "
-        "iteration.",
+        "the first iteration.",
         "J",
         -38.6,
     )
     change_from_best: float | None = described(
         "Energy minus the least energy of all previous iterations; negative if this iteration is "
-        "the best so far. Null "
-        "for the first iteration.",
+        "the best so far. Null for the first iteration.",
         "J",
         -4.1,
     )

@@ -1,5 +1,4 @@
-"""When stored answers are to be pruned: not with every new one, since that reads the sizes of
-all."""
+"""Scheduling of the pruning of answers, which reads the sizes of all answers."""
 
 from __future__ import annotations
 
@@ -7,13 +6,13 @@ import threading
 from collections.abc import Callable
 
 _PARTS = 64
-"""Pruning leaves one part of this many free, and comes again when that much was added."""
+"""Reciprocal of the share freed by a pruning; the next one follows after this much was added."""
 _LONGEST = 3600.0
 """Longest time [s] between two prunings: answers also grow old."""
 
 
 class Pruning:
-    """Counts what is added since the last pruning; `clock` [s]. Safe for use by several threads."""
+    """Counts the bytes added since the last pruning; `clock` [s]. It is thread-safe."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
@@ -22,9 +21,7 @@ class Pruning:
         self._next: float | None = None
 
     def due(self, added: int, most: int) -> bool:
-        """Whether to prune now that `added` bytes more are stored, of at most `most`. It is then
-        counted as done.
-        """
+        """Whether to prune after `added` more bytes, of at most `most`; counts as done if true."""
         with self._lock:
             self._added += added
             if (
@@ -37,11 +34,11 @@ class Pruning:
             return True
 
     def failed(self) -> None:
-        """The pruning that was due was not done: the next one is due at once."""
+        """Makes the next pruning due at once, after a failure."""
         with self._lock:
             self._next = None
 
     @staticmethod
     def target(most: int) -> int:
-        """What a pruning leaves [byte], so that the total stays below `most` until the next one."""
+        """Total after a pruning [byte], so that it stays below `most` until the next one."""
         return most - most // _PARTS

@@ -41,11 +41,9 @@ connections than this.
 """
 _UNAVAILABLE = (DBAPIError, PoolTimeout, OSError, CommandError)
 _LONG = 0.5
-"""Time [s] above which a failure was a wait for a lock or a server."""
+"""Time [s] above which a failure is a time-out of a lock or server."""
 _PAUSE = 1.0
-"""Time [s] after such a failure in which all work fails at once, so that a client waits for one
-time-out at most.
-"""
+"""Time [s] after a time-out in which all work fails at once, so that clients wait only once."""
 _CHECK_PERIOD = 2.0
 """Time [s] between two checks of the database."""
 
@@ -67,8 +65,7 @@ class Store:
         self._checking: asyncio.Task[None] | None = None
         self._told: StoreFault | None = None
         self.fault: StoreFault | None = None
-        """What is wrong with the database, as far as known; None if it was last read and
-        written."""
+        """The known fault of the database; None after successful access."""
 
     async def open(self) -> None:
         """Tries to reach the database, and checks it from then on. If a check fails, logs an error
@@ -89,13 +86,12 @@ class Store:
         try:
             await asyncio.get_running_loop().run_in_executor(self._threads, self._check)
         except StoreUnavailable as error:
-            # `fault` may be known from other work, of which the operator was told nothing
+            # `fault` may stem from other work, without a message to the operator.
             if self._told != error.cause:
                 self._told = error.cause
                 logger.error(
                     "the database cannot be used: requests that need studies or stored answers "
-                    "return 503 until it "
-                    "can; all other requests work",
+                    "return 503 until it can; all other requests work",
                     extra={"database": str(self), "cause": error.cause},
                 )
         else:
@@ -110,12 +106,10 @@ class Store:
         )
 
     async def write(self, work: Callable[[Session], T], frees: bool = False) -> T:
-        """The result of `work`, after its changes are on the disk. If `work` raises, nothing
-        changes.
+        """The result of `work`, after its changes are on the disk.
 
-        `frees`: the work deletes. On a full disk, it gets the space that is held back for deleting.
-
-        Raises StoreUnavailable.
+        If `work` raises, nothing changes. With `frees`, the work deletes data and may use the
+        reserved space on a full disk. Raises StoreUnavailable.
         """
         do = self._free if frees else self._write
         return await asyncio.get_running_loop().run_in_executor(self._threads, do, work)
@@ -137,7 +131,7 @@ class Store:
         except StoreUnavailable as error:
             if error.cause != "full" or self._file is None:
                 raise
-            # what the log takes of the disk may be all that is missing
+            # The space of the log may be sufficient.
             self._empty_log()
             result = self._do(work, True)
         self.fault = None
@@ -155,14 +149,14 @@ class Store:
                 raise
             result = self._write(work)
         with contextlib.suppress(OSError):
-            # what was deleted is of use only if the log may grow; to empty it, the file may have to
+            # Deleted space is useful only if log and file can grow.
             if released or (room(self._file) < LEAST_ROOM and self._reserve.release()):
                 self._empty_log()
                 self._reserve.fill()
         return result
 
     def _empty_log(self) -> None:
-        """Gives the space of SQLite's log back to the disk, if nobody reads from it."""
+        """Truncates the log of SQLite, unless a reader uses it."""
         with contextlib.suppress(*_UNAVAILABLE, sqlite3.Error):
             connection = self._engine.raw_connection()
             try:
@@ -193,7 +187,7 @@ class Store:
         fault = fault_of(error, self._file)
         # without the statement and its parameters: they hold data of the client
         reason = str(error.orig) if isinstance(error, DBAPIError) else str(error)
-        # once, not with every check; each request that it fails is in the log of requests
+        # Log a fault once; failed requests are in the log of requests.
         level = logging.DEBUG if fault == self.fault else logging.ERROR
         logger.log(
             level,
@@ -203,7 +197,7 @@ class Store:
         if self._clock() - began > _LONG:
             self._paused[writes] = self._clock() + _PAUSE, fault
         if fault == "deleted":
-            # new connections open the file that is there then
+            # New connections open the new file.
             self._migrated = False
             self._engine.dispose()
         self.fault = fault
@@ -232,8 +226,8 @@ class Store:
             if self._migrated:
                 return
             if self._was_open and self._file is not None and not self._file.exists():
-                # an empty database in place of one that is missing, for example with its volume,
-                # would hide the loss
+                # An empty database in place of a missing one, such as a lost volume, would hide the
+                # loss.
                 raise DatabaseMoved(f"{self._file} is gone")
             migrate(self._engine)
             self._migrated = self._was_open = True

@@ -1,4 +1,4 @@
-"""The tables, as SQLAlchemy maps them. `migrations/` creates them; a test compares the two."""
+"""The tables in SQLAlchemy. `migrations/` creates them, and a test compares both."""
 
 from __future__ import annotations
 
@@ -69,15 +69,13 @@ class Instant(TypeDecorator[datetime]):
 
 
 class Table(DeclarativeBase):
-    """Base of the tables. A column `owner` has the name of the API key that created the row; null
-    without one.
-    """
+    """Base of the tables. A column `owner` is the name of the creator's API key, or null."""
 
     metadata = MetaData(naming_convention=_NAMES)
 
 
 class Study(Table):
-    """A motion that is improved step by step until its energy is at most `threshold` [J]."""
+    """Iterative improvement of a motion until its energy is at most `threshold` [J]."""
 
     __tablename__ = "studies"
     __table_args__ = (Index(None, "created", "id"),)
@@ -95,9 +93,7 @@ class Study(Table):
 
 
 class OwnRobot(Table):
-    """A robot that a user added: its figures, as a bundled robot's file has them, and what was
-    remarked on them.
-    """
+    """An added robot: figures in the form of a bundled robot's file, and warnings."""
 
     __tablename__ = "robots"
 
@@ -109,9 +105,8 @@ class OwnRobot(Table):
 
 
 class StoredLog(Table):
-    """A log of one arm: the file as it was sent, packed with gzip, and the `settings` with which it
-    is read.
-    """
+    """A log of one arm: the file of the user, packed with gzip, and the `settings` of its
+    reader."""
 
     __tablename__ = "logs"
     __table_args__ = (Index(None, "created", "id"),)
@@ -123,16 +118,14 @@ class StoredLog(Table):
     owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
     settings: Mapped[dict[str, Any]] = mapped_column(JSON)
     report: Mapped[dict[str, Any]] = mapped_column(JSON)
-    """What was seen in it: the fields of the answer that no column has."""
+    """Fields of the report without a column of their own."""
     size: Mapped[int]
     """Size of the body [byte]."""
     body: Mapped[bytes] = mapped_column(LargeBinary)
 
 
 class Figures(Table):
-    """Figures of a robot that were identified on one arm: those that take the place of the robot's
-    own.
-    """
+    """Figures identified on one arm, replacing the robot's own."""
 
     __tablename__ = "figures"
     __table_args__ = (Index(None, "created", "id"),)
@@ -167,7 +160,7 @@ class Answer(Table):
     job_id: Mapped[str | None] = mapped_column(String(ID_LENGTH))
     """Whoever deletes a job deletes its answers."""
     robot: Mapped[str | None] = mapped_column(String(ROBOT_LENGTH))
-    """This and the next three are what lists show; null if it has none."""
+    """With the next three columns, the figures in lists; null without one."""
     energy: Mapped[float | None]
     duration: Mapped[float | None]
     status: Mapped[str | None] = mapped_column(String(16))
@@ -177,7 +170,7 @@ class Answer(Table):
 
 
 class CachedAnswer(Table):
-    """The answer to a request, whose canonical form has the hash `key`."""
+    """The answer to a request; `key` is the hash of its canonical form."""
 
     __tablename__ = "cached_answers"
     __table_args__ = (Index(None, "answer_id"),)
@@ -185,9 +178,7 @@ class CachedAnswer(Table):
     key: Mapped[str] = mapped_column(String(64), primary_key=True)
     answer_id: Mapped[str] = mapped_column(ForeignKey("answers.id", ondelete="CASCADE"))
     deadline: Mapped[float | None]
-    """Longest deadline [s] of a request that it answers; null if that does not matter, because it
-    is optimal.
-    """
+    """Longest deadline [s] of a request with this answer; null for an optimal answer."""
 
 
 class KnownMotion(Table):
@@ -199,9 +190,9 @@ class KnownMotion(Table):
     __table_args__ = (Index(None, "cell", "used"), Index(None, "used"))
 
     cell: Mapped[str] = mapped_column(String(64), primary_key=True)
-    """Hash of what a cycle says of the arm and its cell."""
+    """Hash of the arm and the cell of a cycle."""
     key: Mapped[str] = mapped_column(String(64), primary_key=True)
-    """Hash of everything that the motion hangs on."""
+    """Hash of everything on which the motion depends."""
     used: Mapped[datetime] = mapped_column(Instant)
     body: Mapped[bytes] = mapped_column(LargeBinary)
     """The spline: JSON, compressed."""
@@ -236,7 +227,7 @@ class Iteration(Table):
 
 
 class Job(Table):
-    """Requests that are computed one by one while their client does not wait.
+    """Requests computed one by one without a waiting client.
 
     `state` is `waiting`, `running`, `done` (every request has ended), `cancelling` or `cancelled`.
     """
@@ -256,22 +247,21 @@ class Job(Table):
     total: Mapped[int]
     """Number of requests."""
     ended_before: Mapped[int]
-    """Number of requests that had ended when it started, or started again."""
+    """Number of ended requests at the latest start."""
     events: Mapped[int]
     """Number of its last event."""
     progressed: Mapped[datetime | None] = mapped_column(Instant)
     """Time of its last event `progress`."""
     idempotency_key: Mapped[str | None] = mapped_column(String(KEY_LENGTH), unique=True)
     fingerprint: Mapped[str] = mapped_column(String(64))
-    """SHA-256 of what was sent."""
+    """SHA-256 of the requests."""
 
 
 class JobRequest(Table):
     """One request of a job. `state` is `waiting`, `running`, `done`, `failed` or `cancelled`."""
 
     __tablename__ = "job_requests"
-    # what waits, the lowest numbers first: a job that has just begun goes before the rest of a long
-    # one
+    # Waiting requests with low numbers first: a new job precedes the rest of a long one.
     __table_args__ = (Index(None, "state", "number", "job_id"), Index(None, "job_id", "state"))
 
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
@@ -284,10 +274,10 @@ class JobRequest(Table):
     body: Mapped[bytes] = mapped_column(LargeBinary)
     """The request: JSON, compressed."""
     meaning: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
-    """See `cache.Meaning`; null if it is to be computed whatever was computed before."""
+    """See `cache.Meaning`; null if stored answers must not be used."""
     state: Mapped[str] = mapped_column(String(16))
     attempt: Mapped[int]
-    """How often it was handed out, apart from the times that another request took its worker."""
+    """Number of leases without preemptions."""
     deaths: Mapped[int]
     """How many workers died of it."""
     preempted: Mapped[int]
@@ -301,13 +291,11 @@ class JobRequest(Table):
     answer_id: Mapped[str | None] = mapped_column(ForeignKey("answers.id"), unique=True)
     problem: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
     figures: Mapped[str | None] = mapped_column(String(ID_LENGTH))
-    """Id of the figures that an identification found, if they could be stored. They may have been
-    deleted since.
-    """
+    """Id of identified figures, if they were stored; they may have been deleted since."""
 
 
 class JobEvent(Table):
-    """Something that happened to a job, by its number in the job: 1, 2, 3, … without gaps."""
+    """An event of a job with its number 1, 2, 3, … without gaps."""
 
     __tablename__ = "job_events"
 

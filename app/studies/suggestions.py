@@ -1,7 +1,6 @@
-"""Suggestions for the next iteration: requests that differ from an iteration of the study in one
-respect each.
+"""Suggestions for the next iteration: requests with one difference from an iteration.
 
-This module makes the requests only. The optimiser computes their energies.
+This module only makes the requests. The optimiser computes their energies.
 """
 
 from __future__ import annotations
@@ -34,12 +33,12 @@ _LONGER = 1.25
 _NEARER = 0.5
 """Factor of the distance between flange and centre of mass."""
 _OTHER_BRANCHES = 2
-"""Most other branches that are suggested."""
+"""Most suggested branches."""
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """A suggestion that is not computed yet; `request` is a body of `POST /optimize`."""
+    """A suggestion without a computed energy; `request` is a body of `POST /optimize`."""
 
     step: Step
     summary: str
@@ -48,11 +47,11 @@ class Proposal:
 
 @dataclass(frozen=True)
 class Base:
-    """The iteration that the suggestions start from.
+    """The iteration behind the suggestions.
 
     `request` is a body of `POST /optimize`, `q_goal` the goal configuration of its motion [rad],
-    `duration` [s] that of the motion. `candidates` are those of its answer; empty if the motion was
-    not optimised.
+    `duration` [s] the duration of the motion. `candidates` are the candidates of its answer; empty
+    for an evaluated motion.
     """
 
     request: Fields
@@ -65,8 +64,7 @@ class Base:
 def base_of(kind: str, request: Fields, answer: Fields, objective: str) -> Base | None:
     """The base from the request and the answer of an iteration.
 
-    None if an evaluated motion has no two ends to optimise between: it passes configurations
-    between its ends, or ends where it starts.
+    None if an evaluated motion passes further configurations, or ends at its start.
     """
     if kind == "optimize":
         return Base(
@@ -84,9 +82,7 @@ def base_of(kind: str, request: Fields, answer: Fields, objective: str) -> Base 
 
 
 def proposals(base: Base) -> list[Proposal]:
-    """All suggestions for the base, in the order in which they are computed: usually those first
-    that save most.
-    """
+    """All suggestions for the base in the order of computation, usually largest savings first."""
     arm = to_arm(OptimizeRequest.model_validate(base.request))
     takes_poses = inverse_kinematics_for(arm.robot) is not None
     here, *tilted = _poses(arm, base.q_goal, [np.zeros(3), *_TILTS])
@@ -164,8 +160,7 @@ def _orientation(base: Base, here: Fields, tilted: list[Fields]) -> Iterator[Pro
     yield Proposal(
         "orientation",
         "Tilt the tool by 10 degrees at the goal, about its x or y axis, in the direction that "
-        "needs the least energy"
-        " (four directions compared).",
+        "needs the least energy (four directions compared).",
         base.request | {"goal": {"any_of": tilted}},
     )
 

@@ -1,4 +1,4 @@
-"""What `POST /cycle` takes."""
+"""Request of `POST /cycle`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ LongTime = Annotated[float, Field(gt=0, le=LONGEST_ROUND)]
 
 
 class TimeRange(DurationRange):
-    """Bounds on the duration of a cycle; each is optional."""
+    """Optional bounds on the duration of a cycle."""
 
     min: LongTime | None = described("Smallest duration. Null: no bound.", "s", 10.0, default=None)
     max: LongTime | None = described("Largest duration. Null: no bound.", "s", 12.0, default=None)
@@ -45,7 +45,7 @@ CycleTime = Annotated[
 
 
 class CycleRequest(ArmRequest):
-    """A cycle of stops. `payload` is what the arm carries to the first stop that changes it."""
+    """A cycle of stops. `payload` is carried until the first stop with another payload."""
 
     start: Target = described(
         "Where the arm rests before the first move: joint positions, a pose of the TCP, or one of "
@@ -75,9 +75,8 @@ class CycleRequest(ArmRequest):
     )
     order: Literal["given", "free"] = described(
         "`given`: the stops are visited in the order of `stops`. `free`: in the order that needs "
-        "the least energy, for "
-        f"at most {MOST_FREE_STOPS} stops. The arm then carries the same between groups of stops "
-        "as at the start.",
+        f"the least energy, for at most {MOST_FREE_STOPS} stops. The arm then carries the same "
+        "between groups of stops as at the start.",
         None,
         "given",
         default="given",
@@ -95,8 +94,7 @@ class CycleRequest(ArmRequest):
         Field(max_length=MOST_FREE_STOPS),
     ] = described(
         "With a free order: lists of stops that are visited one directly after the other, as they "
-        "are listed, like the "
-        "one where a part is taken up and the one where it is put down.",
+        "are listed, like the one where a part is taken up and the one where it is put down.",
         None,
         [["pick", "place"]],
         default=[],
@@ -110,17 +108,16 @@ class CycleRequest(ArmRequest):
     )
     time: CycleTime | None = described(
         "Duration of the cycle, dwells and waiting included, or bounds on it. Time is shared among "
-        "the moves so that "
-        "the energy is least; what is left over is waited out where that costs least. Null: the "
-        "optimiser chooses.",
+        "the moves so that the energy is least; what is left over is waited out where that costs "
+        "least. Null: the optimiser chooses.",
         "s",
         12.0,
         default=None,
     )
     objective: Objective = described(
         "`electrical`: the energy drawn by the whole cycle. `mechanical`: the work of its moves, ∫ "
-        "Σ |tau_j v_j| dt; "
-        "rests need none, and slower moves less, so it needs a `time` or a `time.max`.",
+        "Σ |tau_j v_j| dt; rests need none, and slower moves less, so it needs a `time` or a "
+        "`time.max`.",
         None,
         "electrical",
         default="electrical",
@@ -149,8 +146,7 @@ class CycleRequest(ArmRequest):
     )
     windings: bool = described(
         "Whether full-turn alternatives q + 2πk within the joint range count at every stop. If "
-        "not, each configuration "
-        "has the joint positions nearest to the middle of the joint range.",
+        "not, each configuration has the joint positions nearest to the middle of the joint range.",
         None,
         True,
         default=True,
@@ -158,8 +154,7 @@ class CycleRequest(ArmRequest):
     candidates: WhichCandidates = which_candidates()
     sample_period: float = described(
         f"Time between the samples of the answers of the moves. With more than {_MANY_STOPS} "
-        "stops, at least "
-        f"{_LEAST_PERIOD:g} s.",
+        f"stops, at least {_LEAST_PERIOD:g} s.",
         "s",
         0.008,
         default=0.008,
@@ -168,10 +163,8 @@ class CycleRequest(ArmRequest):
     )
     deadline: float = described(
         "Wall time from the arrival of the request, including the wait for a worker. When it "
-        "nears, the service "
-        f"returns the best certified cycle found so far. With more than {_MANY_STOPS} stops, the "
-        "default is "
-        f"{_LONG_DEADLINE:g} s.",
+        "nears, the service returns the best certified cycle found so far. With more than "
+        f"{_MANY_STOPS} stops, the default is {_LONG_DEADLINE:g} s.",
         "s",
         60.0,
         default=60.0,
