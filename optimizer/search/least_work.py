@@ -26,7 +26,7 @@ from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.attempts import in_time, solver_of
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.incumbent import Incumbent
-from joulepath.optimizer.search.outer_turns import FAMILIES, MEMBERS, NEAR, families_of, leave
+from joulepath.optimizer.search.outer_turns import FAMILIES, families_of, settle_waiting
 from joulepath.optimizer.search.rough_work import COARSE, Rough, RoughWork, best_of_each
 from joulepath.optimizer.search.sharpening import (
     DENSE,
@@ -108,8 +108,8 @@ def explore_least_work(incumbent: Incumbent, explore: Callable[[], object]) -> b
         each.deferred = True
     explore()
     # neither proves that they need more than the answer
-    leave(incumbent, behind, Reason.ROUGHLY)
-    leave(incumbent, left)
+    settle_waiting(incumbent, behind, Reason.ROUGHLY)
+    settle_waiting(incumbent, left)
     return True
 
 
@@ -188,10 +188,10 @@ class _LeastWork:
         for k in range(0, len(firsts), AT_ONCE):
             self._find(firsts[k : k + AT_ONCE])
         works = [self._work_of(family[0]) for family in self.families]
-        near = [
-            k for k in np.argsort(works, kind="stable").tolist() if works[k] <= NEAR * min(works)
-        ]
-        self._find([each for k in near[:FAMILIES] for each in self.families[k][1:MEMBERS]])
+        most = FAMILIES.energy_ratio * min(works)
+        near = [k for k in np.argsort(works, kind="stable").tolist() if works[k] <= most]
+        best = [self.families[k] for k in near[: FAMILIES.families]]
+        self._find([each for family in best for each in family[1 : FAMILIES.members]])
 
     def _find(self, candidates: Sequence[Candidate]) -> None:
         """Find rough motions of those candidates whose bounds do not rule them out."""

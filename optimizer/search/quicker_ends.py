@@ -1,6 +1,4 @@
-"""Ends of a candidate that are samples of a target, moved within it to where the joints need the
-least time.
-"""
+"""Sampled ends of a candidate, moved within their targets to a shorter least duration."""
 
 from __future__ import annotations
 
@@ -20,35 +18,33 @@ from joulepath.optimizer.search.sampled_ends import nearest_configuration, with_
 
 @dataclass(frozen=True)
 class QuickerEndsSettings:
-    """How long quicker ends are looked for."""
+    """Settings of the random search for ends of shorter duration."""
 
     trials: int = 120
-    """Random steps from the best ends so far: with the steps below, the last ones are some 1e-3
-    rad.
-    """
-
+    """Number of random steps from the best ends so far; the last steps are about 1e-3 rad."""
     first_step: float = 0.3
     """Standard deviation of the first steps [rad]: about the distance of neighbouring samples."""
-
     longer: float = 1.5
-    """Factor on the step after one that helped."""
-
+    """Factor on the step after a success."""
     shorter: float = 0.9
-    """Factor on the step after one that did not: together they keep one step in five helpful."""
-
+    """Factor on the step after a failure; both factors together keep one step in five helpful."""
     worth: float = 1e-3
     """Relative decrease of the duration that is worth another candidate."""
 
 
-def with_quicker_ends(
-    prepared: PreparedProblem, candidate: Candidate, settings: QuickerEndsSettings | None = None
-) -> Candidate | None:
-    """A candidate for the same targets whose proven least duration is shorter; None if none is
-    found near by.
+QUICKER_ENDS = QuickerEndsSettings()
 
-    Ends by DeadlinePassed if the watched deadline passes.
+
+def with_quicker_ends(
+    prepared: PreparedProblem,
+    candidate: Candidate,
+    settings: QuickerEndsSettings = QUICKER_ENDS,
+) -> Candidate | None:
+    """A candidate for the same targets with a shorter proven least duration; None if none is found.
+
+    Raises:
+        DeadlinePassed: the watched deadline passed.
     """
-    settings = settings or QuickerEndsSettings()
     limits, rng = prepared.arm.active_limits, np.random.default_rng(0)
     q_start, q_goal, least, step = (
         candidate.q_start,
@@ -75,8 +71,10 @@ def with_quicker_ends(
 
 
 def _moved(prepared: PreparedProblem, end: EndConfiguration, q: Array, by: Array) -> Array | None:
-    """The configuration (nq,) [rad] of a sampled end that is nearest to one moved from q, in the
-    same turn; q itself of another end, None if the target is not reached there."""
+    """The nearest configuration (nq,) [rad] of a sampled end's target to q + by, in the same turn.
+
+    It is q itself for an end that is no sample, None if the target is not reached nearby.
+    """
     if not end.sampled:
         return q
     found = nearest_configuration(prepared, end, q + by)

@@ -1,4 +1,4 @@
-"""Why a search has no motion."""
+"""The error of a search without a motion."""
 
 from __future__ import annotations
 
@@ -10,9 +10,7 @@ from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory
 
 
 def no_trajectory(candidates: Sequence[Candidate]) -> NoTrajectory:
-    """The error for no motion at all; it names the collision that stopped the best candidate, if
-    there is one.
-    """
+    """The error for no motion, with the collision that stopped the best candidate, if any."""
     reports = [candidate.report() for candidate in candidates]
     hits = [
         (each, each.attempt.collision)

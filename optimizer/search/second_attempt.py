@@ -1,6 +1,4 @@
-"""What follows when the certificate rejects a motion: the candidate is solved once more, within
-tighter limits.
-"""
+"""Second solve of a candidate within tighter limits, after the certificate rejected its motion."""
 
 from __future__ import annotations
 
@@ -15,8 +13,8 @@ from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.refinement import refine
 
-# limits become tighter by what the motion exceeded them by, and by this share
-BEYOND = 2e-3
+LIMIT_RESERVE = 2e-3
+"""Share by which limits become tighter beyond the excess of the rejected motion."""
 WITHIN_TIGHTER = (
     "converged within tighter limits, after the certificate did not confirm the first motion"
 )
@@ -25,8 +23,8 @@ WITHIN_TIGHTER = (
 def reject(incumbent: Incumbent, candidate: Candidate) -> None:
     """Drop a motion that the certificate did not confirm.
 
-    If it exceeded a limit, the candidate is solved again within limits that are tighter by the
-    excess, once. What the certificate confirms of that becomes its motion.
+    If it exceeded a limit, the candidate is solved once more, within limits tighter by the excess.
+    The new motion is accepted if the certificate confirms it for the original limits.
     """
     tighter = None if candidate.tightened else _tightened(incumbent, candidate)
     incumbent.reject(candidate)
@@ -46,9 +44,7 @@ def reject(incumbent: Incumbent, candidate: Candidate) -> None:
 
 
 def _tightened(incumbent: Incumbent, candidate: Candidate) -> Arm | None:
-    """The arm with tighter limits; None if the motion of the candidate exceeds none of them, or
-    follows a path.
-    """
+    """The arm with tighter limits; None if the motion exceeds none of them or follows a path."""
     problem, arm, spline = incumbent.problem, incumbent.problem.arm, candidate.spline
     if problem.tool_path is not None or problem.passes:
         return None
@@ -60,7 +56,8 @@ def _tightened(incumbent: Incumbent, candidate: Candidate) -> Arm | None:
     except DeadlinePassed:
         return None
     share = {
-        name: 1 / (ratio * (1 + BEYOND)) if ratio > 1 else 1.0 for name, ratio in worst.items()
+        name: 1 / (ratio * (1 + LIMIT_RESERVE)) if ratio > 1 else 1.0
+        for name, ratio in worst.items()
     }
     if all(each == 1.0 for name, each in share.items() if name != "position"):
         return None
@@ -83,8 +80,8 @@ def _tightened(incumbent: Incumbent, candidate: Candidate) -> Arm | None:
 
 
 def _take(incumbent: Incumbent, candidate: Candidate, twin: Candidate) -> None:
-    """Give the candidate the motion of `twin` if the certificate confirms it for the limits that
-    were asked for.
+    """Give the candidate the motion of its `twin` if the certificate confirms it for the own
+    limits.
     """
     energy = incumbent.confirmed_energy(twin, twin.spline)
     if energy is not None:

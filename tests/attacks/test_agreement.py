@@ -128,7 +128,7 @@ def test_a_motion_that_the_certificate_rejects_is_solved_again_within_tighter_li
 
 def test_what_is_rejected_twice_is_not_answered(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sqp_method, "path_excess", lambda *_: np.zeros(2))
-    monkeypatch.setattr("joulepath.optimizer.search.second_attempt.BEYOND", -0.02)
+    monkeypatch.setattr("joulepath.optimizer.search.second_attempt.LIMIT_RESERVE", -0.02)
     try:
         answer = solved(SLOW_TOOL)
     except (NoTrajectory, DeadlineExceeded):

@@ -35,7 +35,7 @@ from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.free_goal import goal_constraints
 from joulepath.optimizer.search.reserve import RESERVE
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.search.sampled_ends import BATCH
+from joulepath.optimizer.search.sampled_ends import SAMPLES
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates, GoalConstraints
 from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
@@ -309,7 +309,7 @@ def test_no_sample_is_activated_after_the_deadline() -> None:
     assert len(deferred) > 1000
     clock.now += 1e6
     run.explore()
-    assert sum(each.deferred for each in deferred) >= len(deferred) - BATCH
+    assert sum(each.deferred for each in deferred) >= len(deferred) - SAMPLES.batch
 
 
 def test_mixes_with_full_targets() -> None:

@@ -24,7 +24,7 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.ends import label_of
-from joulepath.optimizer.search.near_goals import APART, MOST, OTHERS, activate_near_goals
+from joulepath.optimizer.search.near_goals import NEAR_GOALS, activate_near_goals
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sampled_ends import nearest_configuration
 from joulepath.optimizer.search.seeds import estimates
@@ -100,11 +100,14 @@ def test_what_is_activated_is_different_and_may_be_solved() -> None:
     assert activate_near_goals(incumbent.prepared, incumbent.candidates)
     active = [each for each in incumbent.candidates if not each.deferred and each.holdable]
     fresh = incumbent.candidates[before:]
-    assert 0 < len(fresh) <= MOST and len(active) <= MOST + OTHERS
+    assert (
+        0 < len(fresh) <= NEAR_GOALS.electrical.count
+        and len(active) <= NEAR_GOALS.electrical.count + NEAR_GOALS.others
+    )
     for k, each in enumerate(fresh):
         assert each.goal.tolerance is problem.goal and each.lower_bound > 0 and each.shortest > 0
         for other in fresh[:k]:
-            assert np.abs(each.q_goal - other.q_goal).max() > APART
+            assert np.abs(each.q_goal - other.q_goal).max() > NEAR_GOALS.electrical.separation
     # the place of the shortest way is nearer than all samples
     coulomb = problem.arm.friction_law.coulomb
     ways = [np.abs(each.q_goal - each.q_start) @ coulomb for each in incumbent.candidates]

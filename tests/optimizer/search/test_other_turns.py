@@ -20,7 +20,7 @@ from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search.candidates import Candidate
-from joulepath.optimizer.search.other_turns import MOST, NEAR, other_turns
+from joulepath.optimizer.search.other_turns import OTHER_TURNS, other_turns
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.seeds import estimates_between, expected
 
@@ -90,7 +90,7 @@ def test_one_joint_is_turned_within_the_limits(start: Any) -> None:
     run, samples, others, least = turned(problem)
     limits = problem.arm.active_limits
     known = {(id(each.start), id(each.goal)): each for each in samples}
-    assert 0 < len(others) <= MOST
+    assert 0 < len(others) <= OTHER_TURNS.most
     for each in others:
         sample = known[id(each.start), id(each.goal)]
         way, least_way = each.q_goal - each.q_start, sample.q_goal - sample.q_start
@@ -102,7 +102,9 @@ def test_one_joint_is_turned_within_the_limits(start: Any) -> None:
             assert (q >= limits.q_min).all() and (q <= limits.q_max).all()
         assert (each.q_start == sample.q_start).all() or not sample.start.fixed
         assert each.lower_bound >= sample.lower_bound
-        assert each.lower_bound <= (least + (NEAR - 1) * abs(least)) * (1 + ROUGH)
+        assert each.lower_bound <= (least + (OTHER_TURNS.energy_ratio - 1) * abs(least)) * (
+            1 + ROUGH
+        )
     assert not other_turns(run.incumbent.prepared, samples, 0.0)
 
 

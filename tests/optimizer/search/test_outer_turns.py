@@ -16,8 +16,6 @@ from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.outer_turns import (
     FAMILIES,
-    MEMBERS,
-    NEAR,
     explore_families,
     families_of,
 )
@@ -92,10 +90,12 @@ def test_best_families_are_solved() -> None:
     rank = {id(each): k for k, family in enumerate(families) for each in family}
     # every family needs a tenth more than the one before
     explore_families(incumbent, exploring(incumbent, lambda each: 1e3 * 1.1 ** rank[id(each)]))
-    near = [k for k in range(len(families)) if 1.1**k <= NEAR][:FAMILIES]
+    near = [k for k in range(len(families)) if 1.1**k <= FAMILIES.energy_ratio][: FAMILIES.families]
     for k, family in enumerate(families):
         solved = [each.energy is not None for each in family]
-        assert solved == [place < (MEMBERS if k in near else 1) for place in range(len(family))]
+        assert solved == [
+            place < (FAMILIES.members if k in near else 1) for place in range(len(family))
+        ]
         left = [each for each in family if each.energy is None]
         assert all(
             (each.status, each.reason) == (CandidateStatus.UNVISITED, Reason.FAMILY)

@@ -24,9 +24,7 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.seeds import (
-    MOST_ESTIMATED,
-    MOST_SEEDS,
-    NEAR,
+    SEEDS,
     activate_seeds,
     estimates,
 )
@@ -114,10 +112,10 @@ def test_seeds_are_the_least_along_their_self_motions(both: bool) -> None:
     before = [each for each in incumbent.candidates if each.deferred]
     assert activate_seeds(incumbent.prepared, incumbent.candidates)
     seeds = [each for each in before if not each.deferred]
-    assert 0 < len(seeds) <= MOST_SEEDS
+    assert 0 < len(seeds) <= SEEDS.count
     assert all(each.status is CandidateStatus.UNVISITED for each in seeds)
     energy = dict(zip(map(id, before), estimates(incumbent.prepared, before), strict=True))
-    assert max(energy[id(each)] for each in seeds) <= NEAR * min(energy[id(each)] for each in seeds)
+    assert max(energy[each] for each in seeds) <= SEEDS.ratio * min(energy[each] for each in seeds)
     ends: list[Array] = [end.q for end in {id(each.goal): each.goal for each in before}.values()]
     for seed in seeds:
         beside = [
@@ -133,7 +131,7 @@ def test_seeds_are_the_least_along_their_self_motions(both: bool) -> None:
             for each in beside
             if any(each.goal.q is q for q in ends[max(place - 1, 0) : place + 2])
         ]
-        assert all(energy[id(each)] >= energy[id(seed)] for each in near)
+        assert all(energy[each] >= energy[id(seed)] for each in near)
 
 
 def test_the_next_seeds_follow_until_none_is_left() -> None:
@@ -170,9 +168,9 @@ def test_pairs_whose_lower_bounds_are_all_the_same_have_seeds_too() -> None:
         for each in incumbent.candidates
         if each.deferred and each.status is CandidateStatus.UNVISITED
     ]
-    assert sum(each.lower_bound == 0 for each in before) > MOST_ESTIMATED
+    assert sum(each.lower_bound == 0 for each in before) > SEEDS.most_estimated
     assert activate_seeds(incumbent.prepared, incumbent.candidates)
-    assert 0 < sum(not each.deferred for each in before) <= MOST_SEEDS
+    assert 0 < sum(not each.deferred for each in before) <= SEEDS.count
 
 
 @pytest.mark.long
