@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-ANSWERED, PROBLEM, INVALID = 0, 1, 2
+ANSWERED = 0
+PROBLEM = 1
+INVALID = 2
 # 128 + SIGINT, as shells report it
 INTERRUPTED = 130
 

@@ -22,7 +22,9 @@ from joulepath.optimizer.motion.through_samples import spline_through
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cycle import LONGEST_ROUND, MOST_STOPS
 
-MOST_KNOTS, HIGHEST_DEGREE, LONGEST_REST = 4096, 31, LONGEST_ROUND
+MOST_KNOTS = 4096
+HIGHEST_DEGREE = 31
+LONGEST_REST = LONGEST_ROUND
 # of a stop: a move, two lines, a path, a dwell and a wait
 MOST_LEGS = 6 * MOST_STOPS + 5
 MOVING = ("move", "line", "path")

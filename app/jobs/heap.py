@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from joulepath.app.engine.work import Ended, Work
 from joulepath.app.jobs.progress import HEARD, Found
-from joulepath.app.jobs.work import MOST_PREEMPTIONS, task_of
+from joulepath.app.jobs.work import RETRY, task_of
 from joulepath.app.store.cache import Asked
 from joulepath.app.store.leases import Lease
 from joulepath.optimizer.progress import nobody
@@ -124,7 +124,7 @@ class Taker:
                 self._ended(held, how)
 
         tell = held.found.tell if lease.kind in HEARD else nobody
-        stoppable = lease.preempted < MOST_PREEMPTIONS
+        stoppable = lease.preempted < RETRY.preemptions
         is_small = len(lease.body) + sum(map(len, held.motions.values())) <= SMALL
         task, expected = task_of(lease, held.motions), self._expected(lease.kind)
         return Work(task, lease.deadline, ended, stoppable, tell, expected, is_small)

@@ -31,9 +31,14 @@ _POSE_TEXT = (
 )
 # standard alphabet, filled to a multiple of four characters
 BASE64 = r"^[A-Za-z0-9+/]*={0,2}$"
-# most cells of a grid in bits, and most bytes of a mesh file, and the lengths of their base64
-MOST_CELLS, MOST_FILE_BYTES = 1 << 23, 1 << 22
-MOST_BITS_TEXT, MOST_FILE_TEXT = 4 * -(-MOST_CELLS // 8 // 3) + 4, 4 * -(-MOST_FILE_BYTES // 3)
+MOST_CELLS = 1 << 23
+"""Most cells of a grid given as bits."""
+MOST_FILE_BYTES = 1 << 22
+"""Largest mesh file [byte]."""
+MOST_BITS_TEXT = 4 * -(-MOST_CELLS // 8 // 3) + 4
+"""Longest base64 text of a grid."""
+MOST_FILE_TEXT = 4 * -(-MOST_FILE_BYTES // 3)
+"""Longest base64 text of a mesh file."""
 Size = Annotated[float, Field(ge=SIZES.smallest, le=SIZES.largest)]
 
 

@@ -33,7 +33,7 @@ from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.attempts import settled, solve
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.solve.methods.method import SolveStatus
+from joulepath.optimizer.solve.methods.solve_result import SolveStatus
 
 # shares of the deadline that the search leaves to the motions of its answer, and these to certify a
 # simpler cycle that needs less
@@ -244,8 +244,8 @@ class CycleSearch(LazySearch):
             if result.status is SolveStatus.OUT_OF_TIME:
                 return self.late()
             self.failed |= result.spline is None
-            if settled(incumbent, candidate, result, result.reason) is None:
-                self.causes[k] = result.reason
+            if settled(incumbent, candidate, result, result.message) is None:
+                self.causes[k] = result.message
                 return np.inf
         self._runs[k, s, g] = run
         self._spent.append(self.clock() - run.began)

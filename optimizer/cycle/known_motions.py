@@ -21,7 +21,7 @@ import pinocchio as pin
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
 # how a motion was looked for: as the search of a cycle tries it, to the end, at a price of time, or
 # for its duration
@@ -41,7 +41,10 @@ class KnownMotion:
     def result(self) -> SolveResult:
         """The result of having solved for it."""
         return SolveResult(
-            SolveStatus.SOLVED, "converged", spline=self.spline, stationarity=self.stationarity
+            SolveStatus.SOLVED,
+            SolveReason.CONVERGED,
+            spline=self.spline,
+            stationarity=self.stationarity,
         )
 
 

@@ -18,7 +18,9 @@ from joulepath.optimizer.problem.problem import LEAST_DURATION
 from joulepath.optimizer.solve.methods import solver_for
 from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval
 from joulepath.optimizer.solve.methods.fastest_motion import FastestMotion
-from joulepath.optimizer.solve.methods.method import Method, SolveResult
+from joulepath.optimizer.solve.methods.method import Method
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import SolveResult
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,9 @@ class _FastestOfPair(FastestMotion):
         return self._deadline
 
     def solver(self, interval: DurationInterval) -> Method:
-        return solver_for(self.prepared, self.q_start, self.q_goal, self.deadline, interval)
+        return solver_for(
+            SolveContext(self.prepared, self.q_start, self.q_goal, self.deadline, interval)
+        )
 
     def confirms(self, spline: Spline) -> bool:
         return certify(
@@ -168,7 +172,10 @@ def _looked_for(
     leg: Leg, s: int, g: int, interval: DurationInterval, deadline: Deadline, guess: Spline | None
 ) -> SolveResult | None:
     """What a solver makes of a pair; None if the time is up."""
-    solver = solver_for(leg.prepared_for(s, g), leg.start.q[s], leg.goal.q[g], deadline, interval)
+    context = SolveContext(
+        leg.prepared_for(s, g), leg.start.q[s], leg.goal.q[g], deadline, interval
+    )
+    solver = solver_for(context)
     try:
         with watch(deadline):
             return solver.solve() if guess is None else solver.solve_from(*sampled(guess), False)

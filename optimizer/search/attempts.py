@@ -6,39 +6,67 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import DeadlinePassed, watch
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.incumbent import Incumbent
-from joulepath.optimizer.search.sliding import SLID, moved_to, released
+from joulepath.optimizer.search.sliding import moved_to, with_sliding_ends
 from joulepath.optimizer.solve.methods import solver_for
 from joulepath.optimizer.solve.methods.duration_intervals import (
     DurationInterval,
     duration_intervals,
 )
-from joulepath.optimizer.solve.methods.method import (
-    DEADLINE_PASSED,
-    Method,
+from joulepath.optimizer.solve.methods.method import Method
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import (
+    MotionOrigin,
+    SolveReason,
     SolveResult,
     SolveStatus,
 )
-from joulepath.optimizer.solve.methods.planned_paths import FROM_PLANNED_PATH
 
 # goals of other candidates that a path may lead to as long as no motion is known
 MOST_OTHER_GOALS = 7
-NO_END = "the arm cannot be where the turn of the tool leads"
 
 
-def solver_of(incumbent: Incumbent, candidate: Candidate, interval: DurationInterval) -> Method:
-    """The solver of the problem's method for a candidate, in one interval of durations."""
-    solver = solver_for(
-        incumbent.prepared, candidate.q_start, candidate.q_goal, incumbent.deadline, interval
+def context_of(
+    incumbent: Incumbent,
+    candidate: Candidate,
+    interval: DurationInterval,
+    incumbent_cost: float = np.inf,
+) -> SolveContext:
+    """Context of a solve of a candidate in one interval of durations.
+
+    Args:
+        incumbent: state of the search.
+        candidate: the candidate.
+        interval: allowed durations.
+        incumbent_cost: cost that the motion must come below [J]; infinite for any motion.
+    """
+    attempt = candidate.attempt
+    planned = attempt is not None and attempt.origin is MotionOrigin.FROM_PLANNED_PATH
+    return SolveContext(
+        incumbent.prepared,
+        candidate.q_start,
+        candidate.q_goal,
+        incumbent.deadline,
+        interval,
+        incumbent_cost,
+        is_from_planned_path=planned,
     )
-    solver.is_from_planned_path = (
-        candidate.attempt is not None and FROM_PLANNED_PATH in candidate.attempt.reason
-    )
-    return solver
+
+
+def solver_of(
+    incumbent: Incumbent,
+    candidate: Candidate,
+    interval: DurationInterval,
+    incumbent_cost: float = np.inf,
+) -> Method:
+    """The problem's method for a candidate; arguments as of `context_of`."""
+    return solver_for(context_of(incumbent, candidate, interval, incumbent_cost))
 
 
 def in_time(incumbent: Incumbent, attempt: Callable[[], SolveResult]) -> SolveResult:
@@ -49,7 +77,7 @@ def in_time(incumbent: Incumbent, attempt: Callable[[], SolveResult]) -> SolveRe
         with watch(incumbent.deadline):
             return incumbent.add_effort(attempt())
     except DeadlinePassed:
-        return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED)
+        return SolveResult(SolveStatus.OUT_OF_TIME, SolveReason.DEADLINE_PASSED)
 
 
 def solve(incumbent: Incumbent, candidate: Candidate) -> SolveResult:
@@ -57,52 +85,55 @@ def solve(incumbent: Incumbent, candidate: Candidate) -> SolveResult:
 
     If no interval has a motion, a result that the deadline cut off comes before the others.
     """
-    results, ends = list[SolveResult](), dict[int, Candidate]()
-    attempt = partial(_solved, incumbent, candidate)
+    results, solved = list[SolveResult](), list[tuple[SolveResult, Candidate]]()
     for interval in duration_intervals(incumbent.prepared, candidate.q_goal):
         if interval.t_max < candidate.shortest:
             continue
-        result, moved = _attempted(incumbent, candidate, interval, attempt)
+        context = partial(_informed_context, incumbent, candidate, interval)
+        result, moved = _attempted(incumbent, candidate, context, lambda solver: solver.solve())
         results.append(result)
-        ends[id(result)] = moved
-    solved = [result for result in results if result.spline is not None]
+        if result.spline is not None:
+            solved.append((result, moved))
     if len(solved) > 1:
-        solved.sort(key=lambda result: incumbent.prepared.cost_of(result.spline))
+        solved.sort(key=lambda each: incumbent.prepared.cost_of(each[0].spline))
     if solved:
-        candidate.move(ends[id(solved[0])])
+        candidate.move(solved[0][1])
     late = [result for result in results if result.status is SolveStatus.OUT_OF_TIME]
     postponed = [result for result in results if result.status is SolveStatus.POSTPONED]
-    incumbent.cut_short |= bool(late) or any(result.cut_short for result in solved)
-    return (solved + late + postponed + results)[0]
+    incumbent.cut_short |= bool(late) or any(result.cut_short for result, _ in solved)
+    return ([result for result, _ in solved] + late + postponed + results)[0]
 
 
-def _solved(incumbent: Incumbent, candidate: Candidate, solver: Method) -> SolveResult:
-    """The result of a solver that knows what the search knows so far."""
+def _informed_context(
+    incumbent: Incumbent, candidate: Candidate, interval: DurationInterval
+) -> SolveContext:
+    """Context of a solve, with all that the search knows so far."""
     best, ruled_out = incumbent.best(), CandidateStatus.INFEASIBLE
-    solver.is_sole = sum(each.status is not ruled_out for each in incumbent.candidates) == 1
-    solver.was_postponed = (
-        candidate.attempt is not None and candidate.attempt.status is SolveStatus.POSTPONED
+    attempt, known = candidate.attempt, best is not None and best.energy is not None
+    context = context_of(incumbent, candidate, interval)
+    return replace(
+        context,
+        incumbent_cost=best.energy if best is not None and best.energy is not None else np.inf,
+        other_goals=tuple if known else partial(_other_goals, incumbent, candidate),
+        is_sole=sum(each.status is not ruled_out for each in incumbent.candidates) == 1,
+        was_postponed=attempt is not None and attempt.status is SolveStatus.POSTPONED,
     )
-    if best is None or best.energy is None:
-        solver.other_goals = partial(_other_goals, incumbent, candidate)
-    else:
-        solver.best_known = best.energy
-    return solver.solve()
 
 
 def _attempted(
     incumbent: Incumbent,
     candidate: Candidate,
-    interval: DurationInterval,
+    context_now: Callable[[], SolveContext],
     attempt: Callable[[Method], SolveResult],
 ) -> tuple[SolveResult, Candidate]:
     """The result of an attempt, and the candidate with the ends of its motion.
 
     Ends on self-motions slide, unless this leads to where the problem does not allow them to be.
     """
-    solver, prepared = solver_of(incumbent, candidate, interval), incumbent.prepared
-    sliding = released(prepared, candidate, solver)
-    result = in_time(incumbent, partial(attempt, solver))
+    fixed, prepared = context_now(), incumbent.prepared
+    context = with_sliding_ends(fixed, candidate)
+    sliding = context is not fixed
+    result = in_time(incumbent, partial(attempt, solver_for(context)))
     # the turn of the tool along a path is chosen, and with it where the path begins and ends
     free = candidate.start.tolerance is not None or candidate.goal.tolerance is not None
     turned = incumbent.problem.tool_path is not None and free
@@ -110,12 +141,11 @@ def _attempted(
         return result, candidate
     moved = moved_to(prepared, incumbent.candidates, candidate, result.spline)
     if moved is not None:
-        return (result if turned else replace(result, reason=f"{result.reason}{SLID}")), moved
+        return (result if turned else replace(result, ends_slid=True)), moved
     if turned:
-        return replace(result, status=SolveStatus.FAILED, reason=NO_END, spline=None), candidate
-    return in_time(
-        incumbent, partial(attempt, solver_of(incumbent, candidate, interval))
-    ), candidate
+        failed, reason = SolveStatus.FAILED, SolveReason.TURN_OUT_OF_REACH
+        return replace(result, status=failed, reason=reason, spline=None), candidate
+    return in_time(incumbent, partial(attempt, solver_for(context_now()))), candidate
 
 
 def _other_goals(incumbent: Incumbent, candidate: Candidate) -> list[Array]:
@@ -184,7 +214,8 @@ def improve(
     for interval in duration_intervals(incumbent.prepared, candidate.q_goal, surplus_value):
         if duration is not None:
             interval = replace(interval, t_min=duration, t_max=duration)
-        result, moved = _attempted(incumbent, candidate, interval, attempt)
+        context = partial(context_of, incumbent, candidate, interval)
+        result, moved = _attempted(incumbent, candidate, context, attempt)
         if result.spline is not None:
             incumbent.accept_if_better(
                 candidate, result, incumbent.prepared.energy(result.spline), moved

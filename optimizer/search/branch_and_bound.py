@@ -11,7 +11,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.solve.methods import method_of
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.solve_result import SolveResult, SolveStatus
 
 
 def explore(
@@ -57,7 +57,7 @@ def explore(
             queue.insert(0, candidate)
             queue.sort(key=lambda e: _hopelessness(prepared, e))
             continue
-        candidate.settle(CandidateStatus(result.status.value), Reason.METHOD, result.reason)
+        candidate.settle(CandidateStatus(result.status.value), Reason.METHOD, result.message)
         if result.spline is not None:
             candidate.energy = prepared.cost_of(result.spline)
             candidate.refined = not method_of(prepared.problem).may_refine(result.spline)

@@ -23,7 +23,7 @@ from joulepath.optimizer.problem.targets import AnyOf, Side
 from joulepath.optimizer.result.candidates import CandidateReport, CandidateStatus
 from joulepath.optimizer.search.end_feasibility import check_configurations, raise_if_none_is_left
 from joulepath.optimizer.search.ends import SIDES
-from joulepath.optimizer.solve.methods.method import SolveResult
+from joulepath.optimizer.solve.methods.solve_result import SolveResult
 
 # 64 poses from a given start make 16384, two poses 2048; each is named in the answer with some 400
 # bytes
@@ -117,7 +117,7 @@ class Candidate:
         hand."""
         self.earlier = None if self.energy is None else copy(self)
         self.attempt, self.energy = result, energy
-        self.settle(CandidateStatus.SOLVED, Reason.METHOD, result.reason)
+        self.settle(CandidateStatus.SOLVED, Reason.METHOD, result.message)
 
     def refuse(self) -> None:
         """Go back to the motion before the last one, which the certificate did not confirm; without

@@ -24,7 +24,8 @@ from joulepath.optimizer.search.quicker_ends import with_quicker_ends
 from joulepath.optimizer.search.sampled_ends import fastest_samples
 from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval
 from joulepath.optimizer.solve.methods.fastest_motion import FastestMotion, FastestSettings
-from joulepath.optimizer.solve.methods.method import Method, SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.method import Method
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
 # motions that obstacles stop are not too slow if so many times the shortest duration is allowed
 AMPLE = 20.0
@@ -238,7 +239,7 @@ def find_fastest(incumbent: Incumbent, known: Sequence[Spline] = (), improve: bo
         candidate.settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
     energy = incumbent.confirmed_energy(candidate, spline)
     if energy is not None:
-        result = SolveResult(SolveStatus.SOLVED, "the fastest motion, retimed", spline=spline)
+        result = SolveResult(SolveStatus.SOLVED, SolveReason.FASTEST_MOTION_RETIMED, spline=spline)
         incumbent.accept_if_better(candidate, result, energy)
     incumbent.cut_short |= incumbent.deadline.passed
     if improve:

@@ -29,9 +29,9 @@ from joulepath.optimizer.solve.methods.duration_intervals import (
     DurationInterval,
     duration_intervals,
 )
-from joulepath.optimizer.solve.methods.free_spline import COARSE, FreeSpline
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
-from joulepath.optimizer.solve.methods.sqp_method import Guess
+from joulepath.optimizer.solve.methods.guess import Guess
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates, GoalConstraints
 from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
 from joulepath.optimizer.solve.nlp.sqp import solve
@@ -152,9 +152,11 @@ def _solved(
         return None
     solver = solver_of(incumbent, fresh, _interval_of(prepared, q_goal, guess.duration))
     guess.points[-REST_POINTS:] = q_goal
-    # the guess is a motion of the free spline's own kind; other methods only take its goal
+    # a method without free control points takes the goal of the guess alone
     result = incumbent.add_effort(
-        solver.improve(guess) if type(solver) is FreeSpline else solver.solve()
+        solver.solve_control_points(guess.space, guess.points, guess.duration)
+        if solver.free_control_points
+        else solver.solve()
     )
     return settled(
         incumbent, fresh, result, REFINED_GOAL if candidate.goal.self_motion is None else REFINED
@@ -167,8 +169,8 @@ def _proposal(
     """The motion of least energy to any goal in the tangent space of the goal set, at most `radius`
     [rad] away, and its energy [J]; inf without a motion."""
     prepared, spline = incumbent.prepared, candidate.spline
-    space = bspline.uniform(COARSE)
-    if incumbent.method is FreeSpline and spline.degree == space.degree:
+    space = bspline.uniform(SPLINE_SPACES.coarse_points)
+    if incumbent.method.free_control_points and spline.degree == space.degree:
         space, points = bspline.Basis.of(spline.knots / spline.duration), spline.control_points
     else:
         at = np.linspace(0.0, 1.0, FIT_SAMPLES)
@@ -195,7 +197,9 @@ def _proposal(
     )
     free = np.concatenate([points[space.free], candidate.q_goal[None]])
     result = solve(program, free, spline.duration, None, incumbent.deadline, PROGRESS)
-    incumbent.add_effort(SolveResult(SolveStatus.FAILED, "a proposal", result.iterations, 1))
+    incumbent.add_effort(
+        SolveResult(SolveStatus.FAILED, SolveReason.GOAL_PROPOSAL, result.iterations, 1)
+    )
     if not result.feasible:
         return None, np.inf
     return Guess(space, program.points(result.free), result.duration), result.cost

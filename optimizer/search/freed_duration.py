@@ -14,13 +14,11 @@ from joulepath.optimizer.search.attempts import solve, solve_from
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.refinement import refine
-from joulepath.optimizer.solve.methods.free_spline import FreeSpline
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
 # greatest ratio of the two durations, and of the two energies, at which the free motion may lead to
 # a better one
 NEAR, PROMISING = 1.15, 1.01
-RETIMED = "the motion of least energy of any duration, retimed"
 
 
 def start_from_free_duration(incumbent: Incumbent, best: Candidate) -> None:
@@ -57,7 +55,7 @@ def _applies(incumbent: Incumbent) -> bool:
     plain = (
         problem.objective == "electrical" and problem.dwell is None and not incumbent.uses_storage
     )
-    return fixed and plain and incumbent.method is FreeSpline
+    return fixed and plain and incumbent.method.free_control_points
 
 
 def _take(incumbent: Incumbent, best: Candidate, twin: Candidate, duration: float) -> None:
@@ -69,7 +67,10 @@ def _take(incumbent: Incumbent, best: Candidate, twin: Candidate, duration: floa
     before, confirmed = best.energy, incumbent.confirmed_energy(twin, motion)
     if confirmed is not None:
         found = SolveResult(
-            SolveStatus.SOLVED, RETIMED, spline=motion, stationarity=twin.attempt.stationarity
+            SolveStatus.SOLVED,
+            SolveReason.FREE_DURATION_RETIMED,
+            spline=motion,
+            stationarity=twin.attempt.stationarity,
         )
         incumbent.accept_if_better(best, found, confirmed, twin)
     if motion is not twin.spline and incumbent.prepared.cost_of(motion) < PROMISING * before:

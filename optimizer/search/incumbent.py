@@ -21,7 +21,8 @@ from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.reserve import reserve
 from joulepath.optimizer.solve.methods import method_of
-from joulepath.optimizer.solve.methods.method import Method, SolveResult
+from joulepath.optimizer.solve.methods.method import Method
+from joulepath.optimizer.solve.methods.solve_result import SolveResult
 
 # a baseline counts as better only beyond this share, the error of the quadratures that are compared
 SLACK = 1e-6

@@ -2,10 +2,10 @@
 solved.
 
 The bound on mechanical work rules out little, and a motion has many local optima. Rough motions
-take a fifth of the time of solves (`many_motions`): those of tens of candidates, then of the best
-on more control points and from random guesses. They may collide, and exceed a limit by a little. So
-the motion of least work among those that do not collide is solved, with sharp corners. Then every
-candidate is solved whose rough motion promises less than what is found.
+take a fifth of the time of solves (`batched_motions`): those of tens of candidates, then of the
+best on more control points and from random guesses. They may collide, and exceed a limit by a
+little. So the motion of least work among those that do not collide is solved, with sharp corners.
+Then every candidate is solved whose rough motion promises less than what is found.
 
 Where no motion is found here, all candidates are solved as with other objectives: by `outer_turns`
 and `sharpening`.
@@ -22,6 +22,7 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import DeadlinePassed, watch
 from joulepath.optimizer.dynamics.plant import SHARPER_WIDTHS, WIDTH
+from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.attempts import in_time, solver_of
 from joulepath.optimizer.search.candidates import Candidate, Reason
@@ -37,10 +38,10 @@ from joulepath.optimizer.search.sharpening import (
     follow_in_time,
 )
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
-from joulepath.optimizer.solve.methods.free_spline import TIGHT, FreeSpline
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
-from joulepath.optimizer.solve.methods.sharp_motion import sharp_motion
-from joulepath.optimizer.solve.methods.sqp_method import above
+from joulepath.optimizer.solve.methods.method import above
+from joulepath.optimizer.solve.methods.refined_work import refine_work
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
 
 # time [s] that the search needs to be sure of a motion
 LEAST_TIME = 3.0
@@ -271,7 +272,7 @@ class _LeastWork:
 
         def sharpen() -> SolveResult:
             points, first = rough.on(DENSE), FIRST_WIDTH
-            result, points = sharp_motion(
+            result, points = refine_work(
                 incumbent.prepared, points, self.work.duration, first, self._least_known
             )
             found.append(points)
@@ -323,16 +324,14 @@ class _LeastWork:
         of jerk."""
         incumbent, candidate = self.incumbent, rough.candidate
         interval = duration_intervals(incumbent.prepared, candidate.q_goal, width=width)[0]
-        solver = solver_of(incumbent, candidate, interval)
-        assert isinstance(solver, FreeSpline)
-        solver.best_known = below
-        result = SolveResult(
-            SolveStatus.FAILED, "time is too short for evenly spaced control points"
-        )
-        if self.work.duration >= TIGHT * candidate.shortest or len(points) == DENSE:
-            result = in_time(
-                incumbent, partial(solver.solve_points, points, self.work.duration, progress)
+        solver = solver_of(incumbent, candidate, interval, below)
+        result = SolveResult(SolveStatus.FAILED, SolveReason.TOO_SHORT_FOR_EVEN_KNOTS)
+        if self.work.duration >= SPLINE_SPACES.tight * candidate.shortest or len(points) == DENSE:
+            space = bspline.uniform(len(points))
+            attempt = partial(
+                solver.solve_control_points, space, points, self.work.duration, progress
             )
+            result = in_time(incumbent, attempt)
         if result.status is SolveStatus.FAILED and len(points) != DENSE:
             result = in_time(incumbent, solver.solve)
         incumbent.cut_short |= result.cut_short
@@ -340,7 +339,7 @@ class _LeastWork:
             incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(result.spline))
         elif len(points) != DENSE and result.status in (SolveStatus.FAILED, SolveStatus.PRUNED):
             candidate.attempt = result
-            candidate.settle(CandidateStatus(result.status.value), Reason.METHOD, result.reason)
+            candidate.settle(CandidateStatus(result.status.value), Reason.METHOD, result.message)
         if candidate.status is not CandidateStatus.UNVISITED:
             incumbent.tell_tried(candidate)
         return result

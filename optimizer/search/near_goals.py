@@ -23,7 +23,7 @@ from joulepath.optimizer.search.end_feasibility import check_configurations
 from joulepath.optimizer.search.other_turns import other_turns
 from joulepath.optimizer.search.sampled_ends import activate_deferred, moved_end, on_branch
 from joulepath.optimizer.search.seeds import SEEDS, estimates, expected
-from joulepath.optimizer.solve.methods.sqp_method import above
+from joulepath.optimizer.solve.methods.method import above
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,10 @@ from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.sampled_ends import with_ends
 from joulepath.optimizer.search.sliding import slides
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
-from joulepath.optimizer.solve.methods.free_spline import COARSE, FreeSpline
-from joulepath.optimizer.solve.methods.method import Method, SolveResult
-from joulepath.optimizer.solve.methods.sqp_method import above
-from joulepath.optimizer.solve.nlp.sqp import PROGRESS
+from joulepath.optimizer.solve.methods.method import Method, above
+from joulepath.optimizer.solve.methods.solve_result import SolveResult
+from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
+from joulepath.optimizer.solve.nlp.sqp_state import SQP
 
 # length of the step along a curve [rad]
 STEP = 0.15
@@ -65,12 +65,11 @@ def _solved(incumbent: Incumbent, candidate: Candidate, below: float) -> bool:
     """Solve a candidate as it is, and then with its ends sliding, if it needs less energy than
     `below` [J]; whether it does."""
     for interval in duration_intervals(incumbent.prepared, candidate.q_goal):
-        solver = solver_of(incumbent, candidate, interval)
-        solver.best_known = above(below, MARGIN)
+        solver = solver_of(incumbent, candidate, interval, above(below, MARGIN))
         result = in_time(incumbent, solver.solve)
         if result.spline is None or incumbent.prepared.cost_of(result.spline) >= below:
             continue
-        settled(incumbent, candidate, result, result.reason)
+        settled(incumbent, candidate, result, result.message)
         improve(incumbent, candidate, partial(_again, result))
         return True
     return False
@@ -78,5 +77,6 @@ def _solved(incumbent: Incumbent, candidate: Candidate, below: float) -> bool:
 
 def _again(found: SolveResult, solver: Method) -> SolveResult:
     """Solve from a motion that was found with its ends fixed."""
-    assert isinstance(solver, FreeSpline) and found.spline is not None
-    return solver.solve_evenly(*sampled(found.spline), COARSE, PROGRESS)
+    assert found.spline is not None
+    q, t = sampled(found.spline)
+    return solver.solve_evenly(q, t, SPLINE_SPACES.coarse_points, SQP.progress)

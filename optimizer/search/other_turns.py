@@ -18,7 +18,7 @@ from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.candidates import Candidate, bound
 from joulepath.optimizer.search.seeds import estimates_between
-from joulepath.optimizer.solve.methods.sqp_method import above
+from joulepath.optimizer.solve.methods.method import above
 
 
 @dataclass(frozen=True)

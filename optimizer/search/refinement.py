@@ -25,8 +25,9 @@ from joulepath.optimizer.search.path_baselines import path_baselines
 from joulepath.optimizer.search.regrading import grade
 from joulepath.optimizer.search.sharpening import sharpen
 from joulepath.optimizer.search.sliding import slides
-from joulepath.optimizer.solve.methods.free_spline import EXACT_BELOW, TIGHT
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.free_spline import FREE_SPLINE
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
 
 # assumed values of a joule of surplus if the storage cannot take all of it: shares of the way from
 # what the supply pays for it to what the storage gives back
@@ -44,8 +45,10 @@ def refine(incumbent: Incumbent, candidate: Candidate) -> None:
     candidate.refined = True
     sharpen(incumbent, candidate)
     if method.may_refine(candidate.spline) and not deadline.passed:
-        coarse, exact = candidate.spline, lasts_below(EXACT_BELOW, incumbent, candidate)
-        if lasts_below(TIGHT, incumbent, candidate) and slides(incumbent.prepared, candidate):
+        coarse = candidate.spline
+        exact = lasts_below(FREE_SPLINE.exact_below, incumbent, candidate)
+        tight = lasts_below(SPLINE_SPACES.tight, incumbent, candidate)
+        if tight and slides(incumbent.prepared, candidate):
             grade(incumbent, candidate)
         else:
             improve(incumbent, candidate, lambda solver: solver.refined(coarse, fine=exact))
@@ -250,7 +253,9 @@ def _accept_certified(
             if incumbent.certified(candidate, spline, energy).valid:
                 incumbent.accept_if_better(
                     candidate,
-                    SolveResult(SolveStatus.SOLVED, f"the {name} motion itself", spline=spline),
+                    SolveResult(
+                        SolveStatus.SOLVED, SolveReason.BASELINE, spline=spline, figures=(name,)
+                    ),
                     energy,
                     certified=True,
                 )

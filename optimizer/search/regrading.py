@@ -8,12 +8,10 @@ found.
 
 from __future__ import annotations
 
-from joulepath.optimizer.motion.spline import Spline, sampled
+from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.search.attempts import improve
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.incumbent import Incumbent
-from joulepath.optimizer.solve.methods.free_spline import FreeSpline
-from joulepath.optimizer.solve.methods.method import Method, SolveResult
 
 # relative decrease of the cost that a further step of the first solve must promise
 FIRST_PROGRESS = 1e-3
@@ -41,11 +39,4 @@ def grade(incumbent: Incumbent, candidate: Candidate) -> None:
 def _solve_from(incumbent: Incumbent, candidate: Candidate, spline: Spline) -> None:
     """Solve from a motion, of which the knots follow the posture if they are at switches
     already."""
-
-    def attempt(solver: Method) -> SolveResult:
-        assert isinstance(solver, FreeSpline)
-        if solver.may_refine(spline):
-            return solver.solve_tightly(*sampled(spline), FIRST_PROGRESS)
-        return solver.solve_regraded(spline)
-
-    improve(incumbent, candidate, attempt)
+    improve(incumbent, candidate, lambda solver: solver.solve_at_switches(spline, FIRST_PROGRESS))

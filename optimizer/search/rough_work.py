@@ -16,8 +16,8 @@ from joulepath.optimizer.motion.spline import Spline, spline_of
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.random_displacements import random_displacements
-from joulepath.optimizer.solve.methods.limit_repair import MARGIN
-from joulepath.optimizer.solve.nlp.many_motions import ManyMotions
+from joulepath.optimizer.solve.methods.limit_repair import LIMIT_REPAIR
+from joulepath.optimizer.solve.nlp.batched_motions import BatchedMotions
 
 # width of corners that counts as none [W]
 SHARP = 1e-6
@@ -65,7 +65,7 @@ class RoughWork:
 
     prepared: PreparedProblem
     duration: float
-    _programs: dict[tuple[int, float], ManyMotions] = field(default_factory=dict)
+    _programs: dict[tuple[int, float], BatchedMotions] = field(default_factory=dict)
 
     def first(self, candidates: Sequence[Candidate]) -> list[Rough]:
         """Guesses of candidates: smoothed time-optimal motions, as of the first solves of
@@ -98,7 +98,7 @@ class RoughWork:
         """Motions solved from others on `count` control points with corners of `width` [W], that of
         least work first.
 
-        `progress` and `behind` as of `ManyMotions.minimised`.
+        `progress` and `behind` as of `BatchedMotions.minimised`.
         """
         if not guesses:
             return []
@@ -117,13 +117,13 @@ class RoughWork:
         ]
         return sorted(solved, key=lambda each: each.work)
 
-    def _program(self, count: int, width: float) -> ManyMotions:
+    def _program(self, count: int, width: float) -> BatchedMotions:
         key = count, width
         if key not in self._programs:
             prepared = self.prepared
-            limits = prepared.problem.arm.active_limits.scaled(1 - MARGIN)
+            limits = prepared.problem.arm.active_limits.scaled(1 - LIMIT_REPAIR.margin)
             p = prepared.parameters(mechanical=1.0, width=width)
-            self._programs[key] = ManyMotions(
+            self._programs[key] = BatchedMotions(
                 prepared.kernel, bspline.uniform(count), limits, self.duration, p
             )
         return self._programs[key]

@@ -54,7 +54,7 @@ from joulepath.optimizer.search.sampled_ends import activate_deferred, between
 from joulepath.optimizer.search.second_attempt import reject
 from joulepath.optimizer.search.seeds import activate_seeds
 from joulepath.optimizer.search.sliding import slides
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
 # time after the deadline [s] at which a certificate is given up: better a little late than no
 # answer
@@ -148,7 +148,10 @@ class Run:
             incumbent.prepared, incumbent.candidates, *spline.control_points[[0, -1]]
         )
         result = SolveResult(
-            SolveStatus.SOLVED, "a known motion", spline=spline, stationarity=stationarity
+            SolveStatus.SOLVED,
+            SolveReason.KNOWN_MOTION,
+            spline=spline,
+            stationarity=stationarity,
         )
         incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(spline))
         incumbent.cut_short = not is_optimal
@@ -307,7 +310,10 @@ class Run:
         )
         spline = found.trajectory.spline
         result = SolveResult(
-            SolveStatus.SOLVED, "converged", spline=spline, stationarity=found.solver.stationarity
+            SolveStatus.SOLVED,
+            SolveReason.CONVERGED,
+            spline=spline,
+            stationarity=found.solver.stationarity,
         )
         return candidate, result, incumbent.prepared.energy(spline)
 
@@ -329,7 +335,7 @@ class Run:
         if energy is not None:
             incumbent.accept_if_better(
                 candidate,
-                SolveResult(SolveStatus.SOLVED, "a known motion, retimed", spline=known),
+                SolveResult(SolveStatus.SOLVED, SolveReason.KNOWN_MOTION_RETIMED, spline=known),
                 energy,
             )
         solve_from(incumbent, candidate, sampled(known), fine=self.problem.method == "time_scaling")

@@ -23,7 +23,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason, bound
 from joulepath.optimizer.search.ends import SIDES, label_of
-from joulepath.optimizer.solve.methods.sqp_method import above
+from joulepath.optimizer.solve.methods.method import above
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,6 @@ from joulepath.optimizer.search.free_goal import REFINED, refine_goal
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
 from joulepath.optimizer.search.sliding import slides
-from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 
 FIRST_STEP = np.pi / SAMPLING.members
 """First step of a parameter [rad]: half the distance of two samples on a whole circle."""
@@ -56,7 +55,7 @@ def refine(incumbent: Incumbent) -> list[Candidate]:
 def _moved_along(incumbent: Incumbent, candidate: Candidate) -> Candidate:
     """The candidate with its ends moved along their self-motions; itself if no step is better."""
     sides = _sides(candidate)
-    if incumbent.method is FreeSpline and "goal" in sides:
+    if incumbent.method.free_control_points and "goal" in sides:
         candidate = refine_goal(incumbent, candidate)
         sides.remove("goal")
     return _descend(incumbent, candidate, sides)

@@ -20,35 +20,35 @@ from joulepath.optimizer.problem.targets import Side
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.sampled_ends import with_ends
 from joulepath.optimizer.solve.methods import method_of
-from joulepath.optimizer.solve.methods.free_spline import FreeSpline
-from joulepath.optimizer.solve.methods.method import Method
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
 
 # joints that a pose fixes
 FIXED = 6
 # a posture farther from a curve is not on it [rad]
 ON_CURVE = 1e-6
-SLID = "; refined along the self-motion that holds the pose"
 
 
 def slides(prepared: PreparedProblem, candidate: Candidate) -> bool:
     """Whether an end of the candidate may slide: on a self-motion of an arm with one joint more
     than a pose fixes.
     """
-    able = prepared.arm.robot.nq == FIXED + 1 and method_of(prepared.problem) is FreeSpline
+    able = prepared.arm.robot.nq == FIXED + 1 and method_of(prepared.problem).free_control_points
     return able and (
         candidate.start.self_motion is not None or candidate.goal.self_motion is not None
     )
 
 
-def released(prepared: PreparedProblem, candidate: Candidate, solver: Method) -> bool:
-    """Let the ends of a candidate slide while its solver runs, if they can; whether one does."""
-    if not isinstance(solver, FreeSpline) or not slides(prepared, candidate):
-        return False
-    if candidate.start.self_motion is not None:
-        solver.start_curve = HeldPose.of(prepared.arm, candidate.q_start)
-    if candidate.goal.self_motion is not None:
-        solver.goal_curve = HeldPose.of(prepared.arm, candidate.q_goal)
-    return True
+def with_sliding_ends(context: SolveContext, candidate: Candidate) -> SolveContext:
+    """The context of a solve whose ends slide along their self-motions; unchanged if none may."""
+    prepared = context.prepared
+    if not slides(prepared, candidate):
+        return context
+    start, goal = candidate.start.self_motion, candidate.goal.self_motion
+    return replace(
+        context,
+        start_curve=None if start is None else HeldPose.of(prepared.arm, candidate.q_start),
+        goal_curve=None if goal is None else HeldPose.of(prepared.arm, candidate.q_goal),
+    )
 
 
 def moved_to(

@@ -287,7 +287,7 @@ def test_outcomes_outlive_a_database_that_fails(tmp_path: Path) -> None:
         )
         service.work.free.set()
         await until(lambda: len(service.dispatcher._outcomes) == 1)
-        await asyncio.sleep(2 * module.LOOK)
+        await asyncio.sleep(2 * module.DISPATCHER.look)
         store._engine = engine
         await until(lambda: is_done(service, job_id))
         assert (await requests(store, job_id))[0].state == "done"

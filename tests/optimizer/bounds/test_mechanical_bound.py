@@ -20,6 +20,7 @@ from joulepath.optimizer.motion.spline import Spline, peak_rates, spline_of, tim
 from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from tests.optimizer.moves import PAYLOAD, TILTED, fixed, limits, problem
 from tests.selection import long_but
 
@@ -167,7 +168,7 @@ def test_no_descent_gets_below(name: str) -> None:
             q = line.curve(t) + bend * np.outer(
                 np.sin(np.pi * t / duration) ** 3, rng.normal(size=6)
             )
-            method = FreeSpline(task, start[k], goal[k], NEVER)
+            method = FreeSpline(SolveContext.of(task, start[k], goal[k], NEVER))
             found = method.solve_evenly(np.clip(q, own.q_min, own.q_max), t, 17, 1e-4)
             if found.spline is not None:
                 attacks += 1

@@ -27,7 +27,8 @@ from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.ends import ends
 from joulepath.optimizer.search.errors import TorqueInfeasible
 from joulepath.optimizer.solve.methods import solver_for
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from joulepath.optimizer.surroundings import Surroundings
 from tests.optimizer.moves import (
     GOAL,
@@ -251,7 +252,9 @@ class Recorder:
 
     def __call__(self, candidate: Candidate) -> SolveResult:
         self.asked.append(candidate)
-        return solver_for(self.task, candidate.q_start, candidate.q_goal, NEVER).solve()
+        return solver_for(
+            SolveContext.of(self.task, candidate.q_start, candidate.q_goal, NEVER)
+        ).solve()
 
     def energy(self, candidate: Candidate) -> float:
         """What a motion of the candidate takes, inf where none is found."""
@@ -352,7 +355,8 @@ def test_goals_that_seem_enclosed_are_tried_after_the_others(
 
     def attempt(candidate: Candidate) -> SolveResult:
         tried.append(candidate)
-        return SolveResult(SolveStatus.POSTPONED if len(tried) == 1 else SolveStatus.FAILED, "")
+        status = SolveStatus.POSTPONED if len(tried) == 1 else SolveStatus.FAILED
+        return SolveResult(status, SolveReason.MOTION_COLLIDES)
 
     explore(task, found, attempt, NEVER)
     assert [[id(each) for each in found].index(id(candidate)) for candidate in tried] == [

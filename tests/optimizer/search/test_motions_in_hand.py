@@ -25,7 +25,8 @@ from joulepath.optimizer.search import refinement
 from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.solve.methods import METHODS
-from joulepath.optimizer.solve.methods.method import Method, SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.method import Method
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.moves import GOAL, PAYLOAD, START, fixed, problem
 from tests.selection import long_but
@@ -57,12 +58,18 @@ def test_the_least_that_is_certified_is_the_answer() -> None:
     assert least_certified([first, second]) == "1 J" and first is not second
 
 
+def _name(spline: Spline) -> str:
+    return f"{spline.duration:g} s"
+
+
 def incumbent_with(*splines: Spline) -> Incumbent:
     """An incumbent whose only candidate got these motions, one after the other."""
     run = Run(problem(), clock=still)
     run.prepare()
     for spline in splines:
-        result = SolveResult(SolveStatus.SOLVED, f"{spline.duration:g} s", spline=spline)
+        result = SolveResult(
+            SolveStatus.SOLVED, SolveReason.BASELINE, spline=spline, figures=(_name(spline),)
+        )
         run.incumbent.accept_if_better(
             run.incumbent.candidates[0], result, run.incumbent.prepared.energy(spline)
         )
@@ -74,7 +81,7 @@ def test_a_refused_motion_leaves_the_one_before_it() -> None:
     incumbent = incumbent_with(slow, faster, best)
     (candidate,) = incumbent.candidates
     for spline in (best, faster, slow):
-        assert candidate.spline is spline and candidate.message == f"{spline.duration:g} s"
+        assert candidate.spline is spline and _name(spline) in candidate.message
         assert candidate.energy == incumbent.prepared.cost_of(spline)
         incumbent.reject(candidate)
     assert (
@@ -90,7 +97,7 @@ def test_a_refused_candidate_takes_certified_motions_alone() -> None:
     incumbent.reject(candidate)
     best = quintic_spline(START, GOAL, SLOW)
     result, energy = (
-        SolveResult(SolveStatus.SOLVED, "found", spline=best),
+        SolveResult(SolveStatus.SOLVED, SolveReason.CONVERGED, spline=best),
         incumbent.prepared.energy(best),
     )
     incumbent.accept_if_better(candidate, result, energy)
@@ -148,7 +155,7 @@ def test_a_baseline_of_the_own_kind_is_the_answer_if_nothing_better_is_found(
     poor = _detour()
 
     def solve(self: Method, *_: Any, **__: Any) -> SolveResult:
-        return SolveResult(SolveStatus.SOLVED, "a detour", spline=poor)
+        return SolveResult(SolveStatus.SOLVED, SolveReason.CONVERGED, spline=poor)
 
     for name in ("solve", "solve_from"):
         monkeypatch.setattr(METHODS[method], name, solve)
@@ -177,7 +184,7 @@ def test_a_baseline_that_is_not_certified_in_time_is_not_feasible(
         monkeypatch.setattr(
             METHODS["bspline"],
             name,
-            lambda *_, **__: SolveResult(SolveStatus.SOLVED, "", spline=poor),
+            lambda *_, **__: SolveResult(SolveStatus.SOLVED, SolveReason.CONVERGED, spline=poor),
         )
 
     def late(*_: Any) -> Any:

@@ -20,7 +20,7 @@ from joulepath.optimizer.search.outer_turns import (
     families_of,
 )
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from tests.optimizer.moves import GOAL, fixed, problem, tcp_pose
 
 DURATION = 3.0
@@ -45,10 +45,10 @@ def exploring(
                 continue
             each.energy = energy(each)
             if each.energy is None:
-                each.attempt = SolveResult(SolveStatus.PRUNED, "collides")
+                each.attempt = SolveResult(SolveStatus.PRUNED, SolveReason.COLLIDES_AND_COSTS_MORE)
                 each.settle(CandidateStatus.PRUNED, Reason.METHOD, "collides")
             else:
-                each.attempt = SolveResult(SolveStatus.SOLVED, "converged")
+                each.attempt = SolveResult(SolveStatus.SOLVED, SolveReason.CONVERGED)
                 each.settle(CandidateStatus.SOLVED, Reason.METHOD, "converged")
 
     return explore

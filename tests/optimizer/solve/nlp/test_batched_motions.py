@@ -1,6 +1,4 @@
-"""Rough motions, many at a time: derivatives against differences, and energies against those of the
-SQP.
-"""
+"""Coarse solves of a batch of motions: derivatives, costs, limits, and independence."""
 
 from __future__ import annotations
 
@@ -12,30 +10,30 @@ from joulepath.optimizer.dynamics.plant import WIDTH
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.spline import peak_rates, spline_of
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.solve.nlp.many_motions import ManyMotions
+from joulepath.optimizer.solve.nlp.batched_motions import BatchedMotions
 from tests.optimizer.moves import GOAL, START, fixed, limits, problem
 
 DURATION = 2.0
-STEP = 1e-6  # of control points [rad]
-# relative to the largest entry: a central difference loses STEP² of the third derivative, and
-# rounding over STEP
-FIRST, SECOND = 1e-6, 1e-5
-# shares by which a limit is exceeded where a penalty holds it
-EXCEEDED = 0.1
+# step of control points in central differences [rad]
+EPS = 1e-6
+# tolerances relative to the largest entry: a central difference has the error step² of the third
+# derivative, and rounding / step
+GRADIENT_TOLERANCE = 1e-6
+HESSIAN_TOLERANCE = 1e-5
+# relative excess over a limit at which its penalty is in balance
+ALLOWED_EXCESS = 0.1
 SPACE = bspline.uniform(13)
 
 
-def motions(**given: float) -> ManyMotions:
+def motions(**given: float) -> BatchedMotions:
     arm_limits = limits(**given)
     prepared = PreparedProblem.of(problem(objective="mechanical", **fixed(DURATION)))
     p = prepared.parameters(mechanical=1.0, width=WIDTH)
-    return ManyMotions(prepared.kernel, SPACE, arm_limits, DURATION, p)
+    return BatchedMotions(prepared.kernel, SPACE, arm_limits, DURATION, p)
 
 
 def guesses(count: int) -> tuple[Array, Array]:
-    """Ends (B, 2, nq) and free control points (B, m, nq) of motions that are neither straight nor
-    alike.
-    """
+    """Ends (B, 2, nq) and free control points (B, m, nq) of different, curved motions."""
     rng = np.random.default_rng(0)
     ends = np.array([[START, GOAL]] * count)
     line = START + np.outer(SPACE.quintic, GOAL - START)[SPACE.free]
@@ -62,16 +60,17 @@ def test_derivatives(given: dict[str, float]) -> None:
         return own._derivatives(ends, at, scale, own._value(ends, at, scale)[2])[0]
 
     for k in range(0, gradient.shape[1], 7):
-        slope = (total(moved(k, STEP)) - total(moved(k, -STEP))) / (2 * STEP)
-        assert gradient[:, k] == pytest.approx(slope, abs=FIRST * np.abs(gradient).max())
-        bends = (slopes(moved(k, STEP)) - slopes(moved(k, -STEP)))[:, k : k + band.shape[2]] / (
-            2 * STEP
+        slope = (total(moved(k, EPS)) - total(moved(k, -EPS))) / (2 * EPS)
+        assert gradient[:, k] == pytest.approx(
+            slope, abs=GRADIENT_TOLERANCE * np.abs(gradient).max()
         )
-        # of penalties, what their squares' curvature times their excess adds is left out: rates are
-        # linear
-        relative = SECOND if not given else 0.05
-        assert band[:, k, : bends.shape[1]] == pytest.approx(
-            bends, abs=relative * np.abs(band).max()
+        columns = (slopes(moved(k, EPS)) - slopes(moved(k, -EPS)))[:, k : k + band.shape[2]] / (
+            2 * EPS
+        )
+        # the Hessian leaves out the curvature of torques in the penalty
+        relative = HESSIAN_TOLERANCE if not given else 0.05
+        assert band[:, k, : columns.shape[1]] == pytest.approx(
+            columns, abs=relative * np.abs(band).max()
         )
 
 
@@ -83,7 +82,7 @@ def test_costs_fall_and_limits_are_kept() -> None:
     points = own.points(ends, found.free)
     for each in points:
         spline = spline_of(SPACE, each, DURATION)
-        assert (peak_rates(spline) <= own.limits.rates * (1 + EXCEEDED)).all()
+        assert (peak_rates(spline) <= own.limits.rates * (1 + ALLOWED_EXCESS)).all()
         assert spline.control_points[[0, -1]] == pytest.approx(np.array([START, GOAL]))
     assert found.cost == pytest.approx(own.costs(points, own.p))
 
@@ -93,5 +92,5 @@ def test_motions_are_solved_as_if_alone() -> None:
     together = own.minimised(ends, free, 1e-2)
     for k in range(3):
         alone = own.minimised(ends[k : k + 1], free[k : k + 1], 1e-2)
-        # rounding of sums in another order, amplified along the way
+        # rounding of sums in another order is amplified by the iteration
         assert alone.cost == pytest.approx(together.cost[k : k + 1], rel=1e-2)
