@@ -230,26 +230,24 @@ class CycleSearch(LazySearch):
             return self.late()
         except JoulepathError:
             return np.inf
-        incumbent, (candidate,) = run.incumbent, run.incumbent.candidates
+        state, (candidate,) = run.state, run.state.candidates
         if candidate.status is CandidateStatus.INFEASIBLE:
             return np.inf
         if candidate.energy is None:
             motions, key = self._known_motions, self._known_motions.key("tried", run.problem)
             known = motions.recall(key)
-            candidate.attempt = result = (
-                solve(incumbent, candidate) if known is None else known.result
-            )
-            if result.spline is not None and not incumbent.cut_short:
+            candidate.attempt = result = solve(state, candidate) if known is None else known.result
+            if result.spline is not None and not state.cut_short:
                 motions.keep(key, KnownMotion(result.spline, result.stationarity))
             if result.status is SolveStatus.OUT_OF_TIME:
                 return self.late()
             self.failed |= result.spline is None
-            if settled(incumbent, candidate, result, result.message) is None:
+            if settled(state, candidate, result, result.message) is None:
                 self.causes[k] = result.message
                 return np.inf
         self._runs[k, s, g] = run
         self._spent.append(self.clock() - run.began)
-        incumbent.end = self.end
+        state.end = self.end
         assert candidate.energy is not None
         return candidate.energy
 
@@ -264,7 +262,7 @@ class CycleSearch(LazySearch):
     def motion(self, k: int, s: int, g: int) -> Spline | None:
         """The first motion of a pair; None if there is none."""
         run = self._runs.get((k, s, g))
-        return None if run is None else run.incumbent.candidates[0].spline
+        return None if run is None else run.state.candidates[0].spline
 
     def confirms(self, k: int, s: int, g: int, spline: Spline) -> bool:
         """Whether the certificate confirms a motion of a pair."""
@@ -313,10 +311,10 @@ class CycleSearch(LazySearch):
             elif run is None:
                 found = self._kept(key, self._run(k, problem, known).solution())
             else:
-                run.incumbent.end = end
-                if run.incumbent.cut_short and known:
+                run.state.end = end
+                if run.state.cut_short and known:
                     # its share of the search's time was too short
-                    run.incumbent.cut_short = False
+                    run.state.cut_short = False
                     run.warm_start(known[0])
                 found = self._kept(key, run.search())
         except NoTrajectory:
@@ -396,7 +394,7 @@ class CycleSearch(LazySearch):
     def _run(self, k: int, problem: Problem, known: Sequence[Spline] = ()) -> Run:
         """The search of a motion of leg `k`."""
         run = Run(problem, known, self.clock, like=self.legs[k].prepared)
-        run.incumbent.prepared.traces.update(self.legs[k].traces_of(problem))
+        run.state.prepared.traces.update(self.legs[k].traces_of(problem))
         return run
 
     def _problem_of(self, k: int, s: int, g: int, time: float) -> Problem:

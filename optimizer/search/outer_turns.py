@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason
-from joulepath.optimizer.search.incumbent import Incumbent
+from joulepath.optimizer.search.state import SearchState
 
 
 @dataclass(frozen=True)
@@ -40,16 +40,16 @@ class FamilySettings:
 FAMILIES = FamilySettings()
 
 
-def explore_families(incumbent: Incumbent, explore: Callable[[], object]) -> None:
+def explore_families(state: SearchState, explore: Callable[[], object]) -> None:
     """Solve one member of each family, then members of the best families.
 
     Candidates that neither a solve nor a bound rules out are left unvisited.
 
     Args:
-        incumbent: state of the search.
+        state: state of the search.
         explore: solves all candidates that are open.
     """
-    families = families_of(incumbent)
+    families = families_of(state)
     if all(len(each) == 1 for each in families):
         explore()
         return
@@ -57,9 +57,9 @@ def explore_families(incumbent: Incumbent, explore: Callable[[], object]) -> Non
     for each in waiting:
         each.deferred = True
     explore()
-    while _replace_hindered(incumbent, families):
+    while _replace_hindered(state, families):
         explore()
-    best = incumbent.best()
+    best = state.best()
     if best is None:
         _release(waiting)
         explore()
@@ -69,19 +69,19 @@ def explore_families(incumbent: Incumbent, explore: Callable[[], object]) -> Non
     for family in sorted(near, key=_energy)[: FAMILIES.families]:
         _release(family[: FAMILIES.members])
     explore()
-    settle_waiting(incumbent, waiting)
+    settle_waiting(state, waiting)
 
 
-def families_of(incumbent: Incumbent) -> list[list[Candidate]]:
+def families_of(state: SearchState) -> list[list[Candidate]]:
     """The open and the solved candidates in families, the member of least possible duration first.
 
     There are none for the electrical objective, whose bounds rule out enough, for other methods,
     and for a tight bound, for which every candidate is solved.
     """
-    asked = incumbent.problem
+    asked = state.problem
     if (asked.objective, asked.method) != ("mechanical", "bspline") or asked.bound == "tight":
         return []
-    open_ = [each for each in incumbent.candidates if each.status is not CandidateStatus.INFEASIBLE]
+    open_ = [each for each in state.candidates if each.status is not CandidateStatus.INFEASIBLE]
     if any(each.sampled or each.deferred for each in open_):
         return []
     families: dict[tuple[EndConfiguration, EndConfiguration, bytes], list[Candidate]] = {}
@@ -98,7 +98,7 @@ def _energy(family: Sequence[Candidate]) -> float:
     return min((each.energy for each in family if each.energy is not None), default=float("inf"))
 
 
-def _replace_hindered(incumbent: Incumbent, families: Sequence[Sequence[Candidate]]) -> bool:
+def _replace_hindered(state: SearchState, families: Sequence[Sequence[Candidate]]) -> bool:
     """Release another member of each family whose members collide so far; whether there is any.
 
     Another turn of the wrist may be clear. A slower member cannot help against the other limits.
@@ -110,7 +110,7 @@ def _replace_hindered(incumbent: Incumbent, families: Sequence[Sequence[Candidat
         if (
             not tried
             or not waiting
-            or incumbent.deadline.passed
+            or state.deadline.passed
             or not all(_collides(each) for each in tried)
         ):
             continue
@@ -131,19 +131,19 @@ def _release(candidates: Sequence[Candidate]) -> None:
 
 
 def settle_waiting(
-    incumbent: Incumbent, waiting: Sequence[Candidate], reason: Reason = Reason.FAMILY
+    state: SearchState, waiting: Sequence[Candidate], reason: Reason = Reason.FAMILY
 ) -> None:
     """Settle candidates that are still deferred, unless the deadline ended the search.
 
     Args:
-        incumbent: state of the search.
+        state: state of the search.
         waiting: candidates.
         reason: reason why a candidate is not solved if its bound does not rule it out.
     """
     left = [each for each in waiting if each.deferred]
     _release(left)
-    best = incumbent.best()
-    if incumbent.deadline.passed or best is None or best.energy is None:
+    best = state.best()
+    if state.deadline.passed or best is None or best.energy is None:
         return
     for each in left:
         if each.status is CandidateStatus.UNVISITED:

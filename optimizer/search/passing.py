@@ -18,10 +18,14 @@ from joulepath.optimizer.search.baselines import baselines, saving
 
 
 def stopping_baselines(prepared: PreparedProblem, spline: Spline, ours: float) -> list[Baseline]:
-    """The baselines from rest to rest, one after the other, each part in the time that our motion
-    takes for it.
+    """Baselines that rest at each pass, every part in the time that our motion takes for it.
 
-    `ours` [J] is our objective. A baseline that some part does not have is left out.
+    A baseline without some part is left out.
+
+    Args:
+        prepared: the problem.
+        spline: our motion.
+        ours: its objective [J].
     """
     problem: Problem = replace(prepared.problem, passes=(), dwell=None)
     q = np.array([spline.control_points[0], *prepared.problem.passes, spline.control_points[-1]])
@@ -43,7 +47,7 @@ def stopping_baselines(prepared: PreparedProblem, spline: Spline, ours: float) -
 
 
 def _joined(problem: Problem, parts: list[Baseline], ours: float) -> Baseline:
-    """One baseline of those of the parts."""
+    """One baseline from the baselines of the parts."""
     electrical, mechanical = (
         sum(each.electrical for each in parts),
         sum(each.mechanical for each in parts),

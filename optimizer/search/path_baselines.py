@@ -13,15 +13,15 @@ from joulepath.optimizer.motion.time_scalings import SampledMotion, even_speed
 from joulepath.optimizer.result.solution import Baseline
 from joulepath.optimizer.search.baselines import compared
 from joulepath.optimizer.search.candidates import Candidate
-from joulepath.optimizer.search.incumbent import Incumbent
+from joulepath.optimizer.search.state import SearchState
 
 
-def path_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseline]:
+def path_baselines(state: SearchState, best: Candidate) -> list[Baseline]:
     """The `trapezoid` along the path of the best candidate's joints, in its duration."""
     prepared, problem, path = (
-        incumbent.prepared,
-        incumbent.problem,
-        incumbent.prepared.joint_path(best.q_start),
+        state.prepared,
+        state.problem,
+        state.prepared.joint_path(best.q_start),
     )
     assert path is not None and best.energy is not None
     motion = along(path, even_speed(best.duration))

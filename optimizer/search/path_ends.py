@@ -201,7 +201,7 @@ def _choices(start: EndConfiguration, trace: Trace, goal: Target) -> list[list[f
 
 
 def attempt_of(limits: Limits, start: EndConfiguration, trace: Trace) -> PathAttempt:
-    """How far a path is followed from a configuration within `limits`, and the reason why it ends."""
+    """How far a path is followed from a configuration, and the reason why it ends."""
     shift = _least_turns(trace, start.choices)
     outside = ((trace.q + shift < limits.q_min) | (trace.q + shift > limits.q_max)).any(axis=1)
     if outside.any():

@@ -10,8 +10,8 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.attempts import solve
 from joulepath.optimizer.search.candidates import Candidate, Reason
-from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.refinement import refine
+from joulepath.optimizer.search.state import SearchState
 
 LIMIT_RESERVE = 2e-3
 """Share by which limits become tighter beyond the excess of the rejected motion."""
@@ -20,39 +20,36 @@ WITHIN_TIGHTER = (
 )
 
 
-def reject(incumbent: Incumbent, candidate: Candidate) -> None:
+def reject(state: SearchState, candidate: Candidate) -> None:
     """Drop a motion that the certificate did not confirm.
 
     If it exceeded a limit, the candidate is solved once more, within limits tighter by the excess.
     The new motion is accepted if the certificate confirms it for the original limits.
     """
-    tighter = None if candidate.tightened else _tightened(incumbent, candidate)
-    incumbent.reject(candidate)
-    if tighter is None or incumbent.deadline.passed:
+    tighter = None if candidate.tightened else _tightened(state, candidate)
+    state.reject(candidate)
+    if tighter is None or state.deadline.passed:
         return
     candidate.tightened = True
-    other = Incumbent(PreparedProblem.of(replace(incumbent.problem, arm=tighter)), incumbent.end)
+    other = SearchState(PreparedProblem.of(replace(state.problem, arm=tighter)), state.end)
     twin = Candidate(candidate.start, candidate.goal, candidate.q_start, candidate.q_goal)
     other.candidates = [twin]
     result = solve(other, twin)
     if result.spline is not None:
         other.accept_if_better(twin, result, other.prepared.energy(result.spline))
         refine(other, twin)
-        _take(incumbent, candidate, twin)
-    incumbent.iterations += other.iterations
-    incumbent.solves += other.solves
+        _take(state, candidate, twin)
+    state.add_search(other)
 
 
-def _tightened(incumbent: Incumbent, candidate: Candidate) -> Arm | None:
+def _tightened(state: SearchState, candidate: Candidate) -> Arm | None:
     """The arm with tighter limits; None if the motion exceeds none of them or follows a path."""
-    problem, arm, spline = incumbent.problem, incumbent.problem.arm, candidate.spline
+    problem, arm, spline = state.problem, state.problem.arm, candidate.spline
     if problem.tool_path is not None or problem.passes:
         return None
     try:
-        with watch(incumbent.deadline):
-            worst = incumbent.certified(
-                candidate, spline, incumbent.prepared.energy(spline)
-            ).worst_ratio
+        with watch(state.deadline):
+            worst = state.certified(candidate, spline, state.prepared.energy(spline)).worst_ratio
     except DeadlinePassed:
         return None
     share = {
@@ -79,12 +76,12 @@ def _tightened(incumbent: Incumbent, candidate: Candidate) -> Arm | None:
     )
 
 
-def _take(incumbent: Incumbent, candidate: Candidate, twin: Candidate) -> None:
+def _take(state: SearchState, candidate: Candidate, twin: Candidate) -> None:
     """Give the candidate the motion of its `twin` if the certificate confirms it for the own
     limits.
     """
-    energy = incumbent.confirmed_energy(twin, twin.spline)
+    energy = state.confirmed_energy(twin, twin.spline)
     if energy is not None:
         candidate.move(twin)
-        candidate.attempt, candidate.energy = twin.attempt, energy.of(incumbent.problem.objective)
+        candidate.attempt, candidate.energy = twin.attempt, energy.of(state.problem.objective)
         candidate.settle(CandidateStatus.SOLVED, Reason.METHOD, WITHIN_TIGHTER)

@@ -32,8 +32,8 @@ from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.result.solution import Solution
+from joulepath.optimizer.search.finishing_time import FINISHING
 from joulepath.optimizer.search.free_goal import goal_constraints
-from joulepath.optimizer.search.reserve import RESERVE
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sampled_ends import SAMPLES
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
@@ -305,7 +305,7 @@ def test_no_sample_is_activated_after_the_deadline() -> None:
     starts = AnyOf(tuple(HOME + rng.normal(scale=0.3, size=6) for _ in range(12)))
     run = Run(problem(starts, ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])), clock=clock)
     run.prepare()
-    deferred = [each for each in run.incumbent.candidates if each.deferred]
+    deferred = [each for each in run.state.candidates if each.deferred]
     assert len(deferred) > 1000
     clock.now += 1e6
     run.explore()
@@ -359,7 +359,7 @@ def test_respects_the_deadline() -> None:
     )
     solution = optimize(task, CountingClock())
     assert solution.certificate.valid and solution.status == "feasible"
-    assert readings - RESERVE < solution.solver.wall_time < readings + LAST_READINGS
+    assert readings - FINISHING.least < solution.solver.wall_time < readings + LAST_READINGS
     assert any(each.status == "unvisited" for each in solution.candidates)
 
 

@@ -59,7 +59,7 @@ def explored(problem: Problem) -> Candidate:
     """The best candidate before refinement and bounds, which take most of the time of a search."""
     run = prepared(problem)
     run.explore()
-    best = run.incumbent.best()
+    best = run.state.best()
     assert best is not None
     return best
 
@@ -77,9 +77,9 @@ def test_the_other_way_around_is_found_where_it_needs_less() -> None:
 
 def turned(problem: Problem) -> tuple[Run, list[Candidate], list[Candidate], float]:
     run = prepared(problem)
-    samples = [each for each in run.incumbent.candidates if each.holdable]
-    least = float(expected(run.incumbent.prepared, samples).min())
-    return run, samples, other_turns(run.incumbent.prepared, samples, least), least
+    samples = [each for each in run.state.candidates if each.holdable]
+    least = float(expected(run.state.prepared, samples).min())
+    return run, samples, other_turns(run.state.prepared, samples, least), least
 
 
 @pytest.mark.parametrize("start", [START, "pose"])
@@ -105,7 +105,7 @@ def test_one_joint_is_turned_within_the_limits(start: Any) -> None:
         assert each.lower_bound <= (least + (OTHER_TURNS.energy_ratio - 1) * abs(least)) * (
             1 + ROUGH
         )
-    assert not other_turns(run.incumbent.prepared, samples, 0.0)
+    assert not other_turns(run.state.prepared, samples, 0.0)
 
 
 def test_without_full_turns_nothing_is_turned() -> None:
@@ -114,13 +114,13 @@ def test_without_full_turns_nothing_is_turned() -> None:
 
 def test_a_rough_estimate_is_near_that_of_several_durations() -> None:
     run = prepared(task())
-    some = [each for each in run.incumbent.candidates if each.holdable][:40]
+    some = [each for each in run.state.candidates if each.holdable][:40]
     q_start, q_goal = (
         np.array([getattr(each, name) for each in some]) for name in ("q_start", "q_goal")
     )
     shortest = np.asarray(shortest_duration(q_goal - q_start, run.problem.arm.active_limits))
     rough, exact = (
-        estimates_between(run.incumbent.prepared, q_start, q_goal, shortest, rough=rough)
+        estimates_between(run.state.prepared, q_start, q_goal, shortest, rough=rough)
         for rough in (True, False)
     )
     ratio = rough / exact

@@ -44,8 +44,8 @@ def test_they_reach_the_target_in_less_time(robot: str, free: bool) -> None:
         run = Run(problem)
         run.prepare()
         pose = problem.goal.T if isinstance(problem.goal, Pose) else None
-        for candidate in fastest_samples(run.incumbent.candidates)[:4]:
-            found = with_quicker_ends(run.incumbent.prepared, candidate)
+        for candidate in fastest_samples(run.state.candidates)[:4]:
+            found = with_quicker_ends(run.state.prepared, candidate)
             if found is None:
                 continue
             helped += 1
