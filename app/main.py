@@ -33,6 +33,7 @@ from joulepath.app.api.robots import route as robots
 from joulepath.app.api.studies import route as studies
 from joulepath.app.api.studies.iterations import route as iterations
 from joulepath.app.api.studies.suggest import route as suggest
+from joulepath.app.api.tools import route as tools
 from joulepath.app.api.whatif import route as whatif
 from joulepath.app.cluster.link import Cluster
 from joulepath.app.engine.pool import Engine
@@ -70,6 +71,7 @@ ROUTES = (
     answers,
     export,
     robots,
+    tools,
     figures,
     health,
     metrics,

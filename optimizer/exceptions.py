@@ -179,6 +179,21 @@ class UnknownRobot(JoulepathError):
 
 
 @dataclass(eq=False)
+class UnknownTool(JoulepathError):
+    """No tool has this name."""
+
+    status = 404
+    title = "Unknown tool"
+    remedy = "Use one of the names in `known`, which `GET /tools` lists too, or give the capsules."
+
+    known: list[str]
+    """Names of all tools."""
+
+    def __str__(self) -> str:
+        return f"There is no tool of that name: use one of {', '.join(self.known)}."
+
+
+@dataclass(eq=False)
 class _TargetError(JoulepathError):
     target: str
     """Target at fault: `start`, `goal` (of `POST /ik`, too), or `stops/` and the name of a stop of

@@ -36,8 +36,8 @@ from joulepath.optimizer.progress import (
     CandidateTried,
     Improved,
     Tell,
-    forward,
-    nobody,
+    no_listener,
+    only_news,
 )
 from joulepath.optimizer.result.front import Dropped, Front, FrontSolver
 from joulepath.optimizer.result.solution import Solution
@@ -78,7 +78,7 @@ class _Node:
 
 
 def pareto(
-    problem: Problem, points: int = 12, clock: Clock = time.perf_counter, tell: Tell = nobody
+    problem: Problem, points: int = 12, clock: Clock = time.perf_counter, tell: Tell = no_listener
 ) -> Front:
     """Find the front of energy over duration, from the fastest motion to that of least energy.
 
@@ -102,7 +102,7 @@ def pareto(
             "duration", "A front runs over durations: leave duration out or give a range."
         )
     with one_thread():
-        return _Search(problem, points, clock, forward(tell)).front()
+        return _Search(problem, points, clock, only_news(tell)).front()
 
 
 class _Search:

@@ -20,6 +20,7 @@ from joulepath.app.cli.optimize import optimize
 from joulepath.app.cli.replay import replay
 from joulepath.app.cli.robots import robots
 from joulepath.app.cli.serve import serve
+from joulepath.app.cli.tools import tools
 
 
 @click.group(
@@ -54,6 +55,7 @@ for command in (
     identify,
     replay,
     robots,
+    tools,
     keys,
     cluster_worker,
 ):

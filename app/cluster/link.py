@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from joulepath.app.cluster.machine import RESOURCES, compute, resource, version
 from joulepath.app.engine.work import Ended, Take, Work
 from joulepath.app.exceptions.queue import ClusterUnavailable, WorkerLost
-from joulepath.optimizer.progress import nobody
+from joulepath.optimizer.progress import no_listener
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -97,7 +97,7 @@ class Cluster:
         if client is None:
             raise ClusterUnavailable
         key = f"joulepath-{uuid.uuid4().hex}"
-        asked = [(work.task, work.deadline, work.tell is not nobody) for work in works]
+        asked = [(work.task, work.deadline, work.tell is not no_listener) for work in works]
         self._works[key] = works
         # Short works share a process, so that the next ones are ready at the machine.
         is_long = len(works) == 1 and expected >= LINK.together

@@ -20,7 +20,7 @@ from joulepath.app.engine.worker import Worker
 from joulepath.app.exceptions.queue import Preempted, ShuttingDown, WorkerLost
 from joulepath.app.settings import Settings
 from joulepath.optimizer.exceptions import DeadlineExceeded
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 
 logger = logging.getLogger(__name__)
 
@@ -125,7 +125,7 @@ class Engine:
         return ClientEngine(self, client)
 
     async def run(
-        self, task: Task, deadline: float, client: str = "", tell: Tell = nobody
+        self, task: Task, deadline: float, client: str = "", tell: Tell = no_listener
     ) -> TaskResult:
         """The task's result, within `deadline` seconds plus `settings.deadline_grace`.
 
@@ -252,6 +252,6 @@ class ClientEngine:
     engine: Engine
     client: str
 
-    async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
+    async def run(self, task: Task, deadline: float, tell: Tell = no_listener) -> TaskResult:
         """See `Engine.run`."""
         return await self.engine.run(task, deadline, self.client, tell)

@@ -19,7 +19,7 @@ from joulepath.app.engine.result import TaskResult, json_document
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import problem_response
 from joulepath.optimizer.exceptions import DeclaredError
-from joulepath.optimizer.progress import Event, Tell, forward
+from joulepath.optimizer.progress import Event, Tell, only_news
 
 logger = logging.getLogger(__name__)
 
@@ -75,7 +75,7 @@ class EventStream(StreamingResponse):
             bell.set()
 
         # A preempted request starts again: its client need not know.
-        working = asyncio.create_task(self._work(forward(told)))
+        working = asyncio.create_task(self._work(only_news(told)))
         working.add_done_callback(lambda _: bell.set())
         try:
             while not working.done() or waiting:

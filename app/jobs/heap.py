@@ -14,7 +14,7 @@ from joulepath.app.jobs.progress import HEARD, Found
 from joulepath.app.jobs.work import RETRY, task_of
 from joulepath.app.store.cache import Asked
 from joulepath.app.store.leases import Lease
-from joulepath.optimizer.progress import nobody
+from joulepath.optimizer.progress import no_listener
 
 SMALL = 1 << 12
 """Size of a small request [byte], compressed."""
@@ -123,7 +123,7 @@ class Taker:
                 del self.left[held]
                 self._ended(held, how)
 
-        tell = held.found.tell if lease.kind in HEARD else nobody
+        tell = held.found.tell if lease.kind in HEARD else no_listener
         stoppable = lease.preempted < RETRY.preemptions
         is_small = len(lease.body) + sum(map(len, held.motions.values())) <= SMALL
         task, expected = task_of(lease, held.motions), self._expected(lease.kind)

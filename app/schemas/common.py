@@ -344,9 +344,10 @@ class RobotWithTcp(Request):
     robot: RobotName = described(
         "Name of the robot, from `GET /robots`.", None, "ur5e", default="ur5e"
     )
-    tcp: Pose = described(
-        "Pose of the TCP in the flange frame.",
+    tcp: Pose | None = described(
+        "Pose of the TCP in the flange frame. Null: that of a tool that is given by name, or the "
+        "flange.",
         None,
         {"position": [0.0, 0.0, 0.12], "rpy": [0.0, 0.0, 0.0]},
-        default=IDENTITY,
+        default=None,
     )

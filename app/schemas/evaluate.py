@@ -15,7 +15,7 @@ from joulepath.app.schemas.examples.values import PAPER_POSE as _THERE
 from joulepath.app.schemas.lengths import LENGTHS
 from joulepath.app.schemas.log_file import LogFile
 from joulepath.app.schemas.request import Seconds
-from joulepath.optimizer.evaluate.sampler import MOST_SAMPLES
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.problem.problem import LONGEST_DURATION
 
 MAX_ROWS = 100_000
@@ -106,7 +106,7 @@ class EvaluateSettings(ArmRequest):
     )
     sample_period: float | None = described(
         "Time between the returned samples; the last sample is at the end. Null: no samples. At "
-        f"most {MOST_SAMPLES} samples.",
+        f"most {MOTION_LIMITS.max_samples} samples.",
         "s",
         0.05,
         default=None,

@@ -19,6 +19,8 @@ class Lengths:
     """Name of an API key."""
     robot: int = 64
     """Name of a robot."""
+    tool: int = 64
+    """Name of a tool."""
     holder: int = 128
     """Name of a process working on jobs."""
 

@@ -19,8 +19,9 @@ from joulepath.app.schemas.common import (
     frame_of,
 )
 from joulepath.app.schemas.examples.values import BOX, MESH_FILE, TOOL, at
+from joulepath.app.schemas.lengths import LENGTHS
 from joulepath.models.shape_sizes import SIZES
-from joulepath.optimizer.problem.arm import MOST_PARTS
+from joulepath.optimizer.problem.arm import MOST_TOOL_PARTS
 from joulepath.optimizer.problem.clouds import MOST_ALONG_EDGE, MOST_POINTS, MOST_VOXELS
 from joulepath.optimizer.problem.names import LONGEST_NAME
 from joulepath.optimizer.problem.scene import DEFAULT_MARGIN, MOST_OBSTACLES, MOST_VERTICES
@@ -353,7 +354,7 @@ class ToolCapsule(Request):
 class Tool(Request):
     """The shape of the tool, for collision checking."""
 
-    capsules: Annotated[list[ToolCapsule], Field(max_length=MOST_PARTS)] = described(
+    capsules: Annotated[list[ToolCapsule], Field(max_length=MOST_TOOL_PARTS)] = described(
         "Capsules that enclose the tool.",
         None,
         TOOL["capsules"],
@@ -361,13 +362,32 @@ class Tool(Request):
     )
 
 
+ToolName = Annotated[str, Field(min_length=1, max_length=LENGTHS.tool)]
+
+
+def _name_or_shape(value: Any) -> str | None:
+    """Discriminator of a union of a string, tagged `name`, and an object, tagged `shape`."""
+    if isinstance(value, str):
+        return "name"
+    return "shape" if isinstance(value, dict | Tool) else None
+
+
 class CellRequest(RobotWithTcp):
     """The robot, its tool and its surroundings."""
 
-    tool: Tool = described(
-        "Shape of the tool, for collision checking.",
+    tool: Annotated[
+        Annotated[ToolName, Tag("name")] | Annotated[Tool, Tag("shape")],
+        Discriminator(
+            _name_or_shape,
+            custom_error_type="name_or_shape",
+            custom_error_message="Give the name of a tool, or an object with its capsules",
+        ),
+    ] = described(
+        "Shape of the tool, for collision checking; or the name of a tool from `GET /tools`. A "
+        "name also gives the TCP, unless `tcp` is given, and adds the tool's mass to every "
+        "payload, which is then the part alone.",
         None,
-        TOOL,
+        "robotiq_2f_85",
         default=Tool(),
     )
     scene: Scene = described(

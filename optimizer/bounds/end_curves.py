@@ -11,7 +11,7 @@ import numpy as np
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.bounds.subdivide import Rows
 from joulepath.optimizer.collision.bodies import Indices
-from joulepath.optimizer.kinematics.covers.covering_sheets import CoveringSheet, boxes_on
+from joulepath.optimizer.kinematics.covers.branch_covers import BranchCover, boxes_on
 from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
 from joulepath.optimizer.kinematics.seven.redundant_curve import CurveStack, RedundantCurve
@@ -20,8 +20,8 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 FIRST_HALF_WIDTH = np.pi / 24
 """Largest half width of the first cells of a curve [rad]."""
 
-Curve = Array | SelfMotion | CoveringSheet
-"""An isolated configuration (nq,) [rad], a self-motion, or a sheet that covers a pose."""
+Curve = Array | SelfMotion | BranchCover
+"""An isolated configuration (nq,) [rad], a self-motion, or a cover of one branch of a pose."""
 
 BoxesOfCells = Callable[[Indices, Array, Array], tuple[Array, Array]]
 """Boxes from rows in a group of curves (n,), parameters (n,) and half widths (n,) [rad]."""
@@ -121,7 +121,7 @@ class EndCurves:
         """
         groups: dict[tuple[type, object], list[int]] = {}
         for k, curve in enumerate(self.curves):
-            if isinstance(curve, RedundantCurve | CoveringSheet):
+            if isinstance(curve, RedundantCurve | BranchCover):
                 key: object = curve.pose
             else:
                 key = None if isinstance(curve, np.ndarray) else curve
@@ -136,8 +136,8 @@ def _boxes_of(curves: Sequence[Curve]) -> BoxesOfCells:
     one = curves[0]
     if isinstance(one, RedundantCurve):
         return CurveStack.of([each for each in curves if isinstance(each, RedundantCurve)]).boxes
-    if isinstance(one, CoveringSheet):
-        return partial(boxes_on, [each for each in curves if isinstance(each, CoveringSheet)])
+    if isinstance(one, BranchCover):
+        return partial(boxes_on, [each for each in curves if isinstance(each, BranchCover)])
     if isinstance(one, np.ndarray):
         q = np.array(curves)
         return lambda rows, _, half: (q[rows], np.zeros((len(half), q.shape[1])))

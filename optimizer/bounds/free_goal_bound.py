@@ -33,7 +33,7 @@ from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.kinematics.covers.pose_boxes import PoseBoxes
 from joulepath.optimizer.kinematics.covers.wrist_boxes import WristBoxes
 from joulepath.optimizer.kinematics.covers.wrist_geometry import (
-    OUTER,
+    WRIST_JOINTS,
     Shell,
     WristBody,
     WristGeometry,
@@ -131,13 +131,13 @@ def one_turn_boxes(nq: int, boxes_per_joint: int) -> tuple[Array, Array]:
     Returns:
         Middles and half sides, shape (b, nq) [rad].
     """
-    inner, side = max(nq - OUTER, 0), np.pi / boxes_per_joint
+    inner, side = max(nq - WRIST_JOINTS, 0), np.pi / boxes_per_joint
     along_joint = -np.pi + side * (2 * np.arange(boxes_per_joint) + 1)
     # two boxes for the two ways of bending the wrist
-    bends = [(-np.pi / 2, np.pi / 2)] * (nq > OUTER)
+    bends = [(-np.pi / 2, np.pi / 2)] * (nq > WRIST_JOINTS)
     parts = np.array(list(product(*[along_joint] * inner, *bends)))
     centre, half = np.zeros((len(parts), nq)), np.full((len(parts), nq), np.pi)
-    if nq > OUTER:
+    if nq > WRIST_JOINTS:
         centre[:, :inner], half[:, :inner] = parts[:, :inner], side
         centre[:, inner + 1], half[:, inner + 1] = parts[:, inner], np.pi / 2
     return centre, half
@@ -168,7 +168,7 @@ class _GoalBoxes(BoxSubdivision[_StartBoxes]):
     def first(self) -> _StartBoxes:
         """Boxes over one turn of every joint, for every start."""
         nq, count = self.starts.shape[1], len(self.starts)
-        inner, most = max(nq - OUTER, 0), FAMILY.most_first_boxes
+        inner, most = max(nq - WRIST_JOINTS, 0), FAMILY.most_first_boxes
         fineness = next(
             (n for n in FAMILY.boxes_per_joint if 2 * n**inner * count <= most),
             FAMILY.boxes_per_joint[-1],

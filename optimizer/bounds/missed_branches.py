@@ -17,7 +17,7 @@ from joulepath.optimizer.bounds.pair import Pair
 from joulepath.optimizer.bounds.self_motion_bound import bound_between_curves, self_motion_bound
 from joulepath.optimizer.bounds.subdivide import SUBDIVISION, SearchLimits
 from joulepath.optimizer.deadline import NEVER, Deadline
-from joulepath.optimizer.kinematics.covers.covering_sheets import covering_sheets
+from joulepath.optimizer.kinematics.covers.branch_covers import branch_covers
 from joulepath.optimizer.kinematics.covers.wrist_geometry import potential_rates
 from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
@@ -46,7 +46,7 @@ def bound_of_missed_branches(
     """Lower bound on motions between poses in configurations of no candidate [J]; inf for none.
 
     - If all branches are known, the other configurations are members of self-motions.
-    - Else, if the arm is nearly of a form with known curves, `covering_sheets` hold them.
+    - Else, if the arm is nearly of a form with known curves, `branch_covers` hold them.
     - Else, from given joint positions, the bound covers the motions to the goal poses with any
       rotation about their z axes, by boxes of joint positions, without inverse kinematics.
     - Else, between poses, the bound covers the motions between any two configurations.
@@ -83,9 +83,9 @@ def bound_of_missed_branches(
 def _covered(
     prepared: PreparedProblem, ends: Sequence[EndConfiguration], target: Target
 ) -> EndCurves | None:
-    """Joint positions given at one end, and sheets with all configurations of its poses.
+    """Joint positions given at one end, and covers with all configurations of its poses.
 
-    It is None for an arm without covering sheets. Poses of partly free orientation are left to
+    It is None for an arm without such covers. Poses of partly free orientation are left to
     `free_goal_bound`.
     """
     arm = prepared.arm
@@ -93,10 +93,10 @@ def _covered(
     curves: list[Curve] = list[Array | Curve](isolated.values())
     poses = _poses(target)
     for pose in poses:
-        sheets = covering_sheets(arm.robot, flange_pose(pose.T, arm.T_flange_tcp))
-        if sheets is None:
+        covers = branch_covers(arm.robot, flange_pose(pose.T, arm.T_flange_tcp))
+        if covers is None:
             return None
-        curves += sheets
+        curves += covers
     return EndCurves(arm.robot.nq, curves, not poses)
 
 

@@ -13,7 +13,7 @@ from joulepath.optimizer.result.solution import (
     Solution,
     SolverReport,
 )
-from joulepath.optimizer.search.baselines import with_saving_intervals
+from joulepath.optimizer.search.baselines import standing, with_savings
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.final_bound import final_bound
 from joulepath.optimizer.search.optimality import may_be_optimal
@@ -67,8 +67,11 @@ def answer(state: SearchState, best: Candidate, baselines: list[Baseline]) -> So
         lower_bound=bound,
         limits=LimitsInForce.of(arm.active_limits, arm.tcp_speed, arm.elbow_speed),
         complete=all_branches_known(problem),
-        baselines=with_saving_intervals(
-            baselines, problem, Known(energy.electrical.total, sensitivity, spline.duration)
+        baselines=with_savings(
+            baselines,
+            problem,
+            Known(energy.electrical.total, sensitivity, spline.duration),
+            standing(arm, best.q_goal, prepared.torques),
         ),
         candidates=[each.report() for each in state.candidates],
         unreachable=state.unreachable,

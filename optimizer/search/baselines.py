@@ -6,6 +6,7 @@ the optimiser.
 - `ruckig`: time-optimal under limits of speed, acceleration and jerk (Berscheid, Kröger 2021);
   without torque limits
 - `ruckig_slowed`: the same motion, its time scaled to our duration
+- `straight`: Ruckig's motion along the straight line in joints, its time scaled to our duration
 - `controller_default`: the robot's own controller at its default speed and acceleration, a
   leading-axis trapezoid; left
   out for a robot whose maker publishes none
@@ -13,6 +14,9 @@ the optimiser.
 All go from the start to the nearest goal and wait there until the end of the dwell, if there is
 one. The acceleration of a trapezoid jumps: its jerk is unbounded, so it is never within a jerk
 limit.
+
+A saving is claimed only against a motion within every limit, in the same cycle time: where there is
+no dwell, the shorter of both motions waits at its goal until the longer one ends.
 """
 
 from __future__ import annotations
@@ -24,21 +28,28 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power, waits
-from joulepath.optimizer.dynamics.interval import Known, arm_spread, saving_intervals
+from joulepath.optimizer.dynamics.interval import (
+    Known,
+    arm_spread,
+    saving_interval,
+    saving_intervals,
+)
 from joulepath.optimizer.dynamics.limited_torque import limited_torque
 from joulepath.optimizer.dynamics.losses import breakdown, friction_torque
 from joulepath.optimizer.dynamics.sensitivity import energy_sensitivity, waiting_sensitivity
 from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE, limit_ratios, too_much
-from joulepath.optimizer.motion.ruckig_motion import time_optimal
+from joulepath.optimizer.motion.ruckig_motion import straight, time_optimal
 from joulepath.optimizer.motion.time_scalings import (
     SampledMotion,
     controller_default,
     quintic,
     trapezoid,
 )
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.result.energy import Energy
-from joulepath.optimizer.result.solution import Baseline, BaselineName
+from joulepath.optimizer.result.energy import Energy, SavingInterval
+from joulepath.optimizer.result.solution import Baseline, BaselineName, Standing
 
 Torques = Callable[[Array, Array, Array], Array]
 Broken = Callable[[Sequence[Array], Sequence[Array]], list[list[str]]]
@@ -69,10 +80,8 @@ def baselines(
         for name in ("q", "v", "a")
     )
     ends = np.cumsum([len(motion.t) for motion in motions.values()])[:-1]
-    result, held = [], np.zeros_like(q_start)
-    if problem.dwell is not None:
-        goal, still = nearest(problem, q_start, q_goals)[None], np.zeros((1, len(q_start)))
-        held = torques(goal, still, still)[0]
+    result = []
+    held = standing(problem.arm, nearest(problem, q_start, q_goals), torques)
     broken = broken_on_the_way(
         [motion.q for motion in motions.values()], [motion.v for motion in motions.values()]
     )
@@ -88,13 +97,13 @@ def compared(
     name: BaselineName,
     motion: SampledMotion,
     tau: Array,
-    held: Array,
+    held: Standing,
     ours: float,
     potential: Callable[[Array], float],
     broken: Sequence[str],
 ) -> Baseline:
-    """A motion with torques tau (k, nq) as a baseline; after it, motors hold torques `held` (nq,).
-    See `baselines`.
+    """A motion with torques tau (k, nq) as a baseline; after it, the arm stands as `held`. See
+    `baselines`. Its saving is that over both motions alone, until `with_savings`.
 
     `broken` are the limits along the path that it breaks, and what collides, in words.
     """
@@ -106,10 +115,9 @@ def compared(
         motion.weights, motion.q, motion.v, motion.a, tau, arm, spread, lost
     )
     if problem.dwell is not None:
-        hold = float(holding_power(arm, held))
-        energy = energy.with_dwell(dwell_energy(problem.dwell, arm, hold, motion.duration))
+        energy = energy.with_dwell(dwell_energy(problem.dwell, arm, held.power, motion.duration))
         times = waits(problem.dwell, motion.duration)
-        sensitivity += waiting_sensitivity(arm, motion.q[-1], held, *times, problem.dwell, spread)
+        sensitivity += waiting_sensitivity(arm, held.q, held.tau, *times, problem.dwell, spread)
     return Baseline(
         name=name,
         duration=motion.duration,
@@ -118,21 +126,52 @@ def compared(
         saving=saving(ours, energy.of(problem.objective)),
         reason="; ".join([*broken_limits(problem, motion, tau, lost), *broken]) or None,
         sensitivity=sensitivity,
+        at_goal=held,
     )
 
 
-def with_saving_intervals(table: list[Baseline], problem: Problem, ours: Known) -> list[Baseline]:
-    """The baselines with the intervals of their savings; without, where mechanical work is
-    compared.
+def standing(arm: Arm, q: Array, torques: Torques) -> Standing:
+    """An arm that its motors hold at q (nq,) [rad]."""
+    still = np.zeros((1, len(q)))
+    held = torques(q[None], still, still)[0]
+    return Standing(q, held, float(holding_power(arm, held)))
+
+
+def with_savings(
+    table: list[Baseline], problem: Problem, ours: Known, at_goal: Standing
+) -> list[Baseline]:
+    """The baselines with savings in the same cycle time, and their intervals; without, where they
+    are not within every limit. `ours` is our motion, which ends as `at_goal`.
     """
-    if problem.objective != "electrical":
-        return table
-    known = [Known(each.electrical, each.sensitivity, each.duration) for each in table]
-    intervals = saving_intervals(ours, known, problem.arm)
+    usable = [each for each in table if each.within_limits]
+    savings: dict[str, SavingInterval | None] = dict.fromkeys(each.name for each in usable)
+    values = {each.name: each.saving for each in usable}
+    if problem.objective == "electrical":
+        together = list[tuple[str, Known]]()
+        for each in usable:
+            theirs = Known(each.electrical, each.sensitivity, each.duration)
+            wait = 0.0 if problem.dwell is not None else each.duration - ours.duration
+            if abs(wait) <= RATIO_TOLERANCE * ours.duration:
+                together.append((each.name, theirs))
+                continue
+            longer = waited(ours, at_goal, wait, problem.arm) if wait > 0 else ours
+            theirs = waited(theirs, each.at_goal, -wait, problem.arm) if wait < 0 else theirs
+            values[each.name] = saving(longer.energy, theirs.energy)
+            savings[each.name] = saving_interval(longer, theirs, problem.arm)
+        intervals = saving_intervals(ours, [known for _, known in together], problem.arm)
+        savings |= {name: known for (name, _), known in zip(together, intervals, strict=True)}
     return [
-        replace(each, saving_interval=interval)
-        for each, interval in zip(table, intervals, strict=True)
+        replace(each, saving=values.get(each.name), saving_interval=savings.get(each.name))
+        for each in table
     ]
+
+
+def waited(known: Known, at: Standing, time: float, arm: Arm) -> Known:
+    """A motion and a wait of `time` [s] after it, the motors holding the arm."""
+    more = waiting_sensitivity(arm, at.q, at.tau, time, 0.0, Dwell(time), arm_spread(arm))
+    return replace(
+        known, energy=known.energy + at.power * time, sensitivity=known.sensitivity + more
+    )
 
 
 def guesses(
@@ -150,6 +189,7 @@ def guesses(
         "quintic": quintic(q_start, q_goal, duration),
         "ruckig": fastest,
         "ruckig_slowed": fastest.scaled_to(duration),
+        "straight": straight(limits, q_start, q_goal).scaled_to(duration),
     }
     if default is not None:
         motions["controller_default"] = controller_default(limits, default, q_start, q_goal)

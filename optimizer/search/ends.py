@@ -13,12 +13,12 @@ from joulepath.optimizer.exceptions import (
     UnreachableTargets,
 )
 from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
+from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives
 from joulepath.optimizer.kinematics.inverse import (
     inverse_kinematics_for,
     required_inverse_kinematics,
 )
 from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations, within_cone
-from joulepath.optimizer.kinematics.six.full_turns import full_turn_alternatives
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose

@@ -11,7 +11,7 @@ from __future__ import annotations
 from functools import partial
 
 from joulepath.optimizer.dynamics.plant import has_corners
-from joulepath.optimizer.kinematics.tool_path.held_pose import HeldPose
+from joulepath.optimizer.kinematics.held_pose import HeldPose
 from joulepath.optimizer.motion.spline import sampled
 from joulepath.optimizer.search.attempts import improve, in_time, settled, solver_of
 from joulepath.optimizer.search.candidates import Candidate

@@ -53,7 +53,7 @@ def _joined(problem: Problem, parts: list[Baseline], ours: float) -> Baseline:
         sum(each.mechanical for each in parts),
     )
     return replace(
-        parts[0],
+        parts[-1],
         duration=sum(each.duration for each in parts),
         electrical=electrical,
         mechanical=mechanical,

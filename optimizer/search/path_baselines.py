@@ -11,7 +11,7 @@ import numpy as np
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.motion.time_scalings import SampledMotion, even_speed
 from joulepath.optimizer.result.solution import Baseline
-from joulepath.optimizer.search.baselines import compared
+from joulepath.optimizer.search.baselines import compared, standing
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.state import SearchState
 
@@ -21,13 +21,12 @@ def path_baselines(state: SearchState, best: Candidate) -> list[Baseline]:
     prepared, problem, path = (
         state.prepared,
         state.problem,
-        state.prepared.joint_path(best.q_start),
+        state.prepared.followed.joint_path(best.q_start),
     )
     assert path is not None and best.energy is not None
     motion = along(path, even_speed(best.duration))
     tau = prepared.torques(motion.q, motion.v, motion.a)
-    still = np.zeros_like(best.q_goal)[None]
-    held = prepared.torques(best.q_goal[None], still, still)[0]
+    held = standing(problem.arm, best.q_goal, prepared.torques)
     (broken,) = prepared.broken_on_the_way([motion.q], [motion.v])
     return [
         compared(problem, "trapezoid", motion, tau, held, best.energy, prepared.potential, broken)

@@ -65,7 +65,7 @@ def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
             candidate = _candidate(prepared, start, whole)
             if candidate is not None:
                 found.append(candidate)
-                prepared.traces[whole.q[0].tobytes()] = whole
+                prepared.followed.keep(whole)
                 continue
         attempts.append(attempt_of(limits, start, trace))
     if not found:
@@ -81,7 +81,7 @@ def _traces(prepared: PreparedProblem, starts: Sequence[EndConfiguration]) -> li
     """
     course, arm = prepared.course, prepared.arm
     assert course is not None
-    known = [prepared.traces.get(each.q.tobytes()) for each in starts]
+    known = [prepared.followed.known_trace(each.q) for each in starts]
     found = [each for each in known if each is not None]
     if len(found) < len(starts):
         found = traces(arm, course, np.array([each.q for each in starts]))

@@ -197,6 +197,7 @@ def _better(
         for each in table
         if each.name in names
         and each.within_limits
+        and each.saving is not None
         and each.saving < -ENERGY_TOLERANCE
         and state.allows(each.duration)
     ]

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 from joulepath.optimizer.deadline import Clock
 from joulepath.optimizer.motion.spline import Spline
-from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.prepared_problem import ArmModels
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search import exploration, stages, warm_start
 from joulepath.optimizer.search.answer import answer
@@ -28,7 +28,7 @@ class Run:
         known: motions between the problem's ends, of any duration, that warm-start the search.
         clock: function that returns the time [s].
         tell: receives the progress.
-        like: another prepared problem of the same arm, whose models are reused.
+        models: models of the problem's arm, if they are built already.
     """
 
     def __init__(
@@ -36,10 +36,10 @@ class Run:
         problem: Problem,
         known: Sequence[Spline] = (),
         clock: Clock = time.perf_counter,
-        tell: Tell = nobody,
-        like: PreparedProblem | None = None,
+        tell: Tell = no_listener,
+        models: ArmModels | None = None,
     ) -> None:
-        self.state = SearchState.of(problem, known, clock, tell, like)
+        self.state = SearchState.of(problem, known, clock, tell, models)
 
     @property
     def problem(self) -> Problem:

@@ -13,9 +13,15 @@ from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.motion.spline import Spline, lasting
-from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.prepared_problem import ArmModels, PreparedProblem
 from joulepath.optimizer.problem.problem import LEAST_DURATION, Problem, narrowed
-from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, nobody
+from joulepath.optimizer.progress import (
+    CandidatesFound,
+    CandidateTried,
+    Improved,
+    Tell,
+    no_listener,
+)
 from joulepath.optimizer.result.candidates import CandidateStatus, UnreachableTarget
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.energy import Energy
@@ -59,7 +65,7 @@ class SearchState:
     """Whether there may be a better motion, because the deadline ended a part of the search."""
     longest: float = 0.0
     """Longest duration that the answer may have, as far as it is known [s]."""
-    tell: Tell = nobody
+    tell: Tell = no_listener
     """Receives the progress."""
     proven: float | None = None
     """Lower bound of all motions [J]; None before it is known."""
@@ -90,12 +96,12 @@ class SearchState:
         problem: Problem,
         known: Sequence[Spline] = (),
         clock: Clock = time.perf_counter,
-        tell: Tell = nobody,
-        like: PreparedProblem | None = None,
+        tell: Tell = no_listener,
+        models: ArmModels | None = None,
     ) -> Self:
         """State of a search that begins now; arguments as of `Run`."""
         began = clock()
-        prepared = PreparedProblem.of(problem) if like is None else like.sharing(problem)
+        prepared = PreparedProblem.of(problem, models)
         end = Deadline.after(problem.deadline, clock)
         return cls(prepared, end, tell=tell, clock=clock, known=known, began=began)
 
@@ -197,7 +203,7 @@ class SearchState:
 
     def tell_tried(self, candidate: Candidate) -> None:
         """Tell the outcome of a candidate, and the best motion."""
-        if self.tell is nobody:
+        if self.tell is no_listener:
             return
         index = self.candidates.index(candidate)
         status: Literal["solved", "pruned", "failed"] = "failed"
@@ -210,7 +216,7 @@ class SearchState:
 
     def tell_best(self) -> None:
         """Tell the best motion so far, if there is one."""
-        best = None if self.tell is nobody else self.best()
+        best = None if self.tell is no_listener else self.best()
         if best is not None and best.energy is not None:
             self.tell(Improved(best.energy, best.duration, self.proven, best.q_goal))
 

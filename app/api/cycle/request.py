@@ -21,7 +21,7 @@ from joulepath.app.schemas.request import (
     which_candidates,
 )
 from joulepath.app.settings import LONGEST_DEADLINE
-from joulepath.optimizer.problem.cycle import LONGEST_ROUND, MOST_STOPS
+from joulepath.optimizer.problem.cycle import LONGEST_CYCLE, MOST_STOPS
 from joulepath.optimizer.problem.free_order import MOST_FREE_STOPS
 from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.result.energy import Objective
@@ -41,7 +41,7 @@ class LongCycle:
 
 LONG_CYCLE = LongCycle()
 
-LongTime = Annotated[float, Field(gt=0, le=LONGEST_ROUND)]
+LongTime = Annotated[float, Field(gt=0, le=LONGEST_CYCLE)]
 
 
 class TimeRange(DurationRange):

@@ -1,4 +1,4 @@
-"""The angle of the tool at an end of its path, where the path leaves this angle free."""
+"""Search for the angle of the tool at an end of its path with a free angle."""
 
 from __future__ import annotations
 

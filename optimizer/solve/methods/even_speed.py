@@ -17,6 +17,7 @@ from scipy.interpolate import CubicSpline
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.kinematics.tool_path.followed_paths import EvenMotion
 from joulepath.optimizer.kinematics.tool_path.least_speed import LeastSpeed
 from joulepath.optimizer.motion.bspline import DEGREE, clamped, fit
 from joulepath.optimizer.motion.spline import Spline, sample
@@ -67,7 +68,7 @@ EVEN_SPEED = EvenSpeedSettings()
 
 
 @dataclass(frozen=True, eq=False)
-class _Tried:
+class _Attempt:
     """Attempt with given ramps."""
 
     times: tuple[float, float]
@@ -109,15 +110,15 @@ class EvenSpeed:
         """
         if self._pace.min() < EVEN_SPEED.least_pace:
             return SolveResult(SolveStatus.INFEASIBLE, SolveReason.TOOL_TURNS_IN_PLACE)
-        tried = list[_Tried]()
+        tried = list[_Attempt]()
         for pairs in (
             self._even_ramps(),
             self._uneven_ramps(0, tried),
             self._uneven_ramps(1, tried),
         ):
-            tried += [self._tried(*pair) for pair in pairs]
+            tried += [self._attempt(*pair) for pair in pairs]
         for each in sorted(tried, key=lambda each: each.cost):
-            motion = self._kept(each)
+            motion = self._on_path(each)
             if motion is not None:
                 return SolveResult(
                     SolveStatus.SOLVED,
@@ -131,25 +132,26 @@ class EvenSpeed:
         reason = SolveReason.FIXED_SPEED_TOO_FAST if too_fast else SolveReason.FIXED_SPEED_NOT_HELD
         return SolveResult(SolveStatus.FAILED, reason, len(tried), len(tried))
 
-    def _tried(self, first: float, last: float) -> _Tried:
+    def _attempt(self, first: float, last: float) -> _Attempt:
         checkpoint()
-        known, key = self.prepared.even_motions, (self.path.control_points.tobytes(), first, last)
-        if key not in known:
+
+        def compute() -> EvenMotion:
             motion = self._motion(first, last, EVEN_SPEED.spans)
-            known[key] = motion, motion is not None and self._is_within_limits(motion)
-        motion, within = known[key]
+            return motion, motion is not None and self._is_within_limits(motion)
+
+        motion, within = self.prepared.followed.even_motion(self.path, first, last, compute)
         cost = self._cost(motion) if motion is not None and within else np.inf
-        return _Tried(
+        return _Attempt(
             (first, last), motion if within else None, cost, motion is not None and not within
         )
 
-    def _kept(self, tried: _Tried) -> Spline | None:
+    def _on_path(self, attempt: _Attempt) -> Spline | None:
         """The motion, with more spans if it leaves its path too far; None without a motion."""
-        motion = tried.motion
+        motion = attempt.motion
         if motion is None or self.keeps(motion):
             return motion
         for spans in EVEN_SPEED.spans[1:]:
-            finer = self._motion(*tried.times, (spans,))
+            finer = self._motion(*attempt.times, (spans,))
             if finer is not None and self._is_within_limits(finer) and self.keeps(finer):
                 return finer
         return None
@@ -206,7 +208,7 @@ class EvenSpeed:
             if least <= time <= most and time > 0:
                 yield time, time
 
-    def _uneven_ramps(self, end: int, tried: list[_Tried]) -> Iterator[tuple[float, float]]:
+    def _uneven_ramps(self, end: int, tried: list[_Attempt]) -> Iterator[tuple[float, float]]:
         """The best times [s] so far, with other times at one end."""
         best = min(tried, key=lambda each: each.cost, default=None)
         if best is None or best.motion is None:

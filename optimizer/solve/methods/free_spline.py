@@ -106,7 +106,7 @@ class FreeSpline(SplineMethod):
     def _from_smoothed(self, space: Basis) -> list[SolveResult]:
         """Attempts from the smoothed time-optimal motion in a space; the last one counts."""
         points = self.spaces.smoothed_time_optimal(space)
-        guess = Guess(space, points, 0.0, rough=True, progress=self._progress)
+        guess = Guess(space, points, 0.0, coarse=True, progress=self._progress)
         tried = list[SolveResult]()
         if self._is_refined_at_once:
             exact_below = FREE_SPLINE.exact_below * self.spaces.shortest
@@ -153,10 +153,8 @@ class FreeSpline(SplineMethod):
         coarse = self.improve(replace(guess, unchecked=True))
         if coarse.spline is None:
             return [coarse], guess
-        points, duration = (
-            self.coordinates.from_joints(coarse.spline.control_points),
-            coarse.spline.duration,
-        )
+        points = self.coordinates.from_joints(coarse.spline.control_points)
+        duration = coarse.spline.duration
         found = replace(guess, points=points, duration=duration, nearly_feasible=True)
         late = self.deadline.left < FREE_SPLINE.time_multiple * (left - self.deadline.left)
         if late or self.prepared.surroundings.worst_violation(coarse.spline) is not None:
@@ -165,9 +163,9 @@ class FreeSpline(SplineMethod):
 
     def _may_be_on_the_wrong_side(self, found: SolveResult) -> bool:
         """Whether a motion may have left obstacles on the wrong side."""
-        if found.spline is None or found.unhindered is None or found.cut_short:
+        if found.spline is None or found.unobstructed_cost is None or found.cut_short:
             return False
-        return self.cost_of(found.spline) > above(found.unhindered, FREE_SPLINE.detour_cost)
+        return self.cost_of(found.spline) > above(found.unobstructed_cost, FREE_SPLINE.detour_cost)
 
     def _compared_with_planned_paths(self, found: SolveResult) -> SolveResult:
         """The motion of least cost: the one found, or one from planned paths."""
@@ -204,11 +202,9 @@ class FreeSpline(SplineMethod):
         return with_effort(polished, [best, polished])
 
     def _polished(self, spline: Spline) -> SolveResult:
-        """The end of a rough solve with more control points than `may_refine` accepts."""
-        space, points = (
-            Basis.of(spline.knots / spline.duration),
-            self.coordinates.from_joints(spline.control_points),
-        )
+        """Finish a coarse solve with more control points than `may_refine` accepts."""
+        space = Basis.of(spline.knots / spline.duration)
+        points = self.coordinates.from_joints(spline.control_points)
         return self.improve(
             Guess(space, points, spline.duration, collision_free=True, progress=self._progress)
         )
@@ -229,7 +225,7 @@ class FreeSpline(SplineMethod):
                 if distance < -FREE_SPLINE.allowed_penetration:
                     continue
             guess = Guess(
-                space, points, 0.0, collision_free=True, rough=True, progress=self._progress
+                space, points, 0.0, collision_free=True, coarse=True, progress=self._progress
             )
             tried.append(self.improve(guess))
             if tried[-1].status is not SolveStatus.FAILED:

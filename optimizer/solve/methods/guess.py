@@ -26,7 +26,7 @@ class Guess:
     """Whether the NLP has clearance constraints from the start. Otherwise it gets them after a
     collision."""
 
-    rough: bool = False
+    coarse: bool = False
     """Whether a further solve refines the motion: with clearance constraints, the solve then ends
     at a larger decrease of the cost."""
 

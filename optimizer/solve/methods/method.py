@@ -71,11 +71,9 @@ class Method(ABC):
 
     def __init__(self, context: SolveContext) -> None:
         self.context, self.prepared, self.deadline = context, context.prepared, context.deadline
-        self.q_start, self.q_goal, self.interval = (
-            context.q_start,
-            context.q_goal,
-            context.interval,
-        )
+        self.q_start = context.q_start
+        self.q_goal = context.q_goal
+        self.interval = context.interval
         self.t_min, self.t_max = self.interval.t_min, self.interval.t_max
         # falls during the solve as motions are found
         self.incumbent_cost = context.incumbent_cost

@@ -11,12 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array, Limits
-from joulepath.optimizer.motion.spline import (
-    Spline,
-    least_time_scale,
-    sample,
-    spline_of,
-)
+from joulepath.optimizer.motion.spline import Spline, least_time_scale, sample, spline_of
 from joulepath.optimizer.solve.methods.limit_repair import (
     LIMIT_REPAIR,
     initial_bounds,
@@ -66,14 +61,10 @@ class PathRetiming(RetimedPath):
             DeadlinePassed: the watched deadline passed.
         """
         prepared = self.prepared
-        limits, bounds = (
-            prepared.problem.arm.active_limits.scaled(1 - LIMIT_REPAIR.margin),
-            initial_bounds(prepared.path),
-        )
-        x, none = (
-            self._first(limits) if guess is None else guess,
-            np.zeros(len(self.path.control_points[0])),
-        )
+        limits = prepared.problem.arm.active_limits.scaled(1 - LIMIT_REPAIR.margin)
+        bounds = initial_bounds(prepared.path)
+        x = self._first(limits) if guess is None else guess
+        none = np.zeros(len(self.path.control_points[0]))
         iterations = 0
         for solves in range(1, PATH_RETIMING.repairs + 1):
             program = RetimingProgram(self, limits, bounds, x)
@@ -89,10 +80,8 @@ class PathRetiming(RetimedPath):
             if factors is not None:
                 spline = slightly_retimed(spline, factors, self.interval.t_max)
                 factors = repair_factors(prepared, spline, (none, none))
-            excess, lacking = (
-                path_excess(prepared, spline, prepared.path, None),
-                self._lacking(spline),
-            )
+            excess = path_excess(prepared, spline, prepared.path, None)
+            lacking = self._lacking(spline)
             if factors is None and not excess.any() and lacking <= 0:
                 return SolveResult(
                     SolveStatus.SOLVED, SolveReason.CONVERGED, iterations, solves, spline

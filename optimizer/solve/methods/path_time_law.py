@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.kinematics.tool_path.course_tracing import path_ratios
+from joulepath.optimizer.kinematics.tool_path.joint_path import path_ratios
 from joulepath.optimizer.motion import quintic, ramped
 from joulepath.optimizer.motion.bspline import Basis, clamped
 from joulepath.optimizer.motion.spline import Spline, sample
@@ -76,7 +76,7 @@ class PathTimeLaws:
         """Share of the time of a ramp, for a least speed and constant speed between the ramps."""
         least = self.prepared.least_speed
         assert least is not None
-        way = PATH_TIME_LAW.used_ramp * least.ramp / float(least.gone[-1])
+        way = PATH_TIME_LAW.used_ramp * least.ramp / float(least.travelled[-1])
         return 2 * way / (1 + 2 * way)
 
     def paced(self, path: Spline) -> tuple[Array, Array]:

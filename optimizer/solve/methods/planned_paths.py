@@ -18,7 +18,7 @@ from joulepath.optimizer.collision.planner.path_planner import (
 )
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.spline import Spline
-from joulepath.optimizer.prepared_problem import RATIO_ROUNDING, PreparedProblem
+from joulepath.optimizer.prepared_problem import PREPARED, PreparedProblem
 from joulepath.optimizer.solve.methods.method import Method
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
@@ -71,11 +71,9 @@ def plan(method: Method) -> PlannedPaths:
     states, and plans to the goals of other candidates too.
     """
     settings = PLANNED_PATHS
-    context, deadline, surroundings = (
-        method.context,
-        method.deadline,
-        method.prepared.surroundings,
-    )
+    context = method.context
+    deadline = method.deadline
+    surroundings = method.prepared.surroundings
     left = deadline.left
     others, unknown = context.other_goals(), np.isinf(method.incumbent_cost)
     tried = context.was_postponed or surroundings.seems_enclosed(method.q_start, method.q_goal)
@@ -163,6 +161,6 @@ def _is_clear(prepared: PreparedProblem, path: Spline) -> bool:
     """Whether all margins along a path are proven, and the tool stays within its cone."""
     if prepared.path is not None:
         q = path.curve(np.linspace(0.0, path.duration, PLANNED_PATHS.cone_samples))
-        if (prepared.path.ratios(q, np.zeros_like(q)) > 1 + RATIO_ROUNDING).any():
+        if (prepared.path.ratios(q, np.zeros_like(q)) > 1 + PREPARED.ratio_rounding).any():
             return False
     return prepared.surroundings.worst_violation(path) is None

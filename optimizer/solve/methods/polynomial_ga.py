@@ -21,12 +21,7 @@ from joulepath.optimizer.collision.planner.path_planner import along
 from joulepath.optimizer.collision.planner.state_validity import StateValidityChecker
 from joulepath.optimizer.motion import quintic
 from joulepath.optimizer.motion.polynomial import PolynomialBasis, polynomials
-from joulepath.optimizer.motion.spline import (
-    least_time_scale,
-    retimed,
-    spline_of,
-    time_scales,
-)
+from joulepath.optimizer.motion.spline import least_time_scale, retimed, spline_of, time_scales
 from joulepath.optimizer.result.solution import BaselineName
 from joulepath.optimizer.solve.methods.limit_repair import torque_peaks
 from joulepath.optimizer.solve.methods.method import Method

@@ -15,10 +15,7 @@ from joulepath.optimizer.dynamics.plant import SHARPER_WIDTHS
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.spline import Spline, span_peak_rates, spline_of
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.solve.methods.limit_repair import (
-    LIMIT_REPAIR,
-    repair_factors,
-)
+from joulepath.optimizer.solve.methods.limit_repair import LIMIT_REPAIR, repair_factors
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from joulepath.optimizer.solve.nlp.interior_point import InteriorPoint
 from joulepath.optimizer.solve.nlp.interior_state import Interior
@@ -87,10 +84,8 @@ def refine_work(
                 SolveStatus.FAILED, SolveReason.NOT_CONVERGED, at.iterations, solves
             ), points
         spline = spline_of(basis, points, duration)
-        spans, torque = (
-            span_peak_rates(spline) / prepared.problem.arm.active_limits.rates[:, None],
-            np.ones(nq),
-        )
+        spans = span_peak_rates(spline) / prepared.problem.arm.active_limits.rates[:, None]
+        torque = np.ones(nq)
         if (spans <= within).all():
             factors = repair_factors(prepared, spline, (np.zeros(nq), np.zeros(nq)))
             if factors is None:

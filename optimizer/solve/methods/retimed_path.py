@@ -22,16 +22,10 @@ from scipy.linalg import solve
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.motion import bspline
-from joulepath.optimizer.motion.spline import (
-    Spline,
-    lasting,
-    spline_of,
-)
+from joulepath.optimizer.motion.spline import Spline, lasting, spline_of
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval
-from joulepath.optimizer.solve.methods.limit_repair import (
-    LIMIT_REPAIR,
-)
+from joulepath.optimizer.solve.methods.limit_repair import LIMIT_REPAIR
 
 
 @dataclass(frozen=True)
@@ -87,10 +81,8 @@ class RetimedPath:
         self.space = space or bspline.uniform(count)
         self.scaling = scaling or bspline.uniform(settings.scaling_points)
         at = np.linspace(0.0, 1.0, settings.fitted_per_point * self.space.n)
-        self._instants, self._at_path = (
-            self.scaling.matrix(at),
-            self.scaling.matrix(self.space.path_points),
-        )
+        self._instants = self.scaling.matrix(at)
+        self._at_path = self.scaling.matrix(self.space.path_points)
         inner, self._ends = self.space.free, np.zeros((self.space.n, 2))
         self._ends[: self.space.resting, 0], self._ends[-self.space.resting :, 1] = 1.0, 1.0
         matrix = self.space.matrix(at)

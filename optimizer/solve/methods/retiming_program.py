@@ -151,10 +151,8 @@ class RetimingProgram:
         rates = retiming.at_rates @ P / powers[1:]
         R = self._by_variables(retiming.at_rates, slopes, rates, np.arange(1.0, 4.0), T)
         limits = self.limits.rates[:, None]
-        torque, torque_slopes = (
-            tau / self.limits.tau_max,
-            (jacobian @ Y) / self.limits.tau_max[:, None],
-        )
+        torque = tau / self.limits.tau_max
+        torque_slopes = (jacobian @ Y) / self.limits.tau_max[:, None]
         values = [rates / limits, torque.copy()]
         slack = [1 - value.ravel() ** 2 for value in values]
         rows = [

@@ -9,7 +9,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.kinematics.tool_path.held_pose import HeldPose
+from joulepath.optimizer.kinematics.held_pose import HeldPose
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.solve.methods.duration_intervals import (
     DurationInterval,

@@ -147,7 +147,7 @@ class SolveResult:
     cut_short: bool = False
     """Whether the deadline ended the optimisation of the motion, or the planning of a path."""
 
-    unhindered: float | None = None
+    unobstructed_cost: float | None = None
     """Cost of the motion without clearance constraints, if that motion collides [J]."""
 
     origin: MotionOrigin = MotionOrigin.OWN_GUESS

@@ -14,10 +14,7 @@ from joulepath.optimizer.motion import bspline, seven_segment
 from joulepath.optimizer.motion.bspline import Basis
 from joulepath.optimizer.motion.spline import Spline, sampled
 from joulepath.optimizer.solve.methods.guess import Guess
-from joulepath.optimizer.solve.methods.solve_result import (
-    MotionOrigin,
-    SolveResult,
-)
+from joulepath.optimizer.solve.methods.solve_result import MotionOrigin, SolveResult
 from joulepath.optimizer.solve.methods.spline_spaces import RAMPS, SPLINE_SPACES, SplineSpaces
 from joulepath.optimizer.solve.methods.sqp_method import SqpMethod
 from joulepath.optimizer.solve.nlp.sqp_state import SQP

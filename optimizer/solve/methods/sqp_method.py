@@ -1,4 +1,4 @@
-"""Base class of methods whose motions form a linear space, optimised by the SQP."""
+"""Base class of methods with a linear space of motions, optimised by the SQP."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ from joulepath.optimizer.solve.nlp.sqp_state import SqpResult, SqpStatus
 
 @dataclass(frozen=True)
 class SqpMethodSettings:
-    """Settings of methods whose motions are optimised by the SQP."""
+    """Settings of methods that use the SQP."""
 
     repairs: int = 8
     """Largest number of NLPs solved, each with the limits tightened that the motion before exceeds
     between the nodes."""
 
-    rough_progress: float = 1e-3
-    """Relative decrease of the cost below which a rough solve among obstacles ends."""
+    coarse_progress: float = 1e-3
+    """Relative decrease of the cost below which a coarse solve among obstacles ends."""
 
     checking_time: float = 0.15
     """Time before the deadline at which an optimisation among obstacles ends, so that its motion
@@ -66,7 +66,7 @@ SQP_METHOD = SqpMethodSettings()
 
 
 class SqpMethod(StagedMethod):
-    """A method whose motions form a linear space; the SQP optimises them."""
+    """A method with a linear space of motions, optimised by the SQP."""
 
     takes_guesses: ClassVar[bool] = True
 
@@ -94,7 +94,7 @@ class SqpMethod(StagedMethod):
         stage = self.first_stage(guess)
         if self._is_far_costlier(guess, stage):
             return SolveResult(SolveStatus.PRUNED, SolveReason.PROMISES_NO_LESS)
-        iterations, collision, unhindered = 0, None, None
+        iterations, collision, unobstructed_cost = 0, None, None
         for solves in range(1, SQP_METHOD.repairs + 1):
             result, needed = self._solved(guess, stage, deadline)
             iterations += result.iterations
@@ -115,12 +115,12 @@ class SqpMethod(StagedMethod):
                     check.spline,
                     result.stationarity,
                     cut_short=late,
-                    unhindered=unhindered,
+                    unobstructed_cost=unobstructed_cost,
                 )
             if collision is not None and not len(stage.pairs):
-                unhindered = self.cost_of(check.spline)
+                unobstructed_cost = self.cost_of(check.spline)
                 effort = iterations, solves
-                if unhindered >= self.incumbent_cost:
+                if unobstructed_cost >= self.incumbent_cost:
                     reason = SolveReason.COLLIDES_AND_COSTS_MORE
                     return SolveResult(SolveStatus.PRUNED, reason, *effort)
                 if self._is_left_to_planner(collision):
@@ -137,8 +137,8 @@ class SqpMethod(StagedMethod):
         needed = self.takes_long or (among_obstacles and np.isinf(self.incumbent_cost))
         until = deadline.earlier_by(settings.checking_time) if needed else deadline
         progress = guess.progress
-        if guess.rough and among_obstacles:
-            progress = max(progress, settings.rough_progress)
+        if guess.coarse and among_obstacles:
+            progress = max(progress, settings.coarse_progress)
         start = stage.free, stage.duration, stage.multiplier
         result = solve(stage.program, *start, until, progress, self._must_be_below(stage))
         return result, needed and result.feasible
@@ -184,7 +184,7 @@ class SqpMethod(StagedMethod):
         returned = self.prepared.arm.bus.mode in ("recuperating", "storage")
         if (
             returned
-            or not (guess.rough and len(stage.pairs))
+            or not (guess.coarse and len(stage.pairs))
             or np.isinf(self._must_be_below(stage))
         ):
             return False

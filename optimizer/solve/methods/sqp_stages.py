@@ -46,7 +46,7 @@ class Stage:
     program: NonlinearProgram
 
     limits: Limits
-    """Limits of the joints, from which those of the coordinates follow."""
+    """Limits of the joints, before the transformation to coordinates."""
 
     pairs: Indices
     """Pairs of bodies with a clearance constraint."""
@@ -62,7 +62,7 @@ class Stage:
 
 
 class StagedMethod(Method):
-    """A method whose motions form a linear space, with the NLPs of its solves.
+    """A method with a linear space of motions, and the NLPs of its solves.
 
     An end with a curve in the context slides along this curve: the motion found may start or end
     elsewhere than the candidate.

@@ -42,7 +42,7 @@ class ToolPathMotionSettings:
     """Largest number of spans of the second time scaling."""
 
     further_spans: int = 12
-    """Spans that the motion has more than its path."""
+    """Spans of the motion in addition to the spans of its path."""
 
     most_first_spans: int = 67
     """Largest number of spans of the motion at first."""
@@ -80,7 +80,7 @@ class ToolPathMotion(Method):
             return SolveResult(SolveStatus.OUT_OF_TIME, SolveReason.DEADLINE_PASSED)
 
     def _solve(self) -> SolveResult:
-        path = self.prepared.joint_path(self.q_start)
+        path = self.prepared.followed.joint_path(self.q_start)
         if path is None:
             return SolveResult(SolveStatus.INFEASIBLE, SolveReason.PATH_TOO_SHARP)
         if self.prepared.least_speed is not None:
@@ -91,14 +91,15 @@ class ToolPathMotion(Method):
                 return SolveResult(
                     SolveStatus.INFEASIBLE, SolveReason.LEAST_SPEED_OUT_OF_REACH, figures=slow
                 )
-        results = [
-            self._kept(path, interval, self._laws.scaling(1)) for interval in self._intervals()
-        ]
+        first = self._laws.scaling(1)
+        results = [self._solved_along(path, each, first) for each in self._intervals()]
         if all(result.spline is None for result in results) and not self._holds_speed:
             results += self._nearly_fastest(path)
-        found = self._clear(min(results, key=lambda result: self.cost_of(result.spline)))
+        found = self._without_collision(
+            min(results, key=lambda result: self.cost_of(result.spline))
+        )
         if found.spline is None and self._may_turn():
-            self._turn(self._laws.paced(path), self._laws.scaling(1), np.inf, results)
+            self._solve_turned(self._laws.paced(path), self._laws.scaling(1), np.inf, results)
             found = min([found, *results], key=lambda result: self.cost_of(result.spline))
         return with_effort(found, results)
 
@@ -110,7 +111,7 @@ class ToolPathMotion(Method):
         """
         law, results = None, list[SolveResult]()
         if self.t_max < LONGEST_DURATION:
-            fast = self._kept(path, fastest(self.prepared), self._laws.scaling(1))
+            fast = self._solved_along(path, fastest(self.prepared), self._laws.scaling(1))
             results.append(replace(fast, status=SolveStatus.FAILED, spline=None))
             if (
                 fast.spline is not None
@@ -123,14 +124,16 @@ class ToolPathMotion(Method):
                 )
                 return [*results, too_slow]
             law = None if fast.spline is None else on_path(path, *sampled(fast.spline))
-        return [
-            *results,
-            self._kept(
-                path, self.interval, self._laws.scaling(TOOL_PATH_MOTION.finer_scaling), law
-            ),
-        ]
+        finer = self._laws.scaling(TOOL_PATH_MOTION.finer_scaling)
+        return [*results, self._solved_along(path, self.interval, finer, law)]
 
-    def _clear(self, found: SolveResult) -> SolveResult:
+    def _clear_along(
+        self, path: Spline, scaling: Basis, law: tuple[Array, Array] | None = None
+    ) -> SolveResult:
+        """The result of `_solved_along`, without its motion if that collides."""
+        return self._without_collision(self._solved_along(path, self.interval, scaling, law))
+
+    def _without_collision(self, found: SolveResult) -> SolveResult:
         """The result, without its motion if that collides."""
         hit = (
             None
@@ -152,10 +155,13 @@ class ToolPathMotion(Method):
         return self._tool_path.fixed_speed is not None
 
     def _may_turn(self) -> bool:
-        """Whether the tool may turn about an axis, and no turning was chosen before."""
-        return self._tool_path.about is not None and not self.prepared.is_chosen(self.q_start)
+        """Whether the tool may turn about an axis, and other turnings were not searched before."""
+        followed = self.prepared.followed
+        return self._tool_path.about is not None and not followed.are_turnings_searched(
+            self.q_start
+        )
 
-    def _turn(
+    def _solve_turned(
         self, law: tuple[Array, Array], scaling: Basis, least: float, results: list[SolveResult]
     ) -> None:
         """Solve with other turnings of the tool.
@@ -170,7 +176,7 @@ class ToolPathMotion(Method):
         """
         prepared, best, q_start = self.prepared, least, self.q_start
         assert prepared.course is not None
-        prepared.choose(q_start)
+        prepared.followed.mark_turnings_searched(q_start)
 
         def is_best(trace: Trace, path: Spline, result: SolveResult) -> bool:
             nonlocal best
@@ -181,7 +187,7 @@ class ToolPathMotion(Method):
             best = cost
             # the path is found from its start, and from the start of its motion
             for first in (trace.q[0], result.spline.control_points[0]):
-                prepared.choose(first, trace, path)
+                prepared.followed.select_turning(first, trace, path)
             return True
 
         for side in prepared.course.free_sides:
@@ -190,11 +196,11 @@ class ToolPathMotion(Method):
                 trace, path, coarse = found
                 assert coarse.spline is not None
                 own = on_path(path, *sampled(coarse.spline))
-                fine = self._clear(self._kept(path, self.interval, scaling, own))
+                fine = self._clear_along(path, scaling, own)
                 if any([is_best(trace, path, coarse), is_best(trace, path, fine)]):
                     q_start, law = trace.q[0], own
         for trace, path in turned_paths(prepared, q_start, self.q_goal, *law):
-            is_best(trace, path, self._clear(self._kept(path, self.interval, scaling, law)))
+            is_best(trace, path, self._clear_along(path, scaling, law))
 
     def _at_best_angle(
         self, turned: TurnedAtEnd, results: list[SolveResult]
@@ -214,7 +220,7 @@ class ToolPathMotion(Method):
             followed = turned.by(angle)
             if followed is None:
                 return np.inf
-            result = self._clear(self._kept(followed[1], self.interval, self._laws.scaling(1)))
+            result = self._clear_along(followed[1], self._laws.scaling(1))
             results.append(replace(result, status=SolveStatus.FAILED, spline=None))
             found.append(
                 (self.cost_of(result.spline), *followed, replace(result, iterations=0, solves=0))
@@ -238,33 +244,29 @@ class ToolPathMotion(Method):
             t: times of the samples, shape (k,) [s].
             fine: not available: the result has no motion.
         """
-        path, scaling = (
-            self.prepared.joint_path(self.q_start),
-            self._laws.scaling(TOOL_PATH_MOTION.finer_scaling),
-        )
+        path = self.prepared.followed.joint_path(self.q_start)
+        scaling = self._laws.scaling(TOOL_PATH_MOTION.finer_scaling)
+        failed = SolveResult(SolveStatus.FAILED, SolveReason.NO_FINER_SCALING)
         if fine or path is None:
-            return SolveResult(SolveStatus.FAILED, SolveReason.NO_FINER_SCALING)
-        results, law = (
-            [SolveResult(SolveStatus.FAILED, SolveReason.NO_FINER_SCALING)],
-            on_path(path, q, t),
-        )
+            return failed
+        results, law = [failed], on_path(path, q, t)
         try:
             with watch(self.deadline):
                 if self._holds_speed:
-                    results.append(self._clear(self._kept(path, self.interval, scaling)))
+                    results.append(self._clear_along(path, scaling))
                 elif scaling.n > TOOL_PATH_MOTION.most_scaling_spans + DEGREE:
                     scaling = self._laws.scaling(1)
                 else:
-                    results.append(self._kept(path, self.interval, scaling, law))
+                    results.append(self._solved_along(path, self.interval, scaling, law))
                 if self._may_turn():
                     least = min(self.cost_of(result.spline) for result in results)
-                    self._turn(law, scaling, least, results)
+                    self._solve_turned(law, scaling, least, results)
         except DeadlinePassed:
             results.append(SolveResult(SolveStatus.OUT_OF_TIME, SolveReason.DEADLINE_PASSED))
         return with_effort(min(results, key=lambda result: self.cost_of(result.spline)), results)
 
     def _intervals(self) -> list[DurationInterval]:
-        """Intervals of durations that are tried.
+        """Intervals of durations to solve in.
 
         Mechanical work falls with the duration, but its smoothed corners do not: the longest
         duration is tried too.
@@ -273,7 +275,7 @@ class ToolPathMotion(Method):
         may_be_slower = self.prepared.problem.objective == "mechanical" and self.t_min < self.t_max
         return [self.interval, longest] if may_be_slower else [self.interval]
 
-    def _kept(
+    def _solved_along(
         self,
         path: Spline,
         interval: DurationInterval,
@@ -288,7 +290,8 @@ class ToolPathMotion(Method):
             path: path of the joints.
             interval: allowed durations and the cost.
             scaling: space of the time scaling.
-            law: initial guess, as times (k,) [s] and fractions (k,) of the path; None for `_paced`.
+            law: initial guess, as times (k,) [s] and fractions (k,) of the path; None for one
+                that slows down at bends.
         """
         if self._holds_speed:
             speed = self._tool_path.fixed_speed

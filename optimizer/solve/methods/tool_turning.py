@@ -25,14 +25,14 @@ from joulepath.optimizer.kinematics.tcp import flange_pose
 from joulepath.optimizer.kinematics.tool_path.course_tracing import (
     Trace,
     chain_of,
-    joint_path,
     traces,
     turned_start,
     within,
 )
-from joulepath.optimizer.kinematics.tool_path.turning_sheet import (
-    REACHED,
-    TurningSheet,
+from joulepath.optimizer.kinematics.tool_path.joint_path import joint_path
+from joulepath.optimizer.kinematics.tool_path.turning_grid import (
+    TURNING_GRID,
+    TurningGrid,
     turning_of,
     turning_through,
     values_of,
@@ -141,9 +141,9 @@ def _known(prepared: PreparedProblem, q_start: Array) -> CubicSpline:
     """The present turning along the course from q_start (nq,) [rad]."""
     assert prepared.course is not None
     free = prepared.course.free_end, prepared.course.free_start
-    return prepared.traces[q_start.tobytes()].turning or turning_of(
-        np.zeros(TOOL_TURNING.knots - 2 + sum(free)), *free
-    )
+    known = prepared.followed.known_trace(q_start)
+    assert known is not None
+    return known.turning or turning_of(np.zeros(TOOL_TURNING.knots - 2 + sum(free)), *free)
 
 
 def _followed(
@@ -215,20 +215,20 @@ class _TimeLaw:
         settings = TOOL_TURNING
         steps = settings.grid_steps + settings.grid_steps_per_bend * self.course.shape.bends
         turned = float(_known(self.prepared, self.q_start)(0.0))
-        sheet = TurningSheet.of(
+        grid = TurningGrid.of(
             self.prepared.arm, self.chain, self.course, self.q_start, steps, most, turned
         )
-        sheet = sheet.without(self._excluded)
-        lengths = np.diff(np.interp(sheet.at, self.s, self.t))
+        grid = grid.without(self._excluded)
+        lengths = np.diff(np.interp(grid.at, self.s, self.t))
 
         def cost(first: Array, second: Array, k: npt.NDArray[np.intp]) -> Array:
             v = (second - first) / np.maximum(lengths[k], 1e-9)[:, None]
             return lengths[k] * self._drawn((first + second) / 2, v, np.zeros_like(v))
 
-        chosen = sheet.least(cost, *free)
+        chosen = grid.least(cost, *free)
         if chosen is None or (not self.course.free_start and (chosen == chosen[0]).all()):
             return None
-        return turning_through(sheet.at, sheet.angles[chosen], settings.knots, *free)
+        return turning_through(grid.at, grid.angles[chosen], settings.knots, *free)
 
     def refined(self, turning: CubicSpline) -> CubicSpline:
         """Locally optimal turning for this time law, from another turning."""
@@ -287,7 +287,7 @@ class _TimeLaw:
         )
         guess = np.tile(near, (count, 1))
         q, missed = newton.solved(self.chain, guess, T, steps=TOOL_TURNING.newton_steps)
-        q[missed > REACHED] = np.nan
+        q[missed > TURNING_GRID.reached] = np.nan
         return q.reshape(count, TOOL_TURNING.instants, nq)
 
     def _costs(self, q: Array) -> Array:
@@ -302,11 +302,9 @@ class _TimeLaw:
 
         A state beyond a limit has a higher power if `soft`, else an infinite power.
         """
-        arm, limits, tau = (
-            self.prepared.arm,
-            self.prepared.arm.active_limits,
-            self.prepared.torques(q, v, a),
-        )
+        arm = self.prepared.arm
+        limits = self.prepared.arm.active_limits
+        tau = self.prepared.torques(q, v, a)
         if self.prepared.problem.objective == "mechanical":
             cost = np.abs(tau * v).sum(axis=1)
         else:

@@ -113,16 +113,12 @@ class UniformScale:
     """
 
     def __init__(self, method: Method, given: Spline) -> None:
-        self.prepared, self.deadline, self._cost_of = (
-            method.prepared,
-            method.deadline,
-            method.cost_of,
-        )
-        self.t_min, self.t_max, self._fastest = (
-            method.t_min,
-            method.t_max,
-            method.interval.minimum_time,
-        )
+        self.prepared = method.prepared
+        self.deadline = method.deadline
+        self._cost_of = method.cost_of
+        self.t_min = method.t_min
+        self.t_max = method.t_max
+        self._fastest = method.interval.minimum_time
         self.given, self.evaluations = given, 0
         q, v, a = sample(given, grid(given.duration))
         still = np.zeros_like(q)
@@ -157,11 +153,9 @@ class UniformScale:
             return SolveResult(
                 SolveStatus.FAILED, SolveReason.NO_TIME_SCALE_WITHIN_LIMITS, self.evaluations
             )
-        factor, low, high = (
-            factors[best],
-            factors[max(best - 1, 0)],
-            factors[min(best + 1, len(factors) - 1)],
-        )
+        factor = factors[best]
+        low = factors[max(best - 1, 0)]
+        high = factors[min(best + 1, len(factors) - 1)]
         if self._fastest:
             # bisection for the smallest feasible factor
             while factor - low > settings.tolerance * factor:

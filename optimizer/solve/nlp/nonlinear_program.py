@@ -21,8 +21,8 @@ import numpy as np
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.collision.clearance_constraint import CLEARANCE
 from joulepath.optimizer.dynamics.kernel import Kernel
+from joulepath.optimizer.kinematics.held_pose import HeldPose
 from joulepath.optimizer.kinematics.path_constraints import PathConstraints
-from joulepath.optimizer.kinematics.tool_path.held_pose import HeldPose
 from joulepath.optimizer.motion.bspline import Basis
 from joulepath.optimizer.solve.nlp.active_path_constraints import Index, PathConstraintRows
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates, GoalConstraints
@@ -128,7 +128,7 @@ class NonlinearProgram:
         return self.goal_constraints is not None or self.goal_curve is not None
 
     @property
-    def held(self) -> bool:
+    def has_equations(self) -> bool:
         """Whether every iterate meets equations of passes or of sliding ends."""
         return not (self.passes is None and self.start_curve is None and self.goal_curve is None)
 

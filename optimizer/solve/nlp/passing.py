@@ -61,22 +61,22 @@ class Passing:
         """Mask (k,) of the passes at which the curve does not rest."""
         return np.asarray(np.linalg.norm(self.tangent, axis=1) > PASSING.resting_speed)
 
-    def held(self) -> Array:
+    def gradients_across(self) -> Array:
         """Gradients (rows, m r) by the free control points of displacements across the curve."""
         r, rows = self.tangent.shape[1], list[Array]()
         for at, tangent, moving in zip(self.at, self.tangent, self._moving, strict=True):
-            across = np.eye(r)
+            normals = np.eye(r)
             if moving:
-                across = np.linalg.qr(tangent[:, None], mode="complete")[0][:, 1:].T
-            rows.append(np.einsum("m,ij->imj", at, across).reshape(len(across), -1))
+                normals = np.linalg.qr(tangent[:, None], mode="complete")[0][:, 1:].T
+            rows.append(np.einsum("m,ij->imj", at, normals).reshape(len(normals), -1))
         return np.concatenate(rows)
 
     def null_space(self, n: int) -> Array:
         """Orthonormal basis (n, count) of the steps that keep the passes to first order."""
-        held = self.held()
-        gradients = np.zeros((n, len(held)))
-        gradients[: held.shape[1]] = held.T
-        return np.linalg.qr(gradients, mode="complete")[0][:, len(held) :]
+        across = self.gradients_across()
+        gradients = np.zeros((n, len(across)))
+        gradients[: across.shape[1]] = across.T
+        return np.linalg.qr(gradients, mode="complete")[0][:, len(across) :]
 
     def curvature(self, pull: Array, n: int) -> Array:
         """Hessian of the passes, weighted by their multipliers.

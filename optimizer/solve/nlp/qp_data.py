@@ -1,18 +1,15 @@
-"""Input and solution of the QP of one SQP step."""
+"""Input and solution of the QP of one SQP step, with helpers on masks and steps."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from joulepath.models.robot import Array
-from joulepath.optimizer.solve.nlp.active_path_constraints import (
-    Index,
-    PathConstraintValues,
-)
-from joulepath.optimizer.solve.nlp.nonlinear_program import (
-    Linearisation,
-)
+import numpy as np
+
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.solve.nlp.active_path_constraints import Index, PathConstraintValues
+from joulepath.optimizer.solve.nlp.nonlinear_program import Linearisation
 from joulepath.optimizer.solve.nlp.qp_rows import Places
 
 
@@ -100,3 +97,24 @@ class TorqueRows:
 
     slack: Array
     """Distances to the limits, shape (rows,)."""
+
+
+def shortened(x: Array, bounds: Array, tolerance: float) -> Array:
+    """The step, shortened to its bounds (2, n): rounds may end before every bound has its row."""
+    most = np.where(x > 0, bounds[1], bounds[0])
+    beyond = np.abs(x) > np.abs(most) + tolerance
+    return np.asarray(x * np.min(np.abs(most[beyond] / x[beyond]), initial=1.0))
+
+
+def peaks(size: Array) -> Mask:
+    """Mask of the local maxima of size (k, M) ≥ 0 along the grid."""
+    high = np.ones(size.shape, dtype=bool)
+    rising = size[:, 1:] >= size[:, :-1]
+    high[:, 1:] = rising
+    high[:, :-1] &= ~rising
+    return high
+
+
+def places_of(marks: Mask) -> tuple[Index, ...]:
+    """Indices of marks: several times as fast in one dimension as `np.nonzero` in two or three."""
+    return np.unravel_index(np.flatnonzero(marks), marks.shape)

@@ -15,18 +15,9 @@ from joulepath.optimizer.solve.nlp.nonlinear_program import FEASIBILITY, Nonline
 from joulepath.optimizer.solve.nlp.passing import Passes, Passing
 from joulepath.optimizer.solve.nlp.qp_data import QPInputs
 from joulepath.optimizer.solve.nlp.sliding_ends import Slide, SlidingEnds
-from joulepath.optimizer.solve.nlp.sqp_state import (
-    SQP,
-    Iterate,
-    Multipliers,
-    SqpResult,
-    SqpStatus,
-)
+from joulepath.optimizer.solve.nlp.sqp_state import SQP, Iterate, Multipliers, SqpResult, SqpStatus
 from joulepath.optimizer.solve.nlp.whitening import whitened
-from joulepath.optimizer.solve.nlp.working_set_qp import (
-    WORKING_SET,
-    WorkingSetQP,
-)
+from joulepath.optimizer.solve.nlp.working_set_qp import WORKING_SET, WorkingSetQP
 
 
 class _Solver:
@@ -49,17 +40,17 @@ class _Solver:
             self.scale[-1] = T
         if multiplier is None:
             multiplier = np.zeros((len(program.basis.nodes), program.kernel.nq))
-        self.holding = _holding(program)
-        held: Passing | Slide | None = None
-        if self.holding is not None:
-            put = self.holding.put(free)
+        self.equations = _equations_of(program)
+        equations: Passing | Slide | None = None
+        if self.equations is not None:
+            put = self.equations.put(free)
             if put is None:
                 raise ValueError("an end of the initial guess is not near its curve")
-            free, held = put
+            free, equations = put
         self.line, kinematics = program.derivatives(free, T, multiplier), program.kinematics(free)
         self.cost_scale = 1.0 / max(abs(self.line.cost), 1e-9)
         excess = self._excess(T, kinematics, self.line.tau)
-        self.at = self._point(free, T, self.line.cost, kinematics, excess, held)
+        self.at = self._point(free, T, self.line.cost, kinematics, excess, equations)
         path = np.zeros_like(self.at.path_values.ratios.value)
         self.multipliers = Multipliers(multiplier, path, len(self.at.violation))
         if program.has_clearance:
@@ -140,7 +131,11 @@ class _Solver:
 
         Among obstacles, and with passes or sliding ends, the next QP has other constraints.
         """
-        if self.p.has_clearance or self.p.held or float(self.at.violation.max()) >= FEASIBILITY:
+        if (
+            self.p.has_clearance
+            or self.p.has_equations
+            or float(self.at.violation.max()) >= FEASIBILITY
+        ):
             return False
         wrong_by = abs((before.cost - self.at.cost) * self.cost_scale - promised)
         allowed = max(SQP.promise_error * abs(promised), SQP.progress_error * self.progress)
@@ -167,14 +162,14 @@ class _Solver:
         cost: float,
         kinematics: Array,
         excess: Array,
-        held: Passing | Slide | None,
+        equations: Passing | Slide | None,
     ) -> Iterate:
         """The iterate, with its path constraints; `excess` are the other violations."""
         path_values = self.p.path_rows.values(self.p.points(free), T)
         beyond = np.maximum(
             path_values.ratios.value.max(axis=0, initial=0.0) - self.p.path_bounds, 0.0
         )
-        return Iterate(free, T, cost, kinematics, path_values, np.append(excess, beyond), held)
+        return Iterate(free, T, cost, kinematics, path_values, np.append(excess, beyond), equations)
 
     def _qp_inputs(self) -> QPInputs:
         """The QP at the iterate, with the Lagrangian's Hessian made positive definite."""
@@ -190,13 +185,15 @@ class _Solver:
         H = H[:n, :n]
         H[-1] *= self.scale[-1]
         H[:, -1] *= self.scale[-1]
-        if at.held is None:
+        if at.equations is None:
             hessian, whitening = whitened(H)
         else:
-            pull = (g + self.multipliers.limits)[: self.qp.count].reshape(at.free.shape)
-            kept = at.held.null_space(n)
+            pull = (g + self.multipliers.constraint_gradient)[: self.qp.count].reshape(
+                at.free.shape
+            )
+            kept = at.equations.null_space(n)
             back = kept.T
-            bends, within = whitened(back @ (back @ (H + at.held.curvature(pull, n))).T)
+            bends, within = whitened(back @ (back @ (H + at.equations.curvature(pull, n))).T)
             whitening = kept @ within
 
             def hessian(x: Array) -> Array:
@@ -239,26 +236,26 @@ class _Solver:
 
         None if the merit function exceeds `allowed`, or an end finds no place on its curve.
         """
-        held, penalty = self.at.held, self.multipliers.penalty
-        if self.holding is not None:
-            put = self.holding.put(free, held)  # type: ignore[arg-type]
+        equations, penalty = self.at.equations, self.multipliers.penalty
+        if self.equations is not None:
+            put = self.equations.put(free, equations)  # type: ignore[arg-type]
             if put is None:
                 return None
-            free, held = put
+            free, equations = put
         (cost, tau), kinematics = self.p.value(free, T), self.p.kinematics(free)
         excess = self._excess(T, kinematics, tau)
         # path constraints take the longest, and never lower the merit function
         if cost * self.cost_scale + float(penalty[: len(excess)] @ excess) > allowed:
             return None
-        trial = self._point(free, T, cost, kinematics, excess, held)
+        trial = self._point(free, T, cost, kinematics, excess, equations)
         return (
             trial if cost * self.cost_scale + float(penalty @ trial.violation) <= allowed else None
         )
 
 
-def _holding(program: NonlinearProgram) -> Passes | SlidingEnds | None:
+def _equations_of(program: NonlinearProgram) -> Passes | SlidingEnds | None:
     """Passes or sliding ends that every iterate is put on; None without such equations."""
-    if not program.held:
+    if not program.has_equations:
         return None
     return SlidingEnds(program) if program.passes is None else Passes(program, program.passes)
 

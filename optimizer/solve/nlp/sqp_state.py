@@ -157,7 +157,7 @@ class Iterate:
     """Largest excess relative to the limit, shape (3 r + nq + c,): per derivative and coordinate,
     joint torque, and path constraint."""
 
-    held: Passing | Slide | None
+    equations: Passing | Slide | None
     """Equations of passes or sliding ends at the iterate; None without such equations."""
 
 
@@ -168,7 +168,7 @@ class Multipliers:
         self.torque = torque
         self.path = path
         # gradient (n,) of Σ multiplier · constraint by the scaled variables
-        self.limits: Array | float = 0.0
+        self.constraint_gradient: Array | float = 0.0
         # second derivative of the kinematic constraints by T, in the scale of the QP's cost
         self.curvature = 0.0
         self.penalty = np.full(violations, SQP.first_penalty)
@@ -189,7 +189,7 @@ class Multipliers:
         )
         self.path = np.zeros_like(self.path)
         self.path[step.passed] = step.path / cost_scale
-        self.limits = step.pull
+        self.constraint_gradient = step.pull
         d = step.places[0]
         self.curvature = -float((step.kinematic * (d + 1) * d).sum()) / (T * T)
         if not step.relaxed:

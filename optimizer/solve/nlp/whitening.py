@@ -1,4 +1,4 @@
-"""Variables in which a QP's Hessian, made positive definite, is the identity."""
+"""Whitening: transformation of a QP's variables that makes the Hessian the identity."""
 
 from __future__ import annotations
 

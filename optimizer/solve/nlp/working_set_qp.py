@@ -14,15 +14,16 @@ import numpy as np
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.deadline import checkpoint
-from joulepath.optimizer.solve.nlp.active_path_constraints import (
-    Index,
-    NearPathConstraints,
+from joulepath.optimizer.solve.nlp.active_path_constraints import Index, NearPathConstraints
+from joulepath.optimizer.solve.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
+from joulepath.optimizer.solve.nlp.qp_data import (
+    QPInputs,
+    QPStep,
+    TorqueRows,
+    peaks,
+    places_of,
+    shortened,
 )
-from joulepath.optimizer.solve.nlp.nonlinear_program import (
-    FEASIBILITY,
-    NonlinearProgram,
-)
-from joulepath.optimizer.solve.nlp.qp_data import QPInputs, QPStep, TorqueRows
 from joulepath.optimizer.solve.nlp.qp_rows import Places, QPRows
 
 
@@ -134,18 +135,32 @@ class WorkingSetQP:
                 break
             if self._adds_bounds(rows, bounds, x):
                 continue
-            adds_rates, (adds_path, path) = (
-                self._adds_rates(rows, at, x),
-                self._adds_path(rows, at, path, x),
-            )
+            adds_rates = self._adds_rates(rows, at, x)
+            (adds_path, path) = self._adds_path(rows, at, path, x)
             if not (adds_rates or adds_path):
                 break
+        x = shortened(x, bounds, WORKING_SET.bound_tolerance)
+        return self._solution(rows, torque, limited, x, multipliers, relaxed)
+
+    def _solution(
+        self,
+        rows: QPRows,
+        torque: TorqueRows,
+        limited: Index,
+        x: Array,
+        multipliers: Array,
+        relaxed: bool,
+    ) -> QPStep:
+        """The step with its multipliers; active constraints are kept for the next QP."""
         mu = np.maximum(multipliers, 0.0)
-        pull = multipliers @ np.concatenate(rows.gradients) if self.p.held else np.zeros(self.n)
+        pull = (
+            multipliers @ np.concatenate(rows.gradients)
+            if self.p.has_equations
+            else np.zeros(self.n)
+        )
         (kinematic, places), (bounded, sides), (near, passed) = (
             each.joined() for each in (rows.rates, rows.bounds, rows.path)
         )
-        # active constraints enter the next QP
         for marks, at_places, numbers in (
             (self._active, places, kinematic),
             (self._bounded, sides, bounded),
@@ -154,7 +169,7 @@ class WorkingSetQP:
             marks[...] = False
             marks[at_places] = mu[numbers] > 0
         return QPStep(
-            _shortened(x, bounds),
+            x,
             relaxed,
             places,
             mu[kinematic],
@@ -210,7 +225,7 @@ class WorkingSetQP:
         chosen = self._active.copy()
         near = WORKING_SET.near_rate_later if chosen.any() else WORKING_SET.near_rate
         chosen[self._worst(at.ratio, np.full(3, near))] = True
-        d, j, grid = _places(chosen)
+        d, j, grid = places_of(chosen)
         places = d, j, grid
         self._add_rates(rows, at, places, at.ratio[places] >= 0, self._active[places])
 
@@ -224,7 +239,7 @@ class WorkingSetQP:
         largest = np.maximum(ratio.max(axis=2), -ratio.min(axis=2))
         d, j = np.nonzero(largest > above[:, None])
         size = np.abs(ratio[d, j])
-        k, grid = _places((size > above[d, None]) & (self._anchors[d] | _peaks(size)))
+        k, grid = places_of((size > above[d, None]) & (self._anchors[d] | peaks(size)))
         return d[k], j[k], grid
 
     def _adds_bounds(self, rows: QPRows, bounds: Array, x: Array) -> bool:
@@ -327,24 +342,3 @@ class WorkingSetQP:
         A[:, self.count - self.p.r : self.count] = constraints.rows
         moved = constraints.rows @ (free[-1] - self.p.coordinates.goal)
         rows.add(A, constraints.upper - moved, constraints.lower - moved, hard=True)
-
-
-def _shortened(x: Array, bounds: Array) -> Array:
-    """The step, shortened to its bounds (2, n): rounds may end before every bound has its row."""
-    most = np.where(x > 0, bounds[1], bounds[0])
-    beyond = np.abs(x) > np.abs(most) + WORKING_SET.bound_tolerance
-    return np.asarray(x * np.min(np.abs(most[beyond] / x[beyond]), initial=1.0))
-
-
-def _peaks(size: Array) -> Mask:
-    """Mask of the local maxima of size (k, M) ≥ 0 along the grid."""
-    high = np.ones(size.shape, dtype=bool)
-    rising = size[:, 1:] >= size[:, :-1]
-    high[:, 1:] = rising
-    high[:, :-1] &= ~rising
-    return high
-
-
-def _places(marks: Mask) -> tuple[Index, ...]:
-    """Indices of marks: several times as fast in one dimension as `np.nonzero` in two or three."""
-    return np.unravel_index(np.flatnonzero(marks), marks.shape)

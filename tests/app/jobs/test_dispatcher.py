@@ -25,7 +25,7 @@ from joulepath.app.store.jobs import NewJob, NewRequest
 from joulepath.app.store.store import Store
 from joulepath.app.store.tables import JobRequest, now
 from joulepath.app.tasks.job_request import JobRequestTask, JobResult
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 
 PATIENCE = 60.0
 BODY = packed(b"{}")
@@ -46,7 +46,7 @@ class Work:
         self.stopped: list[int] = []
         self.stoppable: list[bool] = []
         self.errors: list[Exception] = []
-        self.tell: Tell = nobody
+        self.tell: Tell = no_listener
         self.answer: Callable[[JobRequestTask], TaskResult] = lambda task: answer(name)
 
     async def run(self, take: Take) -> None:

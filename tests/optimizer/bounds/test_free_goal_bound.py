@@ -15,9 +15,9 @@ from joulepath.optimizer.bounds import free_goal_bound
 from joulepath.optimizer.bounds.free_goal_bound import FAMILY, family_bound
 from joulepath.optimizer.bounds.lower_bound import lower_bounds
 from joulepath.optimizer.bounds.subdivide import SUBDIVISION, SearchLimits
+from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations, within_cone
-from joulepath.optimizer.kinematics.six.full_turns import full_turn_alternatives
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.optimizer.cycle.against_stopping import as_passed, start_from
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.cycle.errors import CycleTooShort
 from joulepath.optimizer.cycle.passing_leg import PassingLeg
+from joulepath.optimizer.cycle.stopping_cycle import moves_from_stopping, solve_from_stopping
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.plan_cycle import plan_cycle
@@ -187,11 +187,11 @@ def test_a_time_that_even_passing_does_not_keep_is_too_short() -> None:
 def test_motions_that_stop_become_motions_that_pass_and_need_no_more() -> None:
     """What stands in where the search finds nothing better than stopping."""
     asked = of(*(Stop(name=f"{k}", target=q, via=k < 2) for k, q in enumerate(Q)))
-    theirs = plan_cycle(replace(asked, stopping=True))
+    theirs = plan_cycle(replace(asked, rests_at_passes=True))
     search = CycleSearch(asked, clock=lambda: 0.0)
-    rested = start_from(search, theirs)
+    rested = solve_from_stopping(search, theirs)
     assert rested.known.energy == pytest.approx(theirs.energy.electrical.total, rel=QUADRATURE)
-    motions, waits = as_passed(search, rested)
+    motions, waits = moves_from_stopping(search, rested)
     assert len(motions) == 2 and not waits and len(theirs.moves) == 4
     first = sum(move.solution.duration for move in theirs.moves[:3])
     assert (
@@ -209,7 +209,7 @@ def test_what_stops_is_the_answer_where_the_search_ends_too_early(
     """Its motions are certified as those of a cycle that passes, and it saves nothing."""
 
     def ended(search: CycleSearch) -> Any:
-        if search.asked.passes:
+        if search.cycle.has_passes:
             raise DeadlineExceeded([])
         return searched(search)
 
@@ -236,7 +236,7 @@ def test_limits_of_a_pass_hold_for_the_whole_motion_and_nothing_else() -> None:
     assert (first.arm.active_limits.v_max == 0.5).all() and (
         back.arm.active_limits.v_max > 0.5
     ).all()
-    stopping = replace(asked, stopping=True).moves
+    stopping = replace(asked, rests_at_passes=True).moves
     assert [(move.start, move.goal) for move in stopping] == [
         ("start", "slowly"),
         ("slowly", "last"),

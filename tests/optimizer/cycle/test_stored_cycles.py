@@ -119,12 +119,12 @@ def test_no_motions_with_the_storage_get_below_the_bound() -> None:
     bound, plant = found(LARGE).lower_bound, Plant(asked.arm)
     path = [HIGH, LOW, HIGH + 0.3, HIGH]
     for _ in range(20):
-        shares = rng.dirichlet(np.full(3, 5.0)) * (TIME - asked.dwelling)
+        shares = rng.dirichlet(np.full(3, 5.0)) * (TIME - asked.dwell_time)
         motions = [
             quintic_spline(a, b, t) for (a, b), t in zip(pairwise(path), shares, strict=True)
         ]
         demands = [Demand.of_motion(plant, motion) for motion in motions]
-        demands.append(Demand.of_rest(asked, asked.moves[0], 0.0, asked.dwelling, LOW))
+        demands.append(Demand.of_rest(asked, asked.moves[0], 0.0, asked.dwell_time, LOW))
         assert bound <= drawn(asked.arm, demands, charges_of(asked.arm.bus, demands, True))
 
 

@@ -17,7 +17,8 @@ from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.identify.logs.grid import grid_of
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
-from joulepath.optimizer.identify.logs.reading import LogOptions, read_log
+from joulepath.optimizer.identify.logs.log_options import LogOptions
+from joulepath.optimizer.identify.logs.reading import read_log
 from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import (
     SILENT,
@@ -363,7 +364,7 @@ def test_broken_files_name_the_place(recording: Recording, name: str) -> None:
 def test_bombs_are_defused(recording: Recording) -> None:
     bomb = gzip.compress(csv_of(recording) + b"0," * 6000 + b"\n" + (b"0," * 6000 + b"\n") * 999)
     with pytest.raises(LogTooLarge, match="bytes"):
-        read_log(bomb, ROBOT, LogOptions(most_bytes=4_000_000))
+        read_log(bomb, ROBOT, LogOptions(max_bytes=4_000_000))
     many = b"t,q1,q2,q3,q4,q5,q6\n" + b"0,0,0,0,0,0,0\n" * 1_000_001
     with pytest.raises(LogTooLarge, match="1000000 rows"):
         read_log(gzip.compress(many), ROBOT)

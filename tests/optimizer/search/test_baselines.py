@@ -14,7 +14,8 @@ import ruckig
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Limits
-from joulepath.optimizer.motion.ruckig_motion import time_optimal
+from joulepath.optimizer.dynamics.interval import Known
+from joulepath.optimizer.motion.ruckig_motion import straight, time_optimal
 from joulepath.optimizer.motion.time_scalings import (
     SampledMotion,
     controller_default,
@@ -23,6 +24,7 @@ from joulepath.optimizer.motion.time_scalings import (
 )
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.result.energy import Sensitivity
 from joulepath.optimizer.result.solution import Baseline
 from joulepath.optimizer.search.baselines import (
     Broken,
@@ -32,6 +34,8 @@ from joulepath.optimizer.search.baselines import (
     motion_energy,
     nearest,
     saving,
+    standing,
+    with_savings,
 )
 from tests.optimizer.moves import problem_with
 
@@ -45,7 +49,7 @@ BALANCE = (
 )
 
 ROBOT = load_robot("ur5e")
-NAMES = ["trapezoid", "quintic", "ruckig", "ruckig_slowed", "controller_default"]
+NAMES = ["trapezoid", "quintic", "ruckig", "ruckig_slowed", "straight", "controller_default"]
 START = np.array([0.3, -1.4, 1.6, -0.9, -1.2, 0.5])
 GOAL = START + np.array([0.9, 0.5, -0.7, 0.3, 0.2, -1.0])
 DURATION = 1.3
@@ -250,13 +254,54 @@ def test_energies_are_of_the_friction_law_asked_for(friction: str) -> None:
 
 @pytest.mark.parametrize("objective", ["electrical", "mechanical"])
 def test_report(objective: str) -> None:
-    """All five, in order, each with its saving of the objective, however the comparison ends."""
+    """All six, in order, each with its saving of the objective, however the comparison ends."""
     task = problem(objective=objective, duration_min=DURATION, duration_max=DURATION)
     report = compare(task)
     assert list(report) == NAMES
     for each in report.values():
         assert each.saving == pytest.approx(1 - 60.0 / getattr(each, objective), rel=EXACT)
-    assert compare(task, ours=1e6)["quintic"].saving < 0
+    worse = compare(task, ours=1e6)["quintic"].saving
+    assert worse is not None and worse < 0
+
+
+def test_the_straight_motion_keeps_every_rate_and_uses_one_up() -> None:
+    """Unscaled, one joint is at one of its limits, and all go the straight line in step."""
+    motion = straight(limits(), START, GOAL)
+    way = GOAL - START
+    share = (motion.q - START) / way
+    assert np.ptp(share, axis=1).max() < RUCKIG_POSITION
+    ratios = np.concatenate(
+        [
+            motion.peak_v / limits().v_max,
+            motion.peak_a / limits().a_max,
+            motion.peak_jerk / limits().j_max,
+        ]
+    )
+    assert ratios.max() == pytest.approx(1.0, rel=RATE)
+    assert motion.duration >= time_optimal(limits(), START, GOAL).duration * (1 - RATE)
+
+
+def test_a_saving_is_claimed_in_the_same_time_against_what_keeps_every_limit() -> None:
+    """The shorter of two motions waits, held by the motors; with a dwell both have waited."""
+    task = problem()
+    torques, *_ = oracle(task)
+    goal = standing(task.arm, GOAL, torques)
+    table = list(compare(task).values())
+    nothing = np.zeros_like(table[0].sensitivity.gradient)
+    ours = Known(60.0, Sensitivity(nothing, 0.0), DURATION)
+    fair = {each.name: each for each in with_savings(table, task, ours, goal)}
+    for each in fair.values():
+        assert (each.saving is None) == (not each.within_limits) == (each.saving_interval is None)
+    ruckig, slowed = fair["ruckig"], fair["ruckig_slowed"]
+    wait = (DURATION - ruckig.duration) * goal.power
+    assert wait > 1.0
+    assert ruckig.saving == pytest.approx(1 - 60.0 / (ruckig.electrical + wait), rel=EXACT)
+    assert slowed.saving == pytest.approx(1 - 60.0 / slowed.electrical, rel=EXACT)
+    # ours waits for what takes longer
+    short = replace(ours, duration=ruckig.duration / 2)
+    again = {each.name: each for each in with_savings(table, task, short, goal)}["ruckig"]
+    more = ruckig.duration / 2 * goal.power
+    assert again.saving == pytest.approx(1 - (60.0 + more) / ruckig.electrical, rel=EXACT)
 
 
 def test_savings_keep_their_sign() -> None:
@@ -278,6 +323,7 @@ def test_within_limits_in_time() -> None:
         "quintic",
         "ruckig",
         "ruckig_slowed",
+        "straight",
     ]
     assert comfortable["ruckig"].duration > 0.5
     assert [name for name in NAMES if hasty[name].within_limits] == ["ruckig"]
@@ -324,7 +370,7 @@ def test_no_travel() -> None:
     none = np.zeros((1, 6))
     current = torques(START[None], none, none)[0] / ROBOT.drives.torque_constant
     holding = DURATION * (36.7 + ROBOT.drives.copper @ current**2)
-    for name in ("trapezoid", "quintic", "ruckig_slowed"):
+    for name in ("trapezoid", "quintic", "ruckig_slowed", "straight"):
         assert report[name].duration == pytest.approx(DURATION, rel=EXACT)
         assert report[name].electrical == pytest.approx(holding, rel=EXACT)
         assert report[name].mechanical == 0
@@ -343,4 +389,6 @@ def test_next_to_no_travel() -> None:
                 np.isfinite(part).all()
                 for part in (motion.t, motion.weights, motion.q, motion.v, motion.a)
             )
-        assert all(math.isfinite(each.saving) for each in compare(problem(goal=goal)).values())
+        assert all(
+            math.isfinite(each.saving or 0.0) for each in compare(problem(goal=goal)).values()
+        )

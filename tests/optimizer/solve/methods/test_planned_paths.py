@@ -179,7 +179,10 @@ def test_a_motion_that_left_an_obstacle_at_great_cost_is_compared_with_planned_p
         alone.setattr(free_spline, "FREE_SPLINE", replace(settings, detour_cost=np.inf))
         direct = FreeSpline(context).solve()
     energy = prepared.cost_of(direct.spline)
-    assert direct.unhindered is not None and energy > settings.detour_cost * direct.unhindered
+    assert (
+        direct.unobstructed_cost is not None
+        and energy > settings.detour_cost * direct.unobstructed_cost
+    )
     compared = FreeSpline(context).solve()
     assert prepared.cost_of(compared.spline) <= energy and compared.solves > direct.solves
     planned = MotionOrigin.FROM_PLANNED_PATH

@@ -201,8 +201,8 @@ def test_a_coarse_motion_that_collides_is_no_guess() -> None:
         solver(start, goal, collisions=True, is_sole=is_sole) for is_sole in (True, False)
     )
     found, expected = own.solve(), usual.solve()
-    assert expected.unhindered is not None
-    assert found.unhindered == pytest.approx(expected.unhindered)
+    assert expected.unobstructed_cost is not None
+    assert found.unobstructed_cost == pytest.approx(expected.unobstructed_cost)
     assert FreeSpline.may_refine(spline(found))
 
 
