@@ -20,17 +20,16 @@ def explore(
     most_solved: int | None = None,
     ended: Callable[[Candidate], None] = lambda _: None,
 ) -> Candidate | None:
-    """Solve candidates in order of lower bound until none is below the best energy.
+    """Solve candidates in order of lower bound until no bound is below the best energy.
 
-    Postponed candidates are requeued: first candidates with a planned path, then those without,
-    last those whose goals seem enclosed.
+    Postponed candidates are requeued by the outlook of their path: planned, unknown, goal enclosed.
 
     Args:
         prepared: problem of the motions.
         candidates: candidates.
         attempt: solves a candidate.
         deadline: instant at which the search ends.
-        most_solved: number of solved candidates after which the others are not solved.
+        most_solved: number of solved candidates after which no other is solved.
         ended: receives every candidate after its attempt.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Exploration of the candidates: solving them, first those of a choice where there are many."""
+"""Exploration of the candidates, with heuristics for the order where there are many."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from joulepath.optimizer.search.state import SearchState
 def explore(state: SearchState) -> None:
     """Solve candidates until no lower bound is below the best energy.
 
-    Deferred candidates are solved as long as there is no motion.
+    Deferred candidates are solved while there is no motion.
     """
     _activate(state)
 
@@ -42,9 +42,9 @@ def explore(state: SearchState) -> None:
 
 
 def _has_lost_a_goal(state: SearchState) -> bool:
-    """Whether, for the first time, there is no motion to one of the best goals of free orientation.
+    """Whether one of the best goals of free orientation has no motion, for the first time.
 
-    Where torque hardly suffices, there may be a motion to a goal beside it.
+    If the torque hardly suffices, a goal beside it may have a motion.
     """
     is_lost = any(
         each.status is CandidateStatus.FAILED
@@ -70,7 +70,7 @@ def _activate(state: SearchState) -> bool:
 
 
 def _activate_samples(state: SearchState, candidates: list[Candidate]) -> bool:
-    """Activate some of the deferred candidates among these; false if there are none."""
+    """Activate some of the given candidates; false if none is deferred."""
     if any(slides(state.prepared, each) for each in candidates):
         return activate_seeds(state.prepared, candidates)
     return activate_deferred(candidates)

@@ -37,8 +37,7 @@ def final_bound(state: SearchState, objective: float) -> tuple[float, bool]:
     for candidate in unsolved:
         if candidate.lower_bound >= objective:
             candidate.settle(CandidateStatus.PRUNED, Reason.BOUND)
-    # of targets that infinitely many configurations reach, only samples are solved: a bound has to
-    # rule out all other configurations
+    # only samples of self-motions and free orientations are solved: a bound rules out the others
     unknown, beside = bound_of_missed_branches(prepared, candidates, deadline, objective), np.inf
     if state.problem.tool_path is None:
         free = bound_of_free_goals(prepared, candidates, deadline, objective)
@@ -47,7 +46,7 @@ def final_bound(state: SearchState, objective: float) -> tuple[float, bool]:
         beside = bound_beside(prepared, candidates, deadline, objective)
         if any(each.sampled for each in candidates):
             unknown = min(unknown, beside)
-    # an end without the search's reserve of clearance may still have motions
+    # an end without the clearance reserve of the search may still have motions
     unsearched = min((each.lower_bound for each in candidates if not each.holdable), default=np.inf)
     is_ruled_out = (
         all(each.status is CandidateStatus.PRUNED for each in unsolved)

@@ -1,9 +1,9 @@
-"""Other starts for ends that slide: postures one step to each side of the best posture.
+"""Other starts for sliding ends: postures one step to each side of the best posture.
 
-A motion has several local optima, of energies that differ by some tenths of a percent, by the
-limits that it touches and the times at which it does. An end that slides takes the motion along, so
-that both stay in the optimum from which they began. A motion solved by itself to a posture beside
-may be in a better optimum; from there both ends slide again.
+A motion has several local optima, which differ in the limits that it touches and in their times, by
+some tenths of a percent of energy. An end that slides takes the motion along, so both stay in the
+optimum from which they began. A motion solved by itself to a posture beside may be in a better
+optimum; from there both ends slide again.
 """
 
 from __future__ import annotations
@@ -28,17 +28,16 @@ from joulepath.optimizer.solve.nlp.sqp_state import SQP
 STEP_LENGTH = 0.15
 """Length of the step along a curve [rad]."""
 PROMISE_MARGIN = 1.003
-"""Multiple of the energy to come below under which a solve must promise to come.
-
-The first steps of a solve promise less than it finds.
-"""
+"""Factor on the energy that a solve must promise to come below, since its first steps promise less
+than it finds."""
 
 
 def start_beside(state: SearchState, best: Candidate) -> Candidate:
-    """The best solved candidate, or a better one found from a posture beside, which is appended.
+    """The best solved candidate, or a better candidate found from a posture beside, which is
+    appended.
 
-    Only motions with as few control points as the first solve are compared, and only without
-    corners in joints' powers: `sharpening` starts motions with corners again.
+    Motions with more control points than the first solve are left out, and motions with corners in
+    joints' powers, which `sharpening` starts again.
     """
     prepared = state.prepared
     cornered = has_corners(state.problem.objective, prepared.arm)
@@ -63,10 +62,10 @@ def start_beside(state: SearchState, best: Candidate) -> Candidate:
 
 
 def _solved(state: SearchState, candidate: Candidate, below: float) -> bool:
-    """Solve a candidate with fixed ends, then with sliding ends, if it needs less than `below` [J].
+    """Solve a candidate with fixed ends, then with sliding ends if it needs less than `below` [J].
 
     Returns:
-        Whether it does.
+        Whether it needs less.
     """
     for interval in duration_intervals(state.prepared, candidate.q_goal):
         solver = solver_of(state, candidate, interval, above(below, PROMISE_MARGIN))

@@ -1,4 +1,4 @@
-"""Families of candidates for mechanical work: candidates that differ by full turns of outer joints.
+"""Families of candidates for mechanical work, which differ by full turns of outer joints.
 
 The bound on mechanical work rules out little: tens to hundreds of candidates are left, and most of
 them need far more energy than the best. Candidates between the same branches that differ only by
@@ -43,11 +43,11 @@ FAMILIES = FamilySettings()
 def explore_families(state: SearchState, explore: Callable[[], object]) -> None:
     """Solve one member of each family, then members of the best families.
 
-    Candidates that neither a solve nor a bound rules out are left unvisited.
+    Candidates without a solve or a bound that rules them out are left unvisited.
 
     Args:
         state: state of the search.
-        explore: solves all candidates that are open.
+        explore: solves all open candidates.
     """
     families = families_of(state)
     if all(len(each) == 1 for each in families):
@@ -75,8 +75,8 @@ def explore_families(state: SearchState, explore: Callable[[], object]) -> None:
 def families_of(state: SearchState) -> list[list[Candidate]]:
     """The open and the solved candidates in families, the member of least possible duration first.
 
-    There are none for the electrical objective, whose bounds rule out enough, for other methods,
-    and for a tight bound, for which every candidate is solved.
+    There are none for the electrical objective, with its tighter bounds, for other methods, and for
+    a tight bound, which requires every candidate to be solved.
     """
     asked = state.problem
     if (asked.objective, asked.method) != ("mechanical", "bspline") or asked.bound == "tight":
@@ -99,9 +99,9 @@ def _energy(family: Sequence[Candidate]) -> float:
 
 
 def _replace_hindered(state: SearchState, families: Sequence[Sequence[Candidate]]) -> bool:
-    """Release another member of each family whose members collide so far; whether there is any.
+    """Release another member of each family with collisions only; whether there is any.
 
-    Another turn of the wrist may be clear. A slower member cannot help against the other limits.
+    Another turn of the wrist may be clear. A slower member cannot help against other limits.
     """
     found = False
     for family in families:
@@ -138,7 +138,7 @@ def settle_waiting(
     Args:
         state: state of the search.
         waiting: candidates.
-        reason: reason why a candidate is not solved if its bound does not rule it out.
+        reason: reason for a candidate that its bound does not rule out.
     """
     left = [each for each in waiting if each.deferred]
     _release(left)

@@ -1,6 +1,4 @@
-"""The baseline along a tool path: an even speed on the way, with ramps of a third of the duration
-each.
-"""
+"""Baseline along a tool path: even speed with ramps of a third of the duration each."""
 
 from __future__ import annotations
 
@@ -17,7 +15,7 @@ from joulepath.optimizer.search.state import SearchState
 
 
 def path_baselines(state: SearchState, best: Candidate) -> list[Baseline]:
-    """The `trapezoid` along the path of the best candidate's joints, in its duration."""
+    """The `trapezoid` along the joint path of the best candidate, in its duration."""
     prepared, problem, path = (
         state.prepared,
         state.problem,
@@ -34,7 +32,7 @@ def path_baselines(state: SearchState, best: Candidate) -> list[Baseline]:
 
 
 def along(path: Spline, law: SampledMotion) -> SampledMotion:
-    """The motion along a path over [0, 1] whose fraction of the way is that of `law`, of one
+    """The motion along a path over [0, 1] with the fraction of the path given by `law`, one
     coordinate.
     """
     s, rate, acceleration = law.q[:, 0], law.v, law.a

@@ -1,4 +1,4 @@
-"""Candidates along a tool path: one for each start configuration that can follow it."""
+"""Candidates along a tool path: one for each start configuration from which the arm follows it."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
     """A candidate for each start configuration from which the arm follows the tool path to its end.
 
     Raises:
-        PathInfeasible: no configuration follows the path; it tells how far each one gets.
+        PathInfeasible: no configuration follows the path to its end.
     """
     course, limits = prepared.course, prepared.arm.active_limits
     assert course is not None
@@ -74,10 +74,10 @@ def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
 
 
 def _traces(prepared: PreparedProblem, starts: Sequence[EndConfiguration]) -> list[Trace]:
-    """The tool path as it is followed from each start configuration.
+    """The traces of the tool path from each start configuration.
 
-    From a free start the tool turns evenly. If no angle of a branch reaches the end with an even
-    turn, a course of turning is searched for from one of its angles.
+    From a free start the tool turns evenly. For a branch without an angle from which an even turn
+    reaches the end, a course of turning is computed from one angle.
     """
     course, arm = prepared.course, prepared.arm
     assert course is not None
@@ -100,17 +100,16 @@ def _traces(prepared: PreparedProblem, starts: Sequence[EndConfiguration]) -> li
 def bound_beside(
     prepared: PreparedProblem, followed: Sequence[Candidate], deadline: Deadline, enough: float
 ) -> float:
-    """Lower bound on motions along the tool path between other ends than those of the candidates
-    [J].
+    """Lower bound on motions along the tool path between other ends than those of candidates [J].
 
     A path may come so near to a singularity that a motion within its tolerance continues in another
     branch than the followed one, and of a self-motion at the start only samples were followed. So
-    the bound covers all motions between the first and the last pose, in any other configurations.
-    If an end leaves a rotation free, it covers all configurations of both ends.
+    the bound covers all motions between the first and the last pose in other configurations. If an
+    end leaves a rotation free, it covers all configurations of both ends.
 
     Args:
         prepared: problem of the motions.
-        followed: candidates that follow the path.
+        followed: candidates along the path.
         deadline: instant at which the search for the bound ends.
         enough: sufficient bound for ends with a free rotation [J].
     """
@@ -143,9 +142,7 @@ def bound_beside(
 def _bound_to_free(
     problem: Problem, goal: EndConfiguration, deadline: Deadline, enough: float
 ) -> float:
-    """Lower bound [J] on motions to any configuration of a partly free goal, with one of them
-    given.
-    """
+    """Lower bound [J] on motions to any configuration of a partly free goal, from one of them."""
     prepared = PreparedProblem.of(problem)
     anywhere = [Candidate(start, goal, start.q, goal.q) for start in ends(prepared, "start")[0]]
     return min(
@@ -189,7 +186,7 @@ def _candidate(
 
 
 def _choices(start: EndConfiguration, trace: Trace, goal: Target) -> list[list[float]]:
-    """Positions of each joint at the start from which it reaches a given goal; all if none does."""
+    """Positions of each joint at the start that lead to a given goal; all if none does."""
     if not isinstance(goal, np.ndarray):
         return start.choices
     needed = goal - (trace.q[-1] - trace.q[0])

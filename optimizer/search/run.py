@@ -13,7 +13,7 @@ from joulepath.optimizer.progress import Tell, no_listener
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search import exploration, stages, warm_start
 from joulepath.optimizer.search.answer import answer
-from joulepath.optimizer.search.refinement import baselines_of
+from joulepath.optimizer.search.baseline_comparison import baselines_of
 from joulepath.optimizer.search.refusals import no_trajectory
 from joulepath.optimizer.search.sampled_ends import between
 from joulepath.optimizer.search.state import SearchState
@@ -80,8 +80,8 @@ class Run:
 
         Args:
             spline: the motion.
-            stationarity: stationarity with which the search that found the motion ended.
-            is_optimal: whether that search ended before its deadline.
+            stationarity: stationarity at the end of the search for the motion.
+            is_optimal: whether the search for the motion ended before its deadline.
 
         Raises:
             NoTrajectory: the certificate does not confirm the motion.

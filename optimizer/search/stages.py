@@ -1,7 +1,4 @@
-"""Stages of a search, each a function of the state that it changes.
-
-`METHOD` lists them in order.
-"""
+"""Stages of a search, each a function that changes the state; `METHOD` lists them in order."""
 
 from __future__ import annotations
 
@@ -17,6 +14,7 @@ from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search import free_goal, self_motions
 from joulepath.optimizer.search.answer import answer
+from joulepath.optimizer.search.baseline_comparison import baselines_of, compare_with_baselines
 from joulepath.optimizer.search.candidates import Reason, bound, pairs
 from joulepath.optimizer.search.ends import ends
 from joulepath.optimizer.search.errors import DurationTooShort
@@ -25,12 +23,7 @@ from joulepath.optimizer.search.fastest import explore_or_find_fastest, find_fas
 from joulepath.optimizer.search.freed_duration import start_from_free_duration
 from joulepath.optimizer.search.other_starts import start_beside
 from joulepath.optimizer.search.path_ends import path_candidates
-from joulepath.optimizer.search.refinement import (
-    baselines_of,
-    compare_with_baselines,
-    refine,
-    refine_rivals,
-)
+from joulepath.optimizer.search.refinement import refine, refine_rivals
 from joulepath.optimizer.search.refusals import no_trajectory
 from joulepath.optimizer.search.sampled_ends import between
 from joulepath.optimizer.search.second_attempt import reject
@@ -115,7 +108,7 @@ def refine_best(state: SearchState) -> None:
 
 
 def solve_longest_duration(state: SearchState) -> None:
-    """Compare with the motion of the longest duration, if it is still to be compared."""
+    """Compare with the motion of the longest duration, once."""
     longest = None
     if state.may_rest:
         longest = solve_related(
@@ -127,7 +120,7 @@ def solve_longest_duration(state: SearchState) -> None:
 
 
 def compare_best_with_baselines(state: SearchState) -> None:
-    """Compute the baselines of the best motion, and start from those that need less energy."""
+    """Compute the baselines of the best motion, and start solves from cheaper baselines."""
     best = state.best()
     assert best is not None
     state.baselines = compare_with_baselines(state, best)
@@ -216,12 +209,13 @@ def search(state: SearchState) -> Solution:
 
 
 def solve_related(state: SearchState, problem: Problem, share: float = 1.0) -> FoundMotion | None:
-    """The answer to a related problem, whose motions the own problem allows at no more energy.
+    """The answer to a related problem, whose motions are allowed in the own problem at no more
+    energy.
 
     Args:
         state: state of the search.
         problem: the related problem.
-        share: share of the time left that the related search gets.
+        share: share of the time left for the related search.
 
     Returns:
         The motion with its energy in the own problem; None if there is none in time.

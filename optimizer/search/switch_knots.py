@@ -1,7 +1,7 @@
-"""Finer motions with sliding ends, whose knots follow the switches of jerk.
+"""Finer motions with sliding ends and knots at the switches of jerk.
 
 The instants at which jerk switches depend on the posture at the ends. The first solve with knots at
-the switches ends early, since the posture has moved by then. Each further solve starts from its
+the switches ends early, because the posture has moved by then. Further solves start from its
 motion, with knots at the switches of the motion to the new posture.
 """
 
@@ -46,6 +46,6 @@ def follow_switches(state: SearchState, candidate: Candidate) -> None:
 
 
 def _solve_at_switches(state: SearchState, candidate: Candidate, spline: Spline) -> None:
-    """Solve from a motion; knots that are at switches already follow the posture."""
+    """Solve from a motion; knots at switches follow the posture."""
     progress = SWITCH_KNOTS.first_progress
     improve(state, candidate, lambda solver: solver.solve_at_switches(spline, progress))

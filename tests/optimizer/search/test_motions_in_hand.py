@@ -21,7 +21,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.solution import Solution
-from joulepath.optimizer.search import refinement
+from joulepath.optimizer.search import baseline_comparison
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.state import SearchState
 from joulepath.optimizer.solve.methods import METHODS
@@ -31,7 +31,7 @@ from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.moves import GOAL, PAYLOAD, START, fixed, problem
 from tests.selection import long_but
 
-# relative: the error of the quadratures that are compared, `incumbent.SLACK`
+# relative: the error of the quadratures that are compared, `state.ENERGY_TOLERANCE`
 SLACK = 1e-6
 # s: the quintic, and motions like it, are within all limits
 SLOW = 3.0
@@ -63,7 +63,7 @@ def _name(spline: Spline) -> str:
 
 
 def incumbent_with(*splines: Spline) -> SearchState:
-    """An incumbent whose only candidate got these motions, one after the other."""
+    """The state of a search whose only candidate got these motions, one after the other."""
     run = Run(problem(), clock=still)
     run.prepare()
     for spline in splines:
@@ -191,10 +191,10 @@ def test_a_baseline_that_is_not_certified_in_time_is_not_feasible(
     def late(*_: Any) -> Any:
         raise DeadlinePassed
 
-    monkeypatch.setattr(refinement, "_accept_certified", late)
+    monkeypatch.setattr(baseline_comparison, "_accept_certified", late)
     found = optimize(problem(**fixed(SLOW)))
     (quintic,) = (each for each in found.baselines if each.name == "quintic")
-    assert quintic.saving is None and quintic.reason == refinement.NOT_CONFIRMED
+    assert quintic.saving is None and quintic.reason == baseline_comparison.NOT_CONFIRMED
     assert quintic.electrical < found.energy.electrical.total
     assert all(each >= -SLACK for each in own_kind(found, "bspline"))
 
