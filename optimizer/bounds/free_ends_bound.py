@@ -69,7 +69,7 @@ def bound_between_free_ends(
         prepared: problem of the motions.
         start: pose at the start.
         goal: pose at the goal.
-        deadline: instant at which the search ends with the bound it has.
+        deadline: deadline of the search, which then returns its bound so far.
         enough: sufficient bound, at which the search ends [J].
     """
     arm = prepared.arm

@@ -77,7 +77,7 @@ def bound_of_free_goals(
     Args:
         prepared: problem of the motions.
         pairs: pairs of end configurations; a goal counts if one of them reaches it.
-        deadline: instant at which the search ends with the bound it has.
+        deadline: deadline of the search, which then returns its bound so far.
         enough: sufficient bound, at which the search ends [J].
     """
     goal = prepared.problem.goal

@@ -64,7 +64,7 @@ from joulepath.optimizer.bounds.holding_planes import HoldingTerms, MultiplierCh
 from joulepath.optimizer.bounds.straight_line import Line
 
 SCALES = np.append(np.repeat(HOLDING.scales, 2), 0.0)
-"""Shares of the multipliers that are tried: each for all joints and for one joint, and none."""
+"""Shares of the multipliers tried: each for all joints and for one joint, and none."""
 IS_SINGLE = np.append(np.tile([False, True], len(HOLDING.scales)), False)
 """Whether a trial has the multiplier of a single joint among the loaded joints."""
 

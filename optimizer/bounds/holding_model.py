@@ -25,7 +25,7 @@ class HoldingBoundSettings:
     most_ratio: float = 4.0
     """Greatest ratio ρ; its inverse is the least."""
     scales: tuple[float, ...] = (0.9, 0.7, 0.5, 0.3, 0.15)
-    """Shares of the multipliers of the quadratic model that are tried."""
+    """Shares of the multipliers of the quadratic model tried."""
     light_share: float = 0.05
     """Share of the holding work below which a joint does not count as loaded."""
     reductions: tuple[float, ...] = (0.5, 0.0)

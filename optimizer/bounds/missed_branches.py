@@ -54,7 +54,7 @@ def bound_of_missed_branches(
     Args:
         prepared: problem of the motions.
         candidates: pairs of known end configurations.
-        deadline: instant at which the search ends with the bound it has.
+        deadline: deadline of the search, which then returns its bound so far.
         enough: sufficient bound [J], as in `self_motion_bound`.
     """
     problem = prepared.problem

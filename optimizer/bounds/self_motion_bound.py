@@ -94,7 +94,7 @@ def self_motion_bound(
     Args:
         prepared: problem of the motions.
         candidates: pairs of end configurations; only pairs with a sampled end count.
-        deadline: instant at which the search ends with the bound it has.
+        deadline: deadline of the search, which then returns its bound so far.
         enough: sufficient bound [J]. The copper loss of holding is added only to bounds far below
             it, unless the problem asks for a tight bound.
     """

@@ -1,1 +1,1 @@
-"""Branch and bound over candidates, in stages over one state: bounds, solves, refinement, answer."""
+"""Branch and bound over candidates, in stages over one state."""

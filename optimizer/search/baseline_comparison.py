@@ -15,13 +15,13 @@ from joulepath.optimizer.result.solution import Baseline, BaselineName
 from joulepath.optimizer.search.attempts import solve_from
 from joulepath.optimizer.search.baselines import baselines, guesses, nearest
 from joulepath.optimizer.search.candidates import Candidate
-from joulepath.optimizer.search.passing import stopping_baselines
+from joulepath.optimizer.search.passing_baselines import stopping_baselines
 from joulepath.optimizer.search.path_baselines import path_baselines
 from joulepath.optimizer.search.state import ENERGY_TOLERANCE, SearchState
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
 DURATION_FACTORS = (1.0, 1 + 1e-5)
-"""Factors on the duration of a baseline that are tried in turn.
+"""Factors on the duration of a baseline tried in turn.
 
 Where jumps of jerk are close, rounding takes jerk beyond its limit.
 """
@@ -87,7 +87,7 @@ def baselines_of(state: SearchState, best: Candidate) -> list[Baseline]:
 
 
 def _table(state: SearchState, best: Candidate) -> tuple[list[Baseline], Candidate]:
-    """The baselines from the start of the best candidate to the nearest goal, with their candidate."""
+    """The baselines from the best candidate's start to the nearest goal, with their candidate."""
     assert best.energy is not None
     prepared, problem = state.prepared, state.problem
     candidates = state.candidates
@@ -105,7 +105,7 @@ def _table(state: SearchState, best: Candidate) -> tuple[list[Baseline], Candida
 
 
 def accept_baseline(state: SearchState, candidate: Candidate, better: list[BaselineName]) -> None:
-    """Accept cheaper baselines as motions of a candidate if they are certified before the deadline."""
+    """Accept cheaper baselines as motions of a candidate if they are certified in time."""
     try:
         with watch(state.deadline):
             _accept_certified(state, candidate, better)

@@ -15,8 +15,8 @@ from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.attempts import solve_from, solver_of
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.errors import DurationTooShort
+from joulepath.optimizer.search.least_duration_ends import with_shorter_duration
 from joulepath.optimizer.search.outer_turns import families_of
-from joulepath.optimizer.search.quicker_ends import with_quicker_ends
 from joulepath.optimizer.search.sampled_ends import fastest_samples
 from joulepath.optimizer.search.state import FoundMotion, SearchState
 from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval
@@ -165,7 +165,7 @@ def _tried(state: SearchState) -> list[Candidate]:
     quicker = list[Candidate | None]()
     with suppress(DeadlinePassed), watch(state.deadline):
         for each in sorted(samples, key=lambda each: each.shortest)[: FASTEST.most_moved]:
-            quicker.append(with_quicker_ends(prepared, each))
+            quicker.append(with_shorter_duration(prepared, each))
     return tried + [each for each in quicker if each is not None and each.holdable]
 
 

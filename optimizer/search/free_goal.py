@@ -62,7 +62,7 @@ class GoalRefinementSettings:
     least_move: float = 1e-3
     """Displacement [rad] below which a goal has settled."""
     step_shares: tuple[float, ...] = (1.0, 0.9, 0.5)
-    """Shares of the step to a proposed goal that are tried in turn."""
+    """Shares of the step to a proposed goal tried in turn."""
     fit_samples: int = 201
     """Number of instants at which a motion of another method is sampled."""
     cone_sides: int = 12

@@ -64,17 +64,17 @@ class LeastWorkSettings:
     batch: int = 12
     """Number of candidates whose coarse motions are found at once, in order of lower bounds."""
     coarse_progress: float = 2e-2
-    """Relative decrease that a further step on few control points must promise."""
+    """Relative decrease promised by a further step on few control points at least."""
     restart_progress: float = 2e-3
-    """Relative decrease that a further step from random guesses must promise."""
+    """Relative decrease promised by a further step from random guesses at least."""
     middle_progress: float = 2e-3
-    """Relative decrease that a further step on more control points must promise."""
+    """Relative decrease promised by a further step on more control points at least."""
     behind_ratio: float = 1.4
     """Ratio of expected work above which a motion is given up."""
     contender_ratio: float = 1.35
     """Largest ratio of work on few control points if a motion is solved on more of them."""
     most_contenders: int = 8
-    """Largest number of motions that are solved on more control points."""
+    """Largest number of motions solved on more control points."""
     restart_ratio: float = 1.6
     """Largest ratio of work of a motion from a random guess if it is solved on more points.
 
@@ -86,7 +86,7 @@ class LeastWorkSettings:
     follow_ratio: float = 1.05
     """Largest ratio of work of a motion without collision that is followed."""
     most_followed: int = 6
-    """Largest number of motions that are followed."""
+    """Largest number of motions followed."""
     first_width: float = 0.2
     """First width of their corners [W]."""
     promise: float = 0.97
@@ -351,7 +351,7 @@ class _LeastWorkSearch:
             motion: coarse motion of the candidate.
             points: control points to start from, shape (n, nq) [rad].
             width: width of the smoothed corners [W].
-            progress: relative decrease of the cost that a further step must promise.
+            progress: relative decrease of the cost promised by a further step at least.
             below: cost that the motion must come below [J].
         """
         state, candidate = self.state, motion.candidate

@@ -1,4 +1,4 @@
-"""Choice of the first configurations that are solved for goals of partly free orientation.
+"""Choice of the first configurations solved for goals of partly free orientation.
 
 Samples of the orientation lie far apart on the manifold of goal configurations, farther the more
 joints the arm has. So every sample moves over the manifold to the nearest shortest path from the
@@ -55,7 +55,7 @@ class NearGoalSettings:
     )
     """Choice for mechanical work, for which straight lines and bounds predict little."""
     others: int = 4
-    """Number of samples of other branches that are solved too, in order of their lower bounds.
+    """Number of samples of other branches solved too, in order of their lower bounds.
 
     A straight line predicts little of motions that bend because of a torque limit. For mechanical
     work, samples are activated as if there were no other choice.

@@ -30,9 +30,9 @@ class FamilySettings:
     energy_ratio: float = 1.6
     """Largest ratio of a family's least energy to the best energy if it is solved further."""
     families: int = 4
-    """Largest number of families that are solved further."""
+    """Largest number of families solved further."""
     members: int = 6
-    """Largest number of members of a family that are solved."""
+    """Largest number of members of a family solved."""
     digits: int = 6
     """Number of decimal digits of displacements [rad] in which members agree."""
 

@@ -70,7 +70,7 @@ def refine(state: SearchState, candidate: Candidate) -> None:
 
 @dataclass(frozen=True)
 class RivalSettings:
-    """Settings of the choice of other candidates that are refined.
+    """Settings of the choice of other candidates refined.
 
     A candidate is refined if a multiple of the gain by refining the best candidate would bring its
     energy below the best.

@@ -14,7 +14,7 @@ from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search import exploration, stages, warm_start
 from joulepath.optimizer.search.answer import answer
 from joulepath.optimizer.search.baseline_comparison import baselines_of
-from joulepath.optimizer.search.refusals import no_trajectory
+from joulepath.optimizer.search.no_trajectory import no_trajectory
 from joulepath.optimizer.search.sampled_ends import between
 from joulepath.optimizer.search.state import SearchState
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
@@ -48,7 +48,7 @@ class Run:
 
     @property
     def began(self) -> float:
-        """Instant at which the search began [s]."""
+        """Start of the search [s]."""
         return self.state.began
 
     def prepare(self) -> None:

@@ -35,7 +35,7 @@ class SampleSettings:
     per_branch_pair: int = 2
     """Largest number of samples of one pair of branches in a batch."""
     most_refined: int = 4
-    """Largest number of solved samples that are refined, each of another kind."""
+    """Largest number of solved samples refined, each of another kind."""
     refined_ratio: float = 1.3
     """Largest ratio of the energy of a refined sample to the least energy."""
     equal_distance: float = 1e-6
@@ -54,7 +54,7 @@ def activate_deferred(
 
     Args:
         candidates: candidates of the search.
-        batch: largest number of samples that are activated.
+        batch: largest number of samples activated.
         per_branch_pair: largest number of active samples of one pair of branches. Below the
             default, samples that are active already count too.
 
@@ -118,7 +118,7 @@ def between(
         candidates: candidates of the search.
         q_start: start configuration, shape (nq,) [rad].
         q_goal: goal configuration, shape (nq,) [rad].
-        among: candidates that are considered; by default all.
+        among: candidates considered; by default all.
     """
     known = candidates if among is None else among
 

@@ -47,7 +47,7 @@ class SeedSettings:
     ratio: float = 1.12
     """Largest ratio of a seed's estimate to the least estimate."""
     count: int = 4
-    """Largest number of seeds that are solved at a time."""
+    """Largest number of seeds solved at a time."""
     work_ratio: float = 2.5
     """`ratio` for mechanical work: the best motions do far less work than the straight line."""
     work_count: int = 12

@@ -42,7 +42,7 @@ class CornerStep:
     width: float
     """Width of the smoothed corners [W]."""
     progress: float
-    """Relative decrease of the cost that a further step must promise."""
+    """Relative decrease of the cost promised by a further step at least."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class SharpeningSettings:
     restarts: int = 8
     """Number of random motions from which the coarse problem is solved."""
     followed: int = 3
-    """Number of coarse motions that are solved in the middle space."""
+    """Number of coarse motions solved in the middle space."""
     coarse_points: int = 13
     """Number of control points of coarse motions."""
     middle_points: int = 24
@@ -67,13 +67,13 @@ class SharpeningSettings:
     better.
     """
     progress: float = 1e-3
-    """Relative decrease of the cost that a further step must promise."""
+    """Relative decrease of the cost promised by a further step at least."""
     last_progress: float = 2e-4
-    """Relative decrease of the cost that a further step of the last solves must promise."""
+    """Relative decrease of the cost promised by a further step of the last solves at least."""
     coarse_ratio: float = 1.35
     """Largest ratio of a first motion's energy to the least if it is solved in the middle space."""
     most_coarse: int = 6
-    """Largest number of first motions that are solved in the middle space."""
+    """Largest number of first motions solved in the middle space."""
     rival_ratio: float = 1.03
     """Largest ratio of a candidate's energy to the least if it is followed beside the best."""
     most_rivals: int = 2
@@ -263,7 +263,7 @@ class _Follower:
             spline: motion to start from.
             width: width of the smoothed corners [W].
             count: number of control points.
-            progress: relative decrease of the cost that a further step must promise.
+            progress: relative decrease of the cost promised by a further step at least.
         """
         interval = self._interval(spline.duration, width)
         duration = float(np.clip(spline.duration, interval.t_min, interval.t_max))
@@ -279,7 +279,7 @@ class _Follower:
             t: their times, shape (k,) [s].
             width: width of the smoothed corners [W].
             count: number of control points.
-            progress: relative decrease of the cost that a further step must promise.
+            progress: relative decrease of the cost promised by a further step at least.
             fixed: whether the motion keeps its duration.
         """
         state, candidate = self.state, self.candidate

@@ -21,13 +21,13 @@ from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.exploration import explore
 from joulepath.optimizer.search.fastest import explore_or_find_fastest, find_fastest
 from joulepath.optimizer.search.freed_duration import start_from_free_duration
+from joulepath.optimizer.search.no_trajectory import no_trajectory
 from joulepath.optimizer.search.other_starts import start_beside
 from joulepath.optimizer.search.path_ends import path_candidates
 from joulepath.optimizer.search.refinement import refine, refine_rivals
-from joulepath.optimizer.search.refusals import no_trajectory
 from joulepath.optimizer.search.sampled_ends import between
-from joulepath.optimizer.search.second_attempt import reject
 from joulepath.optimizer.search.state import FoundMotion, SearchState
+from joulepath.optimizer.search.tightened_limits import retry_within_tighter_limits
 from joulepath.optimizer.search.warm_start import warm_start
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
@@ -134,7 +134,7 @@ def confirm_best(state: SearchState) -> None:
     assert best is not None
     state.answer = answer(state, best, state.baselines)
     if state.answer is None:
-        reject(state, best)
+        retry_within_tighter_limits(state, best)
         explore(state)
 
 

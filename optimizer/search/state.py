@@ -54,7 +54,7 @@ class SearchState:
     prepared: PreparedProblem
     """The problem with its models."""
     end: Deadline
-    """Instant at which the answer is due."""
+    """Deadline of the answer."""
     candidates: list[Candidate] = field(default_factory=list)
     """All pairs of start and goal configurations."""
     iterations: int = 0
@@ -70,11 +70,11 @@ class SearchState:
     proven: float | None = None
     """Lower bound of all motions [J]; None before it is known."""
     clock: Clock = time.perf_counter
-    """Function that returns the time [s]."""
+    """Clock [s]."""
     known: Sequence[Spline] = ()
     """Motions between ends of candidates, of any duration, that warm-start the search."""
     began: float = 0.0
-    """Instant at which the search began [s]."""
+    """Start of the search [s]."""
     unreachable: list[UnreachableTarget] = field(default_factory=list)
     """Targets without a configuration."""
     without_storage: FoundMotion | None = None

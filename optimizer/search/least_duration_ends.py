@@ -17,7 +17,7 @@ from joulepath.optimizer.search.sampled_ends import nearest_configuration, with_
 
 
 @dataclass(frozen=True)
-class QuickerEndsSettings:
+class EndSearchSettings:
     """Settings of the random search for ends of shorter duration."""
 
     trials: int = 120
@@ -32,13 +32,13 @@ class QuickerEndsSettings:
     """Relative decrease of the duration that is worth another candidate."""
 
 
-QUICKER_ENDS = QuickerEndsSettings()
+END_SEARCH = EndSearchSettings()
 
 
-def with_quicker_ends(
+def with_shorter_duration(
     prepared: PreparedProblem,
     candidate: Candidate,
-    settings: QuickerEndsSettings = QUICKER_ENDS,
+    settings: EndSearchSettings = END_SEARCH,
 ) -> Candidate | None:
     """A candidate for the same targets with a shorter proven least duration; None if none is found.
 

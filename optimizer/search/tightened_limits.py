@@ -20,7 +20,7 @@ WITHIN_TIGHTER = (
 )
 
 
-def reject(state: SearchState, candidate: Candidate) -> None:
+def retry_within_tighter_limits(state: SearchState, candidate: Candidate) -> None:
     """Drop a motion that the certificate did not confirm.
 
     If it exceeded a limit, the candidate is solved once more, within limits tighter by the excess.

@@ -16,7 +16,7 @@ from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search.errors import DurationTooShort
-from joulepath.optimizer.search.quicker_ends import with_quicker_ends
+from joulepath.optimizer.search.least_duration_ends import with_shorter_duration
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sampled_ends import fastest_samples
 from tests.optimizer.moves import AMPLE, fixed
@@ -45,7 +45,7 @@ def test_they_reach_the_target_in_less_time(robot: str, free: bool) -> None:
         run.prepare()
         pose = problem.goal.T if isinstance(problem.goal, Pose) else None
         for candidate in fastest_samples(run.state.candidates)[:4]:
-            found = with_quicker_ends(run.state.prepared, candidate)
+            found = with_shorter_duration(run.state.prepared, candidate)
             if found is None:
                 continue
             helped += 1
