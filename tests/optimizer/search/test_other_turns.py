@@ -89,10 +89,10 @@ def test_one_joint_is_turned_within_the_limits(start: Any) -> None:
         problem = replace(problem, start=Pose(tcp_pose(problem.arm, START)))
     run, samples, others, least = turned(problem)
     limits = problem.arm.active_limits
-    known = {(id(each.start), id(each.goal)): each for each in samples}
+    known = {(each.start, each.goal): each for each in samples}
     assert 0 < len(others) <= OTHER_TURNS.most
     for each in others:
-        sample = known[id(each.start), id(each.goal)]
+        sample = known[each.start, each.goal]
         way, least_way = each.q_goal - each.q_start, sample.q_goal - sample.q_start
         (joint,) = np.flatnonzero(np.abs(way - least_way) > SAME)
         assert abs(way[joint] - least_way[joint]) == pytest.approx(FULL_TURN)

@@ -70,10 +70,10 @@ def pose_of(robot: Robot, q: Array) -> Pose:
 def members(robot: Robot, q: Array, count: int, seed: int) -> list[Array]:
     """So many configurations of the pose of q, within the limits, drawn evenly from its curves."""
     inverse, rng = required_inverse_kinematics(robot, "goal"), np.random.default_rng(seed)
-    curves: dict[int, SelfMotion] = {}
+    curves: dict[SelfMotion, SelfMotion] = {}
     for each in inverse.solve(pose_of(robot, q).T):
         if each.self_motion is not None:
-            curves[id(each.self_motion)] = each.self_motion
+            curves[each.self_motion] = each.self_motion
     arcs = [(curve, *arc) for curve in curves.values() for arc in curve.arcs]
     lengths = np.array([upper - lower for _, lower, upper in arcs])
     found: list[Array] = []

@@ -112,9 +112,9 @@ def test_seeds_are_the_least_along_their_self_motions(both: bool) -> None:
     seeds = [each for each in before if not each.deferred]
     assert 0 < len(seeds) <= SEEDS.count
     assert all(each.status is CandidateStatus.UNVISITED for each in seeds)
-    energy = dict(zip(map(id, before), estimates(state.prepared, before), strict=True))
+    energy = dict(zip(before, estimates(state.prepared, before), strict=True))
     assert max(energy[each] for each in seeds) <= SEEDS.ratio * min(energy[each] for each in seeds)
-    ends: list[Array] = [end.q for end in {id(each.goal): each.goal for each in before}.values()]
+    ends: list[Array] = [end.q for end in dict.fromkeys(each.goal for each in before)]
     for seed in seeds:
         beside = [
             each
@@ -129,7 +129,7 @@ def test_seeds_are_the_least_along_their_self_motions(both: bool) -> None:
             for each in beside
             if any(each.goal.q is q for q in ends[max(place - 1, 0) : place + 2])
         ]
-        assert all(energy[each] >= energy[id(seed)] for each in near)
+        assert all(energy[each] >= energy[seed] for each in near)
 
 
 def test_the_next_seeds_follow_until_none_is_left() -> None:
