@@ -99,6 +99,16 @@ class Candidate:
             reason.value if message is None else message,
         )
 
+    def defer(self) -> None:
+        """Let the candidate wait until it is activated."""
+        self.deferred = True
+        self.settle(CandidateStatus.UNVISITED, Reason.DEFERRED)
+
+    def activate(self) -> None:
+        """Open the candidate, which was deferred, to a solve."""
+        self.deferred = False
+        self.settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
+
     @property
     def motion(self) -> Spline | None:
         """Motion of the last attempt; None if it found none."""
@@ -192,8 +202,7 @@ def pairs(
             new = [Candidate(start, goal, *both) for both in zip(q_start, q_goal, strict=True)]
             if new[0].sampled:
                 for candidate in new:
-                    candidate.deferred = True
-                    candidate.settle(CandidateStatus.UNVISITED, Reason.DEFERRED)
+                    candidate.defer()
             result += new
     return result
 

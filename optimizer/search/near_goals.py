@@ -18,7 +18,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.goal_manifold import GoalManifold
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.result.candidates import CandidateStatus
-from joulepath.optimizer.search.candidates import Candidate, Reason, bound
+from joulepath.optimizer.search.candidates import Candidate, bound
 from joulepath.optimizer.search.end_feasibility import check_configurations
 from joulepath.optimizer.search.other_turns import other_turns
 from joulepath.optimizer.search.sampled_ends import activate_deferred, moved_end, on_branch
@@ -102,8 +102,7 @@ def activate_near_goals(prepared: PreparedProblem, candidates: list[Candidate]) 
         chosen = _local_minima(pool, energy, NEAR_GOALS.electrical)
     for each in chosen:
         if each.deferred:
-            each.deferred = False
-            each.settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
+            each.activate()
         else:
             candidates.append(each)
     if is_work:

@@ -25,8 +25,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import Target
-from joulepath.optimizer.result.candidates import CandidateStatus
-from joulepath.optimizer.search.candidates import Candidate, Reason, bound, pairs
+from joulepath.optimizer.search.candidates import Candidate, bound, pairs
 from joulepath.optimizer.search.ends import ends, ends_of, label_of
 from joulepath.optimizer.search.errors import PathAttempt, PathInfeasible
 
@@ -180,8 +179,7 @@ def _candidate(
     )
     candidate = Candidate(start, goal, q_start, q_goal)
     if start.tolerance is not None:
-        candidate.deferred = True
-        candidate.settle(CandidateStatus.UNVISITED, Reason.DEFERRED)
+        candidate.defer()
     return candidate
 
 

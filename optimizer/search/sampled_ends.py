@@ -21,7 +21,7 @@ from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.result.candidates import CandidateStatus
-from joulepath.optimizer.search.candidates import Candidate, Reason, bound
+from joulepath.optimizer.search.candidates import Candidate, bound
 from joulepath.optimizer.search.ends import SIDES, label_of
 from joulepath.optimizer.solve.methods.method import above
 
@@ -74,8 +74,7 @@ def activate_deferred(
         if not is_open or active[branch_pair] >= per_branch_pair:
             continue
         active[branch_pair] += 1
-        candidate.deferred = False
-        candidate.settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
+        candidate.activate()
         activated += 1
         if activated == batch:
             break

@@ -22,7 +22,7 @@ from joulepath.optimizer.motion.quadrature import quadrature
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
 from joulepath.optimizer.result.candidates import CandidateStatus
-from joulepath.optimizer.search.candidates import Candidate, Reason
+from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.solve.methods.method import above
 
 
@@ -84,8 +84,7 @@ def activate_seeds(prepared: PreparedProblem, candidates: Sequence[Candidate]) -
     most = above(float(energy[order[0]]), ratio)
     chosen = [k for k in order if energy[k] <= most][:count]
     for k in chosen:
-        known[k].deferred = False
-        known[k].settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
+        known[k].activate()
     return True
 
 
