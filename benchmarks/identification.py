@@ -215,7 +215,7 @@ def sampling_margin(sd: float, runs: int) -> float:
         sd: standard deviation of one run.
         runs: number of runs.
     """
-    return MARGIN * sd * max(0.0, runs**-0.5 - GATED_RUNS**-0.5)
+    return float(MARGIN * sd * max(0.0, runs**-0.5 - GATED_RUNS**-0.5))
 
 
 def _true(truth: Truth, figure: str, joint: int | None) -> float:

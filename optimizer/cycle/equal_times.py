@@ -27,11 +27,10 @@ OTHER_MOTIONS: tuple[Literal["ruckig_slowed", "straight"], ...] = ("ruckig_slowe
 
 
 def in_equal_times(cycle: Cycle, found: CycleSolution) -> CycleSolution:
-    """The cycle with every saving in the same cycle time, and none against a cycle that breaks a
-    limit; and with the same stops and times by other motions.
+    """The cycle with savings in equal cycle times, and with further baselines of the same times.
 
-    Where no `time` is cycle for, cycles differ in duration. The shorter one then waits until the
-    longer one ends, where the answer waits for least.
+    A baseline beyond a limit has no saving. Without a requested `time`, cycles differ in duration:
+    the shorter one then waits for the end of the longer one at the cheapest stop of the answer.
     """
     if not found.baselines:
         return found
@@ -41,7 +40,7 @@ def in_equal_times(cycle: Cycle, found: CycleSolution) -> CycleSolution:
 
 
 def _priced(cycle: Cycle, found: CycleSolution, each: CycleBaseline) -> CycleBaseline:
-    """The baseline, its saving that of both cycles in the longer one's time."""
+    """The baseline with the saving in the time of the longer cycle."""
     if not each.within_limits:
         return replace(each, saving=None, saving_interval=None)
     wait = each.duration - found.duration

@@ -84,9 +84,10 @@ def test_passing_is_never_worse_than_the_best_cycle_that_stops(seed: int) -> Non
     own = found.energy.electrical.total
     (stopping,) = (each for each in found.baselines if each.name == "stopping")
     assert stopping.electrical == pytest.approx(theirs.energy.electrical.total, rel=QUADRATURE)
-    assert own <= stopping.electrical and stopping.saving == pytest.approx(
-        1 - own / stopping.electrical
-    )
+    assert own <= stopping.electrical
+    # the saving is one in equal times: the shorter cycle waits for the longer one
+    assert stopping.saving is not None
+    assert stopping.saving <= 1 - own / stopping.electrical + ROUNDING
     assert found.lower_bound <= own and found.lower_bound <= theirs.lower_bound + ROUNDING
     assert found.order == ["0", "1", "2"] and found.joins < ROUNDING
     assert all(move.solution.certificate.valid for move in found.moves)
@@ -156,7 +157,8 @@ def test_a_cycle_of_passes_alone_comes_back() -> None:
     assert len(move.passes) == 3 and found.order == ["0", "1", "2"] and found.status == "optimal"
     ends = move.solution.trajectory.spline.control_points[[0, -1]]
     assert np.abs(ends - HOME).max() < ROUNDING
-    assert against(found)["stopping"] > 0.03
+    (stopping,) = (each for each in found.baselines if each.name == "stopping")
+    assert found.energy.electrical.total < 0.97 * stopping.electrical
 
 
 @pytest.mark.parametrize("factor", long_but([0.99], [1.25, 0.99]))
