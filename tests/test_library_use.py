@@ -57,6 +57,7 @@ ERRORS = {
     "NoCollisionFreeTrajectory",
     "NoPowerChannel",
     "UnreachableTargets",
+    "NoConfigurationFound",
     "NoSequence",
     "NoTrajectory",
     "NotCertified",

@@ -67,6 +67,22 @@ class JointAxes:
         back = np.linalg.inv(frames)
         return Chain(np.concatenate([frames[:1], back[:-1] @ frames[1:]]), back[-1] @ self.T_zero)
 
+    def in_one_sense(self) -> tuple[JointAxes, Array]:
+        """The same axes, with neighbouring parallel axes in the same sense.
+
+        Returns:
+            The axes, and factors (nq,), 1 or -1, by which their joint positions are those of the
+            given axes.
+        """
+        directions, senses = self.directions.copy(), np.ones(len(self.directions))
+        for k in range(1, len(directions)):
+            if (
+                np.linalg.norm(np.cross(directions[k - 1], directions[k])) < AXES.parallel
+                and directions[k - 1] @ directions[k] < 0
+            ):
+                directions[k], senses[k] = -directions[k], -1.0
+        return JointAxes(directions, self.points, self.T_zero), senses
+
     def simplified(self) -> JointAxes:
         """Nearest arm with exactly parallel and meeting axes; equal to this one if no axes nearly
         are.
