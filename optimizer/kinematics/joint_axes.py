@@ -30,6 +30,8 @@ class JointAxesSettings:
     """Distance of axes below which they count as meeting [m]; far above the shifts of a
     calibration.
     """
+    steep: float = 0.5
+    """Vertical component above which an axis is not nearly level."""
 
 
 AXES = JointAxesSettings()
@@ -105,6 +107,15 @@ class JointAxes:
             for k in range(len(points) - 1, 0, -1):
                 _let_meet(directions, points, k, k - 1)
         return JointAxes(directions, points, self.T_zero)
+
+
+def upward(direction: Array) -> Array:
+    """The direction (3,) or its opposite: the one away from the ground, or for a nearly level axis
+    the one along the positive x or y axis.
+    """
+    steep = abs(direction[2]) > AXES.steep
+    k = 2 if steep else int(np.abs(direction[:2]).argmax())
+    return -direction if direction[k] < 0 else direction
 
 
 def meeting_point(directions: Array, points: Array) -> tuple[Array, float]:
