@@ -17,6 +17,7 @@ from joulepath.models.own_arm.figure import assumed, either, per_joint, stated
 from joulepath.models.own_arm.rules import NOTES, RULES
 from joulepath.models.own_arm.upright import UprightChain
 from joulepath.models.own_arm.urdf_chain import Chain, chain_of
+from joulepath.models.own_arm.urdf_tree import CHAIN
 from joulepath.models.uploads.limits import Checkpoint, unwatched
 from joulepath.models.urdf import BASE, FLANGE
 
@@ -39,6 +40,11 @@ def own_figures(
     chain = chain_of(description, checkpoint)
     upright, links = UprightChain.of(chain), _link_names(chain)
     warnings = list[str]()
+    if chain.rounded > CHAIN.rounded_angle:
+        warnings.append(
+            "Angles of joint origins written with few decimals, such as 1.571, are read as the "
+            f"quarter turns that they stand for: by up to {chain.rounded:.2g} rad."
+        )
     limits = _limits(description, chain)
     tau_max = np.array(limits["torque"]["value"])
     figures = {

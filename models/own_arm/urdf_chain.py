@@ -47,7 +47,8 @@ class Chain:
     pose of the tip in the frame of the last joint, `T_base_base_link` (4, 4) the pose of the link
     `base_link` in the base; None if it is the base or not fixed to it. Limits (nq,) are position
     [rad], speed [rad/s] and torque [N·m]; 0 if the URDF has none. `rigid` has the names of the URDF
-    links fixed to the base and to every moving link.
+    links fixed to the base and to every moving link. `rounded` [rad] is the largest change of a
+    rounded angle to the quarter turn that it stands for.
     """
 
     model: pin.Model
@@ -63,6 +64,7 @@ class Chain:
     v_max: Array
     tau_max: Array
     root: Element
+    rounded: float
 
     @property
     def nq(self) -> int:
@@ -151,7 +153,7 @@ def _merged(
     tip: str,
 ) -> Chain:
     """The chain, read and reduced by Pinocchio."""
-    ranges, bare = [joint_range(joint) for joint in moving], _for_pinocchio(root)
+    ranges, (bare, rounded) = [joint_range(joint) for joint in moving], _for_pinocchio(root)
     names = {name_of(joint): k for k, joint in enumerate(moving, start=1)}
     given = {f"joint {k}": name_of(joint) for k, joint in enumerate(bare.findall("joint"))}
     for unique, joint in zip(given, bare.findall("joint"), strict=True):
@@ -199,17 +201,19 @@ def _merged(
         v_max,
         tau_max,
         root,
+        rounded,
     )
 
 
-def _for_pinocchio(root: Element) -> Element:
-    """A copy of a URDF without shapes, with restored figures and complete limits.
+def _for_pinocchio(root: Element) -> tuple[Element, float]:
+    """A copy of a URDF without shapes, with restored figures and complete limits, and the largest
+    change of an angle [rad].
 
     Pinocchio gives a continuous joint two coordinates, and skips incomplete limits.
     """
-    bare = copy.deepcopy(root)
+    bare, rounded = copy.deepcopy(root), 0.0
     for joint in bare.findall("joint"):
-        restore_rounded(joint)
+        rounded = max(rounded, restore_rounded(joint))
         limit = joint.find("limit")
         if joint.get("type") in (FIXED, "floating", "planar"):
             continue
@@ -222,7 +226,7 @@ def _for_pinocchio(root: Element) -> Element:
             limit.attrib.update({"lower": repr(-CONTINUOUS), "upper": repr(CONTINUOUS)})
     for link in bare.findall("link"):
         link[:] = [each for each in link if each.tag not in ("visual", "collision")]
-    return bare
+    return bare, rounded
 
 
 def _check_inertials(root: Element, names: list[str]) -> None:

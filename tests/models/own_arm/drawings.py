@@ -79,7 +79,7 @@ def _joint(
     joint = SubElement(root, "joint", name=f"joint_{k}", type=kind)
     SubElement(joint, "parent", link=f"link_{k - 1}" if k > 1 else "base")
     SubElement(joint, "child", link=f"link_{k}")
-    rpy = pin.rpy.matrixToRpy(origin.rotation)
+    rpy = pin.rpy.matrixToRpy(origin.rotation.round(15))
     SubElement(
         joint,
         "origin",
@@ -93,10 +93,10 @@ def _link(root: Element, name: str, body: pin.Inertia) -> None:
     inertial = SubElement(SubElement(root, "link", name=name), "inertial")
     SubElement(inertial, "origin", xyz=" ".join(repr(float(each)) for each in body.lever))
     SubElement(inertial, "mass", value=repr(float(body.mass)))
-    I = body.inertia
+    tensor = body.inertia
     entries = zip(
         ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
-        (I[0, 0], I[0, 1], I[0, 2], I[1, 1], I[1, 2], I[2, 2]),
+        tensor[np.triu_indices(3)],
         strict=True,
     )
     SubElement(inertial, "inertia", {name: repr(float(each)) for name, each in entries})
