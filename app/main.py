@@ -29,10 +29,12 @@ from joulepath.app.api.logs import route as logs
 from joulepath.app.api.optimize import route as optimize
 from joulepath.app.api.pareto import route as pareto
 from joulepath.app.api.replay import route as replay
+from joulepath.app.api.report import route as report
 from joulepath.app.api.robots import route as robots
 from joulepath.app.api.studies import route as studies
 from joulepath.app.api.studies.iterations import route as iterations
 from joulepath.app.api.studies.suggest import route as suggest
+from joulepath.app.api.tools import route as tools
 from joulepath.app.api.whatif import route as whatif
 from joulepath.app.cluster.link import Cluster
 from joulepath.app.engine.pool import Engine
@@ -69,7 +71,9 @@ ROUTES = (
     identifications,
     answers,
     export,
+    report,
     robots,
+    tools,
     figures,
     health,
     metrics,

@@ -8,6 +8,7 @@ import errno
 import logging
 import math
 import socket
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, cast
 
@@ -22,16 +23,25 @@ from joulepath.app.settings import Settings, WrongSettings
 
 logger = logging.getLogger(__name__)
 
-_REFUSING_TIME = 0.25
-"""Time [s] of `shutting-down` responses, until load balancers know of the shutdown."""
-_SETTLING_TIME = 0.05
-"""Time [s] to read arrived requests before idle connections are closed."""
+
+@dataclass(frozen=True)
+class ServerSettings:
+    """Settings of the server process."""
+
+    refusing_time: float = 0.25
+    """Time [s] of `shutting-down` responses, until load balancers know of the shutdown."""
+    settling_time: float = 0.05
+    """Time [s] to read arrived requests before idle connections are closed."""
+    large_block: int = 1 << 20
+    """Least size of separately mapped blocks [byte], above the pieces of bodies."""
+    backlog: int = 2048
+    """Connections waiting to be accepted, the default of uvicorn."""
+
+
+SERVER = ServerSettings()
+
 _M_MMAP_THRESHOLD = -3
 """Parameter of glibc's `mallopt`: the least size of separately mapped blocks [byte]."""
-_LARGE_BLOCK = 1 << 20
-"""Least size of separately mapped blocks [byte]; below, every piece of a body would be mapped."""
-_BACKLOG = 2048
-"""Connections waiting to be accepted, the default of uvicorn."""
 _REMEDIES = {
     errno.EADDRINUSE: "another program has this address, perhaps another service. End it, or "
     "choose another port by "
@@ -58,12 +68,12 @@ class _Server(uvicorn.Server):
         self._state.jobs.dispatcher.drain()
         self._state.bodies.drain()
         # The engine has ended its tasks by then; remaining connections do not read.
-        end = self._state.settings.shutdown_grace + _SETTLING_TIME
+        end = self._state.settings.shutdown_grace + SERVER.settling_time
         asyncio.get_running_loop().call_later(end, self._connections.reset)
-        await asyncio.sleep(_REFUSING_TIME)
+        await asyncio.sleep(SERVER.refusing_time)
         for server in self.servers:
             server.close()
-        await asyncio.sleep(_SETTLING_TIME)
+        await asyncio.sleep(SERVER.settling_time)
         await super().shutdown(sockets)
 
 
@@ -75,7 +85,7 @@ def listen(host: str, port: int) -> list[socket.socket]:
         for family, _, _, _, address in dict.fromkeys(found):
             # Two processes may bind an address, but only one can listen.
             sockets.append(
-                socket.create_server(cast(Any, address), family=family, backlog=_BACKLOG)
+                socket.create_server(cast(Any, address), family=family, backlog=SERVER.backlog)
             )
     except OSError as error:
         for each in sockets:
@@ -127,4 +137,4 @@ def _give_memory_back() -> None:
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:  # glibc has it
-        mallopt(_M_MMAP_THRESHOLD, _LARGE_BLOCK)
+        mallopt(_M_MMAP_THRESHOLD, SERVER.large_block)

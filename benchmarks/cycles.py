@@ -209,11 +209,15 @@ def main() -> None:
             asked = in_time(asked, own, given.time)
         began = time.perf_counter()
         answer = plan_cycle(asked)
-        if any(each.name == "stopping" and each.saving < 0 for each in answer.baselines):
+        if any(each.name == "stopping" and (each.saving or 0.0) < 0 for each in answer.baselines):
             raise SystemExit("passing needs more than stopping")
         legs += len(answer.moves)
         certified += sum(move.solution.certificate.valid for move in answer.moves)
-        row = {f"saved against {each.name}": each.saving for each in answer.baselines}
+        row = {
+            f"saved against {each.name}": each.saving
+            for each in answer.baselines
+            if each.saving is not None
+        }
         row[EXCESS] = excess(answer, own)
         row["gap"] = 1 - answer.lower_bound / answer.energy.electrical.total
         row["time [s]"] = time.perf_counter() - began

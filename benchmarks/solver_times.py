@@ -27,7 +27,8 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import MethodName, Problem
 from joulepath.optimizer.solve.methods import solver_for
-from joulepath.optimizer.solve.methods.method import SolveResult
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import SolveResult
 
 PATIENCE = 60.0  # longest time of one solve [s]
 METHODS: tuple[MethodName, ...] = ("bspline", "time_scaling")
@@ -44,7 +45,9 @@ def solve(move: Move, method: MethodName, collisions: bool = False) -> tuple[flo
         )
     )
     began = time.perf_counter()
-    outcome = solver_for(task, move.q_start, move.q_goal, Deadline.after(PATIENCE)).solve()
+    outcome = solver_for(
+        SolveContext.of(task, move.q_start, move.q_goal, Deadline.after(PATIENCE))
+    ).solve()
     return time.perf_counter() - began, outcome
 
 

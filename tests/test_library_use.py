@@ -146,7 +146,7 @@ TYPES = {
     "PlannedTorques",
     "Points",
     "Pose",
-    "PosesAround",
+    "SampledPoses",
     "Problem",
     "Program",
     "RapidOptions",

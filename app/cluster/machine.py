@@ -23,7 +23,7 @@ from joulepath.app.engine.warm_up import warm
 from joulepath.app.engine.work import Ended, Work, taking
 from joulepath.app.exceptions.queue import WorkerLost
 from joulepath.app.settings import read_settings
-from joulepath.optimizer.progress import Event, nobody
+from joulepath.optimizer.progress import Event, no_listener
 
 if TYPE_CHECKING:
     from distributed import Worker
@@ -110,7 +110,7 @@ def _work(
     index: int, asked: Asked, found: list[tuple[int, Event]], ended: dict[int, Ended]
 ) -> Work:
     task, deadline, is_heard = asked
-    tell = (lambda event: found.append((index, event))) if is_heard else nobody
+    tell = (lambda event: found.append((index, event))) if is_heard else no_listener
     return Work(task, deadline, partial(ended.__setitem__, index), stoppable=False, tell=tell)
 
 

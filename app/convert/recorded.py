@@ -18,7 +18,8 @@ from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest,
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
-from joulepath.optimizer.identify.logs.reading import LogOptions, LogReading, check_header, read_log
+from joulepath.optimizer.identify.logs.log_options import LogOptions
+from joulepath.optimizer.identify.logs.reading import LogReading, check_header, read_log
 from joulepath.optimizer.problem import arm as library
 
 S = TypeVar("S", bound=EvaluateSettings)
@@ -38,7 +39,7 @@ def to_log_options(settings: LogSettings, most_bytes: int) -> LogOptions:
         effort=settings.effort,
         name=settings.name,
         tags=tuple(settings.tags),
-        most_bytes=most_bytes,
+        max_bytes=most_bytes,
     )
 
 
@@ -56,7 +57,7 @@ class GivenLog:
         settings = LogSettings.model_validate(self.settings)
         # its size was checked when it was added
         return read_log(
-            self.body, robot_named(settings.robot), to_log_options(settings, LogOptions.most_bytes)
+            self.body, robot_named(settings.robot), to_log_options(settings, LogOptions.max_bytes)
         )
 
 

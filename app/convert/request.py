@@ -13,7 +13,7 @@ from joulepath.app.schemas.orientation import InCone, TargetPose
 from joulepath.app.schemas.path import Path, StopPath
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.evaluate.sampler import MOST_SAMPLES
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.dwell import Dwell
@@ -116,5 +116,5 @@ def _duration_bounds(request: asked.MotionRequest) -> tuple[float | None, float 
         return request.duration, request.duration
     given = request.duration or asked.DurationRange()
     if given.max is None and request.objective == "electrical":
-        return given.min, min(LONGEST_DURATION, request.sample_period * MOST_SAMPLES)
+        return given.min, min(LONGEST_DURATION, request.sample_period * MOTION_LIMITS.max_samples)
     return given.min, given.max

@@ -40,7 +40,7 @@ def to_scene(scene: asked.Scene, robot: Robot) -> Scene:
     )
 
 
-def to_tool(tool: asked.Tool) -> list[Attachment]:
+def to_capsules(tool: asked.Tool) -> list[Attachment]:
     """The capsules of a tool, in the flange frame."""
     return [
         capsule_between(np.array(c.start), np.array(c.end), c.radius, c.touches)

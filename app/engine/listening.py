@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 
-_tell: ContextVar[Tell] = ContextVar("tell", default=nobody)
+_tell: ContextVar[Tell] = ContextVar("tell", default=no_listener)
 
 
 @contextmanager

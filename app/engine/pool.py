@@ -20,16 +20,26 @@ from joulepath.app.engine.worker import Worker
 from joulepath.app.exceptions.queue import Preempted, ShuttingDown, WorkerLost
 from joulepath.app.settings import Settings
 from joulepath.optimizer.exceptions import DeadlineExceeded
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 
 logger = logging.getLogger(__name__)
 
-_FIRST_RESTART_DELAY = 0.5
-_LONGEST_RESTART_DELAY = 30.0
-_CHECK_PERIOD = 1.0
-"""Time [s] between two checks of the queue's consistency."""
-_MOST_DEATHS = 2
-"""Dead workers after which a task is given up; the first one may have been killed by chance."""
+
+@dataclass(frozen=True)
+class PoolSettings:
+    """Settings of the pool of workers."""
+
+    first_restart_delay: float = 0.5
+    """Delay of the first replacement of a worker [s], doubled after every failure."""
+    longest_restart_delay: float = 30.0
+    """Longest delay of a replacement [s]."""
+    check_period: float = 1.0
+    """Time [s] between two checks of the queue's consistency."""
+    most_deaths: int = 2
+    """Dead workers after which a task is given up; the first one may have been killed by chance."""
+
+
+POOL = PoolSettings()
 
 
 class Engine:
@@ -115,7 +125,7 @@ class Engine:
         return ClientEngine(self, client)
 
     async def run(
-        self, task: Task, deadline: float, client: str = "", tell: Tell = nobody
+        self, task: Task, deadline: float, client: str = "", tell: Tell = no_listener
     ) -> TaskResult:
         """The task's result, within `deadline` seconds plus `settings.deadline_grace`.
 
@@ -175,7 +185,7 @@ class Engine:
                     deaths += 1
                     if self._draining.is_set():
                         raise ShuttingDown from None
-                    if deaths == _MOST_DEATHS:
+                    if deaths == POOL.most_deaths:
                         raise
                     reason = "its worker died"
             place.begins_again = True
@@ -189,7 +199,7 @@ class Engine:
         if not first:
             # The first worker compiles the kernels for the cache of all workers.
             await self._first_warm.wait()
-        delay = _FIRST_RESTART_DELAY
+        delay = POOL.first_restart_delay
         while True:
             try:
                 worker = Worker(
@@ -205,9 +215,9 @@ class Engine:
                     extra={"retry_in": delay},
                 )
                 await asyncio.sleep(delay)
-                delay = min(2 * delay, _LONGEST_RESTART_DELAY)
+                delay = min(2 * delay, POOL.longest_restart_delay)
                 continue
-            delay = _FIRST_RESTART_DELAY
+            delay = POOL.first_restart_delay
             self._has_warmed(worker)
             await worker.ended.wait()
             self._workers.discard(worker)
@@ -217,7 +227,7 @@ class Engine:
     async def _check(self) -> None:
         """Repairs the states of the queue periodically, so that a defect costs no worker."""
         while True:
-            await asyncio.sleep(_CHECK_PERIOD)
+            await asyncio.sleep(POOL.check_period)
             for fault in self.queue.mend({worker for worker in self._workers if worker.alive}):
                 logger.error("mended the queue", extra={"fault": fault})
 
@@ -242,6 +252,6 @@ class ClientEngine:
     engine: Engine
     client: str
 
-    async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
+    async def run(self, task: Task, deadline: float, tell: Tell = no_listener) -> TaskResult:
         """See `Engine.run`."""
         return await self.engine.run(task, deadline, self.client, tell)

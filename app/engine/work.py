@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.task import Task
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 
 SHORT = 0.05
 """Longest expected time of short work [s]."""
@@ -27,7 +27,7 @@ class Work:
     deadline: float
     ended: Callable[[Ended], object]
     stoppable: bool = True
-    tell: Tell = nobody
+    tell: Tell = no_listener
     expected: float = float("inf")
     is_small: bool = False
 
@@ -52,7 +52,7 @@ async def result_of(
     task: Task,
     deadline: float,
     stoppable: bool = True,
-    tell: Tell = nobody,
+    tell: Tell = no_listener,
 ) -> TaskResult:
     """The result of one task, run by a function for many. Raises the error of the task or of
     `run`."""

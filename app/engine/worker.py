@@ -28,7 +28,7 @@ from joulepath.app.engine.work import Ended, Take, Work
 from joulepath.app.exceptions.queue import Preempted, WorkerLost
 from joulepath.app.logs import configure_logging
 from joulepath.optimizer.deadline import Stopped, stoppable
-from joulepath.optimizer.progress import Event, Tell, nobody
+from joulepath.optimizer.progress import Event, Tell, no_listener
 
 logger = logging.getLogger(__name__)
 
@@ -103,7 +103,7 @@ class Worker:
                 raise WorkerLost from None
             raise
 
-    async def ask(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
+    async def ask(self, task: Task, deadline: float, tell: Tell = no_listener) -> TaskResult:
         """The task's result. If cancelled, the task is stopped.
 
         Args:
@@ -234,7 +234,7 @@ class Worker:
                 self._send(number, work)
 
     def _send(self, number: int, work: Work) -> None:
-        self._pipe.send((number, work.task, work.deadline, work.tell is not nobody))
+        self._pipe.send((number, work.task, work.deadline, work.tell is not no_listener))
 
     def _has_ended(self) -> None:
         asyncio.get_running_loop().remove_reader(self._process.sentinel)
@@ -248,7 +248,7 @@ class Worker:
 
 
 def _heard(tell: Tell, loop: asyncio.AbstractEventLoop) -> Heard:
-    return None if tell is nobody else lambda event: loop.call_soon_threadsafe(tell, event)
+    return None if tell is no_listener else lambda event: loop.call_soon_threadsafe(tell, event)
 
 
 def _serve(pipe: Connection, stopped_up_to: Any, warm: Callable[[], None], log_level: str) -> None:
@@ -273,7 +273,7 @@ def _serve(pipe: Connection, stopped_up_to: Any, warm: Callable[[], None], log_l
         except EOFError:
             return
         with (
-            listening(pipe.send if is_heard else nobody),
+            listening(pipe.send if is_heard else no_listener),
             stoppable(partial(_is_stopped, stopped_up_to, number)),
         ):
             ended = outcome(task, deadline)

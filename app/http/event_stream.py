@@ -7,6 +7,7 @@ import contextlib
 import logging
 from collections import deque
 from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
 from typing import Any
 
 from fastapi import Request
@@ -18,7 +19,7 @@ from joulepath.app.engine.result import TaskResult, json_document
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import problem_response
 from joulepath.optimizer.exceptions import DeclaredError
-from joulepath.optimizer.progress import Event, Tell, forward
+from joulepath.optimizer.progress import Event, Tell, only_news
 
 logger = logging.getLogger(__name__)
 
@@ -29,10 +30,20 @@ EVENT_SCHEMA = {
 }
 """One event, in the OpenAPI document."""
 Work = Callable[[Tell], Coroutine[Any, Any, TaskResult]]
-_PAUSE = 15.0
-"""Time [s] without an event after which a comment keeps the stream alive in proxies."""
-_MOST_WAITING = 1000
-"""Most unread events of a client; the oldest ones are dropped beyond it."""
+
+
+@dataclass(frozen=True)
+class StreamSettings:
+    """Settings of event streams."""
+
+    pause: float = 15.0
+    """Time [s] without an event after which a comment keeps the stream alive in proxies."""
+    most_waiting: int = 1000
+    """Most unread events of a client; the oldest ones are dropped beyond it."""
+
+
+STREAM = StreamSettings()
+
 EVENT_STREAM_HEADERS = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
 _COMMENT = b": working\n\n"
 
@@ -56,7 +67,7 @@ class EventStream(StreamingResponse):
         await unless_disconnected(self._request, self._answer(send))
 
     async def _answer(self, send: Send) -> None:
-        waiting: deque[Event] = deque(maxlen=_MOST_WAITING)
+        waiting: deque[Event] = deque(maxlen=STREAM.most_waiting)
         bell = asyncio.Event()
 
         def told(event: Event) -> None:
@@ -64,7 +75,7 @@ class EventStream(StreamingResponse):
             bell.set()
 
         # A preempted request starts again: its client need not know.
-        working = asyncio.create_task(self._work(forward(told)))
+        working = asyncio.create_task(self._work(only_news(told)))
         working.add_done_callback(lambda _: bell.set())
         try:
             while not working.done() or waiting:
@@ -81,7 +92,7 @@ class EventStream(StreamingResponse):
         """Waits until the bell rings, and silences it."""
         while not bell.is_set():
             with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(_PAUSE):
+                async with asyncio.timeout(STREAM.pause):
                     await bell.wait()
             if not bell.is_set() and self._begun:
                 await send(_body(_COMMENT))

@@ -29,24 +29,34 @@ logger = logging.getLogger(__name__)
 
 LEASE = timedelta(seconds=30)
 """Length of a lease; leases are renewed after a third of it."""
-LOOK = 0.5
-"""Time [s] between two queries of the database for new requests and cancelled ones."""
-AHEAD = 0.25
-"""Work [s] leased ahead per worker, so that small requests share the cost of a transaction."""
-MOST_AHEAD = 32
-"""Most requests leased ahead per worker."""
-GATHER = 0.05
-"""Time [s] in which outcomes are collected for one transaction while workers have more to do."""
-MOST_EQUAL = 500
-"""Most requests leased beyond MOST_AHEAD while they wait for equal requests."""
-MOST_KNOWN = 64
-"""Most requests leased beyond MOST_AHEAD if all earlier ones had known answers."""
+
+
+@dataclass(frozen=True)
+class DispatcherSettings:
+    """Settings of the dispatcher."""
+
+    look: float = 0.5
+    """Time [s] between two queries of the database for new requests and cancelled ones."""
+    ahead: float = 0.25
+    """Work [s] leased ahead per worker, so that small requests share the cost of a transaction."""
+    most_ahead: int = 32
+    """Most requests leased ahead per worker."""
+    gather: float = 0.05
+    """Time [s] of collecting outcomes for one transaction while workers have more to do."""
+    most_equal: int = 500
+    """Most requests leased beyond `most_ahead` while they wait for equal requests."""
+    most_known: int = 64
+    """Most requests leased beyond `most_ahead` if all earlier ones had known answers."""
+    stop: float = 3.0
+    """Longest time [s] of the last exchange with the database when the service stops."""
+    longest_pause: float = 30.0
+    """Longest time [s] until an unreachable database is tried again."""
+
+
+DISPATCHER = DispatcherSettings()
+
 PRUNING = timedelta(hours=1)
 """Time between two deletions of old jobs."""
-_STOP = 3.0
-"""Longest time [s] of the last exchange with the database when the service stops."""
-_LONGEST_PAUSE = 30.0
-"""Longest time [s] until an unreachable database is tried again."""
 
 
 @dataclass
@@ -82,7 +92,7 @@ class Dispatcher:
         self._outcomes: list[Outcome] = []
         self._bell = asyncio.Event()
         self._times = _Times(now())
-        self._mean_work = AHEAD
+        self._mean_work = DISPATCHER.ahead
         self._mean_of: dict[str, float] = {}
         self._more = True
         self._more_known = 0
@@ -111,7 +121,7 @@ class Dispatcher:
         self.drain()
         if self._tasks:
             # Requests leased just now are returned as well.
-            await asyncio.wait(self._tasks[:1], timeout=_STOP)
+            await asyncio.wait(self._tasks[:1], timeout=DISPATCHER.stop)
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -136,7 +146,9 @@ class Dispatcher:
         """Has leased requests run."""
         while True:
             await self._heap.filled()
-            taker = Taker(self._heap, self._ended, lambda kind: self._mean_of.get(kind, AHEAD))
+            taker = Taker(
+                self._heap, self._ended, lambda kind: self._mean_of.get(kind, DISPATCHER.ahead)
+            )
             taker.working = working = asyncio.create_task(self._executor.run(taker.take))
             try:
                 await asyncio.wait({working})
@@ -178,21 +190,21 @@ class Dispatcher:
 
     async def _dispatch(self) -> None:
         """Exchanges leases and outcomes with the database."""
-        fresh, pause = True, LOOK
+        fresh, pause = True, DISPATCHER.look
         while not self._draining:
             try:
                 if fresh:
                     await self._store.write(partial(leases.take_back_from, is_gone=is_gone))
                     fresh = False
                 await self._exchange()
-                pause = LOOK
+                pause = DISPATCHER.look
             except Exception as error:
                 if not isinstance(error, StoreUnavailable):
                     logger.exception("unforeseen error")
-                pause = min(2 * pause, _LONGEST_PAUSE)
+                pause = min(2 * pause, DISPATCHER.longest_pause)
             await self._rung(pause)
             if len(self._heap) >= self._executor.slots and not self._draining:
-                await asyncio.sleep(GATHER)
+                await asyncio.sleep(DISPATCHER.gather)
 
     async def _rung(self, longest: float) -> None:
         """Waits until there is something to do, at most for a time [s]."""
@@ -213,7 +225,7 @@ class Dispatcher:
         await self._begin(self._equals.released())
         want = (
             self._most_held
-            + min(self._equals.waiting, MOST_EQUAL)
+            + min(self._equals.waiting, DISPATCHER.most_equal)
             + self._more_known
             - len(self._held)
         )
@@ -232,7 +244,7 @@ class Dispatcher:
             if await self._begin(fresh) or not fresh:
                 self._more_known = 0
             else:  # where all were known, more may be
-                self._more_known = min(max(1, 2 * self._more_known), MOST_KNOWN)
+                self._more_known = min(max(1, 2 * self._more_known), DISPATCHER.most_known)
 
     async def _begin(self, held: list[Held]) -> int:
         """Starts requests without equal ones, and returns their number."""
@@ -254,7 +266,12 @@ class Dispatcher:
     @property
     def _most_held(self) -> int:
         """Most leased requests: one per worker, and some ahead."""
-        ahead = max(1, round(AHEAD / max(self._mean_work, AHEAD / MOST_AHEAD)))
+        ahead = max(
+            1,
+            round(
+                DISPATCHER.ahead / max(self._mean_work, DISPATCHER.ahead / DISPATCHER.most_ahead)
+            ),
+        )
         return self._executor.slots * (1 + ahead)
 
     @staticmethod
@@ -282,7 +299,7 @@ class Dispatcher:
         if self._held and now - self._times.renewed >= LEASE / 3:
             await self._store.write(partial(leases.renew, holder=self.holder, until=now + LEASE))
             self._times.renewed = now
-        if self._held and clock - self._times.looked >= LOOK:
+        if self._held and clock - self._times.looked >= DISPATCHER.look:
             held = list(self._held.values())
             kept = await self._store.read(partial(leases.kept, holder=self.holder))
             self._times.looked = clock
@@ -297,7 +314,7 @@ class Dispatcher:
     async def _report(self) -> None:
         """Records progress within requests."""
         fresh = {held.lease.key: held.found for held in self._held.values() if held.found.is_news}
-        if fresh and self._clock() - self._times.reported >= LOOK:
+        if fresh and self._clock() - self._times.reported >= DISPATCHER.look:
             self._times.reported = self._clock()
             reports = {key: found.report for key, found in fresh.items()}
             report = partial(leases.report, holder=self.holder, reports=reports, now=self._now())

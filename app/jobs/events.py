@@ -15,13 +15,23 @@ from joulepath.app.jobs.dispatcher import Dispatcher
 from joulepath.app.store import job_events
 from joulepath.app.store.store import Store
 
-_BATCH = 500
-LOOK = 1.0
-"""Time [s] between two queries for events of other services."""
-GATHER = 0.2
-"""Least time [s] between two reads for one reader; events in between are sent together."""
-QUIET = 15.0
-"""Time [s] without an event after which a comment keeps the stream alive in proxies."""
+
+@dataclass(frozen=True)
+class EventSettings:
+    """Settings of event streams."""
+
+    batch: int = 500
+    """Most events of one read."""
+    look: float = 1.0
+    """Time [s] between two queries for events of other services."""
+    gather: float = 0.2
+    """Least time [s] between two reads for one reader; events in between are sent together."""
+    quiet: float = 15.0
+    """Time [s] without an event after which a comment keeps the stream alive in proxies."""
+
+
+EVENTS = EventSettings()
+
 _COMMENT = b": working\n\n"
 
 
@@ -55,24 +65,24 @@ async def events_after(
             if batch.text:
                 quiet = 0.0
                 yield batch.text
-            elif quiet >= QUIET:
+            elif quiet >= EVENTS.quiet:
                 quiet = 0.0
                 yield _COMMENT
             if batch.over or is_last:
                 return
             # An incomplete batch is the last one.
-            if batch.count < _BATCH:
-                await asyncio.sleep(GATHER)
-                quiet += GATHER
+            if batch.count < EVENTS.batch:
+                await asyncio.sleep(EVENTS.gather)
+                quiet += EVENTS.gather
             if not batch.count:
-                await changes.wait(bell, LOOK)
-                quiet += LOOK
+                await changes.wait(bell, EVENTS.look)
+                quiet += EVENTS.look
     finally:
         changes.leave(job_id, bell)
 
 
 def _batch(session: Session, job_id: str, number: int) -> _Batch:
-    found, over = job_events.after(session, job_id, number, _BATCH)
+    found, over = job_events.after(session, job_id, number, EVENTS.batch)
     texts = [
         format_sse_event(data_str=json.dumps(each.data), event=each.name, id=str(each.number))
         for each in found

@@ -20,7 +20,7 @@ from joulepath.app.store.store import Store
 from joulepath.app.tasks.arm_engine import ArmEngine, given_log
 from joulepath.app.tasks.job_request import IDENTIFY, JobRequestTask
 from joulepath.optimizer.exceptions import DeclaredError, UnknownRobot
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 
 
 class Executor(Protocol):
@@ -115,5 +115,5 @@ class _Alone:
     many: Callable[[Take], Awaitable[None]]
     stoppable: bool
 
-    async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
+    async def run(self, task: Task, deadline: float, tell: Tell = no_listener) -> TaskResult:
         return await result_of(self.many, task, deadline, self.stoppable, tell)

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 
 from joulepath.app.engine.work import Ended, Work
 from joulepath.app.jobs.progress import HEARD, Found
-from joulepath.app.jobs.work import MOST_PREEMPTIONS, task_of
+from joulepath.app.jobs.work import RETRY, task_of
 from joulepath.app.store.cache import Asked
 from joulepath.app.store.leases import Lease
-from joulepath.optimizer.progress import nobody
+from joulepath.optimizer.progress import no_listener
 
 SMALL = 1 << 12
 """Size of a small request [byte], compressed."""
@@ -123,8 +123,8 @@ class Taker:
                 del self.left[held]
                 self._ended(held, how)
 
-        tell = held.found.tell if lease.kind in HEARD else nobody
-        stoppable = lease.preempted < MOST_PREEMPTIONS
+        tell = held.found.tell if lease.kind in HEARD else no_listener
+        stoppable = lease.preempted < RETRY.preemptions
         is_small = len(lease.body) + sum(map(len, held.motions.values())) <= SMALL
         task, expected = task_of(lease, held.motions), self._expected(lease.kind)
         return Work(task, lease.deadline, ended, stoppable, tell, expected, is_small)

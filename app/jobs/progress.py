@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from joulepath.app.store.job_events import Report
-from joulepath.optimizer.progress import CandidateTried, Event, Improved, forward
+from joulepath.optimizer.progress import CandidateTried, Event, Improved, only_news
 
 HEARD = ("cycle", "pareto")
 """Endpoints with long requests, whose progress is reported by events."""
@@ -17,7 +17,7 @@ class Found:
     def __init__(self, attempt: int) -> None:
         self.report = Report(attempt)
         self.is_news = False
-        self.tell = forward(self._note)
+        self.tell = only_news(self._note)
 
     def _note(self, event: Event) -> None:
         if isinstance(event, CandidateTried):

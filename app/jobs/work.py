@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import orjson
@@ -27,10 +28,18 @@ from joulepath.optimizer.exceptions import DeclaredError
 
 logger = logging.getLogger(__name__)
 
-MOST_DEATHS = 3
-"""Dead workers after which a request fails."""
-MOST_PREEMPTIONS = 2
-"""Preemptions of a request, after which it may run to its end."""
+
+@dataclass(frozen=True)
+class RetrySettings:
+    """Retries of a request."""
+
+    deaths: int = 3
+    """Dead workers after which a request fails."""
+    preemptions: int = 2
+    """Preemptions of a request, after which it may run to its end."""
+
+
+RETRY = RetrySettings()
 
 
 def task_of(lease: Lease, motions: Mapping[str, bytes]) -> JobRequestTask:
@@ -46,7 +55,7 @@ def outcome_of(lease: Lease, ended: Ended, began: float) -> Outcome:
         return Outcome(lease, "waiting", preempted=True)
     if isinstance(ended, ShuttingDown | StoreUnavailable | ClusterUnavailable):
         return Outcome(lease, "waiting")
-    if isinstance(ended, WorkerLost) and lease.deaths + 1 < MOST_DEATHS:
+    if isinstance(ended, WorkerLost) and lease.deaths + 1 < RETRY.deaths:
         return Outcome(lease, "waiting", died=True)
     error = WorkerDied() if isinstance(ended, WorkerLost) else ended
     if isinstance(error, DeclaredError):

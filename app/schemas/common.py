@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import islice
 from typing import Annotated, Any, Literal
@@ -20,25 +21,37 @@ from pydantic_core import PydanticCustomError
 
 from joulepath.app.answers.declared import with_unit
 from joulepath.app.schemas.examples.values import ANSWER_ID, REQUEST_ID
-from joulepath.app.schemas.lengths import ROBOT_LENGTH
+from joulepath.app.schemas.lengths import LENGTHS
 from joulepath.optimizer.problem.names import is_plain
 from joulepath.optimizer.problem.pose import QUATERNION_TOLERANCE
 
-_LONGEST_TYPO = 64
-_SHORTEST = 3
-_ALIKE, _NEARLY_SAME = 0.6, 0.8
+
+@dataclass(frozen=True)
+class TypoSettings:
+    """Recognition of mistyped names."""
+
+    longest: int = 64
+    """Longest name compared with known names [characters]."""
+    shortest: int = 3
+    """Shortest name compared with known names [characters]."""
+    alike: float = 0.6
+    """Least share of common letters of a suggestion, see difflib."""
+    nearly_same: float = 0.8
+    """Least share of common letters of a name taken for another one."""
+    compared: int = 4
+    """Most names of an object compared with the expected names."""
+
+
+TYPOS = TypoSettings()
+
 KEY_HEADER = "Idempotency-Key"
-_MOST_MEANT = 4
-"""Names of an object that are compared with the right ones: no such object has more."""
-
-
 UNKNOWN_FIELD = "unknown_field"
 """Type of the error about fields that a model does not have; its context has the names of those
 that it has, `known`, and the first that it has not, `unknown`."""
 MOST_UNKNOWN = 20
 
 
-def nearest(name: str, known: Iterable[str], alike: float = _ALIKE) -> str | None:
+def nearest(name: str, known: Iterable[str], alike: float = TYPOS.alike) -> str | None:
     """The one of the known names that `name` was meant to be; None if none is like it.
 
     `alike` is the least share of letters in common, see difflib.
@@ -47,11 +60,11 @@ def nearest(name: str, known: Iterable[str], alike: float = _ALIKE) -> str | Non
     begun = [
         each
         for form, each in by_form.items()
-        if len(name) >= _SHORTEST and form.startswith(_form(name))
+        if len(name) >= TYPOS.shortest and form.startswith(_form(name))
     ]
     if len(begun) == 1:
         return begun[0]
-    found = get_close_matches(_form(name[:_LONGEST_TYPO]), by_form, n=1, cutoff=alike)
+    found = get_close_matches(_form(name[: TYPOS.longest]), by_form, n=1, cutoff=alike)
     return by_form[found[0]] if found else None
 
 
@@ -151,7 +164,8 @@ def by_field(*names: str, beside: str | None = None) -> Discriminator:
         if not present and isinstance(value, dict):
             # a name that is nearly one of them: the member that has the right name says so
             meant = (
-                nearest(str(given), names, _NEARLY_SAME) for given in islice(value, _MOST_MEANT)
+                nearest(str(given), names, TYPOS.nearly_same)
+                for given in islice(value, TYPOS.compared)
             )
             present = list(islice((name for name in meant if name is not None), 1))
         return f"by {present[0]}" if len(present) == 1 else None
@@ -321,7 +335,7 @@ BasePose = Annotated[
 IDENTITY = QuaternionPose(position=[0.0, 0.0, 0.0], quaternion=[0.0, 0.0, 0.0, 1.0])
 
 FiguresId = Annotated[str, Field(pattern=r"^[0-9a-f-]{36}$")]
-RobotName = Annotated[str, Field(min_length=1, max_length=ROBOT_LENGTH)]
+RobotName = Annotated[str, Field(min_length=1, max_length=LENGTHS.robot)]
 
 
 class RobotWithTcp(Request):
@@ -330,9 +344,10 @@ class RobotWithTcp(Request):
     robot: RobotName = described(
         "Name of the robot, from `GET /robots`.", None, "ur5e", default="ur5e"
     )
-    tcp: Pose = described(
-        "Pose of the TCP in the flange frame.",
+    tcp: Pose | None = described(
+        "Pose of the TCP in the flange frame. Null: that of a tool that is given by name, or the "
+        "flange.",
         None,
         {"position": [0.0, 0.0, 0.12], "rpy": [0.0, 0.0, 0.0]},
-        default=IDENTITY,
+        default=None,
     )

@@ -12,10 +12,10 @@ from joulepath.app.schemas.common import JointPositions, Request, described
 from joulepath.app.schemas.examples.values import LOG_ID
 from joulepath.app.schemas.examples.values import PAPER_HOME as _HOME
 from joulepath.app.schemas.examples.values import PAPER_POSE as _THERE
-from joulepath.app.schemas.lengths import ID_LENGTH
+from joulepath.app.schemas.lengths import LENGTHS
 from joulepath.app.schemas.log_file import LogFile
 from joulepath.app.schemas.request import Seconds
-from joulepath.optimizer.evaluate.sampler import MOST_SAMPLES
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.problem.problem import LONGEST_DURATION
 
 MAX_ROWS = 100_000
@@ -106,7 +106,7 @@ class EvaluateSettings(ArmRequest):
     )
     sample_period: float | None = described(
         "Time between the returned samples; the last sample is at the end. Null: no samples. At "
-        f"most {MOST_SAMPLES} samples.",
+        f"most {MOTION_LIMITS.max_samples} samples.",
         "s",
         0.05,
         default=None,
@@ -136,7 +136,7 @@ class EvaluateRequest(EvaluateSettings):
         {"t": [0.0, 1.5, 3.0], "q": [_HOME, _THERE, _HOME]},
         default=None,
     )
-    log: Annotated[str, Field(max_length=ID_LENGTH)] | None = described(
+    log: Annotated[str, Field(max_length=LENGTHS.id)] | None = described(
         "Id of a stored log, from `POST /logs`: the motion that the arm has made. `robot`, "
         "`payload` and `gravity` are those of the log where they are left out.",
         None,

@@ -12,14 +12,9 @@ from joulepath.app.schemas.common import BasePose, Request, described, number_or
 from joulepath.app.schemas.orientation import Axis, ConeOrientedPose, TargetPose
 from joulepath.optimizer.problem.line import LEAST_DISTANCE, MOST_DISTANCE
 from joulepath.optimizer.problem.tool_path import (
-    LEAST_RAMP,
-    LEAST_TOLERANCE,
     MOST_POINTS,
-    POSITION_TOLERANCE,
-    RAMP,
-    ROTATION_TOLERANCE,
-    SPEED_RANGE,
     SPEED_TOLERANCE,
+    TOOL_PATH,
     PathShape,
 )
 
@@ -47,19 +42,19 @@ class SpeedRange(Request):
         "Length of the path at either end on which the speed may be below `min`.",
         "m",
         0.02,
-        default=RAMP,
-        ge=LEAST_RAMP,
+        default=TOOL_PATH.ramp,
+        ge=TOOL_PATH.least_ramp,
         le=1,
     )
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         between = self.min is not None and self.max is not None and self.fixed is None
-        if between and (self.max or 0.0) < SPEED_RANGE * (self.min or 0.0):
+        if between and (self.max or 0.0) < TOOL_PATH.speed_range * (self.min or 0.0):
             raise PydanticCustomError(
                 "range",
-                f"`max` must be at least {SPEED_RANGE:g} times `min`, or equal to it: then the "
-                "speed is fixed",
+                f"`max` must be at least {TOOL_PATH.speed_range:g} times `min`, or equal to it: "
+                "then the speed is fixed",
             )
         return self
 
@@ -91,16 +86,16 @@ class PathTolerance(Request):
         "Largest distance of the TCP.",
         "m",
         1e-4,
-        default=POSITION_TOLERANCE,
-        ge=LEAST_TOLERANCE,
+        default=TOOL_PATH.position_tolerance,
+        ge=TOOL_PATH.least_tolerance,
         le=0.1,
     )
     rotation: float = described(
         "Largest angle of the tool.",
         "rad",
         2e-3,
-        default=ROTATION_TOLERANCE,
-        ge=LEAST_TOLERANCE,
+        default=TOOL_PATH.rotation_tolerance,
+        ge=TOOL_PATH.least_tolerance,
         le=0.5,
     )
     about: Axis | None = described(

@@ -19,7 +19,7 @@ from joulepath.app.schemas.common import (
 from joulepath.app.schemas.orientation import TargetPose
 from joulepath.app.schemas.path import Path
 from joulepath.app.settings import LONGEST_DEADLINE
-from joulepath.optimizer.evaluate.sampler import MOST_SAMPLES
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.problem.problem import LONGEST_DURATION, BoundEffort, MethodName
 from joulepath.optimizer.result.energy import Objective
 
@@ -197,8 +197,8 @@ class MotionRequest(ArmRequest):
     duration: Duration | None = described(
         "Duration, or bounds on it. Null: the optimiser chooses the duration. The objective "
         "`mechanical` needs a number, a `max` or a `dwell`, because a slower motion needs less "
-        f"work. The duration is at most {LONGEST_DURATION:g} s and at most {MOST_SAMPLES} times "
-        "`sample_period`.",
+        f"work. The duration is at most {LONGEST_DURATION:g} s and at most "
+        f"{MOTION_LIMITS.max_samples} times `sample_period`.",
         "s",
         {"max": 3.0},
         default=None,
@@ -249,13 +249,13 @@ class MotionRequest(ArmRequest):
     def _few_enough_samples(cls, period: float, info: ValidationInfo) -> float:
         duration = info.data.get("duration")
         longest = duration.max or duration.min if isinstance(duration, DurationRange) else duration
-        if longest is not None and longest > period * MOST_SAMPLES:
-            least = math.ceil(longest / MOST_SAMPLES * 1e4) / 1e4
+        if longest is not None and longest > period * MOTION_LIMITS.max_samples:
+            least = math.ceil(longest / MOTION_LIMITS.max_samples * 1e4) / 1e4
             raise PydanticCustomError(
                 "too_many_samples",
                 "An answer has at most {most} samples: for a `duration` of up to {longest} s, "
                 "`sample_period` must be at least {least} s",
-                {"most": MOST_SAMPLES, "longest": longest, "least": least},
+                {"most": MOTION_LIMITS.max_samples, "longest": longest, "least": least},
             )
         return period
 

@@ -19,8 +19,9 @@ from joulepath.app.schemas.common import (
     frame_of,
 )
 from joulepath.app.schemas.examples.values import BOX, MESH_FILE, TOOL, at
+from joulepath.app.schemas.lengths import LENGTHS
 from joulepath.models.shape_sizes import SIZES
-from joulepath.optimizer.problem.arm import MOST_PARTS
+from joulepath.optimizer.problem.arm import MOST_TOOL_PARTS
 from joulepath.optimizer.problem.clouds import MOST_ALONG_EDGE, MOST_POINTS, MOST_VOXELS
 from joulepath.optimizer.problem.names import LONGEST_NAME
 from joulepath.optimizer.problem.scene import DEFAULT_MARGIN, MOST_OBSTACLES, MOST_VERTICES
@@ -31,9 +32,14 @@ _POSE_TEXT = (
 )
 # standard alphabet, filled to a multiple of four characters
 BASE64 = r"^[A-Za-z0-9+/]*={0,2}$"
-# most cells of a grid in bits, and most bytes of a mesh file, and the lengths of their base64
-MOST_CELLS, MOST_FILE_BYTES = 1 << 23, 1 << 22
-MOST_BITS_TEXT, MOST_FILE_TEXT = 4 * -(-MOST_CELLS // 8 // 3) + 4, 4 * -(-MOST_FILE_BYTES // 3)
+MOST_CELLS = 1 << 23
+"""Most cells of a grid given as bits."""
+MOST_FILE_BYTES = 1 << 22
+"""Largest mesh file [byte]."""
+MOST_BITS_TEXT = 4 * -(-MOST_CELLS // 8 // 3) + 4
+"""Longest base64 text of a grid."""
+MOST_FILE_TEXT = 4 * -(-MOST_FILE_BYTES // 3)
+"""Longest base64 text of a mesh file."""
 Size = Annotated[float, Field(ge=SIZES.smallest, le=SIZES.largest)]
 
 
@@ -348,7 +354,7 @@ class ToolCapsule(Request):
 class Tool(Request):
     """The shape of the tool, for collision checking."""
 
-    capsules: Annotated[list[ToolCapsule], Field(max_length=MOST_PARTS)] = described(
+    capsules: Annotated[list[ToolCapsule], Field(max_length=MOST_TOOL_PARTS)] = described(
         "Capsules that enclose the tool.",
         None,
         TOOL["capsules"],
@@ -356,13 +362,32 @@ class Tool(Request):
     )
 
 
+ToolName = Annotated[str, Field(min_length=1, max_length=LENGTHS.tool)]
+
+
+def _name_or_shape(value: Any) -> str | None:
+    """Discriminator of a union of a string, tagged `name`, and an object, tagged `shape`."""
+    if isinstance(value, str):
+        return "name"
+    return "shape" if isinstance(value, dict | Tool) else None
+
+
 class CellRequest(RobotWithTcp):
     """The robot, its tool and its surroundings."""
 
-    tool: Tool = described(
-        "Shape of the tool, for collision checking.",
+    tool: Annotated[
+        Annotated[ToolName, Tag("name")] | Annotated[Tool, Tag("shape")],
+        Discriminator(
+            _name_or_shape,
+            custom_error_type="name_or_shape",
+            custom_error_message="Give the name of a tool, or an object with its capsules",
+        ),
+    ] = described(
+        "Shape of the tool, for collision checking; or the name of a tool from `GET /tools`. A "
+        "name also gives the TCP, unless `tcp` is given, and adds the tool's mass to every "
+        "payload, which is then the part alone.",
         None,
-        TOOL,
+        "robotiq_2f_85",
         default=Tool(),
     )
     scene: Scene = described(

@@ -7,6 +7,7 @@ import sqlite3
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 from alembic import command
@@ -25,14 +26,24 @@ logger = logging.getLogger(__name__)
 OPENED = "opened"
 """Key of the identity of a connection's files, in the connection's `info`; empty for PostgreSQL."""
 _MIGRATIONS = Path(__file__).parent / "migrations"
-_LOCK_TIMEOUT = 2.0
-"""Longest wait [s] of a statement for another process's transaction."""
-_RETRY = 0.02
-"""Time [s] between two attempts for a lock if SQLite does not wait for it."""
-_MIGRATION_TIMEOUT = 30.0
-"""The same, while another process may be migrating the tables."""
-_SERVER_TIMEOUT = 5.0
-"""Longest wait [s] for an answer of PostgreSQL."""
+
+
+@dataclass(frozen=True)
+class DatabaseSettings:
+    """Time-outs of the database."""
+
+    lock_timeout: float = 2.0
+    """Longest wait [s] of a statement for another process's transaction."""
+    retry: float = 0.02
+    """Time [s] between two attempts for a lock if SQLite does not wait for it."""
+    migration_timeout: float = 30.0
+    """The same, while another process may be migrating the tables."""
+    server_timeout: float = 5.0
+    """Longest wait [s] for an answer of PostgreSQL."""
+
+
+DATABASE = DatabaseSettings()
+
 _PAGES = ("freelist_count", "page_size")
 _MIGRATION_LOCK = 0x6A6F756C65
 """Key of the advisory lock in PostgreSQL, different from the keys of other programs."""
@@ -58,7 +69,7 @@ def create_database_engine(url: str) -> Engine:
     parsed = make_url(url)
     if parsed.get_backend_name() == "sqlite":
         return _sqlite(parsed)
-    return _postgresql(parsed, _SERVER_TIMEOUT)
+    return _postgresql(parsed, DATABASE.server_timeout)
 
 
 def _postgresql(url: URL, timeout: float) -> Engine:
@@ -69,7 +80,7 @@ def _postgresql(url: URL, timeout: float) -> Engine:
         connect_args={"timeout": timeout},
         # after a restart of the server, the connections of the pool are closed
         pool_pre_ping=True,
-        pool_timeout=_SERVER_TIMEOUT,
+        pool_timeout=DATABASE.server_timeout,
     )
 
     @event.listens_for(engine, "begin")
@@ -88,11 +99,11 @@ def sqlite_file(url: URL) -> Path | None:
 def _lock_timeout(connection: Connection) -> int:
     """Longest wait for a lock in this transaction [ms]."""
     migrates = connection.get_execution_options().get("migrates", False)
-    return int(1000 * (_MIGRATION_TIMEOUT if migrates else _LOCK_TIMEOUT))
+    return int(1000 * (DATABASE.migration_timeout if migrates else DATABASE.lock_timeout))
 
 
 def _sqlite(url: URL) -> Engine:
-    engine = create_engine(url, pool_timeout=_LOCK_TIMEOUT)
+    engine = create_engine(url, pool_timeout=DATABASE.lock_timeout)
     file = sqlite_file(url)
 
     @event.listens_for(engine, "connect")
@@ -122,7 +133,7 @@ def _keep_log(connection: sqlite3.Connection) -> None:
 
     SQLite fails instead of waiting if two processes do so to a new file at once.
     """
-    end = time.monotonic() + _LOCK_TIMEOUT
+    end = time.monotonic() + DATABASE.lock_timeout
     while True:
         try:
             connection.execute("PRAGMA journal_mode=WAL")
@@ -130,7 +141,7 @@ def _keep_log(connection: sqlite3.Connection) -> None:
         except sqlite3.OperationalError as error:
             if error.sqlite_errorcode & 0xFF != sqlite3.SQLITE_BUSY or time.monotonic() > end:
                 raise
-        time.sleep(_RETRY)
+        time.sleep(DATABASE.retry)
 
 
 def migrate(engine: Engine) -> None:
@@ -167,7 +178,7 @@ def _migrating(engine: Engine) -> Iterator[Connection]:
         return
     # a connection of the pool would give up on the lock, or on a long change of a table, after
     # `_SERVER_TIMEOUT`
-    patient = _postgresql(engine.url, _MIGRATION_TIMEOUT + _SERVER_TIMEOUT)
+    patient = _postgresql(engine.url, DATABASE.migration_timeout + DATABASE.server_timeout)
     try:
         with patient.execution_options(migrates=True).begin() as connection:
             connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _MIGRATION_LOCK})

@@ -4,11 +4,20 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 
-_PARTS = 64
-"""Reciprocal of the share freed by a pruning; the next one follows after this much was added."""
-_LONGEST = 3600.0
-"""Longest time [s] between two prunings: answers also grow old."""
+
+@dataclass(frozen=True)
+class PruningSettings:
+    """Settings of the pruning of answers."""
+
+    parts: int = 64
+    """Reciprocal of the share freed by a pruning, after whose addition the next one follows."""
+    longest: float = 3600.0
+    """Longest time [s] between two prunings: answers also grow old."""
+
+
+PRUNING = PruningSettings()
 
 
 class Pruning:
@@ -27,10 +36,10 @@ class Pruning:
             if (
                 self._next is not None
                 and self._clock() < self._next
-                and self._added <= most // _PARTS
+                and self._added <= most // PRUNING.parts
             ):
                 return False
-            self._added, self._next = 0, self._clock() + _LONGEST
+            self._added, self._next = 0, self._clock() + PRUNING.longest
             return True
 
     def failed(self) -> None:
@@ -41,4 +50,4 @@ class Pruning:
     @staticmethod
     def target(most: int) -> int:
         """Total after a pruning [byte], so that it stays below `most` until the next one."""
-        return most - most // _PARTS
+        return most - most // PRUNING.parts

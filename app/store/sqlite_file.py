@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
 from joulepath.app.store.faults import DatabaseMoved, room
@@ -18,9 +19,18 @@ logger = logging.getLogger(__name__)
 Identity = dict[Path, tuple[int, int] | None]
 """Device and number of the database's file and of its write-ahead log."""
 
-_RESERVE = 8 << 20
-"""Reserved bytes. A deletion writes one page per thousand freed pages: enough for gigabytes."""
-_SMALLEST_RESERVE = 1 << 20
+
+@dataclass(frozen=True)
+class ReserveSettings:
+    """Space reserved for deletions."""
+
+    bytes: int = 8 << 20
+    """Reserved bytes. A deletion writes one page per thousand freed pages: enough for gigabytes."""
+    smallest: int = 1 << 20
+    """Least reserve [byte]; with less free space there is none."""
+
+
+RESERVE = ReserveSettings()
 
 
 def identity(file: Path) -> Identity:
@@ -63,8 +73,8 @@ class Reserve:
         """Reserves `_RESERVE` bytes, at most half of the free space: the log needs room as well."""
         with contextlib.suppress(OSError):
             held = self._path.stat().st_size if self._path.exists() else 0
-            size = min(_RESERVE, (room(self._path) + held) // 2)
-            if size >= max(_SMALLEST_RESERVE, 2 * held):
+            size = min(RESERVE.bytes, (room(self._path) + held) // 2)
+            if size >= max(RESERVE.smallest, 2 * held):
                 self._path.unlink(missing_ok=True)
                 self._take(size)
 

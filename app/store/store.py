@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import TypeVar
 
 from alembic.util import CommandError
@@ -35,17 +36,24 @@ logger = logging.getLogger(__name__)
 
 T = TypeVar("T")
 
-_THREADS = 4
-"""A statement takes milliseconds, so a few threads suffice; the connection pool has more
-connections than this.
-"""
+
+@dataclass(frozen=True)
+class StoreSettings:
+    """Settings of the access to the database."""
+
+    threads: int = 4
+    """Threads: a statement takes milliseconds, and the connection pool has more connections."""
+    long: float = 0.5
+    """Time [s] above which a failure is a time-out of a lock or server."""
+    pause: float = 1.0
+    """Time [s] after a time-out in which all work fails at once, so that clients wait only once."""
+    check_period: float = 2.0
+    """Time [s] between two checks of the database."""
+
+
+STORE = StoreSettings()
+
 _UNAVAILABLE = (DBAPIError, PoolTimeout, OSError, CommandError)
-_LONG = 0.5
-"""Time [s] above which a failure is a time-out of a lock or server."""
-_PAUSE = 1.0
-"""Time [s] after a time-out in which all work fails at once, so that clients wait only once."""
-_CHECK_PERIOD = 2.0
-"""Time [s] between two checks of the database."""
 
 
 class Store:
@@ -56,7 +64,7 @@ class Store:
         self._file = sqlite_file(self._engine.url)
         self._reserve = None if self._file is None else Reserve(self._file)
         self._clock = clock
-        self._threads = ThreadPoolExecutor(_THREADS, thread_name_prefix="store")
+        self._threads = ThreadPoolExecutor(STORE.threads, thread_name_prefix="store")
         self._migrating = threading.Lock()
         self._migrated = False
         self._was_open = False
@@ -194,8 +202,8 @@ class Store:
             "database unavailable",
             extra={"database": str(self), "cause": fault, "reason": reason},
         )
-        if self._clock() - began > _LONG:
-            self._paused[writes] = self._clock() + _PAUSE, fault
+        if self._clock() - began > STORE.long:
+            self._paused[writes] = self._clock() + STORE.pause, fault
         if fault == "deleted":
             # New connections open the new file.
             self._migrated = False
@@ -218,7 +226,7 @@ class Store:
 
     async def _check_often(self) -> None:
         while True:
-            await asyncio.sleep(_CHECK_PERIOD)
+            await asyncio.sleep(STORE.check_period)
             await self.check()
 
     def _migrate(self) -> None:

@@ -21,12 +21,7 @@ from sqlalchemy import (
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 from joulepath.app.schemas.lengths import (
-    HOLDER_LENGTH,
-    ID_LENGTH,
-    KEY_LENGTH,
-    NAME_LENGTH,
-    OWNER_LENGTH,
-    ROBOT_LENGTH,
+    LENGTHS,
 )
 
 # SQLite can alter a constraint only if it has a name
@@ -80,15 +75,15 @@ class Study(Table):
     __tablename__ = "studies"
     __table_args__ = (Index(None, "created", "id"),)
 
-    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
-    name: Mapped[str] = mapped_column(String(NAME_LENGTH))
-    robot: Mapped[str] = mapped_column(String(ROBOT_LENGTH))
+    id: Mapped[str] = mapped_column(String(LENGTHS.id), primary_key=True)
+    name: Mapped[str] = mapped_column(String(LENGTHS.name))
+    robot: Mapped[str] = mapped_column(String(LENGTHS.robot))
     objective: Mapped[str] = mapped_column(String(32))
     threshold: Mapped[float]
     created: Mapped[datetime] = mapped_column(Instant)
-    owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
-    idempotency_key: Mapped[str | None] = mapped_column(String(KEY_LENGTH), unique=True)
-    figures: Mapped[str | None] = mapped_column(String(ID_LENGTH))
+    owner: Mapped[str | None] = mapped_column(String(LENGTHS.owner))
+    idempotency_key: Mapped[str | None] = mapped_column(String(LENGTHS.key), unique=True)
+    figures: Mapped[str | None] = mapped_column(String(LENGTHS.id))
     """Id of the figures of all iterations; null for the robot's own."""
 
 
@@ -97,9 +92,9 @@ class OwnRobot(Table):
 
     __tablename__ = "robots"
 
-    name: Mapped[str] = mapped_column(String(ROBOT_LENGTH), primary_key=True)
+    name: Mapped[str] = mapped_column(String(LENGTHS.robot), primary_key=True)
     created: Mapped[datetime] = mapped_column(Instant)
-    owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
+    owner: Mapped[str | None] = mapped_column(String(LENGTHS.owner))
     figures: Mapped[dict[str, Any]] = mapped_column(JSON)
     warnings: Mapped[list[str]] = mapped_column(JSON)
 
@@ -111,11 +106,11 @@ class StoredLog(Table):
     __tablename__ = "logs"
     __table_args__ = (Index(None, "created", "id"),)
 
-    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
-    name: Mapped[str | None] = mapped_column(String(NAME_LENGTH))
-    robot: Mapped[str] = mapped_column(String(ROBOT_LENGTH))
+    id: Mapped[str] = mapped_column(String(LENGTHS.id), primary_key=True)
+    name: Mapped[str | None] = mapped_column(String(LENGTHS.name))
+    robot: Mapped[str] = mapped_column(String(LENGTHS.robot))
     created: Mapped[datetime] = mapped_column(Instant)
-    owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
+    owner: Mapped[str | None] = mapped_column(String(LENGTHS.owner))
     settings: Mapped[dict[str, Any]] = mapped_column(JSON)
     report: Mapped[dict[str, Any]] = mapped_column(JSON)
     """Fields of the report without a column of their own."""
@@ -130,11 +125,11 @@ class Figures(Table):
     __tablename__ = "figures"
     __table_args__ = (Index(None, "created", "id"),)
 
-    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
+    id: Mapped[str] = mapped_column(String(LENGTHS.id), primary_key=True)
     """Made of robot and content: the same figures have the same id on every server."""
-    robot: Mapped[str] = mapped_column(String(ROBOT_LENGTH))
+    robot: Mapped[str] = mapped_column(String(LENGTHS.robot))
     created: Mapped[datetime] = mapped_column(Instant)
-    owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
+    owner: Mapped[str | None] = mapped_column(String(LENGTHS.owner))
     content: Mapped[dict[str, Any]] = mapped_column(JSON)
 
 
@@ -152,14 +147,14 @@ class Answer(Table):
         Index(None, "job_id"),
     )
 
-    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
+    id: Mapped[str] = mapped_column(String(LENGTHS.id), primary_key=True)
     kind: Mapped[str] = mapped_column(String(32))
     created: Mapped[datetime] = mapped_column(Instant)
-    owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
+    owner: Mapped[str | None] = mapped_column(String(LENGTHS.owner))
     study_id: Mapped[str | None] = mapped_column(ForeignKey("studies.id", ondelete="CASCADE"))
-    job_id: Mapped[str | None] = mapped_column(String(ID_LENGTH))
+    job_id: Mapped[str | None] = mapped_column(String(LENGTHS.id))
     """Whoever deletes a job deletes its answers."""
-    robot: Mapped[str | None] = mapped_column(String(ROBOT_LENGTH))
+    robot: Mapped[str | None] = mapped_column(String(LENGTHS.robot))
     """With the next three columns, the figures in lists; null without one."""
     energy: Mapped[float | None]
     duration: Mapped[float | None]
@@ -223,7 +218,7 @@ class Iteration(Table):
     """Number of the iteration of least energy up to this one, the first of equals."""
     met_by: Mapped[int | None]
     """Number of the first iteration up to this one with an energy of at most the threshold."""
-    idempotency_key: Mapped[str | None] = mapped_column(String(KEY_LENGTH))
+    idempotency_key: Mapped[str | None] = mapped_column(String(LENGTHS.key))
 
 
 class Job(Table):
@@ -235,10 +230,10 @@ class Job(Table):
     __tablename__ = "jobs"
     __table_args__ = (Index(None, "created", "id"), Index(None, "ended"))
 
-    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
-    name: Mapped[str | None] = mapped_column(String(NAME_LENGTH))
+    id: Mapped[str] = mapped_column(String(LENGTHS.id), primary_key=True)
+    name: Mapped[str | None] = mapped_column(String(LENGTHS.name))
     state: Mapped[str] = mapped_column(String(16))
-    owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
+    owner: Mapped[str | None] = mapped_column(String(LENGTHS.owner))
     keep_going: Mapped[bool]
     """Whether the other requests go on after one has failed."""
     created: Mapped[datetime] = mapped_column(Instant)
@@ -252,7 +247,7 @@ class Job(Table):
     """Number of its last event."""
     progressed: Mapped[datetime | None] = mapped_column(Instant)
     """Time of its last event `progress`."""
-    idempotency_key: Mapped[str | None] = mapped_column(String(KEY_LENGTH), unique=True)
+    idempotency_key: Mapped[str | None] = mapped_column(String(LENGTHS.key), unique=True)
     fingerprint: Mapped[str] = mapped_column(String(64))
     """SHA-256 of the requests."""
 
@@ -282,7 +277,7 @@ class JobRequest(Table):
     """How many workers died of it."""
     preempted: Mapped[int]
     """How often another request took its worker."""
-    leased_by: Mapped[str | None] = mapped_column(String(HOLDER_LENGTH))
+    leased_by: Mapped[str | None] = mapped_column(String(LENGTHS.holder))
     leased_until: Mapped[datetime | None] = mapped_column(Instant)
     wall_time: Mapped[float | None]
     energy: Mapped[float | None]
@@ -290,7 +285,7 @@ class JobRequest(Table):
     status: Mapped[str | None] = mapped_column(String(16))
     answer_id: Mapped[str | None] = mapped_column(ForeignKey("answers.id"), unique=True)
     problem: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
-    figures: Mapped[str | None] = mapped_column(String(ID_LENGTH))
+    figures: Mapped[str | None] = mapped_column(String(LENGTHS.id))
     """Id of identified figures, if they were stored; they may have been deleted since."""
 
 

@@ -28,12 +28,21 @@ _TOOL_AXIS = [0.0, 0.0, 1.0]
 """Axis of the tool in the TCP frame."""
 _TILTS = [sign * radians(10.0) * axis for axis in np.eye(3)[:2] for sign in (1, -1)]
 """Tilts of the tool: rotation vectors [rad]."""
-_LONGER = 1.25
-"""Factor of a longer duration."""
-_NEARER = 0.5
-"""Factor of the distance between flange and centre of mass."""
-_OTHER_BRANCHES = 2
-"""Most suggested branches."""
+
+
+@dataclass(frozen=True)
+class SuggestionSettings:
+    """Settings of suggestions."""
+
+    longer: float = 1.25
+    """Factor of a longer duration."""
+    nearer: float = 0.5
+    """Factor of the distance between flange and centre of mass."""
+    other_branches: int = 2
+    """Most suggested branches."""
+
+
+SUGGESTIONS = SuggestionSettings()
 
 
 @dataclass(frozen=True)
@@ -106,7 +115,7 @@ def _method(base: Base) -> Iterator[Proposal]:
 def _duration(base: Base) -> Iterator[Proposal]:
     if base.request.get("duration") is not None and base.request["objective"] == "electrical":
         yield Proposal("duration", "Let the optimiser choose the duration.", _timed(base, None))
-    for factor, word in ((_LONGER, "longer"), (1 / _LONGER, "shorter")):
+    for factor, word in ((SUGGESTIONS.longer, "longer"), (1 / SUGGESTIONS.longer, "shorter")):
         duration = min(base.duration * factor, LONGEST_DURATION)
         yield Proposal(
             "duration", f"Make the motion {abs(factor - 1):.0%} {word}.", _timed(base, duration)
@@ -142,7 +151,7 @@ def _branch(base: Base) -> Iterator[Proposal]:
     known.sort(key=_least_energy)
     for candidate in known:
         name = _branch_name(candidate["goal"])
-        if name not in seen and len(seen) <= _OTHER_BRANCHES:
+        if name not in seen and len(seen) <= SUGGESTIONS.other_branches:
             seen.add(name)
             request = _without(base.request, "branch") | {"goal": {"q": candidate["q_goal"]}}
             yield Proposal("branch", f"Reach the goal in the branch {name}.", request)
@@ -168,7 +177,7 @@ def _orientation(base: Base, here: Fields, tilted: list[Fields]) -> Iterator[Pro
 def _payload(base: Base) -> Iterator[Proposal]:
     payload = base.request.get("payload")
     if payload and payload["mass"] and any(payload["com"]):
-        nearer = payload | {"com": [_NEARER * part for part in payload["com"]]}
+        nearer = payload | {"com": [SUGGESTIONS.nearer * part for part in payload["com"]]}
         yield Proposal(
             "payload",
             "Grip the payload so that its centre of mass is at half its present distance from the "

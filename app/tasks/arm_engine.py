@@ -20,13 +20,13 @@ from joulepath.app.tasks.kept_answers import answers_given
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import UnknownRobot
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 
 
 class Runner(Protocol):
     """A runner of tasks: the engine, or a process running its own tasks."""
 
-    async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
+    async def run(self, task: Task, deadline: float, tell: Tell = no_listener) -> TaskResult:
         """The result of a task in at most `deadline` [s]; `tell` receives its events."""
         ...
 
@@ -102,7 +102,7 @@ class ArmEngine:
     engine: Runner
     store: Store
 
-    async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
+    async def run(self, task: Task, deadline: float, tell: Tell = no_listener) -> TaskResult:
         """The task's result; `tell` receives its events.
 
         Raises UnknownRobot, UnknownFigures, UnknownLog, UnknownAnswer, and the errors of the

@@ -15,7 +15,7 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.models.uncertainty.parameters import BASE_POWER
 from joulepath.models.uncertainty.spread import Spread, spread_of
-from joulepath.optimizer.problem.arm import INVERTER_PARTS, Arm
+from joulepath.optimizer.problem.arm import INVERTER_COEFFICIENTS, Arm
 from joulepath.optimizer.result.energy import Energy, EnergyInterval, SavingInterval, Sensitivity
 
 MOVE = "move"
@@ -33,7 +33,9 @@ class Known:
 def arm_spread(arm: Arm) -> Spread:
     """The errors that the figures of an arm may have. What the request gives itself is known."""
     known = tuple(
-        f"inverter_{part}" for part in INVERTER_PARTS if getattr(arm.inverter, part) is not None
+        f"inverter_{part}"
+        for part in INVERTER_COEFFICIENTS
+        if getattr(arm.inverter, part) is not None
     )
     return spread_of(arm.robot, arm.friction_law.name, known)
 

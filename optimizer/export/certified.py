@@ -1,4 +1,4 @@
-"""The certificate of what is exported: computed again, for the motion as it leaves."""
+"""Certificate of an exported motion, computed again for the exported splines and speeds."""
 
 from __future__ import annotations
 
@@ -17,11 +17,14 @@ from joulepath.optimizer.result.certificate import Certificate
 
 @one_thread()
 def certified(program: Program) -> list[Certificate]:
-    """The certificates of all moves.
+    """Certificates of all moves of a program.
 
-    Checked are the limits of the arm, standstill at the ends and clearance; not a tool path. Raises
-    NotCertified for the first move whose certificate is not valid, and InvalidProblem for one
-    longer than LONGEST_DURATION. Ends by DeadlinePassed if the watched deadline passes.
+    Limits of the arm, standstill at the ends and clearance are checked, but not a tool path.
+
+    Raises:
+        NotCertified: the certificate of a move is not valid.
+        InvalidProblem: a move takes too long.
+        DeadlinePassed: the watched deadline passed.
     """
     certificates = []
     for index, move in enumerate(program.moves):
@@ -44,7 +47,7 @@ def certified(program: Program) -> list[Certificate]:
 
 
 def _reason(certificate: Certificate) -> str:
-    """What is wrong with a motion, in words."""
+    """Reason for an invalid certificate, in words."""
     worst = max(certificate.worst_ratio, key=lambda name: _nan_first(certificate.worst_ratio[name]))
     if not certificate.worst_ratio[worst] <= 1:
         return f"its {worst} is at {certificate.worst_ratio[worst]:.4g} of the limit"

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import ruckig
 
@@ -72,6 +74,51 @@ def time_optimal_spline(limits: Limits, q_start: Array, q_goal: Array) -> Spline
         if min(found_at) <= WITHIN:
             break
     return found_at[min(found_at)]
+
+
+def straight(limits: Limits, q_start: Array, q_goal: Array) -> SampledMotion:
+    """The time-optimal motion from rest to rest along the straight line in joints.
+
+    It is Ruckig's motion of the joint with the longest way, under the limits of the joint that
+    allows least.
+    """
+    way = q_goal - q_start
+    longest = np.abs(way).max(keepdims=True)
+    law = time_optimal(_along(limits, way), np.zeros(1), longest)
+    if law.duration == 0:
+        return standstill(q_start, 0.0)
+    share = way / longest
+    return replace(
+        law,
+        q=q_start + law.q * share,
+        v=law.v * share,
+        a=law.a * share,
+        peak_v=law.peak_v * np.abs(share),
+        peak_a=law.peak_a * np.abs(share),
+        peak_jerk=law.peak_jerk * np.abs(share),
+    )
+
+
+def straight_spline(limits: Limits, q_start: Array, q_goal: Array) -> Spline:
+    """The motion of `straight` as a spline; see `time_optimal_spline`."""
+    way = q_goal - q_start
+    longest = np.abs(way).max(keepdims=True)
+    law = time_optimal_spline(_along(limits, way), np.zeros(1), longest)
+    return replace(law, control_points=q_start + law.control_points * (way / (longest or 1.0)))
+
+
+def _along(limits: Limits, way: Array) -> Limits:
+    """The limits of the joint with the longest way, if all joints go ways (nq,) [rad] in step."""
+    size = np.abs(way)
+    share = size / (size.max() or 1.0)
+    rates = {
+        name: np.divide(
+            getattr(limits, name), share, out=np.full(len(way), np.inf), where=share > 0
+        ).min(keepdims=True)
+        for name in ("v_max", "a_max", "j_max")
+    }
+    none = np.full(1, np.inf)
+    return Limits(q_min=-none, q_max=none, tau_max=none, **rates)
 
 
 def time_optimal_positions(limits: Limits, q_start: Array, q_goal: Array, at: Array) -> Array:

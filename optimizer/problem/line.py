@@ -12,18 +12,24 @@ from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arrays import frozen
 
 LineFrame = Literal["tcp", "base"]
-# m: least and greatest length of a line
-LEAST_DISTANCE, MOST_DISTANCE = 1e-4, 2.0
+LEAST_DISTANCE = 1e-4
+"""Least length of a line [m]."""
+MOST_DISTANCE = 2.0
+"""Greatest length of a line [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Line:
-    """The TCP moves by `distance` [m] along `direction` (3,), and its orientation stays.
+    """Straight motion of the TCP with a constant orientation.
 
-    The direction is a vector of any length in the `frame` of the TCP at the stop, or of the base.
-    `speed` [m/s] bounds the speed of the TCP on the line.
+    Attributes:
+        direction: direction of any length, shape (3,).
+        distance: length of the line [m].
+        frame: frame of the direction: "tcp" at the stop, or "base".
+        speed: speed limit of the TCP on the line [m/s]; None without one.
 
-    Raises InvalidProblem, with the field named.
+    Raises:
+        InvalidProblem: a value is malformed; names the field.
     """
 
     direction: Array
@@ -51,7 +57,8 @@ class Line:
             raise InvalidProblem("speed", "speed must be a positive number of metres per second.")
 
     def shift(self, T_base_tcp: Array) -> Array:
-        """The way (3,) [m] of the TCP in the base frame, at a stop with the pose T_base_tcp (4,
-        4)."""
+        """Displacement (3,) [m] of the TCP in the base frame, at a stop with pose T_base_tcp (4,
+        4).
+        """
         along = self.direction / np.linalg.norm(self.direction) * self.distance
         return np.asarray(T_base_tcp[:3, :3] @ along if self.frame == "tcp" else along)

@@ -1,4 +1,6 @@
-"""Targets, at which a motion may start or end: joint positions, a pose, or any one of several."""
+"""Targets at which a motion may start or end: joint positions, a pose, or one of several
+targets.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +14,8 @@ from joulepath.optimizer.problem.arrays import frozen
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 
-# targets of one `AnyOf`
 MOST_TARGETS = 64
+"""Most targets of one `AnyOf`."""
 
 Side = Literal["start", "goal"]
 Single = Array | Pose | ConeOrientedPose
@@ -21,10 +23,11 @@ Single = Array | Pose | ConeOrientedPose
 
 @dataclass(frozen=True)
 class AnyOf:
-    """The one of `targets` that needs the least energy: 1 to MOST_TARGETS joint positions (nq,)
-    [rad] or poses, mixed.
+    """The target of least energy among `targets`: 1 to MOST_TARGETS joint positions (nq,) [rad] or
+    poses.
 
-    Raises InvalidProblem if there are none, too many, or one of them is itself an AnyOf.
+    Raises:
+        InvalidProblem: there are no targets, too many, or nested ones.
     """
 
     targets: tuple[Single, ...]
@@ -38,25 +41,29 @@ class AnyOf:
 
 
 @dataclass(frozen=True)
-class PosesAround(AnyOf):
-    """Some of the poses that `around` allows; the bound of a cycle that has them is that of all
-    configurations of all of these poses. Without it, they are some of infinitely many that are not
-    bounded."""
+class SampledPoses(AnyOf):
+    """Samples of the poses that `free_pose` allows.
 
-    around: ConeOrientedPose | None = None
+    The lower bound of a cycle then holds for all configurations of all poses that `free_pose`
+    allows. Without it, the poses are samples of infinitely many, which are not bounded together.
+    """
+
+    free_pose: ConeOrientedPose | None = None
 
 
 Target = Single | AnyOf
 
 
 def members(target: Target) -> tuple[Single, ...]:
-    """The targets of an AnyOf; of any other target, only itself."""
+    """The targets of an AnyOf; any other target alone."""
     return target.targets if isinstance(target, AnyOf) else (target,)
 
 
 def single(target: Target) -> Single:
-    """The target itself. Raises ValueError for an AnyOf, which must be narrowed to one target
-    first.
+    """The target itself.
+
+    Raises:
+        ValueError: the target is an AnyOf, which must be narrowed to one target first.
     """
     if isinstance(target, AnyOf):
         raise ValueError("narrow the problem to one of its targets first")
@@ -64,11 +71,19 @@ def single(target: Target) -> Single:
 
 
 def validated(arm: Arm, name: str, target: Target, on_path: bool = False) -> Target:
-    """The target `name` (start or goal) of a problem, with its joint positions as read-only arrays.
+    """A target of a problem, with its joint positions as read-only arrays.
 
-    Raises InvalidProblem, also for a start with an orientation tolerance unless it is `on_path`,
-    and OutsideLimits for joint positions out of range. Joint positions of an AnyOf may be out of
-    range: they count as unreachable.
+    Joint positions of an AnyOf may be out of range: they count as unreachable.
+
+    Args:
+        arm: arm of the problem.
+        name: `start`, `goal`, or another field.
+        target: the target.
+        on_path: whether the target is an end of a tool path, where a start may be free in part.
+
+    Raises:
+        InvalidProblem: the target is malformed, or a start with an orientation tolerance.
+        OutsideLimits: joint positions are out of range.
     """
     if (
         name == "start"

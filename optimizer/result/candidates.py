@@ -1,4 +1,4 @@
-"""Candidates of a search, with what became of each; targets that have none."""
+"""Candidates of a search and their outcomes, and targets without candidates."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class CandidateCounts(TypedDict):
 class CandidateReport(NamedTuple):
     """One pair of a start and a goal configuration, and the result of the search for it."""
 
-    # an answer has thousands of them: a frozen dataclass takes four times as long to make
+    # an answer has thousands of candidates: a frozen dataclass takes four times as long to create
     start: str
     """Branch at the start."""
     start_target: int
@@ -94,7 +94,7 @@ class CandidateReport(NamedTuple):
 
 
 def count_by_status(candidates: Sequence[CandidateReport]) -> CandidateCounts:
-    """How many of the candidates have each status."""
+    """Number of candidates by status."""
     counted = Counter(each.status for each in candidates)
     return CandidateCounts(
         solved=counted[CandidateStatus.SOLVED],

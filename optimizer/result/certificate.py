@@ -1,4 +1,4 @@
-"""The independent check of a motion."""
+"""Independent check of a motion."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Clearance:
 
     @property
     def message(self) -> str:
-        """The two bodies and the missing clearance [m]."""
+        """The two bodies, and the missing clearance [m]."""
         first, second = self.pair
         return f"{first} and {second}: clearance {max(-self.sampled, 0.0):.4f} m too small"
 

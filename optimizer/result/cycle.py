@@ -1,4 +1,4 @@
-"""What is answered of a cycle: its places, legs, certificate and the effort of its search."""
+"""Parts of the answer to a cycle: places, legs, certificate and effort of the search."""
 
 from __future__ import annotations
 

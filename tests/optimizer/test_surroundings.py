@@ -18,7 +18,7 @@ from joulepath.optimizer.motion.spline import sample
 from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
-from joulepath.optimizer.surroundings import ACTIVE, Surroundings
+from joulepath.optimizer.surroundings import CONTACT, Surroundings
 from tests.optimizer.cells import LOADS, arm_in_cell, at, cell
 from tests.optimizer.moves import ROBOT
 
@@ -87,9 +87,9 @@ def test_active_pairs_are_those_that_come_near() -> None:
     least = surroundings.model.signed_distances(q)[0].min(axis=0)
     # between two of the samples a joint at 1.9 rad/s moves a point 1 m away by less than 2 cm
     assert (
-        set(np.flatnonzero(least < ACTIVE - 0.02))
+        set(np.flatnonzero(least < CONTACT.active_distance - 0.02))
         <= set(active.tolist())
-        <= set(np.flatnonzero(least < ACTIVE))
+        <= set(np.flatnonzero(least < CONTACT.active_distance))
     )
     constraints = surroundings.with_clearance(active)
     assert len(constraints.names) == len(active)

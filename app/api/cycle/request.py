@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, Tag, ValidationInfo, field_validator, model_validator
@@ -20,16 +21,27 @@ from joulepath.app.schemas.request import (
     which_candidates,
 )
 from joulepath.app.settings import LONGEST_DEADLINE
-from joulepath.optimizer.problem.cycle import LONGEST_ROUND, MOST_STOPS
+from joulepath.optimizer.problem.cycle import LONGEST_CYCLE, MOST_STOPS
 from joulepath.optimizer.problem.free_order import MOST_FREE_STOPS
 from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.result.energy import Objective
 
-# of a cycle with more stops, the default deadline is longer, and samples are no closer: answers
-# stay as large as before
-_MANY_STOPS, _LONG_DEADLINE, _LEAST_PERIOD = 100, 120.0, 1e-3
 
-LongTime = Annotated[float, Field(gt=0, le=LONGEST_ROUND)]
+@dataclass(frozen=True)
+class LongCycle:
+    """Rules of cycles with many stops, so that their answers stay readable."""
+
+    stops: int = 100
+    """Most stops of an ordinary cycle."""
+    deadline: float = 120.0
+    """Default deadline above it [s]."""
+    period: float = 1e-3
+    """Least period of samples above it [s]."""
+
+
+LONG_CYCLE = LongCycle()
+
+LongTime = Annotated[float, Field(gt=0, le=LONGEST_CYCLE)]
 
 
 class TimeRange(DurationRange):
@@ -153,8 +165,8 @@ class CycleRequest(ArmRequest):
     )
     candidates: WhichCandidates = which_candidates()
     sample_period: float = described(
-        f"Time between the samples of the answers of the moves. With more than {_MANY_STOPS} "
-        f"stops, at least {_LEAST_PERIOD:g} s.",
+        f"Time between the samples of the answers of the moves. With more than {LONG_CYCLE.stops} "
+        f"stops, at least {LONG_CYCLE.period:g} s.",
         "s",
         0.008,
         default=0.008,
@@ -164,7 +176,7 @@ class CycleRequest(ArmRequest):
     deadline: float = described(
         "Wall time from the arrival of the request, including the wait for a worker. When it "
         "nears, the service returns the best certified cycle found so far. With more than "
-        f"{_MANY_STOPS} stops, the default is {_LONG_DEADLINE:g} s.",
+        f"{LONG_CYCLE.stops} stops, the default is {LONG_CYCLE.deadline:g} s.",
         "s",
         60.0,
         default=60.0,
@@ -175,19 +187,19 @@ class CycleRequest(ArmRequest):
     @field_validator("sample_period")
     @classmethod
     def _few_enough_samples(cls, period: float, info: ValidationInfo) -> float:
-        if len(info.data.get("stops", ())) > _MANY_STOPS and period < _LEAST_PERIOD:
+        if len(info.data.get("stops", ())) > LONG_CYCLE.stops and period < LONG_CYCLE.period:
             raise PydanticCustomError(
                 "too_many_samples",
                 "With more than {stops} stops, `sample_period` must be at least {least} s",
-                {"stops": _MANY_STOPS, "least": _LEAST_PERIOD},
+                {"stops": LONG_CYCLE.stops, "least": LONG_CYCLE.period},
             )
         return period
 
     @model_validator(mode="after")
     def _long_enough(self) -> Self:
-        if "deadline" not in self.model_fields_set and len(self.stops) > _MANY_STOPS:
+        if "deadline" not in self.model_fields_set and len(self.stops) > LONG_CYCLE.stops:
             # still a default: it is no longer than the service allows
-            object.__setattr__(self, "deadline", _LONG_DEADLINE)
+            object.__setattr__(self, "deadline", LONG_CYCLE.deadline)
         return self
 
     @model_validator(mode="after")

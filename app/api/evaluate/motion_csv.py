@@ -14,7 +14,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.csv_table import FIRST_ROW, header_of, line_of, numbers_of, with_points
-from joulepath.optimizer.evaluate.recording import BLOCK, RecordedRows
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS, RecordedRows
 from joulepath.optimizer.exceptions import InvalidTable
 
 LONGEST_LINE = 4096
@@ -110,14 +110,14 @@ def _check_header(columns: list[str], nq: int) -> None:
 
 def _blocks(file: BufferedReader, columns: list[str], separator: str) -> Iterator[Array]:
     row = FIRST_ROW
-    while lines := [*islice(_lines(file, row), BLOCK)]:
+    while lines := [*islice(_lines(file, row), MOTION_LIMITS.block_rows)]:
         if separator != ",":
             lines = [*with_points(lines, row)]
         yield numbers_of(
             lines, range(row, row + len(lines)), columns, separator, range(len(columns))
         )
         row += len(lines)
-        if len(lines) < BLOCK:
+        if len(lines) < MOTION_LIMITS.block_rows:
             return
 
 

@@ -20,12 +20,13 @@ from joulepath.app.schemas.common import described
 from joulepath.app.schemas.examples.values import HOME
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.excitation.excitation_problem import (
-    LEAST_DEADLINE,
+    REQUEST_LIMITS,
     Criterion,
     ExcitationProblem,
     Part,
 )
-from joulepath.optimizer.excitation.excite import Excitation, excite
+from joulepath.optimizer.excitation.excitation_result import Excitation
+from joulepath.optimizer.excitation.excite import excite
 
 _ALL: list[Part] = ["inertials", "rotor", "friction"]
 _Angles = Annotated[
@@ -137,7 +138,7 @@ def _problem(request: ExcitationRequest, deadline: float) -> ExcitationProblem:
     Raises UnknownRobot, InvalidProblem or DeadlineExceeded.
     """
     # it may have passed while the request waited
-    end = Deadline.after(max(deadline, LEAST_DEADLINE))
+    end = Deadline.after(max(deadline, REQUEST_LIMITS.min_deadline))
     with until(end):
         arm = to_arm(request)
     same = (

@@ -21,7 +21,7 @@ from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identify.fits.payload_fit import Carried
+from joulepath.optimizer.identify.fits.payload_fit import IdentifiedPayload
 from joulepath.optimizer.identify.identify import Identification, identify
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.results import Curves, Validation
@@ -138,7 +138,7 @@ def _rounded(values: Array) -> Array:
     return np.ascontiguousarray(values.round(_DECIMALS))
 
 
-def _payload_fields(carried: Carried) -> dict[str, Any]:
+def _payload_fields(carried: IdentifiedPayload) -> dict[str, Any]:
     mass_sd, *com_sd = np.sqrt(np.diag(carried.covariance)).tolist()
     told = {
         "log": carried.log,

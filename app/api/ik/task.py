@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 from joulepath.app.answers.envelope import Answer
 from joulepath.app.convert.arm import robot_named
-from joulepath.app.convert.pose import to_base_pose, to_matrix
-from joulepath.app.convert.scene import to_attachment, to_scene, to_tool
+from joulepath.app.convert.pose import to_base_pose
+from joulepath.app.convert.scene import to_attachment, to_scene
+from joulepath.app.convert.tool import to_tcp, to_tool
 from joulepath.app.convert.until import until
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.common import BasePose, described
@@ -90,7 +91,7 @@ def to_ik_arm(request: IKRequest, robot: Robot) -> Arm:
     carried = request.payload
     return Arm(
         robot=robot,
-        T_flange_tcp=to_matrix(request.tcp),
+        T_flange_tcp=to_tcp(request.tcp, request.tool),
         tool=to_tool(request.tool),
         payload=Payload(
             shape=None if carried is None else to_attachment(carried.shape, carried.touches)

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from joulepath.app.schemas.common import NO_CONTROLS, PLAIN, Request, described
 from joulepath.app.schemas.examples.own_arm import URDF
-from joulepath.app.schemas.lengths import NAME_LENGTH, ROBOT_LENGTH
+from joulepath.app.schemas.lengths import LENGTHS
 from joulepath.models.own_arm.description import PLAUSIBLE
 from joulepath.models.shape_sizes import SIZES
 
@@ -17,14 +17,16 @@ Positive = Annotated[float, Field(ge=1e-6, le=1e6)]
 NotNegative = Annotated[float, Field(ge=0, le=1e6)]
 PositivePerJoint = Positive | Annotated[list[Positive], Field(min_length=1, max_length=16)]
 PerJoint = NotNegative | Annotated[list[NotNegative], Field(min_length=1, max_length=16)]
-Text = Annotated[str, Field(min_length=1, max_length=NAME_LENGTH, pattern=NO_CONTROLS), PLAIN]
+Text = Annotated[str, Field(min_length=1, max_length=LENGTHS.name, pattern=NO_CONTROLS), PLAIN]
 # a name in the URDF
 Named = Annotated[str, Field(min_length=1, max_length=100)]
 Length = Annotated[float, Field(ge=-10, le=10)]
 Capsule = Annotated[list[Length], Field(min_length=7, max_length=7)]
 Pair = Annotated[list[Named], Field(min_length=2, max_length=2)]
-NAME_PATTERN = re.compile(rf"^[a-z0-9][a-z0-9_-]{{0,{ROBOT_LENGTH - 1}}}$")
-OwnName = Annotated[str, Field(min_length=1, max_length=ROBOT_LENGTH, pattern=NAME_PATTERN.pattern)]
+NAME_PATTERN = re.compile(rf"^[a-z0-9][a-z0-9_-]{{0,{LENGTHS.robot - 1}}}$")
+OwnName = Annotated[
+    str, Field(min_length=1, max_length=LENGTHS.robot, pattern=NAME_PATTERN.pattern)
+]
 
 
 class OwnDrives(Request):

@@ -50,7 +50,7 @@ class Replayed:
         if self.length == 0:
             return energy
         hold = float(holding_power(resting, self.held))
-        return energy + dwell_energy(self.asked.waiting(self.length), resting, hold, 0.0)
+        return energy + dwell_energy(self.asked.dwell_of(self.length), resting, hold, 0.0)
 
 
 @pytest.mark.long

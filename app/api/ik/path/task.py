@@ -12,7 +12,8 @@ from pydantic_core import PydanticCustomError
 
 from joulepath.app.answers.envelope import Answer
 from joulepath.app.convert.arm import robot_named
-from joulepath.app.convert.pose import to_base, to_base_pose, to_matrix
+from joulepath.app.convert.pose import to_base, to_base_pose
+from joulepath.app.convert.tool import to_tcp
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.common import (
     BasePose,
@@ -153,7 +154,7 @@ class IKPathTask:
         """The answer of `POST /ik/path` with the points tried within about `deadline` seconds."""
         end = Deadline.after(deadline)
         request = self.request
-        arm = Arm(robot=robot_named(request.robot), T_flange_tcp=to_matrix(request.tcp))
+        arm = Arm(robot=robot_named(request.robot), T_flange_tcp=to_tcp(request.tcp))
         T_base_frame = to_base(request.frame, arm.robot)
         targets = (
             np.array(request.points) @ T_base_frame[:3, :3].T + T_base_frame[:3, 3]
