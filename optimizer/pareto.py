@@ -40,8 +40,8 @@ from joulepath.optimizer.result.front import Dropped, Front, FrontSolver
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.fastest import fastest, fastest_of
+from joulepath.optimizer.search.finishing_time import report_time
 from joulepath.optimizer.search.front_nodes import FrontNode, distinct, next_interval, switches
-from joulepath.optimizer.search.reserve import report_time
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sampled_ends import between
 
@@ -155,16 +155,16 @@ class _Search:
         motion of least energy is a further start. Raises the errors of `optimize`.
         """
         self.fastest_run.prepare()
-        found, answer = fastest(self.fastest_run.incumbent), None
+        found, answer = fastest(self.fastest_run.state), None
         self.note_end(self.fastest_run)
         if found is None:
             run = self.run([])
             try:
                 answer = run.solution()
-                found = fastest(run.incumbent, [answer.trajectory.spline])
+                found = fastest(run.state, [answer.trajectory.spline])
             finally:
                 self.note_end(run)
-                self.solves += run.incumbent.solves
+                self.solves += run.state.solves
             if found is None:
                 return answer.trajectory.spline, answer
         if found.duration > (self.problem.duration_max or math.inf):
@@ -175,7 +175,7 @@ class _Search:
         """Record whether the deadline ended a search for a fastest motion, which has a share of the
         time.
         """
-        self.cut_short |= run.incumbent.deadline.passed
+        self.cut_short |= run.state.deadline.passed
 
     def left(self) -> float:
         """Time left [s], without the time to encode the answers so far."""
@@ -218,7 +218,7 @@ class _Search:
             self.cut_short |= isinstance(error, DeadlineExceeded)
             return self.insert(FrontNode(duration, None, reason=str(error)))
         finally:
-            self.solves += run.incumbent.solves
+            self.solves += run.state.solves
 
     def keep(self, answer: Solution) -> FrontNode:
         """Node of an answer."""
@@ -260,10 +260,10 @@ class _Search:
         except DeadlineExceeded:
             self.cut_short = True
             return False
-        candidate = between(run.incumbent.prepared, run.incumbent.candidates, q_start, q_goal)
-        spline = fastest_of(run.incumbent, candidate)
+        candidate = between(run.state.prepared, run.state.candidates, q_start, q_goal)
+        spline = fastest_of(run.state, candidate)
         self.note_end(run)
-        self.solves += run.incumbent.solves
+        self.solves += run.state.solves
         if spline is None or not distinct(left.duration, spline.duration):
             return False
         durations = [spline.duration * (1 - share) for share in PARETO.before_jump]
@@ -335,7 +335,7 @@ class _Search:
                 least = node.energy
         if not points:
             raise DeadlineExceeded(
-                [candidate.report() for candidate in self.fastest_run.incumbent.candidates]
+                [candidate.report() for candidate in self.fastest_run.state.candidates]
             )
         return Front(
             status="optimal" if complete else "feasible",
@@ -344,6 +344,6 @@ class _Search:
             dropped=[each for each in dropped if math.isfinite(each.duration)],
             solver=FrontSolver(
                 wall_time=self.clock() - self.began,
-                nlp_solves=self.solves + self.fastest_run.incumbent.solves,
+                nlp_solves=self.solves + self.fastest_run.state.solves,
             ),
         )

@@ -27,7 +27,7 @@ from joulepath.optimizer.dynamics.interval import Known
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from joulepath.optimizer.motion.spline import Spline, lasting, retimed
 from joulepath.optimizer.result.solution import Solution
-from joulepath.optimizer.search.incumbent import SLACK
+from joulepath.optimizer.search.state import ENERGY_TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -221,7 +221,7 @@ def _solved_in(timing: TimedSearch, pair: Pair, length: float) -> Solution:
         if best is None:
             raise
     if best is None or (
-        found is not None and found.energy.of(objective) <= cost_of(best) * (1 + SLACK)
+        found is not None and found.energy.of(objective) <= cost_of(best) * (1 + ENERGY_TOLERANCE)
     ):
         assert found is not None
         return found

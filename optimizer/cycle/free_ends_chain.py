@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.bounds.least_displacement import ROUNDING
+from joulepath.optimizer.bounds.least_displacement import LIMIT_TOLERANCE
 from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.cycle.chains import LeastChain
@@ -338,7 +338,9 @@ def _is_start_of_path(cycle: Cycle, layer: Layer) -> bool:
 def _is_within_half_turn(cycle: Cycle, layer: Layer) -> bool:
     """Whether every joint of the known nodes is within half a turn of the middle of its range."""
     limits = cycle.arm.active_limits
-    return bool((np.abs(layer.q - (limits.q_min + limits.q_max) / 2) <= np.pi + ROUNDING).all())
+    return bool(
+        (np.abs(layer.q - (limits.q_min + limits.q_max) / 2) <= np.pi + LIMIT_TOLERANCE).all()
+    )
 
 
 def _indices_of_least(values: Array, count: int) -> Indices:

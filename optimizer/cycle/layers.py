@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -21,7 +22,7 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import Target, members
 from joulepath.optimizer.search.end_feasibility import check_configurations, raise_if_none_is_left
-from joulepath.optimizer.search.ends import EndConfiguration, ends_of
+from joulepath.optimizer.search.ends import ends_of
 
 
 @dataclass(frozen=True)

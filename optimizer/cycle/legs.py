@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.bounds.lower_bound import priced_bounds
+from joulepath.optimizer.bounds.priced_work import priced_work_bounds
 from joulepath.optimizer.cycle.kinds import displacements_between, kinds_of
 from joulepath.optimizer.cycle.layers import Layer
 from joulepath.optimizer.deadline import checkpoint
@@ -27,7 +28,6 @@ from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LONGEST_DURATION, Problem
 from joulepath.optimizer.problem.stops import PlannedMove
-from joulepath.optimizer.search.priced_work import priced_work_bounds
 
 
 @dataclass(frozen=True)

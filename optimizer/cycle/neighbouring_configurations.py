@@ -26,7 +26,7 @@ from joulepath.optimizer.problem.cycle import START, Cycle
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.targets import AnyOf
-from joulepath.optimizer.search.sliding import FIXED
+from joulepath.optimizer.search.sliding import POSE_FREEDOMS
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def has_free_postures(cycle: Cycle) -> bool:
 def _is_free(arm: Arm, stop: Stop) -> bool:
     if not isinstance(stop.target, Pose) or stop.path is not None:
         return False
-    if arm.robot.nq > FIXED:
+    if arm.robot.nq > POSE_FREEDOMS:
         return True
     kinematics = required_inverse_kinematics(arm.robot, stop.name)
     found = kinematics.solve(
