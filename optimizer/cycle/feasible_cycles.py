@@ -47,7 +47,7 @@ FEASIBLE = FeasibleCycleSettings()
 class FeasibleCycle:
     """A cycle with known motions.
 
-    Args:
+    Attributes:
         timing: search in the given time.
         nodes: chain of the cycle.
         motions: motion of every move.

@@ -43,7 +43,7 @@ class CandidateStatus(StrEnum):
 
 
 class CandidateCounts(TypedDict):
-    """How many candidates have each status; all of them, listed or not."""
+    """Number of candidates by status, listed or not."""
 
     solved: Count
     """A motion was found."""
