@@ -21,7 +21,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import DeadlinePassed, watch
-from joulepath.optimizer.dynamics.plant import SHARPER_WIDTHS, WIDTH
+from joulepath.optimizer.dynamics.plant import SMOOTHING
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.attempts import in_time, solver_of
@@ -156,7 +156,7 @@ class _LeastWork:
             :CONTENDERS
         ]
         contenders = self._note(
-            self.work.solved(contenders, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND)
+            self.work.solved(contenders, MIDDLE, SMOOTHING.power_width, MIDDLE_PROGRESS, BEHIND)
         )
         effort = SOLE if len(contenders) == 1 else SEVERAL
         again = self._restarted(contenders[0], effort)
@@ -173,10 +173,16 @@ class _LeastWork:
         )
         for k in range(0, len(guesses), effort.at_once):
             coarse = self.work.solved(
-                guesses[k : k + effort.at_once], COARSE, WIDTH, RESTART_PROGRESS, BEHIND
+                guesses[k : k + effort.at_once],
+                COARSE,
+                SMOOTHING.power_width,
+                RESTART_PROGRESS,
+                BEHIND,
             )
             worth = [each for each in coarse if each.work <= HOPELESS * least]
-            middle = self._note(self.work.solved(worth, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND))
+            middle = self._note(
+                self.work.solved(worth, MIDDLE, SMOOTHING.power_width, MIDDLE_PROGRESS, BEHIND)
+            )
             found += middle
             before, least = least, min([least, *(each.work for each in middle)])
             if least > HELPFUL * before:
@@ -198,7 +204,11 @@ class _LeastWork:
         """Find rough motions of those candidates whose bounds do not rule them out."""
         least = min((each.work for each in self.rough.values()), default=np.inf)
         open_ = [each for each in candidates if each.lower_bound < least]
-        self._note(self.work.solved(self.work.first(open_), COARSE, WIDTH, COARSE_PROGRESS, BEHIND))
+        self._note(
+            self.work.solved(
+                self.work.first(open_), COARSE, SMOOTHING.power_width, COARSE_PROGRESS, BEHIND
+            )
+        )
 
     def _note(self, found: list[Rough]) -> list[Rough]:
         """Keep the motions of least work of each candidate; returns what was found."""
@@ -280,7 +290,7 @@ class _LeastWork:
 
         result = in_time(incumbent, sharpen)
         if result.spline is None and result.status is not SolveStatus.PRUNED and found:
-            return self._solved(rough, found[0], SHARPER_WIDTHS[-1], LAST_PROGRESS)
+            return self._solved(rough, found[0], SMOOTHING.sharper_power_widths[-1], LAST_PROGRESS)
         if result.spline is not None:
             incumbent.accept_if_better(
                 rough.candidate, result, incumbent.prepared.energy(result.spline)
@@ -300,7 +310,9 @@ class _LeastWork:
                 self._sharpen(rough)
             if not self._is_settled(candidate):
                 self.tried.add(id(candidate))
-                result = self._solved(rough, rough.on(MIDDLE), WIDTH, PROGRESS, above(known, WORTH))
+                result = self._solved(
+                    rough, rough.on(MIDDLE), SMOOTHING.power_width, PROGRESS, above(known, WORTH)
+                )
                 if result.spline is not None and (candidate.energy or np.inf) < above(
                     known, WORTH_SHARPENING
                 ):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from joulepath.optimizer.motion.quadrature import GRID_PERIOD
+from joulepath.optimizer.motion.quadrature import QUADRATURE
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.solution import Solution
 
@@ -23,7 +23,7 @@ def reserve(problem: Problem, duration: float, candidates: int) -> float:
     constrained = (
         arm.tool_cone is not None or arm.tcp_speed is not None or arm.elbow_speed is not None
     )
-    certificate = duration / GRID_PERIOD * (CERTIFIED + CONSTRAINED * constrained)
+    certificate = duration / QUADRATURE.grid_period * (CERTIFIED + CONSTRAINED * constrained)
     least = min(RESERVE_SHARE * problem.deadline, RESERVE)
     needed = least + certificate + _report(problem, duration, candidates)
     return min(needed, MOST_SHARE * problem.deadline)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
-from joulepath.optimizer.dynamics.interval import Known, with_interval
+from joulepath.optimizer.dynamics.interval import MotionEnergy, with_interval
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from joulepath.optimizer.motion.spline import Spline, lasting, sampled
 from joulepath.optimizer.prepared_problem import ArmModels, PreparedProblem
@@ -390,7 +390,7 @@ class Run:
             baselines=with_savings(
                 table,
                 self.problem,
-                Known(energy.electrical.total, sensitivity, spline.duration),
+                MotionEnergy(energy.electrical.total, sensitivity, spline.duration),
                 standing(arm, best.q_goal, prepared.torques),
             ),
             candidates=[each.report() for each in incumbent.candidates],

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
-from joulepath.optimizer.dynamics.dwell import brake_power, waits
+from joulepath.optimizer.dynamics.dwell import brake_power, holding_times
 from joulepath.optimizer.motion import quintic
 from joulepath.optimizer.motion.quadrature import quadrature
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -118,7 +118,7 @@ def _waiting(prepared: PreparedProblem, q_goal: Array, durations: Array) -> Arra
     problem = prepared.problem
     if problem.dwell is None or _is_work(problem):
         return np.zeros(len(durations))
-    by_motors, by_brakes = np.array([waits(problem.dwell, T) for T in durations.tolist()]).T
+    by_motors, by_brakes = np.array([holding_times(problem.dwell, T) for T in durations.tolist()]).T
     return np.asarray(
         prepared.holding_power(q_goal) * by_motors
         + brake_power(problem.dwell, prepared.arm) * by_brakes

@@ -2,11 +2,11 @@
 motions, sharper corners.
 
 The mechanical objective is the integral of Σ_j |tau_j v_j|, and an isolated bus draws Σ_j max(P_j,
-0). The NLP smooths these corners over `WIDTH`. Every joint has one, so that the optimum of the
-smoothed cost lies some percent above the least energy. Sharp corners from the start would leave the
-SQP in poor local optima. So the optimum is followed from one width to the next, in a space fine
-enough for the short pushes of such motions. On an isolated bus, it is followed back to the first
-width in between: sharp corners hold a motion in an optimum that smooth ones lead out of.
+0). The NLP smooths these corners over `SMOOTHING.power_width`. Every joint has one, so that the
+optimum of the smoothed cost lies some percent above the least energy. Sharp corners from the start
+would leave the SQP in poor local optima. So the optimum is followed from one width to the next, in
+a space fine enough for the short pushes of such motions. On an isolated bus, it is followed back to
+the first width in between: sharp corners hold a motion in an optimum that smooth ones lead out of.
 
 The mechanical work of a motion has many local optima. As rest costs nothing, the best of them
 swing, push and rest, which few control points hardly show. Coarse solves from random motions are
@@ -22,7 +22,7 @@ from functools import partial
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.dynamics.plant import SHARPER_WIDTHS, WIDTH, has_corners
+from joulepath.optimizer.dynamics.plant import SMOOTHING, has_corners
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.spline import Spline, lasting, sampled
 from joulepath.optimizer.motion.time_scalings import quintic_spline
@@ -49,11 +49,14 @@ PROGRESS, LAST_PROGRESS = 1e-3, 2e-4
 # widths of the corners [W], and the decrease that a further step must promise, of the solves that
 # follow a motion; with corners that only become sharper, two of 20 motions on an isolated bus ended
 # 0.5 and 0.6 % too high
-STEPS = ((SHARPER_WIDTHS[0], PROGRESS), (SHARPER_WIDTHS[1], LAST_PROGRESS))
+STEPS = (
+    (SMOOTHING.sharper_power_widths[0], PROGRESS),
+    (SMOOTHING.sharper_power_widths[1], LAST_PROGRESS),
+)
 ISOLATED_STEPS = (
-    (SHARPER_WIDTHS[0], PROGRESS),
-    (WIDTH, LAST_PROGRESS),
-    (SHARPER_WIDTHS[0], LAST_PROGRESS),
+    (SMOOTHING.sharper_power_widths[0], PROGRESS),
+    (SMOOTHING.power_width, LAST_PROGRESS),
+    (SMOOTHING.sharper_power_widths[0], LAST_PROGRESS),
 )
 # first solves are rough and coarse: those that need at most this ratio of the least energy are
 # solved in the middle space, and so many of them
@@ -87,7 +90,7 @@ def sharpen(incumbent: Incumbent, best: Candidate) -> None:
         return
     coarse = {id(each): each.spline for each in _near(incumbent, best, CONTENDING)[:CONTENDERS]}
     for rough in _near(incumbent, best, CONTENDING)[:CONTENDERS]:
-        _Follower(incumbent, rough).solved(rough.spline, WIDTH, MIDDLE, PROGRESS)
+        _Follower(incumbent, rough).solved(rough.spline, SMOOTHING.power_width, MIDDLE, PROGRESS)
     best = incumbent.best() or best
     rivals = _near(incumbent, best, NEAR)[1 : RIVALS + 1]
     follower, mechanical = _Follower(incumbent, best), problem.objective == "mechanical"
@@ -113,7 +116,7 @@ def follow_in_time(incumbent: Incumbent, candidate: Candidate, best: float) -> N
     inf if none is known."""
     follower = _Follower(incumbent, candidate)
     if len(candidate.spline.control_points) != MIDDLE:
-        follower.solved(candidate.spline, WIDTH, MIDDLE, PROGRESS)
+        follower.solved(candidate.spline, SMOOTHING.power_width, MIDDLE, PROGRESS)
     # with rounder corners it needs more
     follower.follow(
         restarts=0, ahead=[ROUNDER * best] * (len(STEPS) - 1) if np.isfinite(best) else []
@@ -151,7 +154,7 @@ class _Follower:
         """
         cost_of = self.incumbent.prepared.cost_of
         coarse = sorted(self._restarted(restarts), key=cost_of)[:FOLLOWED]
-        middle = [self.solved(motion, WIDTH, MIDDLE, PROGRESS) for motion in coarse]
+        middle = [self.solved(motion, SMOOTHING.power_width, MIDDLE, PROGRESS) for motion in coarse]
         best: Spline | None = min(
             [self.candidate.spline, *(each for each in middle if each is not None)], key=cost_of
         )
@@ -176,7 +179,7 @@ class _Follower:
         for duration in (share * best for share in AROUND):
             if interval.t_min < duration < interval.t_max:
                 q, t = sampled(lasting(coarse, duration))
-                self._from_samples(q, t, WIDTH, MIDDLE, PROGRESS, fixed=True)
+                self._from_samples(q, t, SMOOTHING.power_width, MIDDLE, PROGRESS, fixed=True)
 
     def _restarted(self, count: int) -> list[Spline]:
         """Coarse motions from random displacements of the rest-to-rest quintic."""
@@ -187,7 +190,7 @@ class _Follower:
         found = []
         for each in random_displacements(limits, line.duration, t / line.duration, count):
             guess = np.clip(q + each, limits.q_min, limits.q_max)
-            motion = self._from_samples(guess, t, WIDTH, FEW, PROGRESS)
+            motion = self._from_samples(guess, t, SMOOTHING.power_width, FEW, PROGRESS)
             if motion is not None:
                 found.append(motion)
         return found
@@ -221,7 +224,7 @@ class _Follower:
             incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(result.spline))
         return result.spline
 
-    def _interval(self, duration: float, width: float = WIDTH) -> DurationInterval:
+    def _interval(self, duration: float, width: float = SMOOTHING.power_width) -> DurationInterval:
         """The interval of durations that holds `duration` [s]; the longest duration alone for
         mechanical work.
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.dynamics.dwell import LinearDwell, linear_dwells, waits
-from joulepath.optimizer.dynamics.plant import WIDTH
+from joulepath.optimizer.dynamics.dwell import LinearDwell, holding_times, linear_dwells
+from joulepath.optimizer.dynamics.plant import SMOOTHING
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
@@ -50,7 +50,7 @@ def duration_intervals(
     prepared: PreparedProblem,
     q_goal: Array,
     surplus_value: float | None = None,
-    width: float = WIDTH,
+    width: float = SMOOTHING.power_width,
 ) -> list[DurationInterval]:
     """Intervals of a problem, in order of duration.
 
@@ -94,7 +94,7 @@ def duration_intervals(
 def _goal_holding(
     prepared: PreparedProblem, dwell: Dwell, hold: float, piece: LinearDwell
 ) -> GoalHolding:
-    first, last = (waits(dwell, T)[0] for T in (piece.t_min, piece.t_max))
+    first, last = (holding_times(dwell, T)[0] for T in (piece.t_min, piece.t_max))
     rate = (first - last) / (piece.t_max - piece.t_min)
     return GoalHolding(prepared.holding_power, hold, first + rate * piece.t_min, rate)
 

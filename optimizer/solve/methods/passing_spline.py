@@ -21,7 +21,7 @@ from joulepath.optimizer.motion.bspline import Basis
 from joulepath.optimizer.motion.joined import joined
 from joulepath.optimizer.motion.passing import pass_times
 from joulepath.optimizer.motion.seven_segment import shortest_duration
-from joulepath.optimizer.motion.spline import FIT_SAMPLES, Spline, lasting, sampled
+from joulepath.optimizer.motion.spline import SAMPLING, Spline, lasting, sampled
 from joulepath.optimizer.motion.through_samples import spline_through
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
@@ -158,7 +158,7 @@ class PassingSpline(SqpMethod):
         slopes, v = np.diff(q, axis=0) / width, np.zeros_like(q)
         mean = (slopes[:-1] * width[1:] + slopes[1:] * width[:-1]) / (width[1:] + width[:-1])
         v[1:-1] = np.where(slopes[:-1] * slopes[1:] > 0, mean, 0.0)
-        at = np.linspace(0.0, 1.0, FIT_SAMPLES)
+        at = np.linspace(0.0, 1.0, SAMPLING.fit_samples)
         return space.fit(spline_through(t, q, v, np.zeros_like(q)).curve(at), at)
 
     def _between_rests(self) -> list[SolveResult]:
