@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.collision.clearance_constraint import RESERVE
+from joulepath.optimizer.collision.clearance_constraint import CLEARANCE_CONSTRAINT
 from joulepath.optimizer.collision.model import ClosestPair
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
@@ -29,7 +29,7 @@ class InvalidReason:
     """Why a configuration is infeasible: a message and its cause (an angle [rad] beyond the cone, a
     pair, a joint).
 
-    `possible`: the margins are kept, but not RESERVE beyond them. No motion is sought, although
+    `possible`: the margins are kept, but not the reserve beyond them. No motion is sought, although
     there may be one.
     """
 
@@ -44,15 +44,14 @@ def check_configurations(prepared: PreparedProblem, q: Array) -> list[InvalidRea
     result: list[InvalidReason | None] = [*_overloads(prepared, q)]
     # later reasons replace earlier ones: they do not depend on the load
     for k, contact in enumerate(
-        prepared.surroundings.model.closest_pairs(q, within=RESERVE)
+        prepared.surroundings.model.closest_pairs(q, within=CLEARANCE_CONSTRAINT.reserve)
         if prepared.problem.arm.collisions
         else ()
     ):
-        if contact.distance < RESERVE:
+        if contact.distance < CLEARANCE_CONSTRAINT.reserve:
             first, second = contact.pair
-            message = (
-                f"{first} and {second}: clearance {RESERVE - contact.distance:.5f} m too small"
-            )
+            missing = CLEARANCE_CONSTRAINT.reserve - contact.distance
+            message = f"{first} and {second}: clearance {missing:.5f} m too small"
             result[k] = InvalidReason(message, contact, contact.distance >= 0 and result[k] is None)
     for k, beyond in enumerate(_beyond_cone(prepared, q)):
         if beyond > 0:
@@ -83,7 +82,7 @@ def raise_if_none_is_left(
     if overloads:
         raise min(overloads, key=lambda error: error.needed / error.available)
     colliding = [
-        CollidingBranch(label, target, q, cause.pair, RESERVE - cause.distance)
+        CollidingBranch(label, target, q, cause.pair, CLEARANCE_CONSTRAINT.reserve - cause.distance)
         for (label, target, q), cause in zip(branches, causes, strict=True)
         if isinstance(cause, ClosestPair)
     ]

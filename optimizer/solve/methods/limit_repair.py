@@ -12,7 +12,7 @@ import numpy as np
 
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.collision.bodies import Indices
-from joulepath.optimizer.collision.clearance_constraint import CLEARANCE, RESERVE, SCALE
+from joulepath.optimizer.collision.clearance_constraint import CLEARANCE, CLEARANCE_CONSTRAINT
 from joulepath.optimizer.dynamics.limited_torque import limited_parts
 from joulepath.optimizer.dynamics.torque_bound import TORQUE_BOUND, TorqueSamples, torque_bounds
 from joulepath.optimizer.kinematics.path_constraints import PathConstraints
@@ -244,5 +244,9 @@ def with_repaired_path(
         return replace(program, path=path, path_bounds=widened)
     if check.collision is not None and program.path is not None and not check.path_excess.any():
         # no sample collides, but the clearance is not proven: more of it at the path points
-        bounds -= np.where(np.array(program.path.names) == CLEARANCE, RESERVE / SCALE, 0.0)
+        bounds -= np.where(
+            np.array(program.path.names) == CLEARANCE,
+            CLEARANCE_CONSTRAINT.reserve / CLEARANCE_CONSTRAINT.ratio_range,
+            0.0,
+        )
     return replace(program, path_bounds=bounds)
