@@ -113,7 +113,7 @@ def cell_tasks(seed: int, number: int) -> Iterator[CellTask]:
 
 
 def _clear(arm: Arm, model: CollisionModel, T: Array) -> list[Array]:
-    """Configurations (nq,) [rad] of a TCP pose that keep all margins and the reserve beyond them."""
+    """Configurations (nq,) [rad] of a TCP pose with all margins and the reserve beyond them."""
     kinematics = required_inverse_kinematics(arm.robot, "goal")
     try:
         found = kinematics.solve(

@@ -56,7 +56,7 @@ class ClearanceMonitor:
 
     Attributes:
         nearest: the least clearance with margins subtracted; None if no pair is checked.
-        close_pass: the least distance without margins; None unless it is below `CLOSE_PASS.distance`
+        close_pass: the least distance without margins; None unless below `CLOSE_PASS.distance`
             at a sample.
         unmodelled: the deepest contacts of the stand-ins for a tool and a payload without a shape.
     """
