@@ -23,7 +23,7 @@ from joulepath.optimizer.bounds.straight_line import Line
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
 # the bound is raised by this share of the plain one at most; durations at which that is compared,
 # and cells
@@ -82,9 +82,11 @@ class HoldingCells:
         displacements (n, nq) [rad]: edges (n, CELLS + 1) [s] and η (n, CELLS); and which motions
         may be made in the allowed time (n,)."""
         problem, rows = self.prepared.problem, np.arange(len(away))
-        first = np.maximum(shortest_duration(away, self.prepared.arm.active_limits), LEAST_DURATION)
+        first = np.maximum(
+            shortest_duration(away, self.prepared.arm.active_limits), DURATIONS.least
+        )
         first = np.maximum(first, problem.duration_min or 0.0)
-        longest = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
+        longest = DURATIONS.longest if problem.duration_max is None else problem.duration_max
         # the plain bound is no less than work and the power that is drawn at all times
         drawn = net.power - net.deficit
         last = np.minimum(

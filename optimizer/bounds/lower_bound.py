@@ -18,7 +18,7 @@ from joulepath.optimizer.dynamics.dwell import holding_power, linear_dwells
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
 # max over x ≥ 0 of x - x² / sqrt(x² + 1), rounded up: what spreading Coulomb friction's jump takes
 # from |v|, in knees
@@ -46,9 +46,9 @@ def lower_bounds(
     """  # noqa: E501
     problem = prepared.problem
     shortest = np.maximum(
-        shortest_duration(displacement, problem.arm.active_limits), LEAST_DURATION
+        shortest_duration(displacement, problem.arm.active_limits), DURATIONS.least
     )
-    most = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
+    most = DURATIONS.longest if problem.duration_max is None else problem.duration_max
     t_min = np.maximum(shortest, max(problem.duration_min or 0.0, min(prepared.least_time, most)))
     t_max = np.full_like(t_min, most)
     if problem.objective == "mechanical":
@@ -82,7 +82,7 @@ def priced_bounds(
     may be negative.
     """
     shortest = np.maximum(
-        shortest_duration(displacement, prepared.arm.active_limits), LEAST_DURATION
+        shortest_duration(displacement, prepared.arm.active_limits), DURATIONS.least
     )
     t_max, waiting = np.full_like(shortest, longest), np.full_like(shortest, -price)
     t_min = np.maximum(shortest, min(prepared.least_time, longest))
@@ -95,7 +95,7 @@ def travel_bounds(
     displacement: Array,
     potential_gain: Array,
     price: float = 0.0,
-    longest: float = LONGEST_DURATION,
+    longest: float = DURATIONS.longest,
 ) -> Array:
     """Bounds (P,) [J] on energy + price · duration of parts of a motion that may begin and end at
     any speed.

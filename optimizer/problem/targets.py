@@ -1,4 +1,4 @@
-"""Targets at which a motion may start or end: joint positions, a pose, or one of several
+"""Targets for the start or the end of a motion: joint positions, a pose, or one of several
 targets.
 """
 
@@ -42,10 +42,10 @@ class AnyOf:
 
 @dataclass(frozen=True)
 class SampledPoses(AnyOf):
-    """Samples of the poses that `free_pose` allows.
+    """Samples of the poses allowed by `free_pose`.
 
-    The lower bound of a cycle then holds for all configurations of all poses that `free_pose`
-    allows. Without it, the poses are samples of infinitely many, which are not bounded together.
+    The lower bound of a cycle then holds for all configurations of all poses allowed by
+    `free_pose`. Without it, the poses are samples of infinitely many poses without a common bound.
     """
 
     free_pose: ConeOrientedPose | None = None
@@ -63,7 +63,7 @@ def single(target: Target) -> Single:
     """The target itself.
 
     Raises:
-        ValueError: the target is an AnyOf, which must be narrowed to one target first.
+        ValueError: the target is an AnyOf, and must be narrowed to one target first.
     """
     if isinstance(target, AnyOf):
         raise ValueError("narrow the problem to one of its targets first")
@@ -79,7 +79,7 @@ def validated(arm: Arm, name: str, target: Target, on_path: bool = False) -> Tar
         arm: arm of the problem.
         name: `start`, `goal`, or another field.
         target: the target.
-        on_path: whether the target is an end of a tool path, where a start may be free in part.
+        on_path: whether the target is an end of a tool path; a start may then be free in part.
 
     Raises:
         InvalidProblem: the target is malformed, or a start with an orientation tolerance.

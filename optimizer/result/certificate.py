@@ -22,8 +22,9 @@ class Clearance:
     time: Seconds
     """Time of this sample, from the start of the motion."""
     points: Annotated[tuple[list[float], list[float]], Unit("m")] | None = None
-    """The nearest points of the two bodies at that time, in the base frame, without the margin.
-    Null in answers of an earlier version."""
+    """Nearest points of the two bodies at that time, in the base frame, without the margin. Null in
+    answers of an earlier version.
+    """
 
     @property
     def message(self) -> str:
@@ -33,8 +34,9 @@ class Clearance:
 
 
 class WorstRatio(TypedDict):
-    """Largest value / limit over all joints and instants: at most 1 + 1e-6. What follows `torque`
-    is there only if the request limits it."""
+    """Largest value / limit over all joints and instants: at most 1 + 1e-6. The entries after
+    `torque` exist only if the request limits them.
+    """
 
     position: Ratio
     """Joint position: distance from the middle of the range / half of the range."""
@@ -94,10 +96,10 @@ class Certificate:
     clearance: Clearance | None
     """Smallest clearance; null if `collisions` is false."""
     close_pass: Annotated[Clearance | None, Internal]
-    """The least distance without margins; None unless it may be below 2 mm."""
+    """Least distance without margins; None unless it may be below 2 mm."""
 
     POSITION_TOLERANCE = 1e-6
-    # rounding of control points (1e-16 rad) over the square of the shortest knot span
+    # Rounding of control points (1e-16 rad) over the square of the shortest knot span.
     REST_TOLERANCE = 1e-7
     ENERGY_TOLERANCE = 1e-3
 

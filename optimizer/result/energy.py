@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 from joulepath.models.robot import Array
 from joulepath.optimizer.declared import Joules, PerJoint, Ratio, Unit, Watts
 
-# what is minimised: energy drawn from the supply, or mechanical work
 Objective = Literal["electrical", "mechanical"]
+"""Minimised quantity: energy drawn from the supply, or mechanical work."""
 
 JointJoules = Annotated[PerJoint, Unit("J")]
 
@@ -32,7 +32,7 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class EnergyInterval:
-    """How well the energy is known, from the errors that the figures of the arm may have."""
+    """Uncertainty of the energy, from the possible errors of the figures of the arm."""
 
     p5: Joules
     """The energy is above this with 95 % probability."""
@@ -41,14 +41,15 @@ class EnergyInterval:
     sd: Joules
     """Standard deviation."""
     shares: Annotated[dict[str, float], Unit("1")]
-    """Share of the variance by its source; they add up to 1. A figure of the arm: the greatest
-    share is the one to measure. `session`: friction differs from day to day. `move`: what the
-    model cannot express of a motion."""
+    """Share of the variance by its source; the shares add up to 1. A figure of the arm: measuring
+    the figure with the greatest share helps most. `session`: day-to-day change of friction. `move`:
+    model error of a motion.
+    """
 
 
 @dataclass(frozen=True)
 class SavingInterval:
-    """How well a saving is known. Both motions share the errors of the figures."""
+    """Uncertainty of a saving. Both motions share the errors of the figures."""
 
     p5: Ratio
     """The saving is above this with 95 % probability."""
@@ -82,15 +83,17 @@ class ElectricalEnergy:
     braking: Joules
     """Regenerated energy that no joint uses and no energy storage takes."""
     recovered: Joules
-    """The part of `braking` that the supply takes back; zero or negative. The brake resistor
-    dissipates the sum of the two."""
+    """Part of `braking` taken back by the supply; zero or negative. The brake resistor dissipates
+    the sum of the two.
+    """
     storage_loss: Joules = 0.0
     """Loss in the energy storage on the bus."""
     dwell: Joules = 0.0
     """Energy drawn while the arm waits at the goal until the end of the dwell."""
     interval: EnergyInterval | None = None
-    """How well the total is known. Null for a part of a motion, and in answers stored by an earlier
-    version."""
+    """Uncertainty of the total. Null for a part of a motion, and in answers stored by an earlier
+    version.
+    """
 
     @property
     def parts_sum(self) -> float:
@@ -166,11 +169,11 @@ class Energy:
     """Mean power drawn from the supply during the motion."""
 
     def of(self, objective: Objective) -> float:
-        """The energy that an objective minimises [J]."""
+        """Minimised energy of an objective [J]."""
         return self.electrical.total if objective == "electrical" else self.mechanical.total
 
     def with_dwell(self, dwell: float) -> Energy:
-        """The same with the energy [J] of a dwell afterwards."""
+        """This energy with the energy [J] of a subsequent dwell."""
         electrical = self.electrical
         return replace(
             self, electrical=replace(electrical, total=electrical.total + dwell, dwell=dwell)

@@ -11,15 +11,16 @@ from joulepath.optimizer.result.solution import Solution
 
 @dataclass(frozen=True)
 class Dropped:
-    """A duration that was solved and is not a point of the front."""
+    """A solved duration that is not a point of the front."""
 
     duration: Seconds
     """The duration."""
     energy: Joules | None
     """Energy of the motion found, of the objective; null if none was found."""
     reason: str
-    """Why it is not a point: no motion was found, a faster motion needs no more energy, or the
-    motion is the same optimum as the last point."""
+    """Reason: no motion was found, a faster motion needs no more energy, or the motion is the same
+    optimum as the last point.
+    """
 
 
 @dataclass(frozen=True)

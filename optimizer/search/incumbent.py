@@ -13,7 +13,7 @@ from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
 from joulepath.optimizer.motion.spline import Spline, lasting
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION, Problem, narrowed
+from joulepath.optimizer.problem.problem import DURATIONS, Problem, narrowed
 from joulepath.optimizer.progress import (
     CandidatesFound,
     CandidateTried,
@@ -166,7 +166,7 @@ class Incumbent:
     @property
     def _durations(self) -> tuple[float, float]:
         """The least and the greatest duration [s] that the problem allows."""
-        return self.problem.duration_min or LEAST_DURATION, self.problem.duration_max or np.inf
+        return self.problem.duration_min or DURATIONS.least, self.problem.duration_max or np.inf
 
     def allows(self, duration: float) -> bool:
         """Whether the problem allows a duration [s]; a baseline between equal ends has the duration

@@ -14,7 +14,7 @@ from joulepath.optimizer.bounds.lower_bound import travel_bounds
 from joulepath.optimizer.motion.passing import pass_times
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
+from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.result.solution import Baseline
 from joulepath.optimizer.search.baselines import baselines, saving
 
@@ -28,7 +28,7 @@ def bound_through(prepared: PreparedProblem, q_start: Array, q_goal: Array) -> f
         return -np.inf
     q = np.array([q_start, *problem.passes, q_goal])
     gains = np.diff([prepared.potential(each) for each in q])
-    longest = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
+    longest = DURATIONS.longest if problem.duration_max is None else problem.duration_max
     return float(travel_bounds(prepared, np.diff(q, axis=0), gains, longest=longest).sum())
 
 
@@ -46,7 +46,7 @@ def stopping_baselines(prepared: PreparedProblem, spline: Spline, ours: float) -
         {
             each.name: each
             for each in baselines(
-                problem, a, b[None], max(end - begin, LEAST_DURATION), ours, *oracle
+                problem, a, b[None], max(end - begin, DURATIONS.least), ours, *oracle
             )
         }
         for (a, b), (begin, end) in zip(pairwise(q), pairwise(times), strict=True)

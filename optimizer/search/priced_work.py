@@ -20,7 +20,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.mechanical_bound import EnergyRange, Swing, most_travel
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
 # cells of the durations, and works of the table, from this share of the greatest one on
 CELLS, WORKS, LEAST_WORK = 40, 96, 1e-3
@@ -42,7 +42,7 @@ def priced_work_bounds(
     """
     arm, displacement = EnergyRange(prepared), q_goal - q_start
     limits, rotors = prepared.arm.active_limits, prepared.arm.drives.rotor_inertia
-    shortest = np.maximum(shortest_duration(displacement, limits), LEAST_DURATION)
+    shortest = np.maximum(shortest_duration(displacement, limits), DURATIONS.least)
     travel = np.sqrt(displacement**2 @ rotors)
     swing = Swing.of(arm, q_start, q_goal, potentials)
     ends, which = np.unique(np.column_stack([potentials, swing.least]), axis=0, return_inverse=True)

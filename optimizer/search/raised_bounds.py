@@ -21,7 +21,7 @@ from joulepath.optimizer.bounds.grid_cells import Spacing
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.dynamics.dwell import LinearDwell, linear_dwells
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.dual_cells import DurationCells, Effort, PairBounds
 from joulepath.optimizer.search.turns_left_out import bound_of_turns_left_out
@@ -106,8 +106,8 @@ class _Pair:
             dwells = linear_dwells(
                 dwell, prepared.arm, prepared.holding_power(candidate.q_goal[None])
             )
-        shortest = max(candidate.shortest, LEAST_DURATION, problem.duration_min or 0.0)
-        longest = problem.duration_max or LONGEST_DURATION
+        shortest = max(candidate.shortest, DURATIONS.least, problem.duration_min or 0.0)
+        longest = problem.duration_max or DURATIONS.longest
         return [
             DurationCells(self.shared, candidate, dwell, (low, high), self.target)
             for dwell in dwells

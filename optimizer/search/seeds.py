@@ -19,7 +19,7 @@ from joulepath.optimizer.dynamics.dwell import brake_power, holding_times
 from joulepath.optimizer.motion import quintic
 from joulepath.optimizer.motion.quadrature import quadrature
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
+from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.ends import EndConfiguration
@@ -128,8 +128,8 @@ def _waiting(prepared: PreparedProblem, q_goal: Array, durations: Array) -> Arra
 def _durations(problem: Problem, shortest: Array, scales: Sequence[float]) -> list[Array]:
     """The durations (n,) [s] that are tried, at these multiples of the shortest ones, within those
     that are allowed; for work and in a cycle the longest one, too."""
-    least = LEAST_DURATION if problem.duration_min is None else problem.duration_min
-    most = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
+    least = DURATIONS.least if problem.duration_min is None else problem.duration_min
+    most = DURATIONS.longest if problem.duration_max is None else problem.duration_max
     if problem.dwell is not None:
         most = min(most, problem.dwell.time)
     if least == most:

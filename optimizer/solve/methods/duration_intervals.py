@@ -16,7 +16,7 @@ from joulepath.optimizer.dynamics.dwell import LinearDwell, holding_times, linea
 from joulepath.optimizer.dynamics.plant import SMOOTHING
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.dwell import Dwell
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.solve.nlp.goal_holding import GoalHolding
 
 
@@ -62,8 +62,8 @@ def duration_intervals(
         width: width over which corners of the cost are smoothed [W].
     """
     problem = prepared.problem
-    t_min = LEAST_DURATION if problem.duration_min is None else problem.duration_min
-    t_max = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
+    t_min = DURATIONS.least if problem.duration_min is None else problem.duration_min
+    t_max = DURATIONS.longest if problem.duration_max is None else problem.duration_max
     if surplus_value is None and problem.arm.bus.mode == "storage":
         surplus_value = max(problem.arm.bus.efficiency, problem.arm.regeneration)
     if problem.dwell is None or problem.objective == "mechanical":
@@ -102,5 +102,5 @@ def _goal_holding(
 def fastest(prepared: PreparedProblem) -> DurationInterval:
     """The interval of all durations, with the duration as cost."""
     return DurationInterval(
-        prepared.fastest_parameters, LEAST_DURATION, LONGEST_DURATION, minimum_time=True
+        prepared.fastest_parameters, DURATIONS.least, DURATIONS.longest, minimum_time=True
     )

@@ -24,7 +24,7 @@ from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.spline import SAMPLING, Spline, lasting, sampled
 from joulepath.optimizer.motion.through_samples import spline_through
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 from joulepath.optimizer.solve.methods.guess import Guess
 from joulepath.optimizer.solve.methods.limit_repair import sampled_overshoot
@@ -152,7 +152,7 @@ class PassingSpline(SqpMethod):
         turns back.
         """
         q, limits = self._configurations, self.coordinates.limits
-        lengths = np.maximum(shortest_duration(np.diff(q, axis=0), limits), LEAST_DURATION)
+        lengths = np.maximum(shortest_duration(np.diff(q, axis=0), limits), DURATIONS.least)
         t = np.concatenate([[0.0], np.cumsum(lengths)]) / lengths.sum()
         width = np.diff(t)[:, None]
         slopes, v = np.diff(q, axis=0) / width, np.zeros_like(q)
@@ -164,7 +164,7 @@ class PassingSpline(SqpMethod):
     def _between_rests(self) -> list[SolveResult]:
         """Motions of any duration from rest to rest, up to the first solve without a motion."""
         problem = replace(self.prepared.problem, passes=(), duration_min=None, duration_max=None)
-        interval = replace(self.interval, t_min=LEAST_DURATION, t_max=LONGEST_DURATION)
+        interval = replace(self.interval, t_min=DURATIONS.least, t_max=DURATIONS.longest)
         results = list[SolveResult]()
         for a, b in pairwise(self._configurations):
             part = PreparedProblem.of(replace(problem, start=a, goal=b))

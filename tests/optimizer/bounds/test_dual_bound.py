@@ -24,7 +24,7 @@ from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.spline import sample
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.search.baselines import guesses
 from tests.optimizer.bounds.numpy_terms import greatest
 from tests.optimizer.bounds.test_holding import NAMES, NEAR, SAMPLED, SHIFT, asked, many_motions
@@ -349,7 +349,7 @@ def test_boxes_hold_motions() -> None:
     own = task.arm.active_limits
     share = np.linspace(0, 1, STEPS + 1)[:, None]
     for start, goal in zip(*ends(12, 8), strict=True):
-        least = max(float(shortest_duration(goal - start, own)), LEAST_DURATION)
+        least = max(float(shortest_duration(goal - start, own)), DURATIONS.least)
         reference = Reference(start + share * (goal - start), np.zeros((STEPS + 1, 6)))
         motion = guesses(task, start, goal, least)["ruckig"]
         if motion.duration <= 0:

@@ -14,7 +14,7 @@ from joulepath.optimizer.collision.clearance_proof import (
     is_proven_clear,
     proven_clearance,
 )
-from joulepath.optimizer.collision.model import STRIDE, CollisionModel
+from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.clouds import Points
 from joulepath.optimizer.problem.scene import Obstacle, Scene
@@ -35,6 +35,10 @@ def samples(kind: str, seed: int, count: int) -> Array:
     if kind == "still":
         return np.repeat(rng.uniform(-3, 3, (1, 6)), count, axis=0)
     return positions(wander(seed), np.linspace(0, wander(seed).duration, count))
+
+
+STRIDE = 6
+"""Default stride of `CollisionModel.distances_along`."""
 
 
 @pytest.mark.parametrize("kind", ["motion", "leaps", "still"])

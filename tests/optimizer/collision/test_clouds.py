@@ -22,7 +22,7 @@ from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.collision.planner.state_validity import StateValidityChecker
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.clouds import MOST_POINTS, Points, TriangleMesh, Voxels
+from joulepath.optimizer.problem.clouds import CLOUD_RANGES, Points, TriangleMesh, Voxels
 from joulepath.optimizer.problem.clouds import Cloud as Shape
 from joulepath.optimizer.problem.scene import Attachment, Box, Mesh, Obstacle, Scene, Sphere
 from joulepath.optimizer.search.errors import StartInCollision
@@ -348,7 +348,7 @@ NAN = np.array([[0.0, np.nan, 0.0]])
         (lambda: Points(np.zeros((0, 3)), 0.1), "points"),
         (lambda: Points(NAN, 0.1), "points"),
         (lambda: Points(np.zeros((2, 2)), 0.1), "points"),
-        (lambda: Points(np.zeros((MOST_POINTS + 1, 3)), 0.1), "points"),
+        (lambda: Points(np.zeros((CLOUD_RANGES.max_points + 1, 3)), 0.1), "points"),
         (lambda: Points(np.full((1, 3), 1e3), 0.1), "points"),
         (lambda: Points(np.zeros((1, 3)), 0.0), "radius"),
         (lambda: Points(np.zeros((1, 3)), float("nan")), "radius"),
@@ -362,7 +362,10 @@ NAN = np.array([[0.0, np.nan, 0.0]])
         (lambda: Attachment(Points(np.zeros((1, 3)), 0.1)), "shape"),
         (
             lambda: Scene(
-                [Obstacle(f"{k}", Points(np.zeros((MOST_POINTS, 3)), 0.1)) for k in range(3)]
+                [
+                    Obstacle(f"{k}", Points(np.zeros((CLOUD_RANGES.max_points, 3)), 0.1))
+                    for k in range(3)
+                ]
             ),
             "scene.obstacles",
         ),
