@@ -80,7 +80,7 @@ class BoundingTree:
             root: nodes (k,) below which parts are searched.
             nearest: whether parts that cannot be the nearest part of their query are left out, too.
         """
-        found = [
+        blocks = [
             self._near(
                 segments[block], reach[block], within[block], root[block], nearest, block.start
             )
@@ -89,10 +89,10 @@ class BoundingTree:
                 for low in range(0, len(segments), TREE.queries_per_block)
             )
         ]
-        none = np.zeros(0, dtype=np.intp)
+        empty = np.zeros(0, dtype=np.intp)
         return (
-            np.concatenate([none, *(query for query, _ in found)]),
-            np.concatenate([none, *(part for _, part in found)]),
+            np.concatenate([empty, *(query for query, _ in blocks)]),
+            np.concatenate([empty, *(part for _, part in blocks)]),
         )
 
     def _near(

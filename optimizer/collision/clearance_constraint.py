@@ -94,28 +94,30 @@ class ClearanceConstraint:
         """Ratios with gradients; the gradient is zero for pairs beyond `gradient_distance`, and for
         pairs that are not `wanted`.
         """
-        found = (
+        distances = (
             self._pair_distances(frames, q)
             if wanted is None
             else self.model.chosen_distances(frames, self.pairs, wanted)
         )
-        by_q = np.zeros((*found.distance.shape, q.shape[1]))
+        by_q = np.zeros((*distances.distance.shape, q.shape[1]))
         gradients = self.model.gradients(
-            frames, found.configuration, self.pairs[found.column], found.nearest
+            frames, distances.configuration, self.pairs[distances.column], distances.nearest
         )
-        by_q[found.configuration, found.column] = gradients / -CLEARANCE_CONSTRAINT.ratio_range
-        return ConstraintRatios(_ratio(found.distance), by_q, np.broadcast_to(0.0, by_q.shape))
+        by_q[distances.configuration, distances.column] = (
+            gradients / -CLEARANCE_CONSTRAINT.ratio_range
+        )
+        return ConstraintRatios(_ratio(distances.distance), by_q, np.broadcast_to(0.0, by_q.shape))
 
     def _pair_distances(self, frames: Array, q: Array) -> PairDistances:
         """Distances at q (n, nq), with bounds instead for pairs bounded away from
         `gradient_distance` by the distances of the last call.
         """
         bounds = self._last.bounds(self.model, q, self.pairs)
-        found = self.model.pair_distances(
+        distances = self.model.pair_distances(
             frames, self.pairs, CLEARANCE_CONSTRAINT.gradient_distance, bounds
         )
-        self._last.store(q, found.distance)
-        return found
+        self._last.store(q, distances.distance)
+        return distances
 
     @cached_property
     def _last(self) -> _LastDistances:

@@ -83,12 +83,12 @@ def proven_clearance(model: CollisionModel, spline: Spline) -> Clearance | None:
     """
     if not len(model.pairs):
         return None
-    found = _Proof(model, spline).run()
-    if found.min_clearance < 0 and found.sampled >= CLEARANCE_PROOF.gap:
+    clearance = _Proof(model, spline).run()
+    if clearance.min_clearance < 0 and clearance.sampled >= CLEARANCE_PROOF.gap:
         # The limits on the effort ended the proof, but less effort may show that the margins hold.
         bound = _Proof(model, spline, CLEARANCE_PROOF.gap).bound()
-        found = replace(found, min_clearance=max(found.min_clearance, bound))
-    return found
+        clearance = replace(clearance, min_clearance=max(clearance.min_clearance, bound))
+    return clearance
 
 
 def is_proven_clear(model: CollisionModel, spline: Spline) -> bool:
@@ -202,13 +202,13 @@ class _Proof:
         distances[instant, pair] = np.maximum(distances[instant, pair], bounds)
         is_open &= self.may_be_closest(distances, travel)
         instant, pair = np.nonzero(_at_ends(is_open))
-        found = self.sample_normals(instants, instant, pair, np.full(len(pair), -1))
+        witness = self.sample_normals(instants, instant, pair, np.full(len(pair), -1))
         row = np.zeros((n, p), dtype=np.intp)
         row[instant, pair] = np.arange(len(pair))
         begin, pair = np.nonzero(is_open)
         part = np.full(len(pair), -1)
         return IntervalChecks(
-            pair, part, begin, begin + 1, found[row[begin, pair]], found[row[begin + 1, pair]]
+            pair, part, begin, begin + 1, witness[row[begin, pair]], witness[row[begin + 1, pair]]
         )
 
     def may_be_closest(self, bounds: Array, travel: Array) -> Mask:
@@ -249,12 +249,12 @@ class _Proof:
 
     def halved(self, instants: Instants, checks: IntervalChecks) -> tuple[Instants, IntervalChecks]:
         """Both halves of every interval, with the normals at the middle."""
-        intervals, which = checks.distinct_intervals()
-        middle = which + len(instants.t)
+        intervals, interval = checks.distinct_intervals()
+        middle = interval + len(instants.t)
         instants = instants.with_more(self.motion.instants(instants.t[intervals].mean(axis=1)))
-        found = self.sample_normals(instants, middle, checks.pair, checks.part)
-        first = replace(checks, end=middle, at_end=found)
-        return instants, first.with_more(replace(checks, begin=middle, at_begin=found))
+        witness = self.sample_normals(instants, middle, checks.pair, checks.part)
+        first = replace(checks, end=middle, at_end=witness)
+        return instants, first.with_more(replace(checks, begin=middle, at_begin=witness))
 
     def sample_normals(
         self, instants: Instants, instant: Indices, pair: Indices, part: Indices
@@ -263,27 +263,27 @@ class _Proof:
         distance.
         """
         within = max(self.least, 0.0) + self.settings.cloud_distance_margin
-        found = self.geometry.witness_points(instants.frames, instant, pair, within, part)
+        witness = self.geometry.witness_points(instants.frames, instant, pair, within, part)
         # For patches of a cloud that are farther away, a lower bound is enough.
-        found.distance[np.isinf(found.distance)] = within
+        witness.distance[np.isinf(witness.distance)] = within
         if len(pair):
-            k = int(found.distance.argmin())
-            if found.distance[k] < self.least:
-                self.least = float(found.distance[k])
+            k = int(witness.distance.argmin())
+            if witness.distance[k] < self.least:
+                self.least = float(witness.distance[k])
                 self.closest = int(pair[k]), float(instants.t[instant[k]])
-        return found
+        return witness
 
     def bounds(self, instants: Instants, checks: IntervalChecks) -> Array:
         """Lower bounds (k,) [m] on the distances over the intervals."""
         of_cloud = self.model.geometry.is_cloud[checks.pair] & (checks.part < 0)
         if of_cloud.any():
-            whole, convex = checks[np.flatnonzero(of_cloud)], checks[np.flatnonzero(~of_cloud)]
+            clouds, convex = checks[np.flatnonzero(of_cloud)], checks[np.flatnonzero(~of_cloud)]
             result = np.empty(len(of_cloud))
             result[~of_cloud] = self.convex_bounds(instants, convex)
             result[of_cloud] = (
-                whole.at_begin.distance
-                + whole.at_end.distance
-                - self.motion.travels(instants, whole)
+                clouds.at_begin.distance
+                + clouds.at_end.distance
+                - self.motion.travels(instants, clouds)
             ) / 2
             return result
         return self.convex_bounds(instants, checks)

@@ -39,17 +39,21 @@ def close_pass(arm: Arm, spline: Spline, clearance: Clearance | None) -> Clearan
     """
     if clearance is None or clearance.min_clearance >= CLOSE_PASS.distance:
         return None
-    found = proven_clearance(model_without_margins(arm), spline)
-    return found if found is not None and found.min_clearance < CLOSE_PASS.distance else None
+    without_margins = proven_clearance(model_without_margins(arm), spline)
+    return (
+        without_margins
+        if without_margins is not None and without_margins.min_clearance < CLOSE_PASS.distance
+        else None
+    )
 
 
 def model_without_margins(arm: Arm) -> CollisionModel:
     """Collision model of the arm with the obstacles of margins below `CLOSE_PASS.distance`, without
     their margins.
     """
-    near = [
+    obstacles = [
         replace(obstacle, margin=0.0)
         for obstacle in arm.scene.obstacles
         if obstacle.margin < CLOSE_PASS.distance
     ]
-    return collision_model(replace(arm, scene=Scene(near)))
+    return collision_model(replace(arm, scene=Scene(obstacles)))

@@ -63,7 +63,7 @@ def triangle_segment(triangles: Array, b: Array) -> tuple[Array, Array, Array]:
     corner, edge = triangles, np.roll(triangles, -1, axis=1) - triangles
     face = cross(edge[:, 0], edge[:, 1])
     face = face / np.maximum(np.linalg.norm(face, axis=1), 1e-300)[:, None]
-    found = [
+    edge_witness = [
         segment_segment(np.stack([corner[:, i], corner[:, i] + edge[:, i]], axis=1), b)
         for i in range(3)
     ]
@@ -74,20 +74,22 @@ def triangle_segment(triangles: Array, b: Array) -> tuple[Array, Array, Array]:
         for e in range(2)
     ]
     distances = np.stack(
-        [d for d, _, _ in found]
+        [d for d, _, _ in edge_witness]
         + [np.where(above[e], np.abs(heights[:, e]), np.inf) for e in range(2)]
     )
     up = [np.where(heights[:, e, None] >= 0, face, -face) for e in range(2)]
-    normals = np.stack([n for _, n, _ in found] + up)
-    points = np.stack([r for _, _, r in found] + [b[:, 0], b[:, 1]])
+    normals = np.stack([n for _, n, _ in edge_witness] + up)
+    points = np.stack([r for _, _, r in edge_witness] + [b[:, 0], b[:, 1]])
     best, rows = distances.argmin(axis=0), np.arange(len(b))
     distance, normal, point = distances[best, rows], normals[best, rows], points[best, rows]
-    u = b[:, 1] - b[:, 0]
+    along = b[:, 1] - b[:, 0]
     drop = heights[:, 0] - heights[:, 1]
     opposite = heights[:, 0] * heights[:, 1] < 0
     fraction = np.clip(heights[:, 0] / np.where(drop == 0, 1.0, drop), 0.0, 1.0)
-    at = b[:, 0] + fraction[:, None] * u
-    crossed = opposite & (np.einsum("kci,kci->kc", at[:, None] - corner, inward) >= 0).all(axis=1)
+    crossing = b[:, 0] + fraction[:, None] * along
+    crossed = opposite & (np.einsum("kci,kci->kc", crossing[:, None] - corner, inward) >= 0).all(
+        axis=1
+    )
     if crossed.any():
         on_edges = points[:3, crossed]
         distance[crossed], normal[crossed], point[crossed] = _crossing(

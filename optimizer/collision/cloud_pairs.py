@@ -70,25 +70,29 @@ class CloudPairs:
         """
         count = len(first)
         distance, normal, point = np.empty(count), np.empty((count, 3)), np.empty((count, 3))
-        for named in (True, False):
-            cases = np.flatnonzero((part >= 0) == named)
+        for has_part in (True, False):
+            cases = np.flatnonzero((part >= 0) == has_part)
             for batch in self._batches(frames, configuration, first, second, cases):
                 k = batch.chosen
                 if batch.segments is not None:
-                    found = (
+                    witness = (
                         batch.cloud.to_segments(part[k], batch.segments)
-                        if named
+                        if has_part
                         else batch.cloud.nearest(batch.segments, batch.root, within[k])
                     )
                 else:
                     assert batch.convex is not None and batch.T is not None
-                    found = (
+                    witness = (
                         batch.convex.to_cores(part[k], batch.T)
-                        if named
+                        if has_part
                         else batch.convex.nearest(batch.T, batch.root, within[k])
                     )
                 R, origin = batch.T_base_cloud[:3, :3], batch.T_base_cloud[:3, 3]
-                distance[k], normal[k], point[k] = found[0], found[1] @ R.T, found[2] @ R.T + origin
+                distance[k], normal[k], point[k] = (
+                    witness[0],
+                    witness[1] @ R.T,
+                    witness[2] @ R.T + origin,
+                )
         return distance, normal, point
 
     def near(

@@ -100,13 +100,13 @@ class Cloud:
         within = np.where(may_be_inside, np.inf, within)
         query, part = self.tree.near(segments, np.zeros(len(segments)), within, root, nearest=True)
         query, part = self._promising(segments, query, part)
-        found = _least(self.to_segments(part, segments[query]), query, len(segments), within)
+        witness = _least(self.to_segments(part, segments[query]), query, len(segments), within)
         if self.is_solid:
-            apart = np.flatnonzero(may_be_inside & (found[0] > 0))
-            inside = apart[self.inside(segments[apart, 0])]
-            found[0][inside] *= -1
-            found[1][inside] *= -1
-        return found
+            outside = np.flatnonzero(may_be_inside & (witness[0] > 0))
+            inside = outside[self.inside(segments[outside, 0])]
+            witness[0][inside] *= -1
+            witness[1][inside] *= -1
+        return witness
 
     def _promising(self, segments: Array, query: Indices, part: Indices) -> tuple[Indices, Indices]:
         """The (query, part) that may be nearer than the part with the nearest ball of the same
@@ -121,8 +121,8 @@ class Cloud:
         reached[query[first]] = (
             self.to_segments(part[first], segments[query[first]])[0] + TREE.rounding
         )
-        kept = least <= np.maximum(reached[query], 0.0)
-        return query[kept], part[kept]
+        is_candidate = least <= np.maximum(reached[query], 0.0)
+        return query[is_candidate], part[is_candidate]
 
     def to_segments(self, part: Indices, segments: Array) -> Witness:
         """Signed distance (k,), normal (k, 3) and point (k, 3) of segments (k, 2, 3) from parts
@@ -218,8 +218,8 @@ class ConvexAgainstCloud:
                 if d[0] < distance[q] and d[0] <= within[q]:
                     distance[q], normal[q], point[q] = d[0], n[0], p[0]
         if cloud.is_solid:
-            apart = np.flatnonzero(distance > 0)
-            inside = apart[cloud.inside(balls[apart, 0])]
+            outside = np.flatnonzero(distance > 0)
+            inside = outside[cloud.inside(balls[outside, 0])]
             distance[inside] *= -1
             normal[inside] *= -1
         return distance, normal, point
@@ -307,18 +307,18 @@ def cloud_of(shape: Shape) -> Cloud:
     return Cloud(shape)
 
 
-def _least(found: Witness, query: Indices, count: int, within: Array) -> Witness:
+def _least(witness: Witness, query: Indices, count: int, within: Array) -> Witness:
     """Nearest part of every query; infinitely far if no part is within its limit."""
     distance, normal, point = (
         np.full(count, np.inf),
         np.tile([0.0, 0.0, 1.0], (count, 1)),
         np.zeros((count, 3)),
     )
-    order = np.lexsort((found[0], query))
+    order = np.lexsort((witness[0], query))
     first = order[np.unique(query[order], return_index=True)[1]]
-    first = first[found[0][first] <= within[query[first]]]
+    first = first[witness[0][first] <= within[query[first]]]
     distance[query[first]], normal[query[first]], point[query[first]] = (
-        each[first] for each in found
+        each[first] for each in witness
     )
     return distance, normal, point
 

@@ -70,12 +70,12 @@ class ConvexPairs:
             pose_a, pose_b = _transform(T_first[k]) * local_a, _transform(T_second[k]) * local_b
             for request in self._requests:
                 result = coal.DistanceResult()
-                found = coal.distance(a, pose_a, b, pose_b, request, result)
+                value = coal.distance(a, pose_a, b, pose_b, request, result)
                 if (
-                    abs(found) < COAL.largest_distance
+                    abs(value) < COAL.largest_distance
                     and abs(float(result.normal @ result.normal) - 1) < 1e-6
                 ):
-                    distance[k], normal[k] = found + skin_a + skin_b, result.normal
+                    distance[k], normal[k] = value + skin_a + skin_b, result.normal
                     point[k] = result.getNearestPoint2() + skin_b * result.normal
                     break
             else:

@@ -54,9 +54,9 @@ class CompiledDistances:
 
     def __init__(self, arrays: PairArrays, nq: int) -> None:
         self._nq, self._bodies = nq, len(arrays.links)
-        given = vars(arrays) | {"first": arrays.pairs[:, 0], "second": arrays.pairs[:, 1]}
+        sources = vars(arrays) | {"first": arrays.pairs[:, 0], "second": arrays.pairs[:, 1]}
         # An address does not keep its array alive.
-        self._kept = [_plain(given[name]) for name in _ARRAYS]
+        self._kept = [_plain(sources[name]) for name in _ARRAYS]
         self._shapes = _Shapes(
             nq + 1, self._bodies, arrays.points.shape[1], *map(address, self._kept)
         )
@@ -75,19 +75,19 @@ class CompiledDistances:
         n, p = len(frames), len(pairs)
         distance = np.empty((n, p)) if known is None else known.copy()
         row, column = np.empty(n * p, dtype=np.intp), np.empty(n * p, dtype=np.intp)
-        room = np.empty((self._bodies, 3))
-        given = _plain(frames), _plain(pairs)
-        found = library.bounds(
+        workspace = np.empty((self._bodies, 3))
+        arguments = _plain(frames), _plain(pairs)
+        count = library.bounds(
             self._of,
             n,
-            address(given[0]),
+            address(arguments[0]),
             p,
-            address(given[1]),
+            address(arguments[1]),
             within,
             known is not None,
-            *map(address, (distance, row, column, room)),
+            *map(address, (distance, row, column, workspace)),
         )
-        return distance, row[:found], column[:found]
+        return distance, row[:count], column[:count]
 
     def cover_bounds(self, frames: Array, configuration: Indices, pair: Indices) -> Array:
         """Lower bounds (k,) [m] on the signed distances of pairs (k,) at configurations (k,), by
@@ -157,8 +157,8 @@ class CompiledDistances:
         """Calls a function of as many cases as the arrays are long; the last arrays are its
         results.
         """
-        given = [_plain(each) for each in (frames, *arrays)]
-        function(self._of, address(given[0]), len(given[1]), *map(address, given[1:]))
+        arguments = [_plain(array) for array in (frames, *arrays)]
+        function(self._of, address(arguments[0]), len(arguments[1]), *map(address, arguments[1:]))
 
 
 def _plain(array: Array | Indices) -> Array | Indices:

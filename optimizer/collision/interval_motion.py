@@ -35,24 +35,24 @@ class IntervalMotion:
 
     def travels(self, instants: Instants, checks: IntervalChecks) -> Array:
         """Greatest travel L h (k,) [m] of a point of the second body relative to the first."""
-        intervals, which = checks.distinct_intervals()
+        intervals, interval = checks.distinct_intervals()
         v, _, h = self.rate_bounds(*instants.t[intervals].T)
-        return np.asarray((self._levers[checks.pair] * v[which]).sum(axis=1) * h[which])
+        return np.asarray((self._levers[checks.pair] * v[interval]).sum(axis=1) * h[interval])
 
     def chord_errors(self, instants: Instants, checks: IntervalChecks) -> Array:
         """Greatest deviation A h² / 8 (k,) [m] of n·x from its chord."""
-        intervals, which = checks.distinct_intervals()
+        intervals, interval = checks.distinct_intervals()
         v, a, h = self.rate_bounds(*instants.t[intervals].T)
         before = np.cumsum(v, axis=1) - v
         between = self._model.joints_between[checks.pair]
         # Joints below the first body move both bodies equally, so their speeds are removed from the
         # running sum.
-        below = np.where(between, 0.0, v[which]).cumsum(axis=1)
-        lower = before[which] - np.where(between, below, 0.0)
-        v, a = v[which], a[which]
+        below = np.where(between, 0.0, v[interval]).cumsum(axis=1)
+        lower = before[interval] - np.where(between, below, 0.0)
+        v, a = v[interval], a[interval]
         levers = self._levers[checks.pair]
         acceleration = (levers * (a + v**2 + 2 * v * np.maximum(lower, 0.0))).sum(axis=1)
-        return np.asarray(acceleration * h[which] ** 2 / 8)
+        return np.asarray(acceleration * h[interval] ** 2 / 8)
 
     def rate_bounds(self, begin: Array, end: Array) -> tuple[Array, Array, Array]:
         """Bounds on |v| [rad/s] and |a| [rad/s²] (k, nq) over intervals (k,) [s], and the lengths

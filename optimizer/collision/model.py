@@ -83,11 +83,11 @@ class CollisionModel:
         balls, a lower bound, and the gradient zero.
         """
         frames = self.frames(q)
-        found = self.pair_distances(frames, within=within)
-        gradient = np.zeros((*found.distance.shape, self.nq))
-        exact = found.configuration, found.column
-        gradient[exact] = self.gradients(frames, *exact, found.nearest)
-        return found.distance, gradient
+        distances = self.pair_distances(frames, within=within)
+        gradient = np.zeros((*distances.distance.shape, self.nq))
+        exact = distances.configuration, distances.column
+        gradient[exact] = self.gradients(frames, *exact, distances.nearest)
+        return distances.distance, gradient
 
     def pair_distances(
         self,
@@ -169,15 +169,17 @@ class CollisionModel:
         """
         every = np.arange(len(self.pairs))
         bound = self.geometry.bounds(frames, every, within)[0]
-        least = bound.argmin(axis=0)
-        found = np.zeros(len(every), dtype=bool)
-        (near,) = np.nonzero((bound[least, every] < within) & ~self.geometry.is_cloud)
-        found[near] = self.geometry.witness_points(frames, least[near], near).distance < within
-        (rest,) = np.nonzero((bound[least, every] < within) & ~found)
-        found[rest] = (
-            self.pair_distances(frames, rest, within, bound[:, rest]).distance < within
+        closest = bound.argmin(axis=0)
+        is_within = np.zeros(len(every), dtype=bool)
+        (near,) = np.nonzero((bound[closest, every] < within) & ~self.geometry.is_cloud)
+        is_within[near] = (
+            self.geometry.witness_points(frames, closest[near], near).distance < within
+        )
+        (undecided,) = np.nonzero((bound[closest, every] < within) & ~is_within)
+        is_within[undecided] = (
+            self.pair_distances(frames, undecided, within, bound[:, undecided]).distance < within
         ).any(axis=0)
-        return found
+        return is_within
 
     def chosen_distances(self, frames: Array, pairs: Indices, wanted: Mask) -> PairDistances:
         """Exact signed distances of the `wanted` (n, p) among `pairs` (p,); the others are zero."""
@@ -216,22 +218,22 @@ class CollisionModel:
         distinct = np.unique(row_of, return_index=True)[1]
         distance = self.pair_distances(frames[distinct], within=within).distance
         closest = distance.argmin(axis=1)
-        found = [
+        pairs = [
             ClosestPair(self.names(int(k)), float(d[k]))
             for k, d in zip(closest, distance, strict=True)
         ]
-        return [found[k] for k in row_of]
+        return [pairs[k] for k in row_of]
 
     def nearest_points(self, frames: Array, pair: int) -> tuple[list[float], list[float]]:
         """Nearest points [m] of a pair on the surfaces of its first and second body, without
         margins, at the frames (1, nq + 1, 4, 4).
         """
-        found = self.geometry.witness_points(frames, np.array([0]), np.array([pair]))
-        first, second = self.geometry.surface_points(np.array([pair]), found)[0].tolist()
+        witness = self.geometry.witness_points(frames, np.array([0]), np.array([pair]))
+        first, second = self.geometry.surface_points(np.array([pair]), witness)[0].tolist()
         return first, second
 
     def gradients(
-        self, frames: Array, configuration: Indices, pair: Indices, found: WitnessPoints
+        self, frames: Array, configuration: Indices, pair: Indices, witness: WitnessPoints
     ) -> Array:
         """Gradients (k, nq) [m/rad] of signed distances: n · (axis × (point - origin)) for every
         joint between the two bodies.
@@ -239,7 +241,7 @@ class CollisionModel:
         By the envelope theorem, the motion of the witness points over the bodies does not
         contribute.
         """
-        return self.geometry.gradients(frames, configuration, pair, found)
+        return self.geometry.gradients(frames, configuration, pair, witness)
 
     @cached_property
     def levers_between(self) -> Array:

@@ -67,7 +67,7 @@ class PairArrays:
     def of(bodies: Sequence[Body], pairs: Indices) -> PairArrays:
         """Arrays of bodies, and of pairs (p, 2) of them."""
         cores = [body.core for body in bodies]
-        most = max((len(body.points) for body in bodies), default=1)
+        max_points = max((len(body.points) for body in bodies), default=1)
         radii = np.array([core.radius for core in cores])
         growth = radii + np.array([body.margin for body in bodies])
         primitive_half_sizes = np.array([_primitive_half_size(body) for body in bodies]).reshape(
@@ -82,8 +82,8 @@ class PairArrays:
             # Cores with fewer points repeat their last point. A patch of a cloud is represented by
             # the box around it, whose separations are lower bounds.
             points=np.array(
-                [b.points[np.minimum(np.arange(most), len(b.points) - 1)] for b in bodies]
-            ).reshape(-1, most, 3),
+                [b.points[np.minimum(np.arange(max_points), len(b.points) - 1)] for b in bodies]
+            ).reshape(-1, max_points, 3),
             counts=np.array([len(body.points) for body in bodies], dtype=np.intp),
             axes=np.array([body.T_link_core[:3, 2] for body in bodies]),
             disc_radii=np.array([core.disc_radius for core in cores]),

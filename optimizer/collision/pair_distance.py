@@ -90,39 +90,39 @@ class PairGeometry:
         exceeds `within` [m], or of `part` (k,) if that is not negative.
         """
         result = WitnessPoints(*self._compiled.witness_points(frames, configuration, pair))
-        left = np.flatnonzero(~self.is_closed_form[pair])
-        of_cloud = self.is_cloud[pair[left]]
-        for chosen, is_cloud in ((left[~of_cloud], False), (left[of_cloud], True)):
+        remaining = np.flatnonzero(~self.is_closed_form[pair])
+        of_cloud = self.is_cloud[pair[remaining]]
+        for chosen, is_cloud in ((remaining[~of_cloud], False), (remaining[of_cloud], True)):
             if not chosen.size:
                 continue
-            case = frames, configuration[chosen]
+            selection = frames, configuration[chosen]
             if is_cloud:
                 parts = np.full(len(chosen), -1) if part is None else part[chosen]
                 beyond = within + self._arrays.growth[pair[chosen]]
-                found = self._clouds.witness_points(
-                    *case, *self._bodies(pair[chosen]), beyond, parts
+                witness = self._clouds.witness_points(
+                    *selection, *self._bodies(pair[chosen]), beyond, parts
                 )
             else:
-                found = self._by_coal(*case, pair[chosen])
-            result.distance[chosen], result.normal[chosen], result.point[chosen] = found
+                witness = self._by_coal(*selection, pair[chosen])
+            result.distance[chosen], result.normal[chosen], result.point[chosen] = witness
         result.distance[:] -= self._arrays.growth[pair]
         return result
 
-    def surface_points(self, pair: Indices, found: WitnessPoints) -> Array:
+    def surface_points(self, pair: Indices, witness: WitnessPoints) -> Array:
         """Nearest points (k, 2, 3) [m] of the first and the second body of pairs (k,), without
         margins.
         """
         first, second = self._bodies(pair)
-        gap = (found.distance + self._arrays.growth[pair])[:, None] * found.normal
+        gap = (witness.distance + self._arrays.growth[pair])[:, None] * witness.normal
         # The witness point is on the first core for these pairs, and on the second core for all
         # others.
         on_first = (self._arrays.kinds[pair] == PairKind.SEGMENT_BOX)[:, None]
         cores = (
-            found.point - np.where(on_first, 0.0, gap),
-            found.point + np.where(on_first, gap, 0.0),
+            witness.point - np.where(on_first, 0.0, gap),
+            witness.point + np.where(on_first, gap, 0.0),
         )
         radii = self._arrays.radii
-        outward = radii[first][:, None] * found.normal, -radii[second][:, None] * found.normal
+        outward = radii[first][:, None] * witness.normal, -radii[second][:, None] * witness.normal
         return np.stack([core + out for core, out in zip(cores, outward, strict=True)], axis=1)
 
     def near_parts(
@@ -181,10 +181,10 @@ class PairGeometry:
         return np.asarray(best)
 
     def gradients(
-        self, frames: Array, configuration: Indices, pair: Indices, found: WitnessPoints
+        self, frames: Array, configuration: Indices, pair: Indices, witness: WitnessPoints
     ) -> Array:
         """Gradients of signed distances, see `CompiledDistances.gradients`."""
-        return self._compiled.gradients(frames, configuration, pair, found.normal, found.point)
+        return self._compiled.gradients(frames, configuration, pair, witness.normal, witness.point)
 
     def _bodies(self, pair: Indices) -> tuple[Indices, Indices]:
         """First and second bodies of pairs (k,)."""

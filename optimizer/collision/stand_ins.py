@@ -73,15 +73,15 @@ class StandIns:
         [s].
         """
         distance = self.model.distances_along(q, 0.0)
-        found = dict[str, Clearance]()
+        deepest = dict[str, Clearance]()
         for column in np.argsort(distance.min(axis=0), kind="stable"):
             row = int(distance[:, column].argmin())
             least = float(distance[row, column])
             if least >= -self.settings.contact:
                 break
             pair = self.model.names(int(column))
-            found.setdefault(pair[1], Clearance(least, least, pair, float(t[row])))
-        return list(found.values())
+            deepest.setdefault(pair[1], Clearance(least, least, pair, float(t[row])))
+        return list(deepest.values())
 
 
 def _rod(arm: Arm, radius: float) -> Attachment | None:

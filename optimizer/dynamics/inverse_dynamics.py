@@ -150,9 +150,9 @@ def _link(model: pin.Model, i: int, payload: SymbolicPayload, scale: ca.SX | int
     body = model.inertias[i]
     com = ca.SX(_tidy(body.lever))
     # Constants are multiplied first, so that the scale costs one product per entry.
-    own = ca.SX(body.mass)
-    mass, moment = scale * own, scale * (own * com)
-    inertia = scale * _about_origin(own, com, ca.SX(_tidy(body.inertia)))
+    link_mass = ca.SX(body.mass)
+    mass, moment = scale * link_mass, scale * (link_mass * com)
+    inertia = scale * _about_origin(link_mass, com, ca.SX(_tidy(body.inertia)))
     if i == model.njoints - 1:
         flange = model.frames[model.getFrameId("flange")].placement
         R = _tidy(flange.rotation)

@@ -163,10 +163,10 @@ class _Loader:
             seal_path(path).exists() for path in self.paths
         ):
             return self._interpreted
-        found = next(filter(is_intact, self.paths), None)
-        if found is not None:
-            mark_used(found)
-            self._compiled = Kernel(self._robot, Compiled(found, self._robot.nq))
+        path = next(filter(is_intact, self.paths), None)
+        if path is not None:
+            mark_used(path)
+            self._compiled = Kernel(self._robot, Compiled(path, self._robot.nq))
             return self._compiled
         if self._interpreted is None:
             self._interpreted = Kernel(self._robot, Interpreted(build(self._robot)))

@@ -32,10 +32,10 @@ def rigid_torques(model: pin.Model, q: Array, v: Array, a: Array) -> Array:
 def rigid_regressor(model: pin.Model, q: Array, v: Array, a: Array) -> Array:
     """Matrices (n, nq, 10 nq) that map the parameters of the bodies to the rigid-body torques."""
     data = model.createData()
-    found = np.empty((len(q), model.nq, PARAMETERS_PER_BODY * model.nq))
+    regressor = np.empty((len(q), model.nq, PARAMETERS_PER_BODY * model.nq))
     for row in range(len(q)):
-        found[row] = pin.computeJointTorqueRegressor(model, data, q[row], v[row], a[row])
-    return found
+        regressor[row] = pin.computeJointTorqueRegressor(model, data, q[row], v[row], a[row])
+    return regressor
 
 
 def base_wrench_regressor(model: pin.Model, q: Array, v: Array, a: Array) -> Array:
@@ -46,17 +46,17 @@ def base_wrench_regressor(model: pin.Model, q: Array, v: Array, a: Array) -> Arr
     are neglected.
     """
     data = model.createData()
-    found = np.empty((len(q), 6, PARAMETERS_PER_BODY * model.nq))
+    regressor = np.empty((len(q), 6, PARAMETERS_PER_BODY * model.nq))
     for row in range(len(q)):
         checkpoint()
         pin.rnea(model, data, q[row], v[row], a[row])
         pin.forwardKinematics(model, data, q[row])
         for joint in range(1, model.njoints):
             body = pin.jointBodyRegressor(model, data, joint)
-            at = slice(PARAMETERS_PER_BODY * (joint - 1), PARAMETERS_PER_BODY * joint)
+            columns = slice(PARAMETERS_PER_BODY * (joint - 1), PARAMETERS_PER_BODY * joint)
             # Minus: the wrench on the base opposes the wrench of the base on the links.
-            found[row, :, at] = -data.oMi[joint].toDualActionMatrix() @ body
-    return found
+            regressor[row, :, columns] = -data.oMi[joint].toDualActionMatrix() @ body
+    return regressor
 
 
 def without_rotors(model: pin.Model) -> pin.Model:

@@ -101,8 +101,8 @@ def torque_bounds(
     """
     limit = arm.active_limits.tau_max
     smooth, friction = limited_parts(arm, samples.tau, samples.v, samples.a)
-    most = np.abs(smooth).max(axis=(0, 1)) + np.abs(friction).max(axis=(0, 1))
-    if (most <= settings.far_below * limit).all():
+    greatest_sum = np.abs(smooth).max(axis=(0, 1)) + np.abs(friction).max(axis=(0, 1))
+    if (greatest_sum <= settings.far_below * limit).all():
         return np.asarray(np.abs(smooth + friction).max(axis=(0, 1)))
     bound = greatest = np.zeros_like(limit)
     for _ in range(settings.max_divisions):
@@ -112,12 +112,12 @@ def torque_bounds(
         undecided = (ratio > greatest + settings.resolution) & (
             ratio > min(float(greatest.max()), settings.near_limit)
         )
-        chosen = _marked_rows(undecided)
-        ratio[chosen] = 0.0
+        divided = _marked_rows(undecided)
+        ratio[divided] = 0.0
         bound = np.maximum(bound, ratio.max(axis=0))
-        if not len(chosen):
+        if not len(divided):
             return np.asarray(np.maximum(bound, greatest) * limit)
-        low, high = (t.ravel()[chosen] for t in (samples.t[:, :-1], samples.t[:, 1:]))
+        low, high = (t.ravel()[divided] for t in (samples.t[:, :-1], samples.t[:, 1:]))
         samples = TorqueSamples.of(
             curve, torques, np.linspace(low, high, settings.parts + 1, axis=1)
         )

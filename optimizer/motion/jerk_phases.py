@@ -70,17 +70,18 @@ def _ending(
         weight_without_jerk: change of the jerk in spans without jerk, relative to its change in
             spans with the greatest jerk. Those spans then change only if the others do not suffice.
     """
-    left = lengths.sum() - np.cumsum(lengths)
-    speed = lengths * (lengths / 2 + left)
-    travel = lengths * (lengths**2 / 6 + lengths * left / 2 + left**2 / 2)
+    remaining = lengths.sum() - np.cumsum(lengths)
+    speed = lengths * (lengths / 2 + remaining)
+    travel = lengths * (lengths**2 / 6 + lengths * remaining / 2 + remaining**2 / 2)
     rows = np.array([lengths, speed, travel])
     missing = np.outer([0.0, 0.0, 1.0], step) - rows @ spans
     changed = spans.copy()
     for joint, weight in enumerate((np.abs(spans) + weight_without_jerk * greatest).T):
-        own = rows * weight
-        scale = np.maximum(np.linalg.norm(own, axis=1), 1e-300)
+        joint_rows = rows * weight
+        scale = np.maximum(np.linalg.norm(joint_rows, axis=1), 1e-300)
         changed[:, joint] += (
-            weight * np.linalg.lstsq(own / scale[:, None], missing[:, joint] / scale, rcond=None)[0]
+            weight
+            * np.linalg.lstsq(joint_rows / scale[:, None], missing[:, joint] / scale, rcond=None)[0]
         )
     return changed
 

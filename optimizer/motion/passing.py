@@ -36,23 +36,23 @@ def pass_times(curve: BSpline, passes: Array) -> Array:
         float(curve.t[-1]),
         max(PASSING.least_instants, PASSING.instants_per_pass * (len(passes) + 1)),
     )
-    at = np.array(_nearest_in_order(np.asarray(curve(t)), passes))
-    return refined_pass_times(curve, passes, t[at], float(t[1]))
+    nearest = np.array(_nearest_in_order(np.asarray(curve(t)), passes))
+    return refined_pass_times(curve, passes, t[nearest], float(t[1]))
 
 
 def refined_pass_times(curve: BSpline, passes: Array, times: Array, step: float) -> Array:
     """Times (k,) at which a curve is nearest to `passes` (k, r), within `step` of the given
     times.
     """
-    found = times
+    refined = times
     for _ in range(PASSING.refinements):
-        position, speed = curve(found), curve(found, 1)
+        position, speed = curve(refined), curve(refined, 1)
         size = (speed**2).sum(axis=1)
         ahead = ((passes - position) * speed).sum(axis=1) / np.where(size > 0, size, 1.0)
-        found = np.clip(
-            found + ahead, np.maximum(times - step, 0.0), np.minimum(times + step, curve.t[-1])
+        refined = np.clip(
+            refined + ahead, np.maximum(times - step, 0.0), np.minimum(times + step, curve.t[-1])
         )
-    return np.asarray(found)
+    return np.asarray(refined)
 
 
 def deviations(curve: BSpline, passes: Array) -> Array:
@@ -70,8 +70,8 @@ def _nearest_in_order(samples: Array, passes: Array) -> list[int]:
         best = np.minimum.accumulate(total)
         # Sample at which every running minimum was reached.
         chosen.append(np.maximum.accumulate(np.where(total == best, np.arange(len(total)), 0)))
-    found, last = list[int](), len(samples) - 1
-    for each in reversed(chosen):
-        last = int(each[last])
-        found.append(last)
-    return found[::-1]
+    indices, last = list[int](), len(samples) - 1
+    for index_of in reversed(chosen):
+        last = int(index_of[last])
+        indices.append(last)
+    return indices[::-1]

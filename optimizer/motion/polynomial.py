@@ -97,8 +97,8 @@ def polynomials(m: int) -> PolynomialBasis:
     """Space of m ≥ 1 values between start and goal, of degree m + 5."""
     degree = m + 5
     knots = np.repeat([0.0, 1.0], degree + 1)
-    at = chebyshev(m)
-    values = BSpline(knots, np.eye(degree + 1), degree)(at)
+    chebyshev_nodes = chebyshev(m)
+    values = BSpline(knots, np.eye(degree + 1), degree)(chebyshev_nodes)
     inner = slice(REST_POINTS, degree + 1 - REST_POINTS)
     bernstein = np.zeros((degree + 1, m + 2))
     bernstein[:REST_POINTS, 0], bernstein[-REST_POINTS:, -1] = 1.0, 1.0
@@ -115,6 +115,6 @@ def polynomials(m: int) -> PolynomialBasis:
         at_nodes=np.stack([cardinals(knots, bernstein, nodes, d) for d in range(3)]),
         at_grid=np.stack([cardinals(knots, bernstein, grid, d) for d in range(1, 4)]),
         anchors=np.tile(np.arange(len(grid)) % POLYNOMIAL.anchor_step == 0, (3, 1)),
-        at=at,
+        at=chebyshev_nodes,
         bernstein=bernstein,
     )

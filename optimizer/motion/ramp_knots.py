@@ -76,8 +76,8 @@ class RampKnots:
         The widest spans are as wide as the spans of `count` control points with evenly spaced
         knots.
         """
-        at = np.unique(np.clip(switches, self.shortest_end_span, 1 - self.shortest_end_span))
-        return graded(at, repeat, 1 / (count - DEGREE), self.growth, next_to_end=0.0)
+        knots = np.unique(np.clip(switches, self.shortest_end_span, 1 - self.shortest_end_span))
+        return graded(knots, repeat, 1 / (count - DEGREE), self.growth, next_to_end=0.0)
 
     def refined(self, knots: Array, switches: Array, repeat: int) -> Basis:
         """Space that contains the space of `knots`.

@@ -12,7 +12,7 @@ def fraction(tau: Array, ramp: float) -> Array:
 
     Each ramp takes a share `ramp` of the time, at most a half. The peak of s' is 1 / (1 - ramp).
     """
-    near = np.minimum(tau, 1 - tau)
-    x = np.minimum(near / ramp, 1.0)
-    way = (ramp * (x**3 - x**4 / 2) + np.maximum(near - ramp, 0.0)) / (1 - ramp)
-    return np.where(tau < 0.5, way, 1 - way)
+    to_end = np.minimum(tau, 1 - tau)
+    x = np.minimum(to_end / ramp, 1.0)
+    travel = (ramp * (x**3 - x**4 / 2) + np.maximum(to_end - ramp, 0.0)) / (1 - ramp)
+    return np.where(tau < 0.5, travel, 1 - travel)

@@ -42,16 +42,16 @@ def time_optimal(limits: Limits, q_start: Array, q_goal: Array) -> SampledMotion
         RuntimeError: Ruckig finds no motion, although one always exists between configurations at
             rest.
     """
-    found = _ruckig(limits, q_start, q_goal)
-    if found.duration == 0:
+    trajectory = _ruckig(limits, q_start, q_goal)
+    if trajectory.duration == 0:
         return standstill(q_start, 0.0)
-    profiles = found.profiles[0]
-    tau, weights = lobatto_nodes(_breaks(found))
-    t = tau * found.duration
-    q, v, a = _states(found, t)
+    profiles = trajectory.profiles[0]
+    tau, weights = lobatto_nodes(_breaks(trajectory))
+    t = tau * trajectory.duration
+    q, v, a = _states(trajectory, t)
     return SampledMotion(
         t=t,
-        weights=weights * found.duration,
+        weights=weights * trajectory.duration,
         q=q,
         v=v,
         a=a,
@@ -69,16 +69,16 @@ def time_optimal_spline(limits: Limits, q_start: Array, q_goal: Array) -> Spline
     over the limits among a few candidates. Between equal configurations Ruckig's motion takes no
     time, and the spline stands still for one second.
     """
-    found = _ruckig(limits, q_start, q_goal)
-    if found.duration == 0:
+    trajectory = _ruckig(limits, q_start, q_goal)
+    if trajectory.duration == 0:
         return Spline(
             bspline.DEGREE,
             bspline.clamped(np.array([0.0, 1.0])),
             np.tile(q_start, (bspline.DEGREE + 1, 1)),
         )
-    profiles = found.profiles[0]
+    profiles = trajectory.profiles[0]
     ends = np.array([profile.t for profile in profiles]).cumsum(axis=1)
-    ends[:, -1] = found.duration
+    ends[:, -1] = trajectory.duration
     jerk = np.array([profile.j for profile in profiles])
     by_time_scale = dict[float, Spline]()
     for closest in RUCKIG.merge_distances:
@@ -95,12 +95,12 @@ def straight(limits: Limits, q_start: Array, q_goal: Array) -> SampledMotion:
     It is Ruckig's motion of the joint with the largest displacement, under limits that respect the
     limits of all joints.
     """
-    way = q_goal - q_start
-    longest = np.abs(way).max(keepdims=True)
-    law = time_optimal(_along(limits, way), np.zeros(1), longest)
+    displacement = q_goal - q_start
+    longest = np.abs(displacement).max(keepdims=True)
+    law = time_optimal(_along(limits, displacement), np.zeros(1), longest)
     if law.duration == 0:
         return standstill(q_start, 0.0)
-    share = way / longest
+    share = displacement / longest
     return replace(
         law,
         q=q_start + law.q * share,
@@ -114,21 +114,23 @@ def straight(limits: Limits, q_start: Array, q_goal: Array) -> SampledMotion:
 
 def straight_spline(limits: Limits, q_start: Array, q_goal: Array) -> Spline:
     """The motion of `straight` as a spline; see `time_optimal_spline`."""
-    way = q_goal - q_start
-    longest = np.abs(way).max(keepdims=True)
-    law = time_optimal_spline(_along(limits, way), np.zeros(1), longest)
-    return replace(law, control_points=q_start + law.control_points * (way / (longest or 1.0)))
+    displacement = q_goal - q_start
+    longest = np.abs(displacement).max(keepdims=True)
+    law = time_optimal_spline(_along(limits, displacement), np.zeros(1), longest)
+    return replace(
+        law, control_points=q_start + law.control_points * (displacement / (longest or 1.0))
+    )
 
 
-def _along(limits: Limits, way: Array) -> Limits:
+def _along(limits: Limits, displacement: Array) -> Limits:
     """Limits of the joint with the largest displacement if all joints move synchronously over
-    displacements `way` (nq,) [rad].
+    displacements (nq,) [rad].
     """
-    size = np.abs(way)
+    size = np.abs(displacement)
     share = size / (size.max() or 1.0)
     rates = {
         name: np.divide(
-            getattr(limits, name), share, out=np.full(len(way), np.inf), where=share > 0
+            getattr(limits, name), share, out=np.full(len(displacement), np.inf), where=share > 0
         ).min(keepdims=True)
         for name in ("v_max", "a_max", "j_max")
     }
@@ -136,19 +138,21 @@ def _along(limits: Limits, way: Array) -> Limits:
     return Limits(q_min=-none, q_max=none, tau_max=none, **rates)
 
 
-def time_optimal_positions(limits: Limits, q_start: Array, q_goal: Array, at: Array) -> Array:
+def time_optimal_positions(
+    limits: Limits, q_start: Array, q_goal: Array, fractions: Array
+) -> Array:
     """Positions (k, nq) [rad] of Ruckig's motion at the fractions `at` (k,) of its duration."""
-    found = _ruckig(limits, q_start, q_goal)
-    return _states(found, at * found.duration)[0]
+    trajectory = _ruckig(limits, q_start, q_goal)
+    return _states(trajectory, fractions * trajectory.duration)[0]
 
 
-def _states(found: ruckig.Trajectory, t: Array) -> tuple[Array, Array, Array]:
+def _states(trajectory: ruckig.Trajectory, t: Array) -> tuple[Array, Array, Array]:
     """q [rad], v [rad/s] and a [rad/s²] (k, nq) at times t (k,) [s], from the phases of constant
     jerk.
 
     Equal to `found.at_time`, a method for one instant at a time.
     """
-    profiles = found.profiles[0]
+    profiles = trajectory.profiles[0]
     length, jerk = np.array([(profile.t, profile.j) for profile in profiles]).transpose(1, 0, 2)
     at_start = np.array([(profile.p[:-1], profile.v[:-1], profile.a[:-1]) for profile in profiles])
     ends = length.cumsum(axis=1)
@@ -160,25 +164,28 @@ def _states(found: ruckig.Trajectory, t: Array) -> tuple[Array, Array, Array]:
 
 
 def _ruckig(limits: Limits, q_start: Array, q_goal: Array) -> ruckig.Trajectory:
-    given = ruckig.InputParameter(len(q_start))
-    given.current_position, given.target_position = q_start.tolist(), q_goal.tolist()
-    given.max_velocity, given.max_acceleration = limits.v_max.tolist(), limits.a_max.tolist()
+    parameters = ruckig.InputParameter(len(q_start))
+    parameters.current_position, parameters.target_position = q_start.tolist(), q_goal.tolist()
+    parameters.max_velocity, parameters.max_acceleration = (
+        limits.v_max.tolist(),
+        limits.a_max.tolist(),
+    )
     for share in RUCKIG.jerk_shares:
-        given.max_jerk = (share * limits.j_max).tolist()
-        found = ruckig.Trajectory(len(q_start))
+        parameters.max_jerk = (share * limits.j_max).tolist()
+        trajectory = ruckig.Trajectory(len(q_start))
         try:
-            result = ruckig.Ruckig(len(q_start)).calculate(given, found)
+            result = ruckig.Ruckig(len(q_start)).calculate(parameters, trajectory)
         except ruckig.RuckigError as error:
             result = error
         if result in (ruckig.Result.Working, ruckig.Result.Finished):
-            return found
+            return trajectory
     raise RuntimeError(f"Ruckig found no motion: {result}")
 
 
-def _breaks(found: ruckig.Trajectory) -> Array:
+def _breaks(trajectory: ruckig.Trajectory) -> Array:
     """Fractions (b,) of the duration at which the jerk of any joint jumps, with 0 and 1,
     ascending.
     """
-    phases = np.array([profile.t for profile in found.profiles[0]])
-    ends = np.append(phases.cumsum(axis=1), [0.0, found.duration]) / found.duration
+    phases = np.array([profile.t for profile in trajectory.profiles[0]])
+    ends = np.append(phases.cumsum(axis=1), [0.0, trajectory.duration]) / trajectory.duration
     return np.asarray(np.unique(np.round(ends, 12)))

@@ -64,9 +64,9 @@ def switches(displacement: Array, duration: float, limits: Limits, closest: floa
         closest: distance of switches, as a fraction of the duration, up to which they count as one.
     """
     distance = np.abs(displacement)
-    own = _durations(distance, limits)
-    lead = int(own.argmax())
-    duration = max(duration, float(own[lead]))
+    durations = _durations(distance, limits)
+    lead = int(durations.argmax())
+    duration = max(duration, float(durations[lead]))
     d, a, j = distance[lead], limits.a_max[lead], limits.j_max[lead]
     if d == 0:
         return np.zeros(0)

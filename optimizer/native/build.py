@@ -87,10 +87,10 @@ def _commands() -> list[list[str]]:
 
     CC may name zig: `make` installs it if there is no C compiler.
     """
-    found, machine = compiler(), platform.machine()
-    if found is not None:
-        gcc = [found, BASELINES[machine]] if machine in BASELINES else [found]
-        return [gcc, [found, ZIG_BASELINE]]
+    command, machine = compiler(), platform.machine()
+    if command is not None:
+        gcc = [command, BASELINES[machine]] if machine in BASELINES else [command]
+        return [gcc, [command, ZIG_BASELINE]]
     if find_spec("ziglang") is not None:
         return [[sys.executable, "-m", "ziglang", "cc", ZIG_BASELINE]]
     return []

@@ -10,10 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
-from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
+from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.dwell import Dwell, Hold
 from joulepath.optimizer.problem.free_order import FreeOrder, check_order
 from joulepath.optimizer.problem.names import check_name, first_repeated
@@ -28,7 +27,7 @@ from joulepath.optimizer.problem.stops import (
     moves_over,
     passing,
 )
-from joulepath.optimizer.problem.targets import AnyOf, Target, validated
+from joulepath.optimizer.problem.targets import Target, validated_in_cycle
 from joulepath.optimizer.result.energy import Objective
 
 
@@ -114,9 +113,9 @@ class Cycle:
         if not 1 <= len(self.stops) <= CYCLE_RANGES.max_stops:
             raise InvalidProblem("stops", f"A cycle must have 1 to {CYCLE_RANGES.max_stops} stops.")
         self._check_names()
-        object.__setattr__(self, "start", _checked_target(self.arm, "start", self.start))
+        object.__setattr__(self, "start", validated_in_cycle(self.arm, "start", self.start))
         checked = tuple(
-            replace(stop, target=_checked_target(self.arm, f"stops.{k}.target", stop.target))
+            replace(stop, target=validated_in_cycle(self.arm, f"stops.{k}.target", stop.target))
             for k, stop in enumerate(self.stops)
         )
         object.__setattr__(self, "stops", checked)
@@ -324,35 +323,3 @@ class Cycle:
         """The allowed duration [s] nearest to the given one."""
         most = np.inf if self.duration_max is None else self.duration_max
         return min(max(duration, self.duration_min or 0.0), most)
-
-
-def _checked_target(arm: Arm, field: str, target: Target) -> Target:
-    """A target with its joint positions as read-only arrays.
-
-    Raises:
-        InvalidProblem: the target is malformed, or a start or a member of several targets has a
-            free orientation.
-        OutsideLimits: joint positions are out of range.
-    """
-    if field == START and isinstance(target, ConeOrientedPose):
-        raise InvalidProblem(
-            field,
-            "The orientation at the start is given in full: give a quaternion, rpy or rotvec, or "
-            "joint positions.",
-        )
-    if isinstance(target, AnyOf) and any(
-        isinstance(member, ConeOrientedPose) for member in target.targets
-    ):
-        raise InvalidProblem(
-            field,
-            "Of several targets, each has its orientation in full: give a quaternion, rpy or "
-            "rotvec.",
-        )
-    try:
-        return validated(arm, "goal", target)
-    except OutsideLimits as error:
-        raise OutsideLimits(field, error.joint, error.value, error.lower, error.upper) from None
-    except InvalidProblem as error:
-        raise InvalidProblem(
-            error.field.replace("goal", field, 1), str(error).replace("goal", field, 1)
-        ) from None

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.arrays import frozen
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -110,3 +110,40 @@ def validated(arm: Arm, name: str, target: Target, on_path: bool = False) -> Tar
     q = frozen(target, (arm.robot.nq,), f"{name}.q")
     arm.check_inside(name, q)
     return q
+
+
+def validated_in_cycle(arm: Arm, field: str, target: Target) -> Target:
+    """A target of a cycle, with its joint positions as read-only arrays.
+
+    Args:
+        arm: arm of the cycle.
+        field: `start`, or the field of a stop's target.
+        target: the target.
+
+    Raises:
+        InvalidProblem: the target is malformed, or a start or a member of several targets has a
+            free orientation.
+        OutsideLimits: joint positions are out of range.
+    """
+    if field == "start" and isinstance(target, ConeOrientedPose):
+        raise InvalidProblem(
+            field,
+            "The orientation at the start is given in full: give a quaternion, rpy or rotvec, or "
+            "joint positions.",
+        )
+    if isinstance(target, AnyOf) and any(
+        isinstance(member, ConeOrientedPose) for member in target.targets
+    ):
+        raise InvalidProblem(
+            field,
+            "Of several targets, each has its orientation in full: give a quaternion, rpy or "
+            "rotvec.",
+        )
+    try:
+        return validated(arm, "goal", target)
+    except OutsideLimits as error:
+        raise OutsideLimits(field, error.joint, error.value, error.lower, error.upper) from None
+    except InvalidProblem as error:
+        raise InvalidProblem(
+            error.field.replace("goal", field, 1), str(error).replace("goal", field, 1)
+        ) from None

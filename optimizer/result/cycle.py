@@ -97,10 +97,8 @@ class CycleSearchReport:
     pairs: Count
     """Pairs of arm configurations, over all moves."""
     distinct: Count
-    """Number of these pairs that differ in more than full turns of both ends; each has a proven
-    bound.
-    """
+    """Number of pairs that differ in more than full turns of both ends; each has a proven bound."""
     solved: Count
-    """Number of these pairs for which a motion was sought."""
+    """Number of distinct pairs for which a motion was sought."""
     wall_time: Seconds
     """Wall time."""

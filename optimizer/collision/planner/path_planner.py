@@ -139,11 +139,11 @@ def plan_paths(
     checkers = ValidityCheckers(arm, collision_model(arm)) if checkers is None else checkers
     if template is not None:
         effort = Effort(min(effort.most_states, PLANNER.template_states), paths=1)
-    found = _reserves(checkers, q_start, np.atleast_2d(q_goals))
-    if found is None:
+    reserves = _reserves(checkers, q_start, np.atleast_2d(q_goals))
+    if reserves is None:
         return PlannedPaths(PlanningEnd.INVALID_END)
     with _seeded(seed, deadline):
-        planning = _Planning(checkers, q_start, *found, template, deadline)
+        planning = _Planning(checkers, q_start, *reserves, template, deadline)
         paths = planning.run(effort)
     end = (
         PlanningEnd.FOUND

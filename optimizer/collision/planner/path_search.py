@@ -215,6 +215,6 @@ class PathSearch:
 
 def _nearest(paths: Sequence[Array], q: Array) -> tuple[int, int]:
     """Indices of the path (k, nq), and of its point, nearest to q (nq,)."""
-    apart = [np.abs(path - q).max(axis=1) for path in paths]
-    chosen = min(range(len(paths)), key=lambda k: float(apart[k].min()))
-    return chosen, int(apart[chosen].argmin())
+    distances = [np.abs(path - q).max(axis=1) for path in paths]
+    chosen = min(range(len(paths)), key=lambda k: float(distances[k].min()))
+    return chosen, int(distances[chosen].argmin())
