@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from joulepath.models.robot import Array, Drives, FrictionLaw
-from joulepath.optimizer.dynamics.bus_flow import exchange
+from joulepath.optimizer.dynamics.bus_flow import BusFlow, exchange
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.result.energy import (
     ElectricalEnergy,
@@ -139,14 +139,11 @@ def breakdown(
         kinetic: gain of kinetic energy from the first to the last state [J].
         tau_friction: friction torques (k, nq) [N·m] if they are known already.
     """
-    duration = float(weights.sum())
     if tau_friction is None:
         tau_friction = friction_torque(arm.friction_law, arm.drives, tau, v, a)
     flow = flow_with(tau_friction, tau, v, arm.drives)
-    bus, joints = arm.bus, flow.joints
-    flows = exchange(bus, arm.regeneration, arm.base_power, joints, weights)
-    surplus, charged = float(flows.surplus.sum()), float(flows.charged.sum())
-    drawn, discharge = float(flows.drawn.sum()), float(flows.charge[0] - flows.charge[-1])
+    flows = exchange(arm.bus, arm.regeneration, arm.base_power, flow.joints, weights)
+    duration, drawn = float(weights.sum()), float(flows.drawn.sum())
     per_joint = JointEnergy(
         friction=weights @ flow.friction,
         copper=weights @ flow.copper,
@@ -154,34 +151,49 @@ def breakdown(
         shaft=weights @ flow.shaft,
     )
     mechanical = weights @ np.abs(tau * v)
+    power = np.divide(flows.drawn, weights, out=np.zeros_like(weights), where=weights > 0)
     return Energy(
-        electrical=ElectricalEnergy(
-            total=drawn + discharge,
-            idle=arm.base_power * duration,
-            potential=potential,
-            kinetic=kinetic,
-            friction=float(per_joint.friction.sum()),
-            copper=float(per_joint.copper.sum()),
-            inverter=float(per_joint.inverter.sum()),
-            braking=surplus,
-            # Subtracted from 0.0, since -1 times 0.0 would be -0.0.
-            recovered=0.0 - arm.regeneration * surplus,
-            storage_loss=(1 - bus.efficiency) * charged,
-        ),
+        electrical=_electrical_energy(flows, per_joint, duration, potential, kinetic, arm),
         mechanical=MechanicalEnergy(total=float(mechanical.sum()), per_joint=mechanical),
         per_joint=per_joint,
-        peak_power=float(
-            np.divide(flows.drawn, weights, out=np.zeros_like(weights), where=weights > 0).max()
-        ),
+        peak_power=float(power.max()),
         mean_power=drawn / duration if duration > 0 else 0.0,
-        storage=None
-        if bus.mode != "storage"
-        else StorageUse(
-            initial=float(flows.charge[0]),
-            final=float(flows.charge[-1]),
-            charged=charged,
-            discharged=float(flows.discharged.sum()),
-        ),
+        storage=_storage_use(flows) if arm.bus.mode == "storage" else None,
+    )
+
+
+def _electrical_energy(
+    flows: BusFlow,
+    per_joint: JointEnergy,
+    duration: float,
+    potential: float,
+    kinetic: float,
+    arm: Arm,
+) -> ElectricalEnergy:
+    """Electrical energy and its parts [J], see `breakdown`."""
+    surplus, charged = float(flows.surplus.sum()), float(flows.charged.sum())
+    drawn, discharge = float(flows.drawn.sum()), float(flows.charge[0] - flows.charge[-1])
+    return ElectricalEnergy(
+        total=drawn + discharge,
+        idle=arm.base_power * duration,
+        potential=potential,
+        kinetic=kinetic,
+        friction=float(per_joint.friction.sum()),
+        copper=float(per_joint.copper.sum()),
+        inverter=float(per_joint.inverter.sum()),
+        braking=surplus,
+        # Subtracted from 0.0, since -1 times 0.0 would be -0.0.
+        recovered=0.0 - arm.regeneration * surplus,
+        storage_loss=(1 - arm.bus.efficiency) * charged,
+    )
+
+
+def _storage_use(flows: BusFlow) -> StorageUse:
+    return StorageUse(
+        initial=float(flows.charge[0]),
+        final=float(flows.charge[-1]),
+        charged=float(flows.charged.sum()),
+        discharged=float(flows.discharged.sum()),
     )
 
 

@@ -141,7 +141,7 @@ def _along(limits: Limits, displacement: Array) -> Limits:
 def time_optimal_positions(
     limits: Limits, q_start: Array, q_goal: Array, fractions: Array
 ) -> Array:
-    """Positions (k, nq) [rad] of Ruckig's motion at the fractions `at` (k,) of its duration."""
+    """Positions (k, nq) [rad] of Ruckig's motion at fractions (k,) of its duration."""
     trajectory = _ruckig(limits, q_start, q_goal)
     return _states(trajectory, fractions * trajectory.duration)[0]
 
