@@ -21,7 +21,7 @@ from joulepath.optimizer.cycle.cycle_solution import (
 from joulepath.optimizer.cycle.moves import moves_of
 from joulepath.optimizer.cycle.rest_energy import dwell_energies, rest_sensitivity
 from joulepath.optimizer.deadline import Clock
-from joulepath.optimizer.dynamics.interval import Known, saving_interval
+from joulepath.optimizer.dynamics.interval import MotionEnergy, saving_interval
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cycle import Cycle
@@ -118,7 +118,7 @@ def chain_baseline(
     sensitivity = reduce(add, [move.sensitivity for move in moves]) + rest_sensitivity_of_chain(
         search, nodes
     )
-    known = Known(energy, sensitivity, sum(move.duration for move in moves))
+    known = MotionEnergy(energy, sensitivity, sum(move.duration for move in moves))
     theirs = CycleEnergies(known, sum(move.energy.mechanical.total for move in moves))
     baseline = cycle_baseline(search.cycle, name, duration, theirs, True, ours)
     return replace(baseline, moves=moves_of(search, nodes, moves, {}))
@@ -166,7 +166,7 @@ def controller_default(
     if search.cycle.clamped_duration(duration) != duration:
         return None
     sensitivity = reduce(add, sensitivities) + rest_sensitivity_of_chain(search, nodes)
-    known = Known(
+    known = MotionEnergy(
         total + sum(dwell_energies_of_chain(search, nodes)),
         sensitivity,
         duration - search.cycle.dwell_time,

@@ -16,7 +16,7 @@ from joulepath.optimizer.cycle.cycle_solution import (
 )
 from joulepath.optimizer.cycle.rest_energy import rest_energy, rest_sensitivity
 from joulepath.optimizer.dynamics.dwell import holding_power
-from joulepath.optimizer.dynamics.interval import Known
+from joulepath.optimizer.dynamics.interval import MotionEnergy
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE
 from joulepath.optimizer.problem.cycle import Cycle
@@ -60,17 +60,17 @@ def _priced(cycle: Cycle, found: CycleSolution, each: CycleBaseline) -> CycleBas
     return replace(each, saving=again.saving, saving_interval=again.saving_interval)
 
 
-def _rest(cycle: Cycle, move: CycleMove, length: float) -> Known:
+def _rest(cycle: Cycle, move: CycleMove, length: float) -> MotionEnergy:
     """A wait of `length` [s] after a move."""
     q, arm = move.solution.goal.q, move.planned.arm_after
     still = np.zeros((1, len(q)))
     hold = float(holding_power(arm, Plant(arm).torques(q[None], still, still)[0]))
     energy = rest_energy(cycle, move.planned, length, hold)
-    return Known(energy, rest_sensitivity(cycle, move.planned, length, q), 0.0)
+    return MotionEnergy(energy, rest_sensitivity(cycle, move.planned, length, q), 0.0)
 
 
-def _sum(first: Known, second: Known) -> Known:
-    return Known(
+def _sum(first: MotionEnergy, second: MotionEnergy) -> MotionEnergy:
+    return MotionEnergy(
         first.energy + second.energy,
         first.sensitivity + second.sensitivity,
         first.duration + second.duration,

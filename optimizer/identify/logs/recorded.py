@@ -67,7 +67,7 @@ def _part(log: Log, plant: Plant, torque: Array | None, rows: slice) -> Measured
     q, v, a = (channel[rows].astype(float) for channel in (log.q, log.v, log.a))
     tau = plant.torques(q, v, a)
     # the measured torque beyond that of the motion is lost
-    energy = breakdown(weights, v, a, tau, 0.0, plant.arm, lost=torque[rows] - tau)
+    energy = breakdown(weights, v, a, tau, 0.0, plant.arm, tau_friction=torque[rows] - tau)
     return MeasuredEnergy(drawn, energy.electrical.total)
 
 
