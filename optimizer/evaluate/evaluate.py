@@ -216,9 +216,10 @@ class _Evaluator:
 
     def _sensitivity_of(self, nodes: _Nodes, inside: slice, charge: float) -> Sensitivity:
         """That of the energy of some nodes, which begin with a charge [J] of the storage."""
-        parts = (nodes.weights, nodes.q, nodes.v, nodes.a, nodes.tau)
-        own = (part[inside] for part in parts)
-        return energy_sensitivity(*own, self._charged(charge), self._spread)
+        weights, q, v, a, tau = (
+            part[inside] for part in (nodes.weights, nodes.q, nodes.v, nodes.a, nodes.tau)
+        )
+        return energy_sensitivity(weights, q, v, a, tau, self._charged(charge), self._spread)
 
     def _charge_course(self, nodes: _Nodes) -> Array:
         """Charge (k + 1,) [J] of the energy storage before each node and after the last."""
