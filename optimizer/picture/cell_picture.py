@@ -10,72 +10,19 @@ from itertools import pairwise
 from xml.sax.saxutils import escape
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.bodies import Body
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.export.program import Move, Program
 from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.picture.solids import corners, extent, faces
+from joulepath.optimizer.picture.view import PictureSettings, View
 from joulepath.optimizer.problem.arm import PAYLOAD, TOOL, Arm
+from joulepath.optimizer.problem.stops import APPROACH, ENTRY, RETREAT
 
-
-@dataclass(frozen=True)
-class PictureSettings:
-    """Size, view and colours of a picture."""
-
-    width: int = 760
-    height: int = 560
-    border: int = 34
-    """Free space around what is drawn [px]."""
-    elevation: float = 0.45
-    """Angle of the view above the horizon [rad]."""
-    directions: int = 12
-    """Directions around the arm of which the one is taken that shows most of the way."""
-    points_of_a_move: int = 60
-    discs: int = 28
-    """Corners of the polygon that stands for a disc."""
-    least_radius: float = 4.0
-    """Half of the least width of a body [px]."""
-    arm: str = "#c3ccd5"
-    tool: str = "#6f8aa5"
-    payload: str = "#e08e2b"
-    obstacle: str = "#d3ab82"
-    loaded: str = "#14654f"
-    empty: str = "#2f6fb3"
-    ink: str = "#17202b"
-    start: float = 0.35
-    """Opacity of the arm at the start."""
-
-
-@dataclass(frozen=True)
-class _View:
-    """Orthographic projection: `axes` (2, 3) of the picture and `towards` (3,) the viewer."""
-
-    axes: Array
-    towards: Array
-    scale: float = 1.0
-    offset: tuple[float, float] = (0.0, 0.0)
-
-    @staticmethod
-    def at(azimuth: float, elevation: float) -> _View:
-        c, s, ce, se = np.cos(azimuth), np.sin(azimuth), np.cos(elevation), np.sin(elevation)
-        # y of a picture points down
-        axes = np.array([[-s, c, 0.0], [se * c, se * s, -ce]])
-        return _View(axes, np.array([ce * c, ce * s, se]))
-
-    def flat(self, points: Array) -> Array:
-        """Points (n, 2) [px] of points (n, 3) [m]."""
-        return np.asarray(points @ self.axes.T * self.scale + self.offset)
-
-    def fitting(self, points: Array, asked: PictureSettings) -> _View:
-        """The same view, in which all points (n, 3) [m] are within the picture."""
-        flat = points @ self.axes.T
-        low, size = flat.min(axis=0), np.maximum(np.ptp(flat, axis=0), 1e-3)
-        room = np.array([asked.width, asked.height]) - 2 * asked.border
-        scale = float((room / size).min())
-        offset = asked.border + (room - size * scale) / 2 - low * scale
-        return _View(self.axes, self.towards, scale, (float(offset[0]), float(offset[1])))
+OUTER_ENDS = (APPROACH, RETREAT, ENTRY)
+"""How the names of places end that are no stops."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +54,7 @@ def cell_picture(program: Program, settings: PictureSettings | None = None) -> s
     obstacles = _placed_scene(first.arm)
     ways = [(move, _way(move, asked)) for move in program.moves]
     points = np.concatenate(
-        [*(way for _, way in ways), *(_extent(*each) for each in (*start, *there, *obstacles))]
+        [*(way for _, way in ways), *(extent(*each) for each in (*start, *there, *obstacles))]
     )
     ground = _ground(points) if _has_ground(first.arm) else np.zeros((0, 3))
     view = _best_view(np.concatenate([way for _, way in ways]), asked).fitting(
@@ -178,35 +125,16 @@ def _has_ground(arm: Arm) -> bool:
     )
 
 
-def _corners(body: Body, T: Array) -> Array:
-    """Points (n, 3) [m] whose hull, grown by the body's radius, is the body."""
-    core = body.core
-    points = core.points
-    if core.disc_radius:
-        angle = np.linspace(0.0, 2 * np.pi, PictureSettings.discs, endpoint=False)
-        disc = core.disc_radius * np.stack(
-            [np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1
-        )
-        points = (points[:, None] + disc).reshape(-1, 3)
-    return np.asarray(points @ T[:3, :3].T + T[:3, 3])
-
-
-def _extent(body: Body, T: Array) -> Array:
-    """Points (n, 3) [m] around the body, its radius included."""
-    directions = 1.2 * body.core.radius * np.concatenate([np.eye(3), -np.eye(3)])
-    return np.asarray((_corners(body, T)[:, None] + directions).reshape(-1, 3))
-
-
-def _best_view(way: Array, asked: PictureSettings) -> _View:
+def _best_view(way: Array, asked: PictureSettings) -> View:
     """The view in which the way covers the largest area."""
     turns = np.linspace(0.0, 2 * np.pi, asked.directions, endpoint=False) + 0.3
-    views = [_View.at(turn, asked.elevation) for turn in turns]
+    views = [View.at(turn, asked.elevation) for turn in turns]
     return max(views, key=lambda view: float(np.prod(np.ptp(way @ view.axes.T, axis=0) + 1e-6)))
 
 
-def _drawn(view: _View, body: Body, T: Array, asked: PictureSettings) -> Iterator[_Drawn]:
+def _drawn(view: View, body: Body, T: Array, asked: PictureSettings) -> Iterator[_Drawn]:
     """The parts of a body: a line as thick as a capsule, or the faces of a solid."""
-    points, colour = _corners(body, T), _colour(body, asked)
+    points, colour = corners(body, T), _colour(body, asked)
     radius = max(body.core.radius * view.scale, asked.least_radius if body.is_segment else 0.0)
     if body.is_segment:
         ends = view.flat(points[[0, -1]])
@@ -220,7 +148,7 @@ def _drawn(view: _View, body: Body, T: Array, asked: PictureSettings) -> Iterato
             f'<path d="{line}" {style} stroke="{colour}" stroke-width="{2 * radius:.1f}"/>',
         )
         return
-    for face, normal in _faces(points):
+    for face, normal in faces(points):
         if normal @ view.towards <= 0 and radius == 0:
             continue
         light = 0.72 + 0.28 * max(float(normal @ np.array([0.2, 0.1, 0.97])), 0.0)
@@ -235,31 +163,6 @@ def _drawn(view: _View, body: Body, T: Array, asked: PictureSettings) -> Iterato
         )
 
 
-def _faces(points: Array) -> Iterator[tuple[Array, Array]]:
-    """The flat faces of a hull: their corners (m, 3) in order, and outward normals (3,)."""
-    try:
-        hull = ConvexHull(points)
-    except QhullError:
-        # a plate without a thickness
-        middle = points.mean(axis=0)
-        normal = np.linalg.svd(points - middle)[2][-1]
-        yield _around(points, normal), normal
-        yield _around(points, -normal), -normal
-        return
-    planes = np.round(hull.equations, 6)
-    for plane in np.unique(planes, axis=0):
-        corners = np.unique(hull.simplices[(planes == plane).all(axis=1)])
-        yield _around(points[corners], plane[:3]), plane[:3]
-
-
-def _around(points: Array, normal: Array) -> Array:
-    """Points of a plane in order around their middle."""
-    off = points - points.mean(axis=0)
-    first = off[int(np.argmax((off**2).sum(axis=1)))]
-    angle = np.arctan2(off @ np.cross(normal, first), off @ first)
-    return np.asarray(points[np.argsort(angle)])
-
-
 def _ground(points: Array) -> Array:
     """Corners (4, 3) [m] of a piece of the ground beneath all points (n, 3) [m]."""
     low, high = points.min(axis=0), points.max(axis=0)
@@ -267,12 +170,12 @@ def _ground(points: Array) -> Array:
     return np.array([[x, y, low[2]] for x, y in corners])
 
 
-def _floor(view: _View, corners: Array) -> str:
+def _floor(view: View, corners: Array) -> str:
     shape = "M" + "L".join(_xy(each) for each in view.flat(corners)) + "Z"
     return f'<path d="{shape}" fill="#eef1f4" stroke="#d7dde3"/>'
 
 
-def _line(view: _View, way: Array, loaded: bool, asked: PictureSettings) -> str:
+def _line(view: View, way: Array, loaded: bool, asked: PictureSettings) -> str:
     colour = asked.loaded if loaded else asked.empty
     dash = "" if loaded else ' stroke-dasharray="7 5"'
     path = "M" + "L".join(_xy(each) for each in view.flat(way))
@@ -282,7 +185,7 @@ def _line(view: _View, way: Array, loaded: bool, asked: PictureSettings) -> str:
     )
 
 
-def _marks(view: _View, program: Program, asked: PictureSettings) -> Iterator[str]:
+def _marks(view: View, program: Program, asked: PictureSettings) -> Iterator[str]:
     """The start, and the numbers of the stops at which the arm rests, or the goal of one move."""
     at = tcp_pose(program.moves[0].arm, program.start)[:3, 3]
     yield _label(view.flat(at[None])[0], "Start", asked)
@@ -307,11 +210,17 @@ class RestingStop:
 
 
 def stops_of(program: Program) -> Iterator[RestingStop]:
-    """The stops of a program. The end of its last move is none: a cycle leads back to the start."""
+    """The stops of a program. The end of its last move is none: a cycle leads back to the start.
+    Nor are the outer ends of lines, and the starts of paths.
+    """
     moves = [k for k, each in enumerate(program.timed) if isinstance(each.step, Move)]
-    for number, (here, following) in enumerate(pairwise(moves), 1):
+    number = 0
+    for here, following in pairwise(moves):
         timed, move = program.timed[here], program.timed[here].step
         assert isinstance(move, Move)
+        if move.label.endswith(OUTER_ENDS):
+            continue
+        number += 1
         place = tcp_pose(move.arm, move.spline.control_points[-1])[:3, 3]
         takes = any(each.grasps for each in program.timed[here + 1 : following + 1])
         yield RestingStop(number, timed.t0 + move.duration, place, takes)
