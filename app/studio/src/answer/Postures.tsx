@@ -39,7 +39,7 @@ export function Postures() {
         </table>
       </div>
       <p class="hint">
-        {best!.letter}: {postureWords(best!.label)}. Each from the start of this move.
+        {best!.letter}: {postureWords(best!.label)}. Each from the start that suits it best.
         {collide > 0 && ` ${collide} of ${all.length} ${collide === 1 ? "collides" : "collide"} at the goal.`}
       </p>
     </Section>

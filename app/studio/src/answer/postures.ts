@@ -7,12 +7,15 @@ import { answered, stale, type Answered } from "../store/state";
 import type { IkSolution, Solution } from "../store/types";
 
 const MOST = 8;
-const PATIENCE = 5; // deadline of one motion [s]
+const PATIENCE = 4; // deadline of one motion [s]
+const MOST_TURNS = 64; // of a posture, that are compared
 
 export interface Posture {
   letter: string;
   label: string;
   q: number[];
+  /** The same posture with joints full turns further. */
+  turns: number[][];
   state: "computing" | "shown" | "collides" | "failed";
   energy: number | null;
   duration: number | null;
@@ -47,6 +50,7 @@ async function compute(shown: Answered, signal: AbortSignal): Promise<void> {
   const { solutions } = await post<{ solutions: IkSolution[] }>("ik", ikBody(asked, target.pose, true), signal);
   const { start, goal } = shown.solution.branch;
   let all = distinct(solutions, start.q, goal.q).map(([{ label, q, collides, nearest }, own], k): Posture => ({
+    turns: solutions.filter((each) => !apart(each.q, q)).map((each) => each.q).slice(0, MOST_TURNS),
     letter: "ABCDEFGH"[k]!,
     label: own ? goal.label : label,
     q: own ? goal.q : q,
@@ -76,13 +80,14 @@ function distinct(solutions: IkSolution[], start: number[], goal: number[]): [Ik
   return [...own.map((each): [IkSolution, boolean] => [each, true]), ...others.map((each): [IkSolution, boolean] => [each, false])].slice(0, MOST);
 }
 
-/** The motion from the answer's own start to one posture. */
+/** The best motion to one posture, from the start that suits it best. */
 async function motionTo(shown: Answered, posture: Posture, signal: AbortSignal): Promise<Posture> {
-  const { branch } = shown.solution;
-  const body = { ...shown.asked, start: { q: branch.start.q }, goal: { q: posture.q }, branch: null, windings: false, candidates: "none", deadline: PATIENCE };
+  const goal = { any_of: posture.turns.map((q) => ({ q })) };
+  const body = { ...shown.asked, goal, branch: null, windings: false, candidates: "none", deadline: PATIENCE };
   try {
     const solution = await post<Solution>("optimize", body, signal);
-    return { ...posture, state: "shown", energy: solution.energy.electrical.total, duration: solution.duration, solution };
+    const { q } = solution.branch.goal;
+    return { ...posture, q, state: "shown", energy: solution.energy.electrical.total, duration: solution.duration, solution };
   } catch (error) {
     return { ...posture, state: "failed", why: (error as Error).message };
   }
