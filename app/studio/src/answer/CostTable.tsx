@@ -3,7 +3,7 @@ import { Button } from "../ui/Button";
 import { Section } from "../ui/Section";
 import { costsOf, type Economics, type Sourced } from "../store/economics";
 import { answered, economics, stale, type Answered } from "../store/state";
-import { figure, parseNumber } from "../store/units";
+import { figure, fixed, parseNumber } from "../store/units";
 import { wait } from "./waits";
 
 /** The parts of what one move or round costs. */
@@ -32,8 +32,8 @@ export function CostTable() {
           <tr>
             <td />
             <th scope="col"><b>{shown.cycle ? "round" : "cycle"}</b> {figure(costs.cycle)} s</th>
-            <th scope="col"><b>shift</b> {figure(costs.cyclesPerShift, 4)}×</th>
-            <th scope="col"><b>year</b> {figure(given.shiftsPerYear, 4)} shifts</th>
+            <th scope="col"><b>shift</b> {fixed(costs.cyclesPerShift, 0)}×</th>
+            <th scope="col"><b>year</b> {fixed(given.shiftsPerYear, 0)} shifts</th>
           </tr>
         </thead>
         <tbody>
@@ -51,7 +51,8 @@ export function CostTable() {
         </tbody>
       </table>
       <p class="hint">
-        {given.price.value} € a kWh ({given.price.source}), {given.carbon.value} kg CO₂e a kWh ({given.carbon.source}).{" "}
+        <span title={given.price.source}>{fixed(given.price.value, 2)} € a kWh ({short(given.price.source)})</span>,{" "}
+        <span title={given.carbon.source}>{fixed(given.carbon.value, 2)} kg CO₂e a kWh ({short(given.carbon.source)})</span>.{" "}
         {given.box ? "" : "The control box itself is not counted: enter a wattmeter’s reading. "}
         {given.cycle === null && !shown.cycle ? "Back to back: say how often the move comes to price the wait." : ""}
         {unpriced ? "The wait is being priced." : ""}
@@ -60,6 +61,9 @@ export function CostTable() {
     </Section>
   );
 }
+
+/** A source by its first words; the whole of it is among the assumptions. */
+const short = (source: string) => source.split(":")[0]!;
 
 /** What the costs rest on; each is replaced by the user's own. */
 function Assumptions() {

@@ -7,6 +7,7 @@ export const BASELINES: Record<string, string> = {
   quintic: "Quintic in joints",
   ruckig: "Fastest in time",
   ruckig_slowed: "Fastest, slowed",
+  straight: "Straight in joints",
   controller_default: "Controller default",
   stopping: "Rests at every stop",
   move_by_move: "Each move by itself",

@@ -46,7 +46,7 @@ function rowOf(cells: string[], head: string[] | null): Row {
   const massAt = head?.findIndex((name) => /\b(kg|mass|payload)\b/.test(name)) ?? -1;
   const idAt = head?.findIndex((name) => /^(no\.?|nr\.?|id|#)$/.test(name)) ?? -1;
   const rest = cells.filter((_, k) => k !== massAt && k !== idAt);
-  const mass = massAt >= 0 ? Number(cells[massAt]!.replace("−", "-") || 0) : null;
+  const mass = massAt >= 0 ? Number((cells[massAt] ?? "").replace("−", "-") || 0) : null;
   return {
     names: rest.filter((cell) => cell && !isNumber(cell)),
     mass: Number.isFinite(mass) ? mass : null,

@@ -21,8 +21,8 @@ const NUMBER = /[+\-−]?(?:\d+(?:[.]\d*)?|[.]\d+)(?:e[+-]?\d+)?/gi;
 const LABEL = /\b(?:r[xyz]|[xyz]|rpy|roll|pitch|yaw|j\d|q\d|joint ?\d|base|shoulder|elbow|wrist ?\d)\b\s*[:=]?/gi;
 
 const LENGTHS = [
-  { factor: 0.001, name: "mm" },
-  { factor: 1, name: "m" },
+  { inMetre: 1000, name: "mm" },
+  { inMetre: 1, name: "m" },
 ];
 
 /** Every way in which a text can be read for an arm of so many joints; `prefer` is the kind of the row it goes to. */
@@ -64,14 +64,14 @@ function posesOf(text: string, numbers: number[]): Reading[] {
   const script = /\bp\s*\[/i.test(text);
   const given = LENGTHS.filter(({ name }) => new RegExp(`(?<![a-z])${name}(?![a-z])`).test(text));
   const away = Math.hypot(...numbers.slice(0, 3));
-  const near = (given.length ? given : LENGTHS).filter(({ factor }) => {
-    const distance = away * factor;
+  const near = (given.length ? given : LENGTHS).filter(({ inMetre }) => {
+    const distance = away / inMetre;
     return given.length === 1 || (distance >= NEAREST && distance <= FARTHEST);
   });
   return near.flatMap((length) =>
     turnsOf(text, numbers.slice(3), script).map(({ rotvec, name }): Reading => ({
       kind: "pose",
-      values: [...numbers.slice(0, 3).map((value) => value * length.factor), ...rotvec],
+      values: [...numbers.slice(0, 3).map((value) => value / length.inMetre), ...rotvec],
       echo: `pose in ${length.name}${name ? ` and ${name}` : ""}`,
     })),
   );

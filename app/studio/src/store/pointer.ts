@@ -54,7 +54,8 @@ export function located(request: unknown, loc: (string | number)[]): Pointer {
   let value = request;
   const parts = loc[0] === "body" ? loc.slice(1) : loc;
   parts.forEach((part, k) => {
-    const has = isObject(value) && String(part) in value;
+    const next = parts[k + 1];
+    const has = isObject(value) && holds(value, part) && !(next !== undefined && !holds(value[String(part)], next) && holds(value, next));
     // a part that the request lacks is the kind of an alternative, or the field that is missing
     const missing = k === parts.length - 1 && isObject(value) && !Array.isArray(value) && isField(part);
     if (!has && !missing) return;
@@ -63,5 +64,7 @@ export function located(request: unknown, loc: (string | number)[]): Pointer {
   });
   return pointer;
 }
+
+const holds = (value: unknown, part: string | number) => isObject(value) && String(part) in value;
 
 const isField = (part: string | number) => typeof part === "string" && /^[a-z_]+$/.test(part);
