@@ -8,10 +8,11 @@ import "../styles/answer.css";
 import "../styles/pages.css";
 import "../styles/narrow.css";
 import { render } from "preact";
-import { Chain, multiply, ofPose } from "../store/chain";
+import { multiply, ofPose } from "../store/chain";
 import { answered, changes, economics, page, playing, project, racers, request, run, saved, selected, show, stale, tab, time, typed, duration, trouble } from "../store/state";
 import { postures } from "../answer/postures";
 import { picture } from "../picture/instance";
+import { reachedGhost } from "../picture/reachedGhost";
 import { tell } from "../store/trouble";
 import { App } from "./App";
 import { start } from "./start";
@@ -36,7 +37,8 @@ window.studio = {
     const flange = arm.links.at(-1)!.matrix.clone().transpose().toArray();
     return multiply(flange, ofPose((answered.value?.cell ?? request.value).tcp));
   },
-  Chain,
+  /** The configuration that reaches what is dragged. */
+  reached: () => reachedGhost.value,
 };
 
 render(<App />, document.getElementById("app")!);

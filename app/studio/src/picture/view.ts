@@ -177,14 +177,13 @@ export class View {
   private resize(): void {
     const { clientWidth: width, clientHeight: height } = this.box;
     if (!width || !height) return;
-    const first = this.size.width === 1;
     this.size = { width, height };
     this.renderer.setPixelRatio(this.fineness);
     this.renderer.setSize(width, height);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
-    // a picture that was hidden before is seen whole
-    if (first && this.shown) this.look(1);
+    // the whole cell stays in view, unless a view was chosen by hand
+    if (this.shown && !this.turned) this.look(1);
     this.draw();
   }
 
