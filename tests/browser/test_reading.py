@@ -127,13 +127,13 @@ def test_axe_finds_nothing_serious(
 def test_letters_of_twice_the_size(browser: Browser, service: Server, width: int) -> None:
     with opened(browser, f"{service.url}/studio", viewport={"width": width, "height": 900}) as page:
         until(page, SHOWN)
-        page.evaluate(
-            "() => { document.documentElement.style.fontSize = '32px'; "
-            "document.body.style.fontSize = '28px'; }"
+        page.context.new_cdp_session(page).send(
+            "Page.setFontSizes", {"fontSizes": {"standard": 32, "fixed": 26}}
         )
+        page.wait_for_timeout(300)
         assert not page.evaluate(CROWDED)
         for control, tab in CONTROLS.items():
-            if width < 1000:
+            if page.locator(".bottom").is_visible():
                 page.get_by_role("tab", name=tab, exact=True).click()
             page.locator(control).scroll_into_view_if_needed()
             expect(page.locator(control)).to_be_in_viewport(ratio=0.9)

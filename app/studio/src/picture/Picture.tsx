@@ -53,7 +53,7 @@ export function Picture() {
   const layer = useRef<HTMLDivElement>(null);
   useEffect(() => (hasWebGl ? start(box.current!, layer.current!) : undefined), []);
   return (
-    <div id="view" ref={box} tabIndex={0} role="img" aria-label={describe()} data-without-axes={show.value.axes ? undefined : ""}>
+    <div id="view" ref={box} tabIndex={0} role="group" aria-label={describe()} data-without-axes={show.value.axes ? undefined : ""}>
       <div id="labels" ref={layer} aria-hidden="true" />
       {!hasWebGl && <p id="no-view">This browser offers no WebGL, so the arm cannot be drawn. Charts, tables and downloads work.</p>}
       {hasWebGl && (
