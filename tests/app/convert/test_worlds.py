@@ -15,7 +15,8 @@ from joulepath.app.convert import mesh_file
 from joulepath.app.convert.mesh_file import MOST_KEPT_TRIANGLES, mesh_from_file
 from joulepath.app.convert.scene import to_scene
 from joulepath.app.schemas.examples.values import MESH_FILE
-from joulepath.app.schemas.scene import MOST_CELLS, Scene
+from joulepath.app.schemas.scene import Scene
+from joulepath.app.schemas.shapes import MOST_CELLS
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
